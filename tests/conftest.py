@@ -1,0 +1,42 @@
+"""What every test stands on: nothing may be left behind, and real data where it is at hand."""
+
+import gc
+import os
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+# Threads that libraries keep for the life of the process, by the start of their name.
+_LIBRARY_THREADS = ("pydev", "OpenBLAS", "transientcam-compile")
+
+
+@pytest.fixture(scope="session")
+def data_dir() -> Path:
+    """The directory of measurements nobody here made; tests that need it skip where it is absent."""
+    directory = Path(os.environ.get("TRANSIENTCAM_TEST_DATA", ROOT.parent / "shared" / "data"))
+    if not directory.is_dir():
+        pytest.skip(f"no measured data at {directory} (set TRANSIENTCAM_TEST_DATA)")
+    return directory
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_behind() -> Iterator[None]:
+    """Fail the test that leaves a thread running or an open file, socket or loop uncollected."""
+    before = set(threading.enumerate())
+    yield
+    left = [
+        thread
+        for thread in threading.enumerate()
+        if thread not in before
+        and thread.is_alive()
+        and not thread.name.startswith(_LIBRARY_THREADS)
+    ]
+    for thread in left:
+        thread.join(timeout=2.0)
+    alive = [thread.name for thread in left if thread.is_alive()]
+    assert not alive, f"threads left behind: {alive}"
+    gc.collect(0)  # unclosed resources warn when collected, and warnings are errors
