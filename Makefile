@@ -1,0 +1,80 @@
+# Two commands do everything on a fresh machine: `make serve` and `make test`.
+# Each target makes what it needs: the virtual environment, the dashboard, the Debian packages of the tests.
+
+PYTHON ?= python3
+HOST ?= 127.0.0.1
+PORT ?= 8000
+CAMERA ?= sim:mirrors
+
+BIN := .venv/bin
+PAGE := server/transientcam_server/static/index.html
+DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f 2>/dev/null)
+DEBIAN_PACKAGES := umockdev libusb-1.0-0 chromium
+
+.DEFAULT_GOAL := help
+.PHONY: help serve test check bench docs clean dashboard debian-packages
+
+help:  ## Say what each target does
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 16
+
+serve: .venv/serve.stamp dashboard  ## Run the daemon and its dashboard (PORT=8000 CAMERA=sim:mirrors)
+	$(BIN)/transientcam serve --host $(HOST) --port $(PORT) --camera '$(CAMERA)'
+
+test: check debian-packages dashboard  ## Run every check and every test
+	npm --prefix client/dashboard test
+	$(BIN)/python -m pytest
+
+check: .venv/test.stamp client/dashboard/node_modules/.package-lock.json  ## Lint, types, import laws
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+	npm --prefix client/dashboard run check
+
+bench: .venv/test.stamp  ## Measure speed, everything in one run on the same data
+	$(BIN)/python -m benchmarks
+
+docs: .venv/test.stamp  ## Write the generated pages of docs/ anew
+	$(BIN)/python -m benchmarks --write
+	$(BIN)/python -m benchmarks.stability
+
+clean:  ## Remove everything that was built or installed here
+	rm -rf .venv build dist client/dashboard/node_modules $(dir $(PAGE))
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# -- what the targets above stand on -----------------------------------------------------------
+
+.venv/bin/python:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "transientcam needs Python 3.11 or newer")'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --upgrade pip
+
+.venv/serve.stamp: pyproject.toml | .venv/bin/python
+	$(BIN)/python -m pip install --quiet --editable '.[server,plot]'
+	@touch $@
+
+.venv/test.stamp: pyproject.toml | .venv/bin/python
+	$(BIN)/python -m pip install --quiet --editable '.[test]'
+	@touch $@ .venv/serve.stamp
+
+client/dashboard/node_modules/.package-lock.json: client/dashboard/package-lock.json
+	npm --prefix client/dashboard ci --no-audit --no-fund
+	@touch $@
+
+# The daemon runs without its page where there is no Node; a test run does not.
+dashboard:
+	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory $(PAGE); \
+	elif [ -e $(PAGE) ]; then echo 'npm was not found: serving the dashboard as it was last built.'; \
+	else echo 'npm was not found: the daemon runs without its dashboard. Install Node.js 20 or newer to get it.'; fi
+
+$(PAGE): $(DASHBOARD) client/dashboard/node_modules/.package-lock.json
+	npm --prefix client/dashboard run build
+	@touch $@
+
+debian-packages:
+	@missing=$$(for p in $(DEBIAN_PACKAGES); do dpkg -s $$p >/dev/null 2>&1 || echo $$p; done); \
+	if [ -z "$$missing" ]; then exit 0; fi; missing=$$(echo $$missing); \
+	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+		apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $$missing; \
+	else echo "The tests need some Debian packages. Run:  sudo apt-get install --no-install-recommends $$missing" >&2; exit 1; fi
