@@ -1,0 +1,134 @@
+"""Everything this package raises.
+
+::
+
+    TransientcamError
+    ├── ServerUnreachable     nobody answers at the address, or not in time
+    ├── ProblemError          the server answered with a problem (RFC 9457)
+    ├── ProtocolError         bytes that are not the protocol of docs/stream.md
+    ├── StreamClosed          the stream ended, by the server or by the network
+    └── ParameterError        an argument given here that cannot be used
+
+Each carries its data in fields and builds its own sentence from them.
+"""
+
+from collections.abc import Mapping
+
+_SHOWN_CHARACTERS = 80
+
+
+def shown(value: object) -> str:
+    """Return a value as it may stand in a sentence: on one line, and not longer than a line."""
+    text = repr(value)
+    return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
+
+
+class TransientcamError(Exception):
+    """Root of all errors of this package.
+
+    ::
+
+        try:
+            frame = camera.frame("range")
+        except transientcam.TransientcamError as error:
+            print(error)
+    """
+
+
+class ServerUnreachable(TransientcamError):  # noqa: N818 - a state has no "Error" in its name
+    """Nobody answers at ``url``, or the connection broke before the answer was complete."""
+
+    def __init__(self, url: str, reason: str) -> None:
+        super().__init__(url, reason)
+        self.url = url
+        self.reason = reason
+
+    def __str__(self) -> str:
+        return f"No camera answers at {self.url}: {self.reason}"
+
+
+class ProblemError(TransientcamError):
+    """The server refused a request and said why.
+
+    Attributes
+    ----------
+    status
+        The HTTP status; 0 where the problem came over the stream without one.
+    type
+        Identifies the kind of problem: ``/problems/<slug>``, or ``about:blank``.
+    title, detail
+        One sentence for the kind, one for this occurrence.
+    field, value, limit
+        Which part of the request was refused, what it was and what it may be; None where the
+        server does not say.
+    document
+        The whole problem as the server sent it.
+    """
+
+    def __init__(
+        self,
+        *,
+        status: int,
+        type: str = "about:blank",  # noqa: A002 - RFC 9457 calls it so
+        title: str = "",
+        detail: str = "",
+        field: str | None = None,
+        value: object = None,
+        limit: object = None,
+        document: Mapping[str, object] | None = None,
+    ) -> None:
+        super().__init__(status, type, title, detail)
+        self.status = status
+        self.type = type
+        self.title = title
+        self.detail = detail
+        self.field = field
+        self.value = value
+        self.limit = limit
+        self.document = dict(document or {})
+
+    def __str__(self) -> str:
+        what = self.detail or self.title or self.type
+        return f"{what} ({self.status})" if self.status else what
+
+
+class ProtocolError(TransientcamError):
+    """A message is not what docs/stream.md allows.
+
+    ``field`` is the path of the offending part (``subscriptions[0].product``; ``message`` where
+    it is the whole), ``value`` what stands there, ``limit`` what may.
+    """
+
+    def __init__(self, field: str, value: object, limit: str) -> None:
+        super().__init__(field, value, limit)
+        self.field = field
+        self.value = value
+        self.limit = limit
+
+    def __str__(self) -> str:
+        return f"{self.field} is {shown(self.value)}, but must be {self.limit}"
+
+
+class StreamClosed(TransientcamError):  # noqa: N818 - the same
+    """The stream ended: ``code`` as in docs/stream.md (1006 where the connection just broke)."""
+
+    def __init__(self, code: int, reason: str = "") -> None:
+        super().__init__(code, reason)
+        self.code = code
+        self.reason = reason
+
+    def __str__(self) -> str:
+        return f"The stream closed ({self.code}): {self.reason or 'no reason was given'}"
+
+
+class ParameterError(TransientcamError, ValueError):
+    """An argument cannot be used: ``field`` names it, ``limit`` says what would do."""
+
+    def __init__(self, field: str, value: object, limit: str) -> None:
+        super().__init__(field, value, limit)
+        self.field = field
+        self.value = value
+        self.limit = limit
+
+    def __str__(self) -> str:
+        return f"{self.field} is {shown(self.value)}, but must be {self.limit}"

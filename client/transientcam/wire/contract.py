@@ -1,0 +1,88 @@
+"""What both ends agree on: names, numbers and the table of products."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+VERSION: Final = 1
+SUBPROTOCOL: Final = "transientcam.v1.msgpack"
+MEDIA_TYPE: Final = "application/vnd.msgpack"
+MEDIA_TYPE_ALIASES: Final = ("application/msgpack", "application/x-msgpack")
+PROBLEM_MEDIA_TYPE: Final = "application/problem+json"
+
+MAX_CLIENT_MESSAGE_BYTES: Final = 64 * 1024
+"""The server reads no message longer than this."""
+MAX_SERVER_MESSAGE_BYTES: Final = 512 * 1024 * 1024
+"""The client reads no message longer than this: 640 x 480 at 32 harmonics is 80 MB."""
+MAX_SUBSCRIPTIONS: Final = 16
+MAX_CREDITS: Final = 64
+FIRST_MESSAGE_WITHIN_S: Final = 10.0
+
+
+class CloseCode(IntEnum):
+    """Why a stream ended; below 4000 as in RFC 6455."""
+
+    NORMAL = 1000
+    GOING_AWAY = 1001
+    """The server shuts down."""
+    ABNORMAL = 1006
+    """The connection broke; never sent."""
+    POLICY = 1008
+    """The origin of the page is not allowed here."""
+    TOO_BIG = 1009
+    INTERNAL_ERROR = 1011
+    TRY_AGAIN_LATER = 1013
+    """Too many clients."""
+    BAD_FIRST_MESSAGE = 4001
+    """The first message was none, late, or no valid ``subscribe``."""
+    AUTHENTICATION_FAILED = 4003
+
+
+@dataclass(frozen=True, slots=True)
+class Product:
+    """One kind of array a frame can be asked for.
+
+    Attributes
+    ----------
+    unit
+        Of the values: ``m``, ``DN`` (digital numbers of the sensor), ``DN/s`` or ``1``.
+    axes
+        Names of the axes, slowest first.
+    dtype
+        As numpy writes it, byte order included.
+    """
+
+    name: str
+    unit: str
+    axes: tuple[str, ...]
+    dtype: str
+    summary: str
+
+
+_IMAGE = ("y", "x")
+
+PRODUCTS: Final[dict[str, Product]] = {
+    product.name: product
+    for product in (
+        Product("range", "m", _IMAGE, "<f4", "range of the first return; NaN without one"),
+        Product("direct", "DN", _IMAGE, "<f4", "weight of the first return"),
+        Product("indirect", "DN", _IMAGE, "<f4", "weight of all later returns"),
+        Product("uniform", "DN", _IMAGE, "<f4", "weight spread evenly over all times"),
+        Product("brightness", "DN", _IMAGE, "<f4", "zeroth moment: all light"),
+        Product("validity", "1", _IMAGE, "<f4", "smallest eigenvalue of the moments, over b_0"),
+        Product("flags", "1", _IMAGE, "|u1", "what was wrong with a pixel; 0 for nothing"),
+        Product(
+            "coefficients",
+            "DN,1",
+            ("coefficient", *_IMAGE),
+            "<f4",
+            "E in DN, then Re and Im of a_1 to a_m (Eq. 2; a_0 is 1)",
+        ),
+        Product("moments", "DN", ("moment", *_IMAGE), "<c8", "calibrated moments b_0 to b_m"),
+        Product("raw", "DN", ("image", *_IMAGE), "<u2", "images of the sensor, each labelled"),
+        Product("transient", "DN/s", ("time", *_IMAGE), "<f4", "density over time of flight"),
+        Product("cumulative", "DN", ("time", *_IMAGE), "<f4", "light up to a time of flight"),
+        Product("truth", "m", _IMAGE, "<f4", "the simulated scene's range; NaN without light"),
+    )
+}
+"""Every product by name."""
