@@ -1,1 +1,55 @@
-"""."""
+"""Compiled lanes beside the planar algorithms: the same results, chosen when they are ready.
+
+A planar function asks ``find`` once and uses what it gets::
+
+    lane = find("levinson", b)
+    if lane is not None:
+        return lane(b)
+
+The lanes and their signatures, each that of the planar statement it stands beside
+(``b`` complex (m+1, ...), NumPy arrays with any trailing shape, strided or not):
+
+============================  ==============================================================
+``levinson``                  ``(b) -> (error (...), polynomial (m+1, ...), reflection (m, ...))``
+``density``                   ``(polynomial, error, phase_rad (T,), out (T, ...) | None) -> out``
+``smallest_eigenvalue``       ``(b) -> (...)``
+``pisarenko``                 ``(b) -> (phase_rad (m, ...), weight (m, ...), uniform (...), count (...))``
+============================  ==============================================================
+
+Importing this package imports no compiler: numba is imported by the thread that compiles.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from transientcam_moments._kernels import registry
+
+__all__ = ["find"]
+
+
+def find(name: str, planes: object) -> Callable[..., Any] | None:
+    """Return the compiled lane ``name`` for planes of this order and type, or None.
+
+    Parameters
+    ----------
+    name
+        ``"levinson"``, ``"density"``, ``"smallest_eigenvalue"`` or ``"pisarenko"``.
+    planes
+        Array (m+1, ...) whose length and dtype choose the lane. Anything but a NumPy array of
+        float32, float64, complex64 or complex128 finds nothing.
+
+    Returns
+    -------
+    lane
+        Callable as in the table of the module, or None where the planar statement is to be used:
+        the lane isn't compiled in this process (yet), kernels are off, or there are too few pixels
+        for a lane to pay.
+    """
+    if not isinstance(planes, np.ndarray) or planes.ndim == 0:
+        return None
+    precision = registry.PRECISIONS.get(planes.dtype.char)
+    if precision is None:
+        return None
+    return registry.compiled.get((name, planes.shape[0] - 1, precision))
