@@ -1,1 +1,43 @@
-"""."""
+"""A camera that sees light move: range, direct and indirect light, and transients as arrays."""
+
+from importlib.metadata import version
+
+from transientcam.aio import AsyncCamera, AsyncStream
+from transientcam.camera import Camera
+from transientcam.density import density, transient
+from transientcam.errors import (
+    FrameTimeout,
+    ParameterError,
+    ProblemError,
+    ProtocolError,
+    ServerUnreachable,
+    StreamClosed,
+    TransientcamError,
+)
+from transientcam.frame import Frame
+from transientcam.stream import Stream
+from transientcam.subscription import Reconnect
+from transientcam.wire import Notice, Subscription
+
+__version__ = version("transientcam")
+
+__all__ = [
+    "AsyncCamera",
+    "AsyncStream",
+    "Camera",
+    "Frame",
+    "FrameTimeout",
+    "Notice",
+    "ParameterError",
+    "ProblemError",
+    "ProtocolError",
+    "Reconnect",
+    "ServerUnreachable",
+    "Stream",
+    "StreamClosed",
+    "Subscription",
+    "TransientcamError",
+    "__version__",
+    "density",
+    "transient",
+]

@@ -7,6 +7,7 @@
     ├── ProblemError          the server answered with a problem (RFC 9457)
     ├── ProtocolError         bytes that are not the protocol of docs/stream.md
     ├── StreamClosed          the stream ended, by the server or by the network
+    ├── FrameTimeout          the stream stands, but no frame came in the time allowed
     └── ParameterError        an argument given here that cannot be used
 
 Each carries its data in fields and builds its own sentence from them.
@@ -119,6 +120,17 @@ class StreamClosed(TransientcamError):  # noqa: N818 - the same
 
     def __str__(self) -> str:
         return f"The stream closed ({self.code}): {self.reason or 'no reason was given'}"
+
+
+class FrameTimeout(TransientcamError):  # noqa: N818 - the same
+    """No frame came within ``timeout_s``; the stream stays open."""
+
+    def __init__(self, timeout_s: float) -> None:
+        super().__init__(timeout_s)
+        self.timeout_s = timeout_s
+
+    def __str__(self) -> str:
+        return f"No frame came within {self.timeout_s:g} s"
 
 
 class ParameterError(TransientcamError, ValueError):

@@ -1,5 +1,6 @@
 """The wire contract, for both ends: docs/stream.md says in words what stands here in code."""
 
+from transientcam.frame import Frame
 from transientcam.wire.arrays import DTYPES, array_document, parse_array
 from transientcam.wire.codec import ALIGNMENT, pack, unpack
 from transientcam.wire.contract import (
@@ -22,7 +23,6 @@ from transientcam.wire.messages import (
     Channel,
     ClientMessage,
     ErrorMessage,
-    FrameMessage,
     FrameMeta,
     Hello,
     Notice,
@@ -57,7 +57,7 @@ __all__ = [
     "ClientMessage",
     "CloseCode",
     "ErrorMessage",
-    "FrameMessage",
+    "Frame",
     "FrameMeta",
     "Hello",
     "Notice",

@@ -18,7 +18,10 @@ _BIN_32 = 0xC6
 
 def pack(document: Mapping[str, Any]) -> bytes:
     """Return a map as msgpack."""
-    return bytes(msgpack.packb(document))
+    packer = msgpack.Packer(autoreset=False)
+    packer.pack(document)
+    packed: bytes = packer.bytes()
+    return packed
 
 
 def unpack(data: bytes | bytearray | memoryview | str, *, max_bytes: int) -> dict[str, Any]:

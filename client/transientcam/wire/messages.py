@@ -7,6 +7,7 @@ from typing import Any, Final, TypedDict
 from numpy.typing import NDArray
 
 from transientcam.errors import ProtocolError
+from transientcam.frame import Frame
 from transientcam.wire import fields
 from transientcam.wire.arrays import DTYPES, MAX_DIMENSIONS, MAX_LENGTH, parse_array
 from transientcam.wire.codec import pack, pack_with_array, unpack
@@ -158,23 +159,6 @@ class Hello:
         }
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FrameMessage:
-    """One product of one frame; ``channel`` is None outside a stream.
-
-    ``extra`` holds what only some products have: ``labels`` of raw, ``time_s`` of transient.
-    """
-
-    product: str
-    unit: str
-    axes: tuple[str, ...]
-    meta: Mapping[str, Any]
-    array: NDArray[Any]
-    encode_s: float
-    channel: int | None = None
-    extra: Mapping[str, Any] = field(default_factory=dict)
-
-
 @dataclass(frozen=True, slots=True)
 class Notice:
     """Something a client should know: ``kind``, and what more there is to it in ``details``.
@@ -203,7 +187,7 @@ class ErrorMessage:
 
 
 ClientMessage = Subscribe | Ack
-ServerMessage = Hello | FrameMessage | Notice | ErrorMessage
+ServerMessage = Hello | Frame | Notice | ErrorMessage
 _FRAME_KEYS = frozenset(
     ("v", "type", "channel", "product", "unit", "axes", "meta", "encode_s", "pad", "array")
 )
@@ -290,7 +274,7 @@ def parse_server_message(
 
 def parse_frame(
     data: bytes | bytearray | memoryview, *, max_bytes: int = MAX_SERVER_MESSAGE_BYTES
-) -> FrameMessage:
+) -> Frame:
     """Return the frame that the body of a REST answer holds.
 
     Raises
@@ -299,7 +283,7 @@ def parse_frame(
         As `parse_server_message`, and if the message is no frame.
     """
     message = parse_server_message(data, max_bytes=max_bytes)
-    if not isinstance(message, FrameMessage):
+    if not isinstance(message, Frame):
         raise ProtocolError("type", type(message).__name__.lower(), "frame")
     return message
 
@@ -378,7 +362,7 @@ def _hello(document: Mapping[str, Any]) -> Hello:
     )
 
 
-def _frame(document: Mapping[str, Any]) -> FrameMessage:
+def _frame(document: Mapping[str, Any]) -> Frame:
     _version(document)
     meta = fields.mapping(document, "meta")
     fields.integer(meta, "frame", minimum=0, maximum=MAX_INTEGER, path="meta")
@@ -386,7 +370,7 @@ def _frame(document: Mapping[str, Any]) -> FrameMessage:
     array = parse_array(fields.mapping(document, "array"))
     if array.ndim != len(axes):
         raise ProtocolError("array.shape", list(array.shape), f"as long as axes {list(axes)}")
-    return FrameMessage(
+    return Frame(
         product=fields.text(document, "product"),
         unit=fields.text(document, "unit"),
         axes=axes,

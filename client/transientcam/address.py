@@ -1,0 +1,48 @@
+"""Where a camera's daemon is: one address for requests, one for streams."""
+
+from dataclasses import dataclass
+from urllib.parse import urlsplit, urlunsplit
+
+from transientcam.errors import ParameterError
+
+_STREAM_SCHEMES = {"http": "ws", "https": "wss"}
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """The daemon's address, without a slash at its end.
+
+    A path is kept, so that a camera may live below one behind a proxy.
+    """
+
+    url: str
+
+    @property
+    def api(self) -> str:
+        """Start of the address of every resource."""
+        return f"{self.url}/api/v1"
+
+    @property
+    def stream(self) -> str:
+        """Address of the stream."""
+        parts = urlsplit(self.api)
+        return urlunsplit(parts._replace(scheme=_STREAM_SCHEMES[parts.scheme])) + "/stream"
+
+
+def parse_address(url: str) -> Address:
+    """Return the address that ``url`` means; without a scheme it is taken for ``http``.
+
+    Raises
+    ------
+    ParameterError
+        If it has another scheme than http or https, no host, a bad port, a query or a fragment.
+    """
+    limit = "an address like http://127.0.0.1:8000"
+    try:
+        parts = urlsplit(url if "://" in url else f"http://{url}")
+        _ = parts.port  # computed, and checked, only when asked for
+    except ValueError as error:
+        raise ParameterError("url", url, limit) from error
+    if parts.scheme not in _STREAM_SCHEMES or not parts.hostname or parts.query or parts.fragment:
+        raise ParameterError("url", url, limit)
+    return Address(urlunsplit(parts).rstrip("/"))

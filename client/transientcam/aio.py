@@ -1,0 +1,304 @@
+"""The twins of `Camera` and `Stream` for asyncio."""
+
+import asyncio
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import AsyncExitStack
+from types import TracebackType
+from typing import Any, TypeVar
+
+import httpx
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.typing import Data
+
+from transientcam import rest
+from transientcam.address import parse_address
+from transientcam.connection import answer, http_options, request_options, stream_options
+from transientcam.deadline import Deadline
+from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamError
+from transientcam.frame import Frame
+from transientcam.subscription import (
+    DEFAULT_CREDITS,
+    NoticeHandler,
+    Reconnect,
+    StreamState,
+    reconnect_policy,
+    subscribe_message,
+)
+from transientcam.translation import translated
+from transientcam.wire import Channel, CloseCode, Hello, Notice, Subscription
+
+_T = TypeVar("_T")
+
+
+class AsyncCamera:
+    """A camera behind a daemon, for asyncio; see `Camera` for what each method does.
+
+    ::
+
+        async with transientcam.AsyncCamera("http://127.0.0.1:8000") as camera:
+            range_m = (await camera.frame("range")).array
+            async with camera.stream("range", "coefficients") as stream:
+                async for frame in stream:
+                    ...
+    """
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        token: str | None = None,
+        timeout_s: float = 10.0,
+        transport: httpx.AsyncBaseTransport | None = None,
+    ) -> None:
+        self._address = parse_address(url)
+        self._token = token
+        self._timeout_s = timeout_s
+        self._http = httpx.AsyncClient(
+            **http_options(token=token, timeout_s=timeout_s), transport=transport
+        )
+        self._streams: list[AsyncStream] = []
+
+    @property
+    def url(self) -> str:
+        """Address of the daemon."""
+        return self._address.url
+
+    async def info(self) -> dict[str, Any]:
+        """Return what the daemon is: names and versions."""
+        return await self._ask(rest.document("info"))
+
+    async def camera(self) -> dict[str, Any]:
+        """Return what the camera is, can do and does: capabilities and state."""
+        return await self._ask(rest.document("camera"))
+
+    async def sequence(self) -> dict[str, Any]:
+        """Return what is captured: the sequence as it was really set."""
+        return await self._ask(rest.document("sequence"))
+
+    async def set_sequence(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """Set the sequence, what is left out to its default, and return what was really set."""
+        return await self._ask(rest.sequence(settings))
+
+    async def configure(self, **changes: object) -> dict[str, Any]:
+        """Change some fields of the sequence, keep the others, and return what was really set."""
+        return await self._ask(rest.sequence({**await self.sequence(), **changes}))
+
+    async def validate(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what a sequence would really be set to, without setting it."""
+        return await self._ask(rest.sequence(settings, only_validate=True))
+
+    async def acquisition(self) -> dict[str, Any]:
+        """Return whether the camera captures, and how fast."""
+        return await self._ask(rest.document("acquisition"))
+
+    async def start(self) -> dict[str, Any]:
+        """Let the camera capture."""
+        return await self._ask(rest.acquire(running=True))
+
+    async def stop(self) -> dict[str, Any]:
+        """Let the camera rest."""
+        return await self._ask(rest.acquire(running=False))
+
+    async def latest(self, *, wait_s: float | None = None) -> dict[str, Any]:
+        """Return what is known of the newest frame; with ``wait_s``, wait so long for a first."""
+        return await self._ask(rest.latest(wait_s=wait_s))
+
+    async def frame(
+        self,
+        product: str,
+        *,
+        time_s: object = None,
+        bins: int | None = None,
+        wait_s: float | None = None,
+    ) -> Frame:
+        """Return one product of the newest frame."""
+        return await self._ask(rest.frame(product, time_s=time_s, bins=bins, wait_s=wait_s))
+
+    async def picture(self, product: str, *, colour: bool = False) -> bytes:
+        """Return one product of the newest frame as PNG: 16 bit (range in mm), or for the eye."""
+        return await self._ask(rest.picture(product, colour=colour))
+
+    async def pixel(self, *, x: int, y: int, bins: int | None = None) -> dict[str, Any]:
+        """Return everything about one pixel of the newest frame."""
+        return await self._ask(rest.pixel(x=x, y=y, bins=bins))
+
+    async def simulation(self) -> dict[str, Any]:
+        """Return what is simulated; a problem where the camera is real."""
+        return await self._ask(rest.document("simulation"))
+
+    async def cause(self, fault: str) -> dict[str, Any]:
+        """Let something go wrong in the simulation: unplug, replug, corrupt-image, drop-image."""
+        return await self._ask(rest.fault(fault))
+
+    def stream(
+        self,
+        *products: str | Subscription,
+        on_notice: NoticeHandler | None = None,
+        reconnect: bool | Reconnect = False,
+        credits: int | None = DEFAULT_CREDITS,  # noqa: A002 - the protocol calls them so
+        max_rate_hz: float | None = None,
+    ) -> "AsyncStream":
+        """Return a stream of frames as they are captured; enter it to have it closed."""
+        subscribe = subscribe_message(
+            products, token=self._token, credits=credits, max_rate_hz=max_rate_hz
+        )
+        state = StreamState(subscribe, on_notice=on_notice, reconnect=reconnect_policy(reconnect))
+        stream = AsyncStream(self._address.stream, state, timeout_s=self._timeout_s)
+        self._streams = [*(each for each in self._streams if not each.closed), stream]
+        return stream
+
+    async def close(self) -> None:
+        """Close every connection and stream; the daemon goes on."""
+        for stream in self._streams:
+            await stream.close()
+        await self._http.aclose()
+
+    async def __aenter__(self) -> "AsyncCamera":
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        await self.close()
+
+    def __repr__(self) -> str:
+        return f"<AsyncCamera {self.url}>"
+
+    async def _ask(self, request: rest.Request[_T]) -> _T:
+        with translated(self.url):
+            response = await self._http.request(
+                request.method,
+                f"{self._address.api}/{request.path}",
+                **request_options(request, timeout_s=self._timeout_s),
+            )
+        return request.result(answer(response))
+
+
+class AsyncStream:
+    """An asynchronous iterator of frames; made by `AsyncCamera.stream`, and read by one task.
+
+    It connects when the first frame is asked for, or on entering it. Asking for the next frame
+    tells the server that the one before is done with.
+    """
+
+    def __init__(self, url: str, state: StreamState, *, timeout_s: float) -> None:
+        self._url = url
+        self._state = state
+        self._timeout_s = timeout_s
+        self._stack = AsyncExitStack()
+        self._connection: ClientConnection | None = None
+        self._closed = asyncio.Event()
+
+    @property
+    def hello(self) -> Hello | None:
+        """How the server greeted; None before the first connection."""
+        return self._state.hello
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What frames look like at present: unit, axes, dtype and shape of each subscription."""
+        return self._state.channels
+
+    @property
+    def notices(self) -> Sequence[Notice]:
+        """The newest 256 notices, oldest first."""
+        return self._state.notices
+
+    @property
+    def closed(self) -> bool:
+        """Whether it was closed for good, here."""
+        return self._closed.is_set()
+
+    async def receive(self, *, timeout_s: float | None = None) -> Frame:
+        """Return the next frame, waiting for it; raises what `Stream.receive` raises."""
+        deadline = Deadline(timeout_s)
+        while not self.closed:
+            try:
+                frame = self._state.received(await self._message(deadline))
+            except TransientcamError as error:
+                await self._recover(error, deadline)
+            else:
+                if frame is not None:
+                    return frame
+        raise StreamClosed(CloseCode.NORMAL, "it was closed here")
+
+    async def subscribe(
+        self,
+        *products: str | Subscription,
+        credits: int | None = DEFAULT_CREDITS,  # noqa: A002 - the protocol calls them so
+        max_rate_hz: float | None = None,
+    ) -> None:
+        """Ask for other products from now on; frames already on their way still arrive."""
+        message = subscribe_message(products, token=None, credits=credits, max_rate_hz=max_rate_hz)
+        data = self._state.resubscribe(message)
+        if self._connection is not None:
+            with translated(self._url):
+                await self._connection.send(data)
+
+    async def close(self) -> None:
+        """End the stream; a ``receive`` that waits in another task ends with it."""
+        self._closed.set()
+        await self._disconnect()
+
+    async def __aenter__(self) -> "AsyncStream":
+        if self._connection is None:
+            await self._connect()
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        await self.close()
+
+    async def __aiter__(self) -> AsyncIterator[Frame]:
+        try:
+            while True:
+                yield await self.receive()
+        except StreamClosed as error:
+            if error.code != CloseCode.NORMAL:
+                raise
+
+    async def _connect(self) -> ClientConnection:
+        with translated(self._url):
+            connection: ClientConnection = await self._stack.enter_async_context(
+                connect(self._url, **stream_options(timeout_s=self._timeout_s))
+            )
+            await connection.send(self._state.opening())
+        self._connection = connection
+        return connection
+
+    async def _disconnect(self) -> None:
+        self._connection = None
+        await self._stack.aclose()
+
+    async def _message(self, deadline: Deadline) -> Data:
+        connection = self._connection or await self._connect()
+        owed = self._state.acknowledgement()
+        with translated(self._url):
+            if owed is not None:
+                await connection.send(owed)
+            try:
+                async with asyncio.timeout(deadline.left_s()):
+                    return await connection.recv()
+            except TimeoutError:
+                raise deadline.missed() from None
+
+    async def _recover(self, error: TransientcamError, deadline: Deadline) -> None:
+        if isinstance(error, StreamClosed | ServerUnreachable):
+            await self._disconnect()
+        if self.closed:
+            return
+        wait_s = self._state.retry_after_s(error)
+        if not deadline.allows(wait_s):
+            raise deadline.missed() from error
+        try:
+            async with asyncio.timeout(wait_s):
+                await self._closed.wait()
+        except TimeoutError:
+            pass

@@ -1,0 +1,228 @@
+"""A camera on the network, as one object."""
+
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Any, TypeVar
+
+import httpx
+
+from transientcam import rest
+from transientcam.address import parse_address
+from transientcam.connection import answer, http_options, request_options
+from transientcam.frame import Frame
+from transientcam.stream import Stream
+from transientcam.subscription import (
+    DEFAULT_CREDITS,
+    NoticeHandler,
+    Reconnect,
+    StreamState,
+    reconnect_policy,
+    subscribe_message,
+)
+from transientcam.translation import translated
+from transientcam.wire import Subscription
+
+_T = TypeVar("_T")
+
+
+class Camera:
+    """A camera behind a daemon.
+
+    ::
+
+        with transientcam.Camera("http://127.0.0.1:8000") as camera:
+            range_m = camera.frame("range").array
+            for frame in camera.stream("range", "coefficients"):
+                ...
+
+    Every method may raise `ServerUnreachable`, `ProblemError` (the daemon refused, and says why)
+    and `ProtocolError`. `AsyncCamera` is its twin for asyncio.
+
+    Parameters
+    ----------
+    url
+        Address of the daemon; http unless it says https.
+    token
+        What proves who asks, where the daemon wants that.
+    timeout_s
+        How long to wait for a connection and for each answer.
+    transport
+        How httpx sends requests, for tests and unusual networks; streams do not take it.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        token: str | None = None,
+        timeout_s: float = 10.0,
+        transport: httpx.BaseTransport | None = None,
+    ) -> None:
+        self._address = parse_address(url)
+        self._token = token
+        self._timeout_s = timeout_s
+        self._http = httpx.Client(
+            **http_options(token=token, timeout_s=timeout_s), transport=transport
+        )
+        self._streams: list[Stream] = []
+
+    @property
+    def url(self) -> str:
+        """Address of the daemon."""
+        return self._address.url
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """What the daemon is: names and versions."""
+        return self._ask(rest.document("info"))
+
+    @property
+    def camera(self) -> dict[str, Any]:
+        """What the camera is, can do and does: capabilities and state."""
+        return self._ask(rest.document("camera"))
+
+    @property
+    def sequence(self) -> dict[str, Any]:
+        """What is captured: the sequence as it was really set, with its times and rates.
+
+        Assigning a mapping sets it, what is left out to its default; `configure` changes single
+        fields. What the daemon added to a sequence that was read is ignored.
+        """
+        return self._ask(rest.document("sequence"))
+
+    @sequence.setter
+    def sequence(self, settings: Mapping[str, Any]) -> None:
+        self._ask(rest.sequence(settings))
+
+    def configure(self, **changes: object) -> dict[str, Any]:
+        """Change some fields of the sequence, keep the others, and return what was really set."""
+        return self._ask(rest.sequence({**self.sequence, **changes}))
+
+    def validate(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what a sequence would really be set to, without setting it."""
+        return self._ask(rest.sequence(settings, only_validate=True))
+
+    @property
+    def acquisition(self) -> dict[str, Any]:
+        """Whether the camera captures, and how fast."""
+        return self._ask(rest.document("acquisition"))
+
+    def start(self) -> dict[str, Any]:
+        """Let the camera capture."""
+        return self._ask(rest.acquire(running=True))
+
+    def stop(self) -> dict[str, Any]:
+        """Let the camera rest."""
+        return self._ask(rest.acquire(running=False))
+
+    def latest(self, *, wait_s: float | None = None) -> dict[str, Any]:
+        """Return what is known of the newest frame; with ``wait_s``, wait so long for a first."""
+        return self._ask(rest.latest(wait_s=wait_s))
+
+    def frame(
+        self,
+        product: str,
+        *,
+        time_s: object = None,
+        bins: int | None = None,
+        wait_s: float | None = None,
+    ) -> Frame:
+        """Return one product of the newest frame.
+
+        Parameters
+        ----------
+        product
+            Its name; `wire.PRODUCTS` lists them.
+        time_s
+            For ``transient`` and ``cumulative``: the times of flight to evaluate at, in s.
+        bins
+            For the same, instead: how many times, evenly over the unambiguous time.
+        wait_s
+            How long to wait for a first frame, if there is none yet.
+        """
+        return self._ask(rest.frame(product, time_s=time_s, bins=bins, wait_s=wait_s))
+
+    def picture(self, product: str, *, colour: bool = False) -> bytes:
+        """Return one product of the newest frame as PNG: 16 bit (range in mm), or for the eye."""
+        return self._ask(rest.picture(product, colour=colour))
+
+    def pixel(self, *, x: int, y: int, bins: int | None = None) -> dict[str, Any]:
+        """Return everything about one pixel of the newest frame."""
+        return self._ask(rest.pixel(x=x, y=y, bins=bins))
+
+    @property
+    def simulation(self) -> dict[str, Any]:
+        """The simulated world; a problem where the camera is real."""
+        return self._ask(rest.document("simulation"))
+
+    def cause(self, fault: str) -> dict[str, Any]:
+        """Let something go wrong in the simulation: unplug, replug, corrupt-image, drop-image."""
+        return self._ask(rest.fault(fault))
+
+    def stream(
+        self,
+        *products: str | Subscription,
+        on_notice: NoticeHandler | None = None,
+        reconnect: bool | Reconnect = False,
+        credits: int | None = DEFAULT_CREDITS,  # noqa: A002 - the protocol calls them so
+        max_rate_hz: float | None = None,
+    ) -> Stream:
+        """Return a stream of frames as they are captured.
+
+        Each product of a frame comes as a frame of its own, in the order of the products.
+
+        Parameters
+        ----------
+        products
+            Names, or `wire.Subscription` where each has its own rate.
+        on_notice
+            Called with each notice, within ``receive``; `Stream.notices` keeps them too.
+        reconnect
+            Come back by itself when the daemon restarts or the network fails; tells so by the
+            notices ``connection-lost`` and ``reconnected``.
+        credits
+            How many frames may be on their way at once; None leaves it to the network.
+        max_rate_hz
+            No more frames a second than this.
+
+        Raises
+        ------
+        ParameterError
+            If there is no product, or a number is out of range.
+        """
+        subscribe = subscribe_message(
+            products, token=self._token, credits=credits, max_rate_hz=max_rate_hz
+        )
+        state = StreamState(subscribe, on_notice=on_notice, reconnect=reconnect_policy(reconnect))
+        stream = Stream(self._address.stream, state, timeout_s=self._timeout_s)
+        self._streams = [*(each for each in self._streams if not each.closed), stream]
+        return stream
+
+    def close(self) -> None:
+        """Close every connection and stream; the daemon goes on."""
+        for stream in self._streams:
+            stream.close()
+        self._http.close()
+
+    def __enter__(self) -> "Camera":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<Camera {self.url}>"
+
+    def _ask(self, request: rest.Request[_T]) -> _T:
+        with translated(self.url):
+            response = self._http.request(
+                request.method,
+                f"{self._address.api}/{request.path}",
+                **request_options(request, timeout_s=self._timeout_s),
+            )
+        return request.result(answer(response))

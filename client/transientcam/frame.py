@@ -1,0 +1,75 @@
+"""One product of one frame, as a numpy array that knows its unit."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Frame:
+    """One product of one frame; numpy functions take it as the array it holds.
+
+    Attributes
+    ----------
+    product
+        Its name: ``range``, ``coefficients`` and so on.
+    unit
+        Of the values: ``m``, ``DN``, ``DN/s`` or ``1``.
+    axes
+        Name of each axis of `array`, slowest first; pixels are ``y``, ``x``.
+    meta
+        What is known of the frame: its number, times, sequence, lost images, pixel counts.
+    array
+        The values, read-only; NaN where a pixel has none.
+    encode_s
+        How long the server took to make this product and its bytes.
+    channel
+        Which subscription of a stream it answers; None outside a stream.
+    extra
+        What only some products have: ``labels`` of raw, ``time_s`` of transient and cumulative.
+    """
+
+    product: str
+    unit: str
+    axes: tuple[str, ...]
+    meta: Mapping[str, Any]
+    array: NDArray[Any]
+    encode_s: float = 0.0
+    channel: int | None = None
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def frame(self) -> int:
+        """Number of the frame, counted by the server from 1; products of one frame share it."""
+        return int(self.meta["frame"])
+
+    @property
+    def time_s(self) -> NDArray[np.float64] | None:
+        """Times of flight along the axis ``time``, (T,), or None where there is no such axis."""
+        times = self.extra.get("time_s")
+        return None if times is None else np.asarray(times, dtype=np.float64)
+
+    @property
+    def labels(self) -> Sequence[Mapping[str, Any]]:
+        """What each image of ``raw`` was taken with, in the order of its first axis; else empty."""
+        return tuple(self.extra.get("labels", ()))
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(self.array, dtype=dtype, copy=copy)
+
+    def __repr__(self) -> str:
+        shape = " x ".join(str(length) for length in self.array.shape)
+        return f"<Frame {self.frame} {self.product} [{shape}] {self._values()}>"
+
+    def _values(self) -> str:
+        if self.array.dtype.kind == "c":
+            return f"complex {self.unit}"
+        finite = self.array[np.isfinite(self.array)]
+        if finite.size == 0:
+            return f"no value, {self.unit}"
+        without = self.array.size - finite.size
+        gaps = f", {without / self.array.size:.1%} without" if without else ""
+        return f"{finite.min():.4g} to {finite.max():.4g} {self.unit}{gaps}"

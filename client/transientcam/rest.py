@@ -1,0 +1,233 @@
+"""Requests and the reading of their answers, without any input or output.
+
+`Camera` and `AsyncCamera` send what is built here and hand back what is read here.
+"""
+
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Generic, TypeVar
+
+import numpy as np
+
+from transientcam.errors import ParameterError, ProblemError, ProtocolError
+from transientcam.frame import Frame
+from transientcam.wire import MEDIA_TYPE, PROBLEM_MEDIA_TYPE, parse_frame
+
+_T = TypeVar("_T")
+_JSON: Final = "application/json"
+
+APPLIED_FIELDS: Final = frozenset(
+    (
+        "sequence_id",
+        "images",
+        "capture_s",
+        "frame_rate_hz",
+        "unambiguous_range_m",
+        "data_rate_bytes_s",
+    )
+)
+"""What the server adds to a sequence; left out when a sequence that was read is written back."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What came back: status, media type (without parameters) and body."""
+
+    status: int
+    media_type: str
+    body: bytes
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Request(Generic[_T]):
+    """What to send, and how to read the answer."""
+
+    method: str
+    path: str
+    read: Callable[[Answer], _T]
+    params: tuple[tuple[str, str], ...] = ()
+    body: bytes | None = None
+    accept: str = _JSON
+    patience_s: float = 0.0
+    """How much longer than usual the server may take, because it was asked to wait."""
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """Headers that belong to this request."""
+        accept = {"accept": f"{self.accept}, {PROBLEM_MEDIA_TYPE}"}
+        return accept if self.body is None else accept | {"content-type": _JSON}
+
+    def result(self, answer: Answer) -> _T:
+        """Return what the answer holds.
+
+        Raises
+        ------
+        ProblemError
+            If the server refused the request.
+        ProtocolError
+            If the answer is not what this request is answered with.
+        """
+        if not 200 <= answer.status < 300:
+            raise problem(answer)
+        return self.read(answer)
+
+
+def document(
+    path: str,
+    *,
+    method: str = "GET",
+    body: Mapping[str, Any] | None = None,
+    params: Iterable[tuple[str, object]] = (),
+    patience_s: float = 0.0,
+) -> Request[dict[str, Any]]:
+    """Build a request that is answered with a JSON object."""
+    return Request(
+        method,
+        path,
+        _read_document,
+        _query(params),
+        None if body is None else _json_bytes(body),
+        patience_s=patience_s,
+    )
+
+
+def sequence(
+    settings: Mapping[str, Any], *, only_validate: bool = False
+) -> Request[dict[str, Any]]:
+    """Build the request that sets a sequence, or only asks what would be set."""
+    wanted = {key: value for key, value in settings.items() if key not in APPLIED_FIELDS}
+    if only_validate:
+        return document("sequence/validate", method="POST", body=wanted)
+    return document("sequence", method="PUT", body=wanted)
+
+
+def acquire(*, running: bool) -> Request[dict[str, Any]]:
+    """Build the request that lets the camera capture, or rest."""
+    return document("acquisition", method="PUT", body={"running": running})
+
+
+def fault(name: str) -> Request[dict[str, Any]]:
+    """Build the request that lets something go wrong in the simulation."""
+    return document("simulation/faults", method="POST", body={"fault": name})
+
+
+def latest(*, wait_s: float | None = None) -> Request[dict[str, Any]]:
+    """Build the request for what is known of the newest frame."""
+    return document("frames/latest", params=(("wait_s", wait_s),), patience_s=wait_s or 0.0)
+
+
+def frame(
+    product: str, *, time_s: object = None, bins: int | None = None, wait_s: float | None = None
+) -> Request[Frame]:
+    """Build the request for one product of the newest frame."""
+    return Request(
+        "GET",
+        f"frames/latest/{_segment(product)}.msgpack",
+        lambda answer: parse_frame(_body(answer, MEDIA_TYPE)),
+        _query((*_times(time_s), ("bins", bins), ("wait_s", wait_s))),
+        accept=MEDIA_TYPE,
+        patience_s=wait_s or 0.0,
+    )
+
+
+def picture(product: str, *, colour: bool = False) -> Request[bytes]:
+    """Build the request for one product of the newest frame as PNG."""
+    return Request(
+        "GET",
+        f"frames/latest/{_segment(product)}.png",
+        lambda answer: _body(answer, "image/png"),
+        _query((("view", "colour" if colour else None),)),
+        accept="image/png",
+    )
+
+
+def pixel(*, x: int, y: int, bins: int | None = None) -> Request[dict[str, Any]]:
+    """Build the request for everything about one pixel of the newest frame."""
+    return document("frames/latest/pixel", params=(("x", x), ("y", y), ("bins", bins)))
+
+
+def problem(answer: Answer) -> ProblemError:
+    """Return the error that a refusal stands for, be it a problem document or not."""
+    if answer.media_type == PROBLEM_MEDIA_TYPE:
+        try:
+            return problem_error(_object(answer.body), status=answer.status)
+        except ProtocolError:
+            pass  # a broken problem is still a refusal
+    text = answer.body[:200].decode("utf-8", "replace").strip()
+    return ProblemError(status=answer.status, title=answer.reason, detail=text)
+
+
+def problem_error(fields: Mapping[str, Any], *, status: int = 0) -> ProblemError:
+    """Return the error that a problem document (RFC 9457) stands for."""
+
+    def text(key: str, default: str) -> str:
+        value = fields.get(key)
+        return value if isinstance(value, str) else default
+
+    stated = fields.get("status")
+    return ProblemError(
+        status=status or (stated if isinstance(stated, int) else 0),
+        type=text("type", "about:blank"),
+        title=text("title", ""),
+        detail=text("detail", ""),
+        field=text("field", "") or None,
+        value=fields.get("value"),
+        limit=fields.get("limit"),
+        document=fields,
+    )
+
+
+def _read_document(answer: Answer) -> dict[str, Any]:
+    return _object(_body(answer, _JSON))
+
+
+def _body(answer: Answer, media_type: str) -> bytes:
+    if answer.media_type != media_type:
+        raise ProtocolError("content-type", answer.media_type, media_type)
+    return answer.body
+
+
+def _object(body: bytes) -> dict[str, Any]:
+    try:
+        value = json.loads(body)
+    except (ValueError, RecursionError) as error:
+        raise ProtocolError("body", body[:80], "JSON") from error
+    if not isinstance(value, dict):
+        raise ProtocolError("body", value, "a JSON object")
+    return value
+
+
+def _json_bytes(value: Mapping[str, Any]) -> bytes:
+    try:
+        return json.dumps(value, default=_plain, allow_nan=False).encode()
+    except (ValueError, TypeError) as error:
+        raise ParameterError("document", value, "numbers, strings, lists and maps") from error
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} has no JSON")
+
+
+def _query(params: Iterable[tuple[str, object]]) -> tuple[tuple[str, str], ...]:
+    return tuple((key, str(value)) for key, value in params if value is not None)
+
+
+def _times(time_s: object) -> list[tuple[str, object]]:
+    if time_s is None:
+        return []
+    times = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
+    if times.ndim != 1 or not np.isfinite(times).all():
+        raise ParameterError("time_s", time_s, "finite times in seconds, in one dimension")
+    return [("time_s", repr(float(time))) for time in times]
+
+
+def _segment(name: str) -> str:
+    if not name or not name.replace("-", "").replace("_", "").isalnum():
+        raise ParameterError("product", name, "a product's name, such as range")
+    return name
