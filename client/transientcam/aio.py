@@ -203,6 +203,11 @@ class AsyncStream:
         return self._state.channels
 
     @property
+    def sequence(self) -> Mapping[str, Any]:
+        """What is captured at present: the applied sequence; empty before the first connection."""
+        return self._state.sequence
+
+    @property
     def notices(self) -> Sequence[Notice]:
         """The newest 256 notices, oldest first."""
         return self._state.notices

@@ -8,7 +8,8 @@
     ├── ProtocolError         bytes that are not the protocol of docs/stream.md
     ├── StreamClosed          the stream ended, by the server or by the network
     ├── FrameTimeout          the stream stands, but no frame came in the time allowed
-    └── ParameterError        an argument given here that cannot be used
+    ├── ParameterError        an argument given here that cannot be used
+    └── CommandUnavailable    a verb of the command line whose packages are not installed
 
 Each carries its data in fields and builds its own sentence from them.
 """
@@ -144,3 +145,17 @@ class ParameterError(TransientcamError, ValueError):
 
     def __str__(self) -> str:
         return f"{self.field} is {shown(self.value)}, but must be {self.limit}"
+
+
+class CommandUnavailable(TransientcamError):  # noqa: N818 - the same
+    """The command line's ``verb`` needs ``module``, which comes with ``extra`` (None: unknown)."""
+
+    def __init__(self, verb: str, module: str, extra: str | None) -> None:
+        super().__init__(verb, module, extra)
+        self.verb = verb
+        self.module = module
+        self.extra = extra
+
+    def __str__(self) -> str:
+        remedy = f": pip install 'transientcam[{self.extra}]'" if self.extra else ""
+        return f"'transientcam {self.verb}' needs {self.module}, which is not installed{remedy}"

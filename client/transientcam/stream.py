@@ -1,9 +1,10 @@
 """Frames as they are captured, one after the other."""
 
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from types import TracebackType
+from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Data
@@ -45,6 +46,11 @@ class Stream:
     def channels(self) -> tuple[Channel, ...]:
         """What frames look like at present: unit, axes, dtype and shape of each subscription."""
         return self._state.channels
+
+    @property
+    def sequence(self) -> Mapping[str, Any]:
+        """What is captured at present: the applied sequence; empty before the first connection."""
+        return self._state.sequence
 
     @property
     def notices(self) -> Sequence[Notice]:

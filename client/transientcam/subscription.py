@@ -6,9 +6,9 @@ when the connection is lost.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 from transientcam.errors import (
     ParameterError,
@@ -31,6 +31,7 @@ from transientcam.wire import (
     Subscribe,
     Subscription,
     encode,
+    fields,
     parse_channels,
     parse_server_message,
 )
@@ -113,6 +114,7 @@ class StreamState:
         self.subscribe = subscribe
         self.hello: Hello | None = None
         self.channels: tuple[Channel, ...] = ()
+        self.sequence: Mapping[str, Any] = {}
         self.notices: deque[Notice] = deque(maxlen=_KEPT_NOTICES)
         self._on_notice = on_notice
         self._reconnect = reconnect
@@ -152,13 +154,25 @@ class StreamState:
                 self._attempt = 0
                 self.hello = message
                 self.channels = message.channels
+                self.sequence = message.sequence
             case Notice():
-                if "channels" in message.details:
-                    self.channels = parse_channels(message.details)
+                self._follow(message)
                 self.notify(message)
             case ErrorMessage():
-                raise problem_error(message.problem)
+                self._refused(message)
         return None
+
+    def _follow(self, notice: Notice) -> None:
+        if notice.kind == "sequence-changed":
+            self.sequence = fields.mapping(notice.details, "sequence")
+            self.channels = parse_channels(notice.details)
+
+    def _refused(self, message: ErrorMessage) -> None:
+        # one product that fails is no reason to lose the others: only what answers a message of
+        # this client, and so names no channel, is raised
+        if "channel" not in message.problem:
+            raise problem_error(message.problem)
+        self.notify(Notice("product-failed", message.problem))
 
     def acknowledgement(self) -> bytes | None:
         """Return what the server is owed for the frame handed out last, once; None for nothing."""

@@ -68,9 +68,19 @@ def translate(error: Exception, url: str) -> TransientcamError:
         case ws.ProxyError() | ws.InvalidProxy():
             return ServerUnreachable(url, f"the proxy failed ({error})")
         case httpx.TransportError() | OSError():
-            return ServerUnreachable(url, str(error) or type(error).__name__)
+            return ServerUnreachable(url, _reason(error))
         case _:
             return ProtocolError("answer", f"{type(error).__name__}: {error}", "as documented")
+
+
+def _reason(error: BaseException) -> str:
+    """Return what the operating system said first, without its number."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, OSError) and cause.strerror:
+            return cause.strerror
+        cause = cause.__cause__ or cause.__context__
+    return str(error) or type(error).__name__
 
 
 def media_type(header: str) -> str:

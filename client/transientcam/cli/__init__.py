@@ -1,0 +1,82 @@
+"""The ``transientcam`` command.
+
+Exit codes: 0 done, 1 failed (one sentence on standard error says why), 2 wrong usage,
+130 interrupted.
+"""
+
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Annotated, Final
+
+import typer
+
+from transientcam.cli.verbs import extra_of, load_verbs
+from transientcam.errors import CommandUnavailable
+
+FAILED: Final = 1
+INTERRUPTED: Final = 130
+_EPILOG = "Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted."
+
+
+def main() -> None:
+    """Run the command line of this process."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line and return its exit code."""
+    app = typer.Typer(
+        name="transientcam",
+        no_args_is_help=True,
+        epilog=_EPILOG,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback()(_top)
+    load_verbs(app, arguments)
+    try:
+        typer.main.get_command(app)(args=list(arguments), prog_name="transientcam")
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else FAILED
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except Exception as error:
+        sentence = _sentence(error, arguments)
+        if sentence is None:
+            raise
+        typer.echo(f"transientcam: {sentence}", err=True)
+        return FAILED
+    return 0
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"transientcam {version('transientcam')}")
+        raise typer.Exit
+
+
+def _top(
+    _version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
+        ),
+    ] = False,
+) -> None:
+    """Drive, watch and evaluate a camera that sees light move."""
+
+
+def _sentence(error: Exception, arguments: Sequence[str]) -> str | None:
+    """Return what to tell of an expected error, or None for a mistake in a program."""
+    if isinstance(error, ModuleNotFoundError):
+        module = error.name or ""
+        if module.startswith("transientcam"):
+            return None
+        verb = next((each for each in arguments if not each.startswith("-")), "")
+        return str(CommandUnavailable(verb, module, extra_of(module, verb)))
+    if isinstance(error, OSError):
+        place = f": {error.filename}" if error.filename is not None else ""
+        return f"{error.strerror or error}{place}"
+    # the packages of this distribution each have a tree of errors, all of them made to be read
+    ours = (each.__module__.partition(".")[0] for each in type(error).__mro__)
+    return str(error) if any(root.startswith("transientcam") for root in ours) else None

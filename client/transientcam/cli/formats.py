@@ -1,0 +1,96 @@
+"""A frame as the bytes of a file."""
+
+import io
+import json
+from collections.abc import Callable
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam.frame import Frame
+from transientcam.wire import encode_frame
+
+
+class Format(StrEnum):
+    """Formats that a frame is saved in, by their suffix."""
+
+    NPY = "npy"
+    """The array alone."""
+    NPZ = "npz"
+    """``array`` with ``product``, ``unit``, ``axes``, ``meta`` (JSON), ``time_s``, ``labels``."""
+    PNG = "png"
+    """As the daemon draws it: 16 bit, or colours for the eye."""
+    MSGPACK = "msgpack"
+    """The message of docs/stream.md."""
+    JSON = "json"
+    """Everything as text; null for NaN, [re, im] for a complex number."""
+
+
+def frame_bytes(frame: Frame, form: Format) -> bytes:
+    """Return ``frame`` in any format but PNG, which only the daemon makes."""
+    return _WRITERS[form](frame)
+
+
+def _npy(frame: Frame) -> bytes:
+    file = io.BytesIO()
+    np.save(file, frame.array, allow_pickle=False)
+    return file.getvalue()
+
+
+def _npz(frame: Frame) -> bytes:
+    parts: dict[str, Any] = {
+        "array": frame.array,
+        "product": frame.product,
+        "unit": frame.unit,
+        "axes": np.array(frame.axes),
+        "meta": json.dumps(dict(frame.meta)),
+    }
+    if frame.time_s is not None:
+        parts["time_s"] = frame.time_s
+    if frame.labels:
+        parts["labels"] = json.dumps([dict(label) for label in frame.labels])
+    file = io.BytesIO()
+    np.savez(file, allow_pickle=False, **parts)
+    return file.getvalue()
+
+
+def _msgpack(frame: Frame) -> bytes:
+    return encode_frame(
+        product=frame.product,
+        unit=frame.unit,
+        axes=frame.axes,
+        meta=frame.meta,
+        array=frame.array,
+        encode_s=frame.encode_s,
+        extra=frame.extra,
+    )
+
+
+def _json(frame: Frame) -> bytes:
+    document = {
+        "product": frame.product,
+        "unit": frame.unit,
+        "axes": frame.axes,
+        "meta": dict(frame.meta),
+        **frame.extra,
+        "array": _nested(frame.array),
+    }
+    return json.dumps(document, allow_nan=False).encode()
+
+
+def _nested(array: NDArray[Any]) -> Any:
+    if array.dtype.kind == "c":
+        array = np.stack((np.real(array), np.imag(array)), axis=-1)
+    values = array.astype(object)
+    values[~np.isfinite(array)] = None
+    return values.tolist()
+
+
+_WRITERS: dict[Format, Callable[[Frame], bytes]] = {
+    Format.NPY: _npy,
+    Format.NPZ: _npz,
+    Format.MSGPACK: _msgpack,
+    Format.JSON: _json,
+}

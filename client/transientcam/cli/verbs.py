@@ -1,0 +1,61 @@
+"""Verbs of the command line: functions that packages offer in an entry-point group.
+
+Only the verb that is asked for is imported, so that the client's verbs start fast and a server's
+verb that lacks its packages stands in nobody's way.
+"""
+
+from collections.abc import Callable, Sequence
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Final
+
+import typer
+from rich.markup import escape
+
+from transientcam.errors import CommandUnavailable
+
+GROUP: Final = "transientcam.commands"
+_EXTRA_OF_PACKAGE: Final = {
+    "matplotlib": "plot",
+    "transientcam_driver": "driver",
+    "transientcam_moments": "server",
+    "transientcam_server": "server",
+}
+
+
+def load_verbs(app: typer.Typer, arguments: Sequence[str]) -> None:
+    """Add the verb that ``arguments`` name to ``app``, or all of them where they name none."""
+    points = {point.name: point for point in entry_points(group=GROUP)}
+    named = next((each for each in arguments if not each.startswith("-")), None)
+    wanted = [points[named]] if named in points else [points[name] for name in sorted(points)]
+    for point in wanted:
+        _add(app, point)
+
+
+def extra_of(module: str, verb: str) -> str | None:
+    """Return the extra that brings a missing ``module`` to a verb; None if it is not known."""
+    packages = [module.partition(".")[0]]
+    packages += [point.module.partition(".")[0] for point in entry_points(group=GROUP, name=verb)]
+    return next(filter(None, map(_EXTRA_OF_PACKAGE.get, packages)), None)
+
+
+def _add(app: typer.Typer, point: EntryPoint) -> None:
+    try:
+        function: Callable[..., Any] = point.load()
+    except ModuleNotFoundError as error:
+        missing = CommandUnavailable(point.name, error.name or "", extra_of("", point.name))
+        remedy = f"pip install 'transientcam[{missing.extra}]'" if missing.extra else str(missing)
+        app.command(
+            point.name,
+            help=escape(f"(not installed: {remedy})"),
+            context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+            add_help_option=False,
+        )(_unavailable(missing))
+    else:
+        app.command(point.name)(function)
+
+
+def _unavailable(missing: CommandUnavailable) -> Callable[[typer.Context], None]:
+    def refuse(context: typer.Context) -> None:
+        raise missing
+
+    return refuse

@@ -1,0 +1,111 @@
+"""``transientcam watch``: what a camera streams, as numbers."""
+
+import json
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.live import Live
+from rich.text import Text
+
+from transientcam.camera import Camera
+from transientcam.cli.options import JsonOption, TokenOption, UrlArgument
+from transientcam.cli.statistics import Sample, Statistics
+from transientcam.wire import Notice
+
+
+def watch(
+    url: UrlArgument,
+    products: Annotated[
+        list[str] | None, typer.Argument(help="What to stream; range, if nothing is named.")
+    ] = None,
+    count: Annotated[
+        int | None, typer.Option(min=1, help="Stop after so many frames of the first product.")
+    ] = None,
+    max_rate_hz: Annotated[
+        float | None, typer.Option(help="No more frames a second than this.")
+    ] = None,
+    reconnect: Annotated[
+        bool, typer.Option(help="Come back by itself when the connection is lost.")
+    ] = True,
+    token: TokenOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show rate, latency, losses and the median of what a camera streams, until interrupted."""
+    wanted = products or ["range"]
+    statistics = Statistics()
+    display = _Lines() if as_json else _Screen(Console())
+
+    def on_notice(notice: Notice) -> None:
+        statistics.notice(notice)
+        display.notice(notice)
+
+    seen = 0
+    with Camera(url, token=token) as camera, display.shown():
+        stream = camera.stream(
+            *wanted, on_notice=on_notice, reconnect=reconnect, max_rate_hz=max_rate_hz
+        )
+        try:
+            for frame in stream:
+                display.sample(statistics.frame(frame, now_s=time.time()))
+                seen += frame.product == wanted[0]
+                if seen == count:
+                    break
+        except KeyboardInterrupt:  # the way to end it, not a failure
+            pass
+
+
+class _Lines:
+    """One JSON document a line."""
+
+    def __init__(self, write: Callable[[str], Any] = typer.echo) -> None:
+        self._write = write
+
+    def shown(self) -> AbstractContextManager[object]:
+        return nullcontext()
+
+    def sample(self, sample: Sample) -> None:
+        self._write(json.dumps(sample.to_document()))
+
+    def notice(self, notice: Notice) -> None:
+        self._write(json.dumps(notice.to_document()))
+
+
+class _Screen:
+    """One line a product that changes in place; a line a frame where that cannot be."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._rows: dict[str, Sample] = {}
+        self._live = Live(console=console, refresh_per_second=8) if console.is_terminal else None
+
+    def shown(self) -> AbstractContextManager[object]:
+        return self._live or nullcontext()
+
+    def sample(self, sample: Sample) -> None:
+        self._rows[sample.product] = sample
+        if self._live is None:
+            self._console.print(_line(sample))
+        else:
+            self._live.update(Text("\n".join(map(_line, self._rows.values()))))
+
+    def notice(self, notice: Notice) -> None:
+        details = "  ".join(
+            f"{name} {value}"
+            for name, value in notice.details.items()
+            if name not in ("sequence", "channels")
+        )
+        self._console.print(Text(f"{notice.kind}  {details}".rstrip(), style="yellow"))
+
+
+def _line(sample: Sample) -> str:
+    rate = "  –  " if sample.rate_hz is None else f"{sample.rate_hz:5.1f}"
+    median = "no values" if sample.median is None else f"median {sample.median:.4g} {sample.unit}"
+    return (
+        f"{sample.product:<12} frame {sample.frame:<7} {rate} Hz  "
+        f"{sample.latency_s * 1e3:6.1f} ms  {median}  "
+        f"dropped {sample.dropped}  lost images {sample.lost_images}"
+    )
