@@ -1,0 +1,32 @@
+import { useEffect } from "preact/hooks";
+import { effect } from "@preact/signals";
+
+import { useStore } from "./store/store";
+import { shortcuts } from "./ui/shortcuts";
+import { Banner } from "./views/status/Banner";
+import { StatusBar } from "./views/status/StatusBar";
+import { VIEWS } from "./views/registry";
+
+/** The page: how things stand, what is wrong, and the views. */
+export function App({ onRetry }: { onRetry: () => void }) {
+  const store = useStore();
+  useEffect(() => shortcuts(window, store), [store]);
+  useEffect(
+    () =>
+      effect(() => {
+        document.documentElement.dataset["stale"] = String(store.status.stale.value);
+      }),
+    [store],
+  );
+  return (
+    <>
+      <StatusBar />
+      <Banner onRetry={onRetry} />
+      <main class="views">
+        {VIEWS.map(({ name, view: View }) => (
+          <View key={name} />
+        ))}
+      </main>
+    </>
+  );
+}

@@ -1,0 +1,38 @@
+import type { Coefficients } from "../physics/maximumEntropy";
+import type { ColourMapName } from "../ui/colourMaps";
+import type { Tone } from "./tone";
+import { TypedArrayRenderer } from "./typedArray";
+import { WebGl2Renderer } from "./webgl2";
+
+/** The still scene behind the light: one brightness a pixel, `white` shown brightest. */
+export interface Backdrop {
+  readonly values: Float32Array;
+  readonly white: number;
+}
+
+export interface Exposure {
+  readonly phase_rad: number;
+  readonly tone: Tone;
+  readonly colours: ColourMapName;
+  readonly backdrop: Backdrop | null;
+}
+
+/**
+ * Draws the density of Eq. (2) at one time of flight on a canvas of the sensor's size.
+ *
+ * `draw` may be called with the same coefficients many times; they are taken over only once.
+ */
+export interface DensityRenderer {
+  readonly kind: "webgl2" | "typed-array";
+  draw(coefficients: Coefficients, exposure: Exposure): void;
+  /** The numbers behind the picture: density of every pixel, in units of b_0 per second. */
+  readDensity(coefficients: Coefficients, phase_rad: number): Float32Array;
+  /** Called when the renderer can no longer draw on this canvas and another must be made. */
+  onLost(listener: () => void): void;
+  dispose(): void;
+}
+
+/** WebGL2 where the browser grants it and `webGl2` asks for it, typed arrays otherwise. */
+export function createRenderer(canvas: HTMLCanvasElement, webGl2: boolean): DensityRenderer {
+  return (webGl2 ? WebGl2Renderer.create(canvas) : null) ?? new TypedArrayRenderer(canvas);
+}

@@ -1,0 +1,65 @@
+import { BACKDROP_GAIN, DECADES } from "./tone";
+
+/** One triangle that covers the canvas, from the vertex number alone. */
+export const VERTEX_SHADER = `#version 300 es
+void main() {
+  gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
+}`;
+
+/**
+ * Eq. (2) at one time of flight, a fragment a pixel of the sensor.
+ *
+ * Layer 0 of \`coefficients\` is E, layers 2j - 1 and 2j are the real and imaginary part of a_j. With
+ * \`asNumbers\` the density itself is written, which needs a framebuffer of floats.
+ */
+export const FRAGMENT_SHADER = `#version 300 es
+precision highp float;
+precision highp sampler2D;
+precision highp sampler2DArray;
+uniform sampler2DArray coefficients;
+uniform sampler2D backdrop;
+uniform sampler2D colours;
+uniform int harmonics;
+uniform vec2 z;                // exp(i phi)
+uniform float baseFrequencyHz;
+uniform float white;           // density shown brightest
+uniform float backdropWhite;   // 0: no backdrop
+uniform int tone;              // linear, root, logarithmic
+uniform bool asNumbers;
+out vec4 colour;
+
+float density(ivec2 at) {
+  vec2 p = vec2(0.0);
+  for (int j = harmonics; j >= 1; j--) {  // Horner's rule
+    p += vec2(
+      texelFetch(coefficients, ivec3(at, 2 * j - 1), 0).r,
+      -texelFetch(coefficients, ivec3(at, 2 * j), 0).r);
+    p = vec2(p.x * z.x - p.y * z.y, p.x * z.y + p.y * z.x);
+  }
+  p.x += 1.0;
+  return texelFetch(coefficients, ivec3(at, 0), 0).r * baseFrequencyHz / dot(p, p);
+}
+
+void main() {
+  // The sensor's first row is on top, a framebuffer's at the bottom; numbers keep the sensor's order.
+  ivec2 size = textureSize(coefficients, 0).xy;
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  if (!asNumbers) at.y = size.y - 1 - at.y;
+  float value = density(at);
+  if (asNumbers) {
+    colour = vec4(value, 0.0, 0.0, 1.0);
+    return;
+  }
+  float share = value / white;
+  share = share >= 0.0 ? min(share, 1.0) : 0.0;  // not a number: no density, no light
+  float place = share;
+  if (tone == 1) place = sqrt(share);
+  if (tone == 2) place = share > 0.0 ? max(0.0, 1.0 + log2(share) * ${(1 / (DECADES * Math.log2(10))).toFixed(9)}) : 0.0;
+  vec3 light = texelFetch(colours, ivec2(clamp(int(place * 256.0), 0, 255), 0), 0).rgb;
+  if (backdropWhite > 0.0) {
+    float scene = texelFetch(backdrop, at, 0).r / backdropWhite;
+    float grey = scene > 0.0 ? ${BACKDROP_GAIN.toFixed(3)} * sqrt(min(scene, 1.0)) : 0.0;
+    light = mix(vec3(grey), light, smoothstep(0.0, 0.35, place));
+  }
+  colour = vec4(light, 1.0);
+}`;

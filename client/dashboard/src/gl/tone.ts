@@ -1,0 +1,41 @@
+/**
+ * Tone: how a density becomes a place on the colour map.
+ *
+ * A density has a far greater range than a screen: its peaks are narrow and high. `white` is the density
+ * that is shown as the brightest colour.
+ */
+
+export type ToneKind = "linear" | "root" | "logarithmic";
+
+export const TONES: readonly ToneKind[] = ["linear", "root", "logarithmic"];
+
+export interface Tone {
+  readonly kind: ToneKind;
+  /** Density shown brightest, in units of b_0 per second. */
+  readonly white: number;
+}
+
+/** Decades below white that the logarithmic tone shows. */
+export const DECADES = 3;
+
+/** Number of the tone in the shader. */
+export function toneIndex(kind: ToneKind): number {
+  return TONES.indexOf(kind);
+}
+
+/** Place of a density between dark (0) and white (1). The shader computes the same. */
+export function toned(kind: ToneKind, share: number): number {
+  const bounded = Math.min(1, Math.max(0, share));
+  if (kind === "linear") return bounded;
+  if (kind === "root") return Math.sqrt(bounded);
+  return bounded > 0 ? Math.max(0, 1 + Math.log10(bounded) / DECADES) : 0;
+}
+
+/** How far the colour of the light covers the still scene behind it, by its place on the map. */
+export function coverage(place: number): number {
+  const x = Math.min(1, Math.max(0, place / 0.35));
+  return x * x * (3 - 2 * x);
+}
+
+/** Brightest grey of the still scene behind the light. */
+export const BACKDROP_GAIN = 0.42;

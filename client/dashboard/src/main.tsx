@@ -1,0 +1,42 @@
+import { render } from "preact";
+import { effect } from "@preact/signals";
+
+import { App } from "./App";
+import { Store, StoreContext } from "./store/store";
+import { StreamClient } from "./stream/client";
+import { AnimationLoop } from "./ui/animation";
+import "./style.css";
+
+const loop = new AnimationLoop((callback) => requestAnimationFrame(callback));
+const store = new Store();
+const worker = new Worker(new URL("./stream/worker.ts", import.meta.url), { type: "module" });
+const stream = new StreamClient(store, worker, loop);
+
+loop.add((elapsed_s) => store.player.advance(elapsed_s));
+effect(() => {
+  if (store.player.playing.value) loop.wake();
+});
+store.player.playing.value = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+const root = document.getElementById("app");
+if (root === null) throw new Error("The page has no place for the application.");
+render(
+  <StoreContext.Provider value={store}>
+    <App
+      onRetry={() => {
+        stream.retryNow();
+      }}
+    />
+  </StoreContext.Provider>,
+  root,
+);
+
+const address = new URL("/api/v1/stream", window.location.href);
+address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
+stream.open(address.href);
+
+if (new URLSearchParams(window.location.search).has("debug")) {
+  void import("./debug").then(({ expose }) => {
+    expose(store, stream);
+  });
+}

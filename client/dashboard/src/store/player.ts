@@ -1,0 +1,40 @@
+import { computed, signal, type ReadonlySignal } from "@preact/signals";
+
+/** Nanoseconds of flight that pass in a second of watching. */
+export const SPEEDS_NS = [0.5, 1, 2, 5, 10, 20] as const;
+
+/** Which moment of the flight is looked at, and how it moves on. */
+export class Player {
+  /** Share of the period that has passed, 0 to 1: it keeps its meaning when the base frequency changes. */
+  readonly turn = signal(0);
+  readonly playing = signal(false);
+  readonly speed_ns = signal<number>(5);
+  readonly time_s: ReadonlySignal<number>;
+  readonly phase_rad = computed(() => 2 * Math.PI * this.turn.value);
+
+  /** `period_s` is 1/f of what is streamed: the time after which the flight repeats. */
+  constructor(readonly period_s: ReadonlySignal<number>) {
+    this.time_s = computed(() => this.turn.value * this.period_s.value);
+  }
+
+  /** Lets `elapsed_s` of watching pass; true while there is more to come. */
+  advance(elapsed_s: number): boolean {
+    if (!this.playing.peek()) return false;
+    this.step(elapsed_s * this.speed_ns.peek() * 1e-9);
+    return true;
+  }
+
+  /** Moves by `flight_s`, around the period at either end. */
+  step(flight_s: number): void {
+    const turn = this.turn.peek() + flight_s / this.period_s.peek();
+    this.turn.value = turn - Math.floor(turn);
+  }
+
+  seek(turn: number): void {
+    this.turn.value = Math.min(1, Math.max(0, turn));
+  }
+
+  toggle(): void {
+    this.playing.value = !this.playing.peek();
+  }
+}

@@ -1,0 +1,85 @@
+import { computed, signal } from "@preact/signals";
+
+import type { FrameMeta } from "../stream/protocol";
+
+/** How this page stands with the service. */
+export type Connection =
+  | { readonly kind: "connecting" }
+  | { readonly kind: "open" }
+  | { readonly kind: "waiting"; readonly retryAt_s: number; readonly reason: string };
+
+/** Frames whose arrival the rate is taken over, and how long they count. */
+const RATE_FRAMES = 64;
+const RATE_WINDOW_S = 3;
+
+/** What the page knows of connection, camera and the flow of frames. Times are of this page's clock. */
+export class Status {
+  readonly connection = signal<Connection>({ kind: "connecting" });
+  /** The camera's state in the service's word; null until it was told. */
+  readonly cameraState = signal<string | null>(null);
+  /** When the camera was lost, in s of unix time; null while it is there. */
+  readonly cameraLostAt_s = signal<number | null>(null);
+  readonly newest = signal<FrameMeta | null>(null);
+  readonly rate_hz = signal<number | null>(null);
+  readonly latency_s = signal<number | null>(null);
+  readonly encode_s = signal<number | null>(null);
+  readonly lostImages = signal(0);
+  readonly unreadable = signal<string | null>(null);
+  readonly #drops = signal<ReadonlyMap<number, number>>(new Map());
+  /** Frames the service left out for this page, which was slower than the camera. */
+  readonly dropped = computed(() => Math.max(0, ...this.#drops.value.values()));
+  /** What is on screen is not what the camera sees now. */
+  readonly stale = computed(() => this.connection.value.kind !== "open" || this.cameraLostAt_s.value !== null);
+  #arrivals: number[] = [];
+
+  /** A new session with the service: it counts anew. */
+  sessionOpened(cameraState: string, now_s: number): void {
+    this.#drops.value = new Map();
+    this.lostImages.value = 0;
+    this.unreadable.value = null;
+    this.cameraIs(cameraState, now_s);
+  }
+
+  cameraIs(state: string, now_s: number): void {
+    this.cameraState.value = state;
+    if (LOST_STATES.has(state)) this.cameraLost(now_s);
+    else this.cameraLostAt_s.value = null;
+  }
+
+  cameraLost(now_s: number): void {
+    if (this.cameraLostAt_s.peek() === null) this.cameraLostAt_s.value = now_s;
+    this.#forgetRate();
+  }
+
+  connectionLost(reason: string, retryAt_s: number): void {
+    this.connection.value = { kind: "waiting", reason, retryAt_s };
+    this.#forgetRate();
+  }
+
+  dropNotice(channel: number, total: number): void {
+    this.#drops.value = new Map(this.#drops.peek()).set(channel, total);
+  }
+
+  /** A frame was drawn at `now_s`; several products of one frame count once. */
+  frameDrawn(meta: FrameMeta, encode_s: number, now_s: number): void {
+    if (this.newest.peek()?.frame === meta.frame) return;
+    this.newest.value = meta;
+    this.encode_s.value = encode_s;
+    const latency_s = now_s - meta.host_time_s;
+    const known = this.latency_s.peek();
+    this.latency_s.value = known === null ? latency_s : known + 0.2 * (latency_s - known);
+    this.#arrivals.push(now_s);
+    this.#arrivals = this.#arrivals.slice(-RATE_FRAMES).filter((at_s) => now_s - at_s < RATE_WINDOW_S);
+    const span_s = now_s - this.#arrivals[0];
+    this.rate_hz.value = span_s > 0 ? (this.#arrivals.length - 1) / span_s : null;
+  }
+
+  #forgetRate(): void {
+    this.#arrivals = [];
+    this.rate_hz.value = null;
+    this.latency_s.value = null;
+  }
+}
+
+/** The driver's words for a camera that is not there. */
+const LOST_STATES = new Set(["disconnected", "connecting", "faulted", "lost"]);

@@ -1,0 +1,189 @@
+/**
+ * One stream that stays: connects, subscribes, notices when the other end is gone, and comes back.
+ *
+ * Knows no worker and no page. The socket, the clock, chance and the probe are arguments.
+ */
+import { decodeMessage, encodeAck, encodeSubscribe, ProtocolError, SUBPROTOCOL, type ServerMessage } from "./protocol";
+
+/** What of a WebSocket is used. */
+export interface Socket {
+  binaryType: BinaryType;
+  onopen: ((event: Event) => void) | null;
+  onmessage: ((event: MessageEvent<ArrayBuffer>) => void) | null;
+  onclose: ((event: CloseEvent) => void) | null;
+  send(data: Uint8Array<ArrayBuffer>): void;
+  close(code?: number, reason?: string): void;
+}
+
+export interface Surroundings {
+  openSocket(url: string, protocol: string): Socket;
+  setTimer(action: () => void, delay_s: number): number;
+  clearTimer(timer: number): void;
+  /** A number in [0, 1). */
+  random(): number;
+  /** Asks the service whether it is there; resolves to the camera's state, rejects if it is not. */
+  probe(): Promise<string>;
+}
+
+export type ConnectionEvent =
+  | { readonly type: "connecting" }
+  | { readonly type: "open" }
+  | { readonly type: "waiting"; readonly retry_s: number; readonly reason: string }
+  | { readonly type: "message"; readonly message: ServerMessage; readonly bytes: number }
+  | { readonly type: "camera"; readonly state: string }
+  | { readonly type: "unreadable"; readonly reason: string };
+
+/** Frames the service may send ahead of what was drawn. */
+export const CREDITS = 2;
+
+const FIRST_RETRY_S = 0.5;
+const LONGEST_RETRY_S = 8;
+/** Silence after which the service is asked whether it is still there. */
+const SILENCE_S = 3;
+
+export class StreamConnection {
+  readonly #url: string;
+  readonly #around: Surroundings;
+  readonly #emit: (event: ConnectionEvent) => void;
+  #products: readonly string[] = [];
+  #socket: Socket | null = null;
+  #open = false;
+  #attempts = 0;
+  #timer: number | null = null;
+  #inFlight = new Set<number>();
+
+  constructor(url: string, around: Surroundings, emit: (event: ConnectionEvent) => void) {
+    this.#url = url;
+    this.#around = around;
+    this.#emit = emit;
+  }
+
+  /** Sets what is streamed, connecting if there is no connection. */
+  want(products: readonly string[]): void {
+    this.#products = products;
+    if (this.#open) this.#subscribe();
+    else if (this.#socket === null && this.#timer === null) this.#connect();
+  }
+
+  /** Frame `frame` and all before it were drawn: the service may send on. */
+  acknowledge(frame: number): void {
+    for (const number of this.#inFlight) if (number <= frame) this.#inFlight.delete(number);
+    if (this.#open) this.#socket?.send(encodeAck(frame));
+  }
+
+  /** Tries at once instead of waiting out the pause between attempts. */
+  retryNow(): void {
+    if (this.#socket !== null) return;
+    this.#clear();
+    this.#connect();
+  }
+
+  close(): void {
+    this.#clear();
+    this.#drop();
+  }
+
+  #connect(): void {
+    this.#emit({ type: "connecting" });
+    const socket = this.#around.openSocket(this.#url, SUBPROTOCOL);
+    this.#socket = socket;
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => {
+      this.#open = true;
+      this.#inFlight.clear();
+      this.#subscribe();
+      this.#emit({ type: "open" });
+      this.#listen();
+    };
+    socket.onmessage = ({ data }) => {
+      this.#receive(data);
+    };
+    socket.onclose = ({ code, reason }) => {
+      this.#lost(reason || CLOSE_REASONS[code] || "The connection was closed.");
+    };
+    // An attempt that neither opens nor fails (a firewall that swallows it) ends here.
+    this.#rearm(() => {
+      this.#lost("The service does not answer.");
+    }, LONGEST_RETRY_S);
+  }
+
+  #subscribe(): void {
+    this.#socket?.send(encodeSubscribe(this.#products, CREDITS));
+  }
+
+  #receive(data: ArrayBuffer): void {
+    this.#attempts = 0;
+    this.#listen();
+    try {
+      const bytes = data.byteLength;
+      const message = decodeMessage(data);
+      if (message === null) return;
+      if (message.type === "frame") this.#inFlight.add(message.meta.frame);
+      this.#emit({ type: "message", message, bytes });
+    } catch (error) {
+      if (!(error instanceof ProtocolError)) throw error;
+      this.#emit({ type: "unreadable", reason: error.message });
+    }
+  }
+
+  /** Starts the wait for the next message anew. */
+  #listen(): void {
+    this.#rearm(() => {
+      // Frames we were sent and did not draw (a hidden or held page) explain the silence.
+      if (this.#inFlight.size >= CREDITS) this.#listen();
+      else void this.#probe();
+    }, SILENCE_S);
+  }
+
+  async #probe(): Promise<void> {
+    const socket = this.#socket;
+    try {
+      const state = await this.#around.probe();
+      if (this.#socket !== socket) return;
+      this.#emit({ type: "camera", state });
+      this.#listen();
+    } catch {
+      if (this.#socket === socket) this.#lost("The service does not answer.");
+    }
+  }
+
+  #lost(reason: string): void {
+    this.#drop();
+    const pause_s = Math.min(LONGEST_RETRY_S, FIRST_RETRY_S * 2 ** this.#attempts);
+    const retry_s = pause_s * (0.8 + 0.4 * this.#around.random()); // many pages must not come at once
+    this.#attempts += 1;
+    this.#emit({ type: "waiting", retry_s, reason });
+    this.#rearm(() => {
+      this.#timer = null;
+      this.#connect();
+    }, retry_s);
+  }
+
+  #drop(): void {
+    const socket = this.#socket;
+    this.#socket = null;
+    this.#open = false;
+    if (socket === null) return;
+    socket.onopen = socket.onmessage = socket.onclose = null;
+    socket.close();
+  }
+
+  #rearm(action: () => void, delay_s: number): void {
+    this.#clear();
+    this.#timer = this.#around.setTimer(action, delay_s);
+  }
+
+  #clear(): void {
+    if (this.#timer !== null) this.#around.clearTimer(this.#timer);
+    this.#timer = null;
+  }
+}
+
+const CLOSE_REASONS: Record<number, string> = {
+  1001: "The service is shutting down.",
+  1006: "The service cannot be reached.",
+  1008: "The service refuses this page.",
+  1013: "The service has as many watchers as it can serve.",
+  4001: "The service does not understand this page: it may be another version.",
+  4003: "The service asks for a token.",
+};

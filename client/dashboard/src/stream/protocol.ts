@@ -1,0 +1,186 @@
+/**
+ * Messages of `WS /api/v1/stream`, subprotocol transientcam.v1.msgpack: types and codec.
+ *
+ * The service may add fields; unknown ones are ignored, unknown kinds of messages too.
+ */
+import { decode, encode } from "@msgpack/msgpack";
+
+export const SUBPROTOCOL = "transientcam.v1.msgpack";
+
+export type Dtype = "<f4" | "<f8" | "<c8" | "<u2" | "|u1";
+
+export type Numbers = Float32Array | Float64Array | Uint16Array | Uint8Array;
+
+/** An array in C order. Complex numbers ("<c8") lie as pairs of float32: real, imaginary. */
+export interface NdArray {
+  readonly dtype: Dtype;
+  readonly shape: readonly number[];
+  readonly data: Numbers;
+}
+
+/** What every frame says about itself; the JSON of `GET /frames/latest`. */
+export interface FrameMeta {
+  readonly frame: number;
+  readonly sequence_id: number;
+  readonly calibration_id: string;
+  readonly device_time_s: number;
+  readonly host_time_s: number;
+  readonly capture_s: number;
+  readonly reconstruct_s: number | null;
+  readonly base_frequency_hz: number;
+  readonly harmonics: number;
+  readonly zeroth: string;
+  readonly exposure_s: number;
+  readonly takes: number;
+  readonly width: number;
+  readonly height: number;
+  readonly temperature_c: number;
+  readonly lost_images: number;
+  readonly pixels: Readonly<Record<string, number>> | null;
+}
+
+/** A sequence as it was really set, with the figures that follow from it. */
+export interface AppliedSequence extends SequenceDocument {
+  readonly sequence_id: number;
+  readonly images: number;
+  readonly capture_s: number;
+  readonly frame_rate_hz: number;
+  readonly unambiguous_range_m: number;
+  readonly data_rate_bytes_s: number;
+}
+
+export type Zeroth = "low-frequency" | "on-off" | "estimated";
+
+export interface SequenceDocument {
+  readonly base_frequency_hz: number;
+  readonly harmonics: number;
+  readonly zeroth: Zeroth;
+  readonly exposure_s: number;
+  readonly takes: number;
+  readonly sub_phases: { readonly scheme: string; readonly n: number };
+}
+
+export interface Hello {
+  readonly type: "hello";
+  readonly session: string;
+  readonly server: { readonly name: string; readonly version: string };
+  readonly sequence: AppliedSequence | null;
+  readonly camera: { readonly state: string };
+}
+
+export interface FrameMessage {
+  readonly type: "frame";
+  readonly product: string;
+  readonly unit: string;
+  readonly axes: readonly string[];
+  readonly meta: FrameMeta;
+  readonly encode_s: number;
+  readonly array: NdArray;
+}
+
+export type Notice =
+  | {
+      readonly type: "notice";
+      readonly kind: "dropped";
+      readonly channel: number;
+      readonly count: number;
+      readonly total: number;
+    }
+  | { readonly type: "notice"; readonly kind: "lost-images"; readonly count: number }
+  | { readonly type: "notice"; readonly kind: "camera-lost" | "camera-back" }
+  | { readonly type: "notice"; readonly kind: "sequence-changed"; readonly sequence: AppliedSequence };
+
+export interface ErrorMessage {
+  readonly type: "error";
+  readonly problem: Problem;
+}
+
+/** RFC 9457, with the extensions of this service. */
+export interface Problem {
+  readonly type?: string;
+  readonly title?: string;
+  readonly status?: number;
+  readonly detail?: string;
+  readonly field?: string;
+  readonly value?: unknown;
+  readonly limit?: unknown;
+}
+
+export type ServerMessage = Hello | FrameMessage | Notice | ErrorMessage;
+
+/** The service sent something this page cannot read. */
+export class ProtocolError extends Error {
+  override readonly name = "ProtocolError";
+}
+
+const ITEM_BYTES: Record<Dtype, number> = { "<f4": 4, "<f8": 8, "<c8": 8, "<u2": 2, "|u1": 1 };
+
+/** Reads a message. Its arrays are views into `buffer` wherever the data is aligned. */
+export function decodeMessage(buffer: ArrayBuffer): ServerMessage | null {
+  let message: unknown;
+  try {
+    message = decode(new Uint8Array(buffer));
+  } catch (error) {
+    throw new ProtocolError(`The message is not msgpack: ${String(error)}`);
+  }
+  if (!isMap(message) || typeof message["type"] !== "string") {
+    throw new ProtocolError("The message is not a map with a type.");
+  }
+  switch (message["type"]) {
+    case "frame":
+      return { ...message, array: ndArray(message["array"]) } as unknown as FrameMessage;
+    case "hello":
+    case "notice":
+    case "error":
+      return message as unknown as ServerMessage;
+    default:
+      return null;
+  }
+}
+
+/** The first message of a client, and every later change of what it wants. */
+export function encodeSubscribe(products: readonly string[], credits: number): Uint8Array<ArrayBuffer> {
+  return encode({
+    type: "subscribe",
+    v: 1,
+    token: null,
+    subscriptions: products.map((product) => ({ product, max_rate_hz: null })),
+    credits,
+    start: null,
+  }) as Uint8Array<ArrayBuffer>;
+}
+
+/** Says that frame `frame` and all before it were taken. */
+export function encodeAck(frame: number): Uint8Array<ArrayBuffer> {
+  return encode({ type: "ack", frame }) as Uint8Array<ArrayBuffer>;
+}
+
+function isMap(value: unknown): value is Record<string, unknown> {
+  return typeof value === "object" && value !== null && !Array.isArray(value) && !ArrayBuffer.isView(value);
+}
+
+function ndArray(value: unknown): NdArray {
+  if (!isMap(value)) throw new ProtocolError("A frame came without an array.");
+  const { dtype, shape, data } = value;
+  if (typeof dtype !== "string" || !(dtype in ITEM_BYTES)) {
+    throw new ProtocolError(`This page does not know arrays of ${String(dtype)}.`);
+  }
+  if (!Array.isArray(shape) || !shape.every((n) => Number.isInteger(n) && (n as number) >= 0)) {
+    throw new ProtocolError("An array came without a shape.");
+  }
+  const bytes = ITEM_BYTES[dtype as Dtype] * (shape as number[]).reduce((a, b) => a * b, 1);
+  if (!(data instanceof Uint8Array) || data.byteLength !== bytes) {
+    throw new ProtocolError(`An array of shape (${shape.join(", ")}) came without its ${bytes} bytes.`);
+  }
+  return { dtype: dtype as Dtype, shape: shape as number[], data: numbers(dtype as Dtype, data) };
+}
+
+function numbers(dtype: Dtype, bytes: Uint8Array): Numbers {
+  if (dtype === "|u1") return bytes;
+  const align = dtype === "<f8" ? 8 : dtype === "<u2" ? 2 : 4;
+  // The service pads its messages so that data is aligned; a proxy's or another server's need a copy.
+  const { buffer, byteOffset, byteLength } = bytes.byteOffset % align === 0 ? bytes : bytes.slice();
+  if (dtype === "<f8") return new Float64Array(buffer, byteOffset, byteLength / 8);
+  if (dtype === "<u2") return new Uint16Array(buffer, byteOffset, byteLength / 2);
+  return new Float32Array(buffer, byteOffset, byteLength / 4);
+}

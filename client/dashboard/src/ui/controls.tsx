@@ -1,0 +1,87 @@
+import type { ComponentChildren } from "preact";
+
+interface ChoiceProps<T extends string | number> {
+  readonly label: string;
+  readonly value: T;
+  readonly options: readonly { readonly value: T; readonly text: string }[];
+  readonly onChange: (value: T) => void;
+}
+
+/** One of several, as a drop-down. */
+export function Choice<T extends string | number>({ label, value, options, onChange }: ChoiceProps<T>) {
+  return (
+    <label class="choice">
+      <span class="quiet">{label}</span>
+      <select
+        value={String(value)}
+        onChange={(event) => {
+          const chosen = options.find((option) => String(option.value) === event.currentTarget.value);
+          if (chosen !== undefined) onChange(chosen.value);
+        }}
+      >
+        {options.map((option) => (
+          <option key={option.value} value={String(option.value)}>
+            {option.text}
+          </option>
+        ))}
+      </select>
+    </label>
+  );
+}
+
+interface TabsProps<T extends string> {
+  readonly label: string;
+  readonly value: T;
+  readonly options: readonly { readonly value: T; readonly text: string; readonly hint?: string }[];
+  readonly onChange: (value: T) => void;
+}
+
+/** One of several, all in sight. Arrow keys move between them, as in any tab list. */
+export function Tabs<T extends string>({ label, value, options, onChange }: TabsProps<T>) {
+  const onKeyDown = (event: KeyboardEvent): void => {
+    const step = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
+    if (step === 0) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const at = options.findIndex((option) => option.value === value);
+    const next = options[(at + step + options.length) % options.length];
+    onChange(next.value);
+    const tabs = (event.currentTarget as HTMLElement).querySelectorAll<HTMLElement>("[role=tab]");
+    tabs[options.indexOf(next)].focus();
+  };
+  return (
+    <div class="tabs" role="tablist" aria-label={label} onKeyDown={onKeyDown}>
+      {options.map((option) => (
+        <button
+          key={option.value}
+          type="button"
+          role="tab"
+          aria-selected={option.value === value}
+          tabIndex={option.value === value ? 0 : -1}
+          title={option.hint}
+          onClick={() => {
+            onChange(option.value);
+          }}
+        >
+          {option.text}
+        </button>
+      ))}
+    </div>
+  );
+}
+
+interface ToggleProps {
+  readonly pressed: boolean;
+  readonly title: string;
+  readonly onToggle: () => void;
+  readonly children: ComponentChildren;
+}
+
+/** On or off. */
+export function Toggle({ pressed, title, onToggle, children }: ToggleProps) {
+  return (
+    <button type="button" class="toggle" aria-pressed={pressed} title={title} onClick={onToggle}>
+      {children}
+    </button>
+  );
+}

@@ -1,0 +1,93 @@
+/** Scales: how a measured value becomes a place between the two ends of a colour bar. */
+
+export type ScaleKind = "linear" | "logarithmic";
+
+export interface Scale {
+  readonly low: number;
+  readonly high: number;
+  readonly kind: ScaleKind;
+}
+
+/** A logarithmic scale never reaches further down than this share of its high end. */
+export const SMALLEST_SHARE = 1e-4;
+
+/** The low end in use: a logarithm needs one above zero. */
+export function lowEnd(scale: Scale): number {
+  return scale.kind === "linear" ? scale.low : Math.max(scale.low, scale.high * SMALLEST_SHARE);
+}
+
+/** Place of `value` between low (0) and high (1); NaN stays NaN, values beyond the ends pass them. */
+export function fraction(scale: Scale, value: number): number {
+  const low = lowEnd(scale);
+  if (scale.kind === "linear") return (value - low) / (scale.high - low);
+  return value > 0 ? Math.log(value / low) / Math.log(scale.high / low) : value <= 0 ? 0 : NaN;
+}
+
+/** The value at a place on the scale; inverse of `fraction` between the ends. */
+export function valueAt(scale: Scale, place: number): number {
+  const low = lowEnd(scale);
+  if (scale.kind === "linear") return low + place * (scale.high - low);
+  return low * (scale.high / low) ** place;
+}
+
+/** The step of 1, 2 or 5 times a power of ten that cuts `span` into at most `count` parts. */
+export function niceStep(span: number, count: number): number {
+  const raw = span / count;
+  const power = 10 ** Math.floor(Math.log10(raw));
+  const factor = [1, 2, 5, 10].find((f) => f * power >= raw * (1 - 1e-9)) ?? 10;
+  return factor * power;
+}
+
+/** Values to write beside a colour bar: round numbers, at most about `count`. */
+export function ticks(scale: Scale, count: number): number[] {
+  const low = lowEnd(scale);
+  if (!(scale.high > low)) return [];
+  if (scale.kind === "logarithmic") {
+    const values: number[] = [];
+    for (let power = Math.floor(Math.log10(low)); power <= Math.log10(scale.high); power++) {
+      const decades = Math.log10(scale.high / low);
+      for (const factor of decades > 2 ? [1] : [1, 2, 5]) {
+        const value = factor * 10 ** power;
+        if (value >= low * (1 - 1e-9) && value <= scale.high * (1 + 1e-9)) values.push(value);
+      }
+    }
+    return values;
+  }
+  const step = niceStep(scale.high - low, count);
+  const values: number[] = [];
+  for (let n = Math.ceil(low / step - 1e-9); n * step <= scale.high + 1e-9 * step; n++) values.push(n * step);
+  return values;
+}
+
+/** Decimals that tell neighbouring ticks of `step` apart. */
+export function decimalsFor(step: number): number {
+  return Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+}
+
+/** What a frame's values span: the 1st and 99th percentile of those that are numbers. */
+export interface Span {
+  readonly low: number;
+  readonly high: number;
+}
+
+/**
+ * Limits that follow the data without trembling: the span widened to round numbers, and the previous
+ * limits as long as the span lies within them and fills more than half of them.
+ */
+export function autoLimits(previous: Span | null, span: Span): Span {
+  if (!(span.high >= span.low)) return previous ?? { low: 0, high: 1 };
+  if (
+    previous !== null &&
+    span.low >= previous.low &&
+    span.high <= previous.high &&
+    span.high - span.low > 0.5 * (previous.high - previous.low)
+  ) {
+    return previous;
+  }
+  const width = span.high - span.low || Math.abs(span.high) || 1;
+  const step = niceStep(width, 6);
+  // Half a step of room on either side, so that noise at the ends does not move them.
+  const low = Math.floor((span.low - 0.25 * step) / step) * step;
+  const high = Math.ceil((span.high + 0.25 * step) / step) * step;
+  return { low: span.low >= 0 ? Math.max(0, low) : low, high };
+}

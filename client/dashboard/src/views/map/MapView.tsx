@@ -1,0 +1,146 @@
+import { computed, useComputed } from "@preact/signals";
+import { useMemo, useRef } from "preact/hooks";
+
+import type { Frame } from "../../store/frames";
+import { oneOf, remembered } from "../../store/settings";
+import { useStore, type Pixel } from "../../store/store";
+import { COLOUR_MAPS } from "../../ui/colourMaps";
+import { Choice, Tabs, Toggle } from "../../ui/controls";
+import { fixed, NOTHING } from "../../ui/format";
+import { useDrawing, useProducts } from "../../ui/hooks";
+import { Panel } from "../../ui/Panel";
+import { Stage } from "../../ui/Stage";
+import { AMPLITUDE, MAP_PRODUCTS, type MapProduct } from "./catalogue";
+import { ColourBar } from "./ColourBar";
+import { LimitFields } from "./LimitFields";
+import { MapLook } from "./limits";
+import { paint } from "./paint";
+
+/** Value of a frame at a pixel; NaN without a frame, a pixel or a value. */
+function valueOf(frame: Frame | null, pixel: Pixel | null): number {
+  if (frame === null || pixel === null) return NaN;
+  const [height, width] = frame.shape;
+  return pixel.x < width && pixel.y < height ? frame.values[pixel.y * width + pixel.x] : NaN;
+}
+
+/** A map of one number a pixel: range, or one of the lights. */
+export function MapView() {
+  const store = useStore();
+  const choice = useMemo(
+    () => remembered(store.shelf, "map.product", "range", oneOf(MAP_PRODUCTS.map(({ product }) => product))),
+    [store],
+  );
+  const shown = MAP_PRODUCTS.find(({ product }) => product === choice.value) ?? MAP_PRODUCTS[0];
+  return (
+    <Panel
+      name="map"
+      title={
+        <Tabs
+          label="Map"
+          value={shown.product}
+          options={MAP_PRODUCTS.map(({ product, name, hint }) => ({ value: product, text: name, hint }))}
+          onChange={(product) => (choice.value = product)}
+        />
+      }
+    >
+      <Map key={shown.product} shown={shown} />
+    </Panel>
+  );
+}
+
+function Map({ shown }: { shown: MapProduct }) {
+  const store = useStore();
+  useProducts([shown.product, AMPLITUDE]);
+  const frame = store.frames.of(shown.product);
+  const look = useMemo(() => new MapLook(shown, frame, store.shelf), [shown, frame, store]);
+  const size = useComputed(() => {
+    const [height, width] = frame.value?.shape ?? [120, 163];
+    return `${width}x${height}`;
+  });
+  const [width, height] = size.value.split("x").map(Number);
+  const looked = useMemo(() => computed(() => store.pointed.value ?? store.selected.value), [store]);
+  const marked = useMemo(() => computed(() => valueOf(frame.value, looked.value)), [frame, looked]);
+
+  const canvas = useRef<HTMLCanvasElement>(null);
+  useDrawing(() => {
+    const newest = frame.value;
+    const scale = look.scale.value;
+    const colours = look.colours.value;
+    const target = canvas.current;
+    if (newest === null || target === null) return;
+    const [rows, columns] = newest.shape;
+    const context = target.getContext("2d");
+    if (context === null) return;
+    if (target.width !== columns || target.height !== rows) [target.width, target.height] = [columns, rows];
+    const image = context.createImageData(columns, rows);
+    paint(newest.values, scale, colours, image.data);
+    context.putImageData(image, 0, 0);
+    // What the picture shows, for tests and for scripts that read the page.
+    Object.assign(target.dataset, { frame: newest.meta.frame, low: scale.low, high: scale.high, colours });
+  }, [frame, look]);
+
+  return (
+    <>
+      <Stage width={width} height={height} label={`${shown.name} map`}>
+        <canvas ref={canvas} data-product={shown.product} />
+        {useComputed(() => frame.value === null).value && <p class="stage-empty">Waiting for the first frame</p>}
+      </Stage>
+      <footer class="panel-foot">
+        <ColourBar scale={look.scale.value} colours={look.colours.value} unit={shown.unit} marked={marked} />
+        <div class="panel-row">
+          <Readout shown={shown} frame={frame} looked={looked} marked={marked} />
+          <div class="panel-tools">
+            <LimitFields look={look} unit={shown.unit} />
+            <Toggle
+              pressed={look.kind.value === "logarithmic"}
+              title="Logarithmic scale"
+              onToggle={() => (look.kind.value = look.kind.peek() === "linear" ? "logarithmic" : "linear")}
+            >
+              log
+            </Toggle>
+            <Choice
+              label="Colours"
+              value={look.colours.value}
+              options={COLOUR_MAPS.map((name) => ({ value: name, text: name }))}
+              onChange={(name) => (look.colours.value = name)}
+            />
+          </div>
+        </div>
+      </footer>
+    </>
+  );
+}
+
+interface ReadoutProps {
+  readonly shown: MapProduct;
+  readonly frame: { readonly value: Frame | null };
+  readonly looked: { readonly value: Pixel | null };
+  readonly marked: { readonly value: number };
+}
+
+/** The value under the pointer, and how much light it rests on. */
+function Readout({ shown, frame, looked, marked }: ReadoutProps) {
+  const store = useStore();
+  const amplitude = store.frames.of(AMPLITUDE);
+  const place = useComputed(() => (looked.value === null ? "" : `${looked.value.x}, ${looked.value.y}`));
+  const value = useComputed(() => fixed(marked.value, shown.decimals, shown.unit));
+  const light = useComputed(() => fixed(valueOf(amplitude.value, looked.value), 0, amplitude.value?.unit ?? ""));
+  const number = useComputed(() => frame.value?.meta.frame ?? "");
+  if (place.value === "") return <p class="readout quiet">Point at the picture to read it.</p>;
+  return (
+    <p class="readout" data-frame={number} aria-live="off">
+      <output class="readout-value" data-field="value">
+        {value}
+      </output>
+      {shown.product !== AMPLITUDE && (
+        <span>
+          <span class="quiet">light</span> <span data-field="amplitude">{light}</span>
+        </span>
+      )}
+      <span class="quiet">
+        pixel <span data-field="pixel">{place}</span>
+      </span>
+      {value.value === NOTHING && <span class="quiet">no value here</span>}
+    </p>
+  );
+}

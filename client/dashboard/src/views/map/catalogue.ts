@@ -1,0 +1,25 @@
+import type { ColourMapName } from "../../ui/colourMaps";
+import type { ScaleKind } from "../../ui/scale";
+
+/** A product that is one number a pixel, and how it is shown unless somebody chose otherwise. */
+export interface MapProduct {
+  readonly product: string;
+  readonly name: string;
+  readonly hint: string;
+  readonly unit: string;
+  readonly colours: ColourMapName;
+  readonly scale: ScaleKind;
+  readonly decimals: number;
+}
+
+/** The maps on offer, in the order of their tabs. */
+export const MAP_PRODUCTS: readonly MapProduct[] = [
+  { product: "range", name: "Range", hint: "Distance to what the first light came from", unit: "m", colours: "viridis", scale: "linear", decimals: 3 },
+  { product: "direct", name: "Direct", hint: "Light of the first return", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
+  { product: "indirect", name: "Indirect", hint: "Light that took a longer way", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
+  { product: "brightness", name: "Brightness", hint: "All light: the zeroth moment", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
+  { product: "validity", name: "Validity", hint: "Smallest eigenvalue of the moments over b₀; below zero no light could have made them", unit: "1", colours: "cividis", scale: "linear", decimals: 4 },
+]; // prettier-ignore
+
+/** What the hover line says beside the map's own value. */
+export const AMPLITUDE = "brightness";

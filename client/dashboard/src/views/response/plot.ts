@@ -1,0 +1,71 @@
+import uPlot from "uplot";
+
+import { rangeOfTime_m } from "../../physics/constants";
+
+/** The plot, and the line that marks the player's time in it. */
+export interface ResponsePlot {
+  readonly plot: uPlot;
+  readonly head: HTMLElement;
+}
+
+/** A plot of density in DN/ns over time of flight in ns, with the range it stands for on top. */
+export function responsePlot(box: HTMLElement, top: () => number, seek: (time_ns: number) => void): ResponsePlot {
+  const style = getComputedStyle(box);
+  const ink = style.getPropertyValue("--quiet");
+  const hairline = style.getPropertyValue("--hairline");
+  const line = style.getPropertyValue("--light");
+  const font = `11px ${style.fontFamily}`;
+  const axis = { stroke: ink, font, labelFont: font, grid: { stroke: hairline, width: 1 }, ticks: { stroke: hairline, width: 1, size: 4 } };
+  const plot = new uPlot(
+    {
+      width: Math.max(1, box.clientWidth),
+      height: Math.max(1, box.clientHeight),
+      legend: { show: false },
+      cursor: { drag: { x: false, y: false }, points: { size: 6 }, y: false },
+      padding: [0, 12, 0, 0],
+      scales: {
+        x: { time: false, range: (_plot, low, high) => [low ?? 0, high ?? 1] },
+        y: { range: () => [0, top()] },
+      },
+      axes: [
+        { ...axis, size: 34, gap: 2, label: "time of flight (ns)", labelSize: 14, labelGap: 0 },
+        { ...axis, size: 52, gap: 4, label: "DN/ns", labelSize: 16, labelGap: 0, space: 28 },
+        {
+          ...axis,
+          scale: "x",
+          side: 0,
+          size: 24,
+          gap: 2,
+          grid: { show: false },
+          // Round numbers of metres, placed at the times they stand for.
+          splits: (_plot, _axis, low, high) => metres(low, high).map((range_m) => (range_m / METRES_PER_NS)),
+          values: (_plot, splits) => splits.map((time_ns) => `${Number((time_ns * METRES_PER_NS).toFixed(2))}\u202fm`),
+        },
+      ],
+      series: [
+        {},
+        { stroke: line, width: 1.5, fill: style.getPropertyValue("--light-wash"), points: { show: false }, spanGaps: false },
+      ],
+    },
+    [[], []],
+    box,
+  );
+  plot.over.addEventListener("click", () => {
+    const left = plot.cursor.left ?? -1;
+    if (left >= 0) seek(plot.posToVal(left, "x"));
+  });
+  const head = document.createElement("i");
+  head.className = "response-head";
+  plot.over.append(head);
+  return { plot, head };
+}
+
+const METRES_PER_NS = rangeOfTime_m(1e-9);
+
+function metres(low_ns: number, high_ns: number): number[] {
+  const span_m = (high_ns - low_ns) * METRES_PER_NS;
+  const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50].find((candidate) => span_m / candidate <= 9) ?? 100;
+  const values: number[] = [];
+  for (let n = Math.ceil((low_ns * METRES_PER_NS) / step); n * step <= high_ns * METRES_PER_NS + 1e-9; n++) values.push(n * step);
+  return values;
+}

@@ -1,0 +1,142 @@
+import { useSignal } from "@preact/signals";
+import { useEffect, useMemo } from "preact/hooks";
+
+import { RequestError } from "../../store/api";
+import { useStore } from "../../store/store";
+import type { AppliedSequence, Problem, SequenceDocument, Zeroth } from "../../stream/protocol";
+import { ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
+import { DRAFT_FIELD, documentOf, draftOf, type Draft } from "./draft";
+import { Figures } from "./SequenceView";
+
+/** Pause after the last keystroke before the service is asked what the sequence would cost. */
+const TYPING_PAUSE_MS = 250;
+
+/** What came of asking the service about a draft. */
+type Verdict =
+  | { readonly kind: "asking" }
+  | { readonly kind: "valid"; readonly applied: AppliedSequence }
+  | { readonly kind: "refused"; readonly problem: Problem; readonly words: string };
+
+/** A form that shows, as you type, what a sequence would cost, and says in plain words what is wrong with it. */
+export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; onDone: () => void }) {
+  const store = useStore();
+  // The sequence that editing began with: one that changes meanwhile must not overwrite what is typed.
+  const base = useMemo(() => applied, []);
+  const draft = useSignal<Draft>(draftOf(base));
+  const verdict = useSignal<Verdict>({ kind: "valid", applied: base });
+  const sending = useSignal(false);
+  const document = documentOf(draft.value, base);
+
+  useEffect(() => {
+    if (document === null) {
+      verdict.value = refusal(new RequestError({ detail: "Every field needs a number." }));
+      return undefined;
+    }
+    const abort = new AbortController();
+    const timer = setTimeout(() => void ask(document, abort.signal), TYPING_PAUSE_MS);
+    return () => {
+      clearTimeout(timer);
+      abort.abort();
+    };
+  }, [JSON.stringify(document)]);
+
+  const ask = async (asked: SequenceDocument, signal: AbortSignal): Promise<void> => {
+    try {
+      verdict.value = { kind: "valid", applied: await store.api.validate(asked, signal) };
+    } catch (error) {
+      if (!signal.aborted) verdict.value = refusal(error);
+    }
+  };
+
+  const apply = async (): Promise<void> => {
+    if (document === null) return;
+    sending.value = true;
+    try {
+      store.sequence.value = await store.api.setSequence(document);
+      onDone();
+    } catch (error) {
+      verdict.value = refusal(error);
+    } finally {
+      sending.value = false;
+    }
+  };
+
+  const told = verdict.value;
+  const wrong = told.kind === "refused" ? faultyField(told.problem) : null;
+  const field = (name: keyof Draft, label: string, unit: string) => (
+    <label class="field">
+      <span>{label}</span>
+      <span class="field-input">
+        <input
+          type="text"
+          inputMode="decimal"
+          autocomplete="off"
+          name={name}
+          value={draft.value[name]}
+          aria-invalid={wrong === name}
+          aria-describedby="sequence-verdict"
+          onInput={(event) => (draft.value = { ...draft.peek(), [name]: event.currentTarget.value })}
+        />
+        <span class="quiet">{unit}</span>
+      </span>
+    </label>
+  );
+
+  return (
+    <form
+      class="editor"
+      onSubmit={(event) => {
+        event.preventDefault();
+        void apply();
+      }}
+    >
+      <div class="fields">
+        {field("base_frequency_mhz", "Base frequency", "MHz")}
+        {field("harmonics", "Harmonics m", "")}
+        {field("exposure_ms", "Exposure", "ms")}
+        {field("takes", "Takes", "")}
+        <label class="field field-wide">
+          <span>Zeroth moment</span>
+          <select
+            name="zeroth"
+            value={draft.value.zeroth}
+            aria-invalid={wrong === "zeroth"}
+            onChange={(event) => (draft.value = { ...draft.peek(), zeroth: event.currentTarget.value as Zeroth })}
+          >
+            {(Object.keys(ZEROTH_NAMES) as Zeroth[]).map((zeroth) => (
+              <option key={zeroth} value={zeroth}>
+                {ZEROTH_NAMES[zeroth]} ({ZEROTH_COSTS[zeroth]})
+              </option>
+            ))}
+          </select>
+        </label>
+      </div>
+      <div id="sequence-verdict" class="verdict" role="status">
+        {told.kind === "refused" && <p class="refusal">{told.words}</p>}
+        {told.kind === "valid" && (
+          <dl class="facts">
+            <Figures applied={told.applied} />
+          </dl>
+        )}
+      </div>
+      <div class="editor-actions">
+        <button type="button" onClick={onDone}>
+          Cancel
+        </button>
+        <button type="submit" class="primary" disabled={sending.value || told.kind === "refused"}>
+          {sending.value ? "Applying…" : "Apply"}
+        </button>
+      </div>
+    </form>
+  );
+}
+
+function refusal(error: unknown): Verdict {
+  if (error instanceof RequestError) return { kind: "refused", problem: error.problem, words: error.message };
+  throw error;
+}
+
+/** The field of the draft that a problem names, as "harmonics" or as "body.harmonics". */
+function faultyField(problem: Problem): keyof Draft | null {
+  return DRAFT_FIELD[problem.field?.split(".").pop() ?? ""] ?? null;
+}

@@ -1,0 +1,79 @@
+import { useSignal } from "@preact/signals";
+
+import { useStore } from "../../store/store";
+import type { AppliedSequence } from "../../stream/protocol";
+import { engineering, fixed, grouped } from "../../ui/format";
+import { Panel } from "../../ui/Panel";
+import { SequenceEditor } from "./SequenceEditor";
+import { ZEROTH_NAMES } from "./words";
+
+/** What the camera measures with, and the way to change it. */
+export function SequenceView() {
+  const { sequence } = useStore();
+  const editing = useSignal(false);
+  const applied = sequence.value;
+  return (
+    <Panel
+      name="sequence"
+      title={<h2>Sequence</h2>}
+      tools={
+        applied !== null &&
+        !editing.value && (
+          <button type="button" onClick={() => (editing.value = true)}>
+            Edit
+          </button>
+        )
+      }
+    >
+      {applied === null ? (
+        <p class="stage-empty">Not known yet</p>
+      ) : editing.value ? (
+        <SequenceEditor applied={applied} onDone={() => (editing.value = false)} />
+      ) : (
+        <Summary applied={applied} />
+      )}
+    </Panel>
+  );
+}
+
+function Summary({ applied }: { applied: AppliedSequence }) {
+  return (
+    <dl class="facts">
+      <Fact name="Base frequency" value={engineering(applied.base_frequency_hz, "Hz", 4)} field="base_frequency_hz" />
+      <Fact name="Harmonics m" value={String(applied.harmonics)} field="harmonics" />
+      <Fact name="Unambiguous range" value={fixed(applied.unambiguous_range_m, 2, "m")} field="unambiguous_range_m" strong />
+      <Fact name="Zeroth moment" value={ZEROTH_NAMES[applied.zeroth]} field="zeroth" />
+      <Fact name="Exposure" value={engineering(applied.exposure_s, "s")} field="exposure_s" />
+      <Fact name="Takes" value={String(applied.takes)} field="takes" />
+      <Figures applied={applied} />
+    </dl>
+  );
+}
+
+/** The figures that follow from a sequence; shown for the one in use and for one being edited. */
+export function Figures({ applied }: { applied: AppliedSequence }) {
+  return (
+    <>
+      <Fact name="Images" value={grouped(applied.images)} field="images" />
+      <Fact name="Capture time" value={engineering(applied.capture_s, "s")} field="capture_s" strong />
+      <Fact name="Frame rate" value={fixed(applied.frame_rate_hz, applied.frame_rate_hz < 10 ? 2 : 1, "Hz")} field="frame_rate_hz" strong />
+      <Fact name="Raw data" value={engineering(applied.data_rate_bytes_s, "B/s")} field="data_rate_bytes_s" />
+    </>
+  );
+}
+
+interface FactProps {
+  readonly name: string;
+  readonly value: string;
+  readonly field: string;
+  readonly strong?: boolean;
+}
+
+function Fact({ name, value, field, strong = false }: FactProps) {
+  return (
+    <div class={strong ? "fact fact-strong" : "fact"}>
+      <dt>{name}</dt>
+      <dd data-field={field}>{value}</dd>
+    </div>
+  );
+}

@@ -1,0 +1,53 @@
+import type { SequenceDocument, Zeroth } from "../../stream/protocol";
+
+/** A sequence as it is typed: text, in the units people use. */
+export interface Draft {
+  readonly base_frequency_mhz: string;
+  readonly harmonics: string;
+  readonly zeroth: Zeroth;
+  readonly exposure_ms: string;
+  readonly takes: string;
+}
+
+/** Which field of the draft stands for a field of the document. */
+export const DRAFT_FIELD: Readonly<Record<string, keyof Draft>> = {
+  base_frequency_hz: "base_frequency_mhz",
+  harmonics: "harmonics",
+  zeroth: "zeroth",
+  exposure_s: "exposure_ms",
+  takes: "takes",
+};
+
+export function draftOf(sequence: SequenceDocument): Draft {
+  return {
+    base_frequency_mhz: tidy(sequence.base_frequency_hz / 1e6),
+    harmonics: String(sequence.harmonics),
+    zeroth: sequence.zeroth,
+    exposure_ms: tidy(sequence.exposure_s * 1e3),
+    takes: String(sequence.takes),
+  };
+}
+
+/** The document a draft stands for, with what is not edited from `base`; null where a field is no number. */
+export function documentOf(draft: Draft, base: SequenceDocument): SequenceDocument | null {
+  const [frequency_mhz, harmonics, exposure_ms, takes] = [
+    draft.base_frequency_mhz,
+    draft.harmonics,
+    draft.exposure_ms,
+    draft.takes,
+  ].map((text) => (text.trim() === "" ? NaN : Number(text)));
+  if (![frequency_mhz, harmonics, exposure_ms, takes].every(Number.isFinite)) return null;
+  return {
+    base_frequency_hz: frequency_mhz * 1e6,
+    harmonics,
+    zeroth: draft.zeroth,
+    exposure_s: exposure_ms / 1e3,
+    takes,
+    sub_phases: base.sub_phases,
+  };
+}
+
+/** A number without the tail that binary fractions leave: 1.92, not 1.9200000000000002. */
+function tidy(value: number): string {
+  return String(Number(value.toPrecision(9)));
+}

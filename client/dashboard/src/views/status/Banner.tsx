@@ -1,0 +1,57 @@
+import { useEffect } from "preact/hooks";
+import { useComputed, useSignal } from "@preact/signals";
+
+import { useStore } from "../../store/store";
+
+/** Says at once what is wrong, and what is being done about it; goes away with it. */
+export function Banner({ onRetry }: { onRetry: () => void }) {
+  const { status } = useStore();
+  const connection = status.connection.value;
+  if (connection.kind === "waiting") {
+    return (
+      <div class="banner" role="alert" data-banner="connection">
+        <strong>No connection to the service.</strong> {connection.reason}{" "}
+        <Countdown until_s={connection.retryAt_s} />
+        <button type="button" onClick={onRetry}>
+          Try now
+        </button>
+      </div>
+    );
+  }
+  const lostAt_s = status.cameraLostAt_s.value;
+  if (lostAt_s !== null && connection.kind === "open") {
+    return (
+      <div class="banner" role="alert" data-banner="camera">
+        <strong>Camera lost.</strong> It went away at {new Date(1000 * lostAt_s).toLocaleTimeString()}. The service looks
+        for it and goes on by itself; what you see is the last frame.
+      </div>
+    );
+  }
+  return <Unreadable />;
+}
+
+function Unreadable() {
+  const { status } = useStore();
+  if (status.unreadable.value === null) return null;
+  return (
+    <div class="banner banner-mild" role="alert" data-banner="message">
+      {status.unreadable.value}
+      <button type="button" onClick={() => (status.unreadable.value = null)}>
+        Dismiss
+      </button>
+    </div>
+  );
+}
+
+/** Seconds until the next attempt. */
+function Countdown({ until_s }: { until_s: number }) {
+  const now_s = useSignal(Date.now() / 1000);
+  useEffect(() => {
+    const timer = setInterval(() => (now_s.value = Date.now() / 1000), 250);
+    return () => {
+      clearInterval(timer);
+    };
+  }, [now_s]);
+  const left = useComputed(() => Math.max(0, Math.ceil(until_s - now_s.value)));
+  return <>{left.value > 0 ? `Trying again in ${left.value} s.` : "Trying again."}</>;
+}

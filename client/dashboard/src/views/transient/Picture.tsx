@@ -1,0 +1,72 @@
+import { signal, useComputed } from "@preact/signals";
+import { useEffect, useMemo, useRef } from "preact/hooks";
+
+import { createRenderer, type DensityRenderer } from "../../gl/renderer";
+import { useStore } from "../../store/store";
+import { useDrawing } from "../../ui/hooks";
+import { Stage } from "../../ui/Stage";
+import { AMPLITUDE } from "../map/catalogue";
+import type { TransientLook } from "./look";
+
+/** Tries of WebGL2 before the page is content with typed arrays. */
+const GRAPHICS_TRIES = 2;
+
+/** The picture of the light at the player's time. */
+export function Picture({ look }: { look: TransientLook }) {
+  const store = useStore();
+  const frame = store.frames.of("coefficients");
+  const scene = store.frames.of(AMPLITUDE);
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const renderer = useMemo(() => signal<DensityRenderer | null>(null), []);
+  const attempt = useMemo(() => signal(0), []);
+  const size = useComputed(() => `${frame.value?.coefficients?.width ?? 163}x${frame.value?.coefficients?.height ?? 120}`);
+  const [width, height] = size.value.split("x").map(Number);
+
+  // A canvas keeps the kind of its context, and a lost one stays lost: each attempt gets a new canvas.
+  useEffect(() => {
+    if (canvas.current === null) return undefined;
+    const tryAgain = (): void => {
+      attempt.value += 1;
+    };
+    let made: DensityRenderer;
+    try {
+      made = createRenderer(canvas.current, attempt.peek() < GRAPHICS_TRIES);
+    } catch (error) {
+      if (attempt.peek() >= GRAPHICS_TRIES) throw error;
+      attempt.value = GRAPHICS_TRIES;
+      return undefined;
+    }
+    made.onLost(tryAgain);
+    renderer.value = made;
+    canvas.current.dataset["renderer"] = made.kind;
+    return () => {
+      renderer.value = null;
+      made.dispose();
+    };
+  }, [attempt.value]);
+
+  useDrawing(() => {
+    const coefficients = frame.value?.coefficients ?? null;
+    const brightness = scene.value;
+    const phase_rad = store.player.phase_rad.value;
+    const tone = look.toneNow;
+    const colours = look.colours.value;
+    const wanted = look.backdrop.value;
+    if (renderer.value === null || coefficients === null) return;
+    const fits = brightness?.values.length === coefficients.width * coefficients.height;
+    const white = brightness?.map?.high ?? NaN;
+    const backdrop =
+      wanted && fits && white > 0 && brightness?.values instanceof Float32Array
+        ? { values: brightness.values, white }
+        : null;
+    renderer.value.draw(coefficients, { phase_rad, tone, colours, backdrop });
+    if (canvas.current !== null) canvas.current.dataset["frame"] = String(frame.peek()?.meta.frame);
+  }, [renderer, look]);
+
+  return (
+    <Stage width={width} height={height} label="Light in flight">
+      <canvas key={attempt.value} ref={canvas} data-product="transient" />
+      {useComputed(() => frame.value === null).value && <p class="stage-empty">Waiting for the first frame</p>}
+    </Stage>
+  );
+}

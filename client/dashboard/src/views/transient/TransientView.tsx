@@ -1,0 +1,126 @@
+import { computed, useComputed } from "@preact/signals";
+import { useMemo } from "preact/hooks";
+
+import { TONES, type ToneKind } from "../../gl/tone";
+import { densityAt } from "../../physics/maximumEntropy";
+import { SPEEDS_NS } from "../../store/player";
+import { useStore } from "../../store/store";
+import { COLOUR_MAPS } from "../../ui/colourMaps";
+import { Choice, Toggle } from "../../ui/controls";
+import { significant, superscript } from "../../ui/format";
+import { useProducts } from "../../ui/hooks";
+import { PauseIcon, PlayIcon } from "../../ui/icons";
+import { Panel } from "../../ui/Panel";
+import { AMPLITUDE } from "../map/catalogue";
+import { TransientLook } from "./look";
+import { Picture } from "./Picture";
+import { Timeline, TimeReadout } from "./Timeline";
+
+const TONE_NAMES: Record<ToneKind, string> = { linear: "linear", root: "root", logarithmic: "log" };
+
+/** Light in flight: the density of Eq. (2) at one time of flight, evaluated in this browser. */
+export function TransientView() {
+  const store = useStore();
+  useProducts(["coefficients", AMPLITUDE]);
+  const frame = store.frames.of("coefficients");
+  const look = useMemo(() => new TransientLook(frame, store.shelf), [frame, store]);
+  const { player } = store;
+  return (
+    <Panel
+      name="transient"
+      title={<h2>Light in flight</h2>}
+      tools={
+        <>
+          <Choice
+            label="Tone"
+            value={look.tone.value}
+            options={TONES.map((kind) => ({ value: kind, text: TONE_NAMES[kind] }))}
+            onChange={(kind) => (look.tone.value = kind)}
+          />
+          <Choice
+            label="Exposure"
+            value={look.stops.value}
+            options={STOPS.map((stops) => ({ value: stops, text: stops > 0 ? `+${stops}` : String(stops).replace("-", "−") }))}
+            onChange={(stops) => (look.stops.value = stops)}
+          />
+          <Toggle
+            pressed={look.backdrop.value}
+            title="Show the still scene behind the light"
+            onToggle={() => (look.backdrop.value = !look.backdrop.peek())}
+          >
+            scene
+          </Toggle>
+          <Choice
+            label="Colours"
+            value={look.colours.value}
+            options={COLOUR_MAPS.map((name) => ({ value: name, text: name }))}
+            onChange={(name) => (look.colours.value = name)}
+          />
+        </>
+      }
+    >
+      <Picture look={look} />
+      <footer class="panel-foot">
+        <Timeline />
+        <div class="panel-row">
+          <button
+            type="button"
+            class="play"
+            aria-label={player.playing.value ? "Pause" : "Play"}
+            title={player.playing.value ? "Pause (space)" : "Play (space)"}
+            onClick={() => {
+              player.toggle();
+            }}
+          >
+            {player.playing.value ? <PauseIcon /> : <PlayIcon />}
+          </button>
+          <TimeReadout />
+          <DensityReadout />
+          <div class="panel-tools">
+            <Choice
+              label="Speed"
+              value={player.speed_ns.value}
+              options={SPEEDS_NS.map((speed) => ({ value: speed, text: `${speed} ns/s` }))}
+              onChange={(speed) => (player.speed_ns.value = speed)}
+            />
+            <span class="quiet slowed" title="How many times slower than light really is">
+              1 : {slowness(player.speed_ns.value)}
+            </span>
+          </div>
+        </div>
+      </footer>
+    </Panel>
+  );
+}
+
+const STOPS = [-4, -3, -2, -1, 0, 1, 2, 3, 4];
+
+/** Times slower than real: 5 ns of flight in a second are 2·10⁸. */
+function slowness(speed_ns: number): string {
+  const factor = 1e9 / speed_ns;
+  const exponent = Math.floor(Math.log10(factor));
+  const mantissa = factor / 10 ** exponent;
+  return `${mantissa === 1 ? "" : `${Number(mantissa.toFixed(1))}·`}10${superscript(exponent)}`;
+}
+
+/** The density at the pixel looked at, at the player's time. */
+function DensityReadout() {
+  const store = useStore();
+  const density = useMemo(
+    () =>
+      computed(() => {
+        const coefficients = store.frames.of("coefficients").value?.coefficients;
+        const pixel = store.pointed.value ?? store.selected.value;
+        if (!coefficients || pixel === null) return NaN;
+        if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return NaN;
+        return densityAt(coefficients, pixel.y * coefficients.width + pixel.x, store.player.phase_rad.value);
+      }),
+    [store],
+  );
+  const text = useComputed(() => (Number.isNaN(density.value) ? "" : significant(density.value * 1e-9, 3, "DN/ns")));
+  return (
+    <span class="readout-density" data-field="density">
+      {text}
+    </span>
+  );
+}

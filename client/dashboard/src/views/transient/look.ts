@@ -1,0 +1,36 @@
+import { computed, type ReadonlySignal, type Signal } from "@preact/signals";
+
+import type { Tone, ToneKind } from "../../gl/tone";
+import { TONES } from "../../gl/tone";
+import type { Frame } from "../../store/frames";
+import { aBoolean, aNumber, oneOf, remembered, type Shelf } from "../../store/settings";
+import { COLOUR_MAPS, type ColourMapName } from "../../ui/colourMaps";
+
+/** How light in flight is shown. */
+export class TransientLook {
+  readonly colours: Signal<ColourMapName>;
+  readonly tone: Signal<ToneKind>;
+  /** Exposure compensation in stops: +1 shows half as much light as brightest. */
+  readonly stops: Signal<number>;
+  readonly backdrop: Signal<boolean>;
+  readonly white: ReadonlySignal<number>;
+  #metered: number | null = null;
+
+  constructor(frame: ReadonlySignal<Frame | null>, shelf: Shelf | null) {
+    this.colours = remembered<ColourMapName>(shelf, "transient.colours", "inferno", oneOf(COLOUR_MAPS));
+    this.tone = remembered<ToneKind>(shelf, "transient.tone", "root", oneOf(TONES));
+    this.stops = remembered(shelf, "transient.stops", 0, aNumber);
+    this.backdrop = remembered(shelf, "transient.backdrop", true, aBoolean);
+    this.white = computed(() => this.#meter(frame.value?.light?.peak ?? NaN) / 2 ** this.stops.value);
+  }
+
+  get toneNow(): Tone {
+    return { kind: this.tone.value, white: this.white.value };
+  }
+
+  /** Follows the brightest light, but not its noise: a change of less than a fifth is kept out. */
+  #meter(peak: number): number {
+    if (peak > 0 && (this.#metered === null || Math.abs(Math.log(peak / this.#metered)) > 0.2)) this.#metered = peak;
+    return this.#metered ?? 1;
+  }
+}

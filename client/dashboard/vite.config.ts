@@ -1,0 +1,20 @@
+/// <reference types="vitest/config" />
+import { defineConfig } from "vite";
+
+// The daemon a developer's page talks to while Vite serves the sources.
+const DAEMON = process.env["TRANSIENTCAM_URL"] ?? "http://127.0.0.1:8000";
+
+export default defineConfig({
+  build: {
+    // The wheel carries what stands here; the daemon serves it at `/`.
+    outDir: "../../server/transientcam_server/static",
+    emptyOutDir: true,
+    target: "es2022",
+    // A data: URL would need its own line in the Content-Security-Policy.
+    assetsInlineLimit: 0,
+    modulePreload: { polyfill: false },
+  },
+  worker: { format: "es" },
+  server: { proxy: { "/api": { target: DAEMON, ws: true } } },
+  test: { include: ["tests/**/*.test.ts"], environment: "node" },
+});
