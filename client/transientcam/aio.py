@@ -99,9 +99,11 @@ class AsyncCamera:
         """Let the camera rest."""
         return await self._ask(rest.acquire(running=False))
 
-    async def latest(self, *, wait_s: float | None = None) -> dict[str, Any]:
-        """Return what is known of the newest frame; with ``wait_s``, wait so long for a first."""
-        return await self._ask(rest.latest(wait_s=wait_s))
+    async def latest(
+        self, *, wait_s: float | None = None, after: int | None = None
+    ) -> dict[str, Any]:
+        """Return what is known of the newest frame; ``wait_s`` and ``after`` as for `frame`."""
+        return await self._ask(rest.latest(rest.Newest(wait_s, after)))
 
     async def frame(
         self,
@@ -110,17 +112,35 @@ class AsyncCamera:
         time_s: object = None,
         bins: int | None = None,
         wait_s: float | None = None,
+        after: int | None = None,
     ) -> Frame:
         """Return one product of the newest frame."""
-        return await self._ask(rest.frame(product, time_s=time_s, bins=bins, wait_s=wait_s))
+        return await self._ask(
+            rest.frame(product, rest.Newest(wait_s, after), time_s=time_s, bins=bins)
+        )
 
-    async def picture(self, product: str, *, colour: bool = False) -> bytes:
+    async def picture(
+        self,
+        product: str,
+        *,
+        colour: bool = False,
+        wait_s: float | None = None,
+        after: int | None = None,
+    ) -> bytes:
         """Return one product of the newest frame as PNG: 16 bit (range in mm), or for the eye."""
-        return await self._ask(rest.picture(product, colour=colour))
+        return await self._ask(rest.picture(product, rest.Newest(wait_s, after), colour=colour))
 
-    async def pixel(self, *, x: int, y: int, bins: int | None = None) -> dict[str, Any]:
+    async def pixel(
+        self,
+        *,
+        x: int,
+        y: int,
+        bins: int | None = None,
+        wait_s: float | None = None,
+        after: int | None = None,
+    ) -> dict[str, Any]:
         """Return everything about one pixel of the newest frame."""
-        return await self._ask(rest.pixel(x=x, y=y, bins=bins))
+        return await self._ask(rest.pixel(rest.Newest(wait_s, after), x=x, y=y, bins=bins))
 
     async def simulation(self) -> dict[str, Any]:
         """Return what is simulated; a problem where the camera is real."""

@@ -115,9 +115,9 @@ class Camera:
         """Let the camera rest."""
         return self._ask(rest.acquire(running=False))
 
-    def latest(self, *, wait_s: float | None = None) -> dict[str, Any]:
-        """Return what is known of the newest frame; with ``wait_s``, wait so long for a first."""
-        return self._ask(rest.latest(wait_s=wait_s))
+    def latest(self, *, wait_s: float | None = None, after: int | None = None) -> dict[str, Any]:
+        """Return what is known of the newest frame; ``wait_s`` and ``after`` as for `frame`."""
+        return self._ask(rest.latest(rest.Newest(wait_s, after)))
 
     def frame(
         self,
@@ -126,6 +126,7 @@ class Camera:
         time_s: object = None,
         bins: int | None = None,
         wait_s: float | None = None,
+        after: int | None = None,
     ) -> Frame:
         """Return one product of the newest frame.
 
@@ -138,17 +139,34 @@ class Camera:
         bins
             For the same, instead: how many times, evenly over the unambiguous time.
         wait_s
-            How long to wait for a first frame, if there is none yet.
+            How long to wait for a frame, if there is none yet, or none after ``after``.
+        after
+            Number of a frame; only a newer one will do.
         """
-        return self._ask(rest.frame(product, time_s=time_s, bins=bins, wait_s=wait_s))
+        return self._ask(rest.frame(product, rest.Newest(wait_s, after), time_s=time_s, bins=bins))
 
-    def picture(self, product: str, *, colour: bool = False) -> bytes:
+    def picture(
+        self,
+        product: str,
+        *,
+        colour: bool = False,
+        wait_s: float | None = None,
+        after: int | None = None,
+    ) -> bytes:
         """Return one product of the newest frame as PNG: 16 bit (range in mm), or for the eye."""
-        return self._ask(rest.picture(product, colour=colour))
+        return self._ask(rest.picture(product, rest.Newest(wait_s, after), colour=colour))
 
-    def pixel(self, *, x: int, y: int, bins: int | None = None) -> dict[str, Any]:
+    def pixel(
+        self,
+        *,
+        x: int,
+        y: int,
+        bins: int | None = None,
+        wait_s: float | None = None,
+        after: int | None = None,
+    ) -> dict[str, Any]:
         """Return everything about one pixel of the newest frame."""
-        return self._ask(rest.pixel(x=x, y=y, bins=bins))
+        return self._ask(rest.pixel(rest.Newest(wait_s, after), x=x, y=y, bins=bins))
 
     @property
     def simulation(self) -> dict[str, Any]:

@@ -15,6 +15,8 @@ Each carries its data in fields and builds its own sentence from them.
 """
 
 from collections.abc import Mapping
+from functools import partial
+from typing import Any
 
 _SHOWN_CHARACTERS = 80
 
@@ -92,6 +94,10 @@ class ProblemError(TransientcamError):
     def __str__(self) -> str:
         what = self.detail or self.title or self.type
         return f"{what} ({self.status})" if self.status else what
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # exceptions are rebuilt from positional arguments, which this one does not take
+        return partial(type(self), status=self.status), (), vars(self)
 
 
 class ProtocolError(TransientcamError):

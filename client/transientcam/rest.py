@@ -113,39 +113,59 @@ def fault(name: str) -> Request[dict[str, Any]]:
     return document("simulation/faults", method="POST", body={"fault": name})
 
 
-def latest(*, wait_s: float | None = None) -> Request[dict[str, Any]]:
+@dataclass(frozen=True, slots=True)
+class Newest:
+    """Which frame is new enough: one after frame ``after``, waited for as long as ``wait_s``."""
+
+    wait_s: float | None = None
+    after: int | None = None
+
+    @property
+    def params(self) -> tuple[tuple[str, object], ...]:
+        """What of it goes into a query."""
+        return (("wait_s", self.wait_s), ("after", self.after))
+
+    @property
+    def patience_s(self) -> float:
+        """How much longer the answer may take."""
+        return self.wait_s or 0.0
+
+
+def latest(newest: Newest) -> Request[dict[str, Any]]:
     """Build the request for what is known of the newest frame."""
-    return document("frames/latest", params=(("wait_s", wait_s),), patience_s=wait_s or 0.0)
+    return document("frames/latest", params=newest.params, patience_s=newest.patience_s)
 
 
 def frame(
-    product: str, *, time_s: object = None, bins: int | None = None, wait_s: float | None = None
+    product: str, newest: Newest, *, time_s: object = None, bins: int | None = None
 ) -> Request[Frame]:
     """Build the request for one product of the newest frame."""
     return Request(
         "GET",
         f"frames/latest/{_segment(product)}.msgpack",
         lambda answer: parse_frame(_body(answer, MEDIA_TYPE)),
-        _query((*_times(time_s), ("bins", bins), ("wait_s", wait_s))),
+        _query((*_times(time_s), ("bins", bins), *newest.params)),
         accept=MEDIA_TYPE,
-        patience_s=wait_s or 0.0,
+        patience_s=newest.patience_s,
     )
 
 
-def picture(product: str, *, colour: bool = False) -> Request[bytes]:
+def picture(product: str, newest: Newest, *, colour: bool = False) -> Request[bytes]:
     """Build the request for one product of the newest frame as PNG."""
     return Request(
         "GET",
         f"frames/latest/{_segment(product)}.png",
         lambda answer: _body(answer, "image/png"),
-        _query((("view", "colour" if colour else None),)),
+        _query((("view", "colour" if colour else None), *newest.params)),
         accept="image/png",
+        patience_s=newest.patience_s,
     )
 
 
-def pixel(*, x: int, y: int, bins: int | None = None) -> Request[dict[str, Any]]:
+def pixel(newest: Newest, *, x: int, y: int, bins: int | None = None) -> Request[dict[str, Any]]:
     """Build the request for everything about one pixel of the newest frame."""
-    return document("frames/latest/pixel", params=(("x", x), ("y", y), ("bins", bins)))
+    params = (("x", x), ("y", y), ("bins", bins), *newest.params)
+    return document("frames/latest/pixel", params=params, patience_s=newest.patience_s)
 
 
 def problem(answer: Answer) -> ProblemError:

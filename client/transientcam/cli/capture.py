@@ -39,8 +39,7 @@ def capture(
     form = form or _format_of(output)
     with Camera(url, token=token) as camera:
         if form is Format.PNG:
-            camera.latest(wait_s=wait_s)
-            data = camera.picture(product, colour=colour)
+            data = camera.picture(product, colour=colour, wait_s=wait_s)
             report: dict[str, object] = {"product": product}
         else:
             frame = camera.frame(product, time_s=time_s, bins=bins, wait_s=wait_s)
