@@ -1,1 +1,92 @@
-"""."""
+"""Trigonometric moments of transient light: reconstruction, analysis and their error bounds.
+
+The mathematics of Peters, Klein, Hullin and Klein, *Solving Trigonometric Moment Problems for Fast
+Transient Imaging* (SIGGRAPH Asia 2015), as functions of arrays: planes of moments first, any shape
+of pixels after them, single or double precision, NumPy, JAX or CuPy. ::
+
+    import transientcam_moments as tm
+
+    b = tm.calibrate(tm.measure(images), calibration)
+    b, biased = tm.bias(tm.smooth(b))
+    h = tm.density(tm.levinson(b), phase_rad)
+    direct, indirect, phase_rad = tm.separate(tm.pisarenko(b))
+"""
+
+from transientcam_moments import kernels
+from transientcam_moments.biasing import (
+    Biased,
+    bias,
+    estimate_zeroth,
+    smallest_eigenvalue,
+)
+from transientcam_moments.bounds import bounds, smoothed_density
+from transientcam_moments.calibration import calibrate, calibration_of, nominal_calibration
+from transientcam_moments.cumulative import cumulative
+from transientcam_moments.errors import MomentsError, ParameterError, ShapeError
+from transientcam_moments.flags import INVALID, Flags, flags
+from transientcam_moments.four_bucket import four_bucket, measure, saturated
+from transientcam_moments.levinson import (
+    Coefficients,
+    extend,
+    from_reflection,
+    levinson,
+    moments_of,
+)
+from transientcam_moments.maximum_entropy import density
+from transientcam_moments.modulation import (
+    arccos_sub_phases,
+    effective_modulation,
+    harmonic_cancellation_sub_phases,
+    harmonic_distortion,
+    modulation_gain,
+)
+from transientcam_moments.peaks import Peaks, peaks
+from transientcam_moments.pisarenko import Returns, Separation, pisarenko, separate
+from transientcam_moments.ranging import SPEED_OF_LIGHT_M_S, range_m
+from transientcam_moments.smoothing import smooth
+from transientcam_moments.takes import Average, average_takes
+
+__all__ = [
+    "INVALID",
+    "SPEED_OF_LIGHT_M_S",
+    "Average",
+    "Biased",
+    "Coefficients",
+    "Flags",
+    "MomentsError",
+    "ParameterError",
+    "Peaks",
+    "Returns",
+    "Separation",
+    "ShapeError",
+    "arccos_sub_phases",
+    "average_takes",
+    "bias",
+    "bounds",
+    "calibrate",
+    "calibration_of",
+    "cumulative",
+    "density",
+    "effective_modulation",
+    "estimate_zeroth",
+    "extend",
+    "flags",
+    "four_bucket",
+    "from_reflection",
+    "harmonic_cancellation_sub_phases",
+    "harmonic_distortion",
+    "kernels",
+    "levinson",
+    "measure",
+    "modulation_gain",
+    "moments_of",
+    "nominal_calibration",
+    "peaks",
+    "pisarenko",
+    "range_m",
+    "saturated",
+    "separate",
+    "smallest_eigenvalue",
+    "smooth",
+    "smoothed_density",
+]

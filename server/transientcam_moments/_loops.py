@@ -1,0 +1,88 @@
+"""Iterations over planes: NumPy stops early and lets finished pixels go, JAX runs a while loop."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from transientcam_moments._arrays import Array, namespace
+
+State = tuple[Array, ...]
+
+# Fewer than this share of unfinished pixels are worth being gathered into a smaller block.
+_SPARSE = 0.7
+
+
+def repeat(
+    body: Callable[[State], State],
+    state: State,
+    *,
+    times: int,
+    done: Callable[[State], Array],
+) -> State:
+    """Apply `body` until every pixel is done, at most `times` times.
+
+    Parameters
+    ----------
+    body : callable
+        Takes and returns the state, a tuple of planes, pixel by pixel.
+    state : tuple of array, shape (P)
+        What it starts from.
+    times : int
+        Most applications.
+    done : callable
+        Takes the state, returns a boolean plane. A pixel that is done may or may not be iterated
+        further; its result must stay valid if it is.
+
+    Returns
+    -------
+    tuple of array
+        The state of every pixel after its last application.
+    """
+    if isinstance(state[-1], np.ndarray):
+        return _repeat_numpy(body, state, times, done)
+    if namespace(state[-1]).__name__ == "jax.numpy":
+        return _repeat_jax(body, state, times, done)
+    for _ in range(times):
+        state = body(state)
+        if bool(done(state).all()):
+            break
+    return state
+
+
+def _repeat_numpy(
+    body: Callable[[State], State], state: State, times: int, done: Callable[[State], Array]
+) -> State:
+    results = [part.copy() for part in state]
+    active: np.ndarray[Any, Any] | None = None  # None stands for all pixels
+    for step in range(times):
+        state = body(state)
+        finished = done(state)
+        left = int(finished.size - np.count_nonzero(finished))
+        if left > _SPARSE * finished.size and step + 1 < times:
+            continue
+        where = slice(None) if active is None else active
+        for result, part in zip(results, state, strict=True):
+            result[where] = part
+        if left == 0:
+            break
+        keep = np.flatnonzero(~finished)
+        active = keep if active is None else active[keep]
+        state = tuple(part[keep] for part in state)
+    return tuple(results)
+
+
+def _repeat_jax(
+    body: Callable[[State], State], state: State, times: int, done: Callable[[State], Array]
+) -> State:
+    from jax import lax
+
+    def more(carry: tuple[Any, State]) -> Any:
+        step, inner = carry
+        return (step < times) & ~done(inner).all()
+
+    def advance(carry: tuple[Any, State]) -> tuple[Any, State]:
+        step, inner = carry
+        return step + 1, body(inner)
+
+    return lax.while_loop(more, advance, (0, state))[1]

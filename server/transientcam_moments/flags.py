@@ -1,0 +1,68 @@
+"""What a pixel says about itself."""
+
+from enum import IntFlag
+
+import numpy as np
+
+from transientcam_moments._arrays import Array, moment_planes, namespace
+
+
+class Flags(IntFlag):
+    """Bits of a pixel's flags, stored as uint8; 0 is a valid pixel that nobody touched."""
+
+    VALID = 0
+    BIASED = 1
+    """The moments contradicted each other or had too little uniform part and were biased."""
+    NO_SIGNAL = 2
+    """No light: b_0 is not above the least brightness."""
+    SATURATED = 4
+    """An image was at the end of its scale."""
+    NON_FINITE = 8
+    """A moment is NaN or infinite."""
+    DEGENERATE = 16
+    """The Toeplitz matrix is singular or indefinite, so that the density is not determined."""
+
+
+INVALID = Flags.NO_SIGNAL | Flags.NON_FINITE
+"""A pixel with one of these has no range."""
+
+
+def flags(b: Array, *, minimum_brightness: float = 0.0, eigenvalue: Array | None = None) -> Array:
+    """Judge moments pixel by pixel.
+
+    Parameters
+    ----------
+    b : array, shape (m + 1, ...)
+        Trigonometric moments.
+    minimum_brightness : float
+        Pixels with b_0 at or below it have no signal, in the unit of b_0.
+    eigenvalue : array, shape (...), optional
+        Smallest eigenvalue of `b`, where it is at hand already.
+
+    Returns
+    -------
+    array, shape (...), uint8
+        Of `Flags`: NON_FINITE, NO_SIGNAL and DEGENERATE. A pixel carries the first that applies.
+
+    Raises
+    ------
+    ShapeError
+        When `b` is not 2 to 33 planes of numbers.
+    """
+    from transientcam_moments.biasing import smallest_eigenvalue
+
+    planes, trailing = moment_planes(b)
+    xp = namespace(planes)
+    smallest: Array = smallest_eigenvalue(planes) if eigenvalue is None else eigenvalue
+    b0 = planes[0].real
+    finite = xp.isfinite(b0)
+    for plane in planes[1:]:
+        finite = finite & xp.isfinite(plane)
+    dark = finite & ~(b0 > minimum_brightness)
+    # an eigenvalue is known to about eps times the order of the matrix
+    rounding = 4 * len(planes) * float(np.finfo(b0.dtype).eps)
+    degenerate = finite & ~dark & ~(smallest.reshape(-1) > rounding * b0)
+    out = xp.where(finite, 0, int(Flags.NON_FINITE))
+    out = xp.where(dark, int(Flags.NO_SIGNAL), out)
+    out = xp.where(degenerate, int(Flags.DEGENERATE), out)
+    return out.astype(xp.uint8).reshape(trailing)

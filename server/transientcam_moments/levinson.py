@@ -1,0 +1,305 @@
+"""Levinson's recursion: from moments to the polynomial of Eq. (2), and back.
+
+The recursion runs over the leading blocks of the Toeplitz matrix B. At order k it knows the
+predictor polynomial a (a_0 = 1), the error E and adds one reflection coefficient g, |g| < 1 as
+long as B is positive definite (Prop. 1). Where the data leave the positive definite cone, or come
+closer to its border than rounding can tell, g is projected back onto the disc and the recursion
+ends there: what comes out is always a valid positive density, and `flags` marks the pixel.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from transientcam_moments import _kernels
+from transientcam_moments._arrays import (
+    MAX_HARMONICS,
+    Array,
+    as_array,
+    by_blocks,
+    moment_planes,
+    namespace,
+    real_type,
+    some,
+    squared,
+)
+from transientcam_moments.errors import ParameterError, ShapeError
+
+
+class Coefficients(NamedTuple):
+    """A maximum entropy density h = E / (2 pi |sum_j conj(a_j) exp(i j phi)|^2), Eq. (2).
+
+    Attributes
+    ----------
+    error : array, shape (...)
+        E, the prediction error, in the unit of b_0; positive wherever b_0 is.
+    polynomial : array, shape (m + 1, ...)
+        a_0 = 1, a_1 .. a_m; E B^-1 e_0 = a.
+    reflection : array, shape (m, ...)
+        g_1 .. g_m, inside the unit disc. Together with b_0 they say the same as the moments.
+    """
+
+    error: Array
+    polynomial: Array
+    reflection: Array
+
+    @property
+    def brightness(self) -> Array:
+        """b_0 = E / prod (1 - |g_k|^2), shape (...), in the unit of b_0."""
+        scale = self.error
+        for g in self.reflection:
+            scale = scale / (1 - squared(g))
+        return scale
+
+
+class Recursion(NamedTuple):
+    """All that Levinson's recursion learns of one block of pixels, in lists of planes.
+
+    Attributes
+    ----------
+    errors : list of real planes
+        E_0 .. E_m of moments with b_0 = 1.
+    polynomial : list of complex planes
+        a_1 .. a_m (a_0 = 1 is not stored).
+    reflection : list of complex planes
+        g_1 .. g_m.
+    order : integer plane
+        The order at which the recursion was stopped by the border of the cone, else m + 1.
+    """
+
+    errors: list[Array]
+    polynomial: list[Array]
+    reflection: list[Array]
+    order: Array
+
+
+def levinson(b: Array) -> Coefficients:
+    """Solve the Toeplitz system of Theorem 1 for every pixel.
+
+    Parameters
+    ----------
+    b : array, shape (m + 1, ...)
+        Trigonometric moments b_0 .. b_m, complex64 or complex128; the imaginary part of b_0 is
+        ignored.
+
+    Returns
+    -------
+    Coefficients
+        In the precision of `b`. A pixel whose matrix B is not positive definite gets the density
+        of the nearest valid reflection coefficients; a pixel with b_0 <= 0 gets E = 0 and
+        reflections of zero; a pixel with a NaN or an infinity gets NaN.
+
+    Raises
+    ------
+    ShapeError
+        When `b` is not 2 to 33 planes of numbers.
+
+    Notes
+    -----
+    Theorem 1 and Eq. (2) of the paper; the recursion is Levinson's and Durbin's.
+    """
+    planes, trailing = moment_planes(b)
+    run = _kernels.find("levinson", planes) or _levinson
+    error, polynomial, reflection = by_blocks(run, planes) if run is _levinson else run(planes)
+    return Coefficients(
+        error.reshape(trailing),
+        polynomial.reshape((-1, *trailing)),
+        reflection.reshape((-1, *trailing)),
+    )
+
+
+def from_reflection(b0: Array, reflection: Array) -> Coefficients:
+    """Build the density of a total brightness and reflection coefficients (step-up recursion).
+
+    Parameters
+    ----------
+    b0 : array, shape (...)
+        Total brightness, real and >= 0.
+    reflection : array, shape (m, ...)
+        g_1 .. g_m with |g_k| < 1, complex; any such set belongs to a positive density.
+
+    Returns
+    -------
+    Coefficients
+
+    Raises
+    ------
+    ShapeError
+        When the shapes don't belong together.
+    """
+    reflection = as_array(reflection)
+    b0 = as_array(b0)
+    if reflection.ndim < 1 or not 1 <= reflection.shape[0] <= MAX_HARMONICS:
+        raise ShapeError("reflection", f"of shape {tuple(reflection.shape)}", "1 to 32 planes")
+    if tuple(b0.shape) != tuple(reflection.shape[1:]):
+        expected = f"of shape {tuple(reflection.shape[1:])}"
+        raise ShapeError("b0", f"of shape {tuple(b0.shape)}", expected)
+    xp = namespace(reflection)
+    error = b0.astype(real_type(reflection))
+    a: list[Array] = []
+    for g in reflection:
+        a = _step_up(a, g)
+        error = error * (1 - squared(g))
+    return Coefficients(error, xp.stack([xp.ones_like(reflection[0]), *a]), reflection)
+
+
+def extend(coefficients: Coefficients, n: int) -> Array:
+    """Continue the moments as the density itself does: b_{m+1} .. b_n.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        Of order m.
+    n : int
+        Highest harmonic, n > m.
+
+    Returns
+    -------
+    array, shape (n - m, ...)
+
+    Raises
+    ------
+    ParameterError
+        When n <= m.
+
+    Notes
+    -----
+    b_k = -sum_j a_j b_{k-j}: the density of Eq. (2) is that of an autoregressive process.
+    """
+    a = coefficients.polynomial
+    m = a.shape[0] - 1
+    if n <= m:
+        raise ParameterError("n", n, f"above the order m = {m}")
+    b = _moments(coefficients)
+    for k in range(m + 1, n + 1):
+        b.append(_predicted(a, b, k))
+    return namespace(a).stack(b[m + 1 :])
+
+
+def moments_of(coefficients: Coefficients) -> Array:
+    """Return the moments b_0 .. b_m of a density, shape (m + 1, ...): levinson's inverse."""
+    return namespace(coefficients.polynomial).stack(_moments(coefficients))
+
+
+def _moments(coefficients: Coefficients) -> list[Array]:
+    """Undo the recursion: at order k, b_k = -sum_{0<j<k} a_j b_{k-j} - g_k E_{k-1}."""
+    error = coefficients.brightness
+    b = [error + 0 * coefficients.polynomial[0]]
+    a: list[Array] = []
+    for k, g in enumerate(coefficients.reflection, start=1):
+        inner = sum((a[j - 1] * b[k - j] for j in range(1, k)), start=g * error)
+        b.append(-inner)
+        a = _step_up(a, g)
+        error = error * (1 - squared(g))
+    return b
+
+
+def _predicted(a: Array, b: list[Array], k: int) -> Array:
+    total = a[1] * b[k - 1]
+    for j in range(2, a.shape[0]):
+        total = total + a[j] * b[k - j]
+    return -total
+
+
+def _levinson(b: Array) -> tuple[Array, Array, Array]:
+    """Planar statement of `levinson`: b (m + 1, P) to error, polynomial, reflection."""
+    xp = namespace(b)
+    with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
+        relative, scale = normalised(b)
+        result = recursion(_physical(relative))
+        error = result.errors[-1] * (relative[0] * scale)
+    one = xp.ones_like(b[0])
+    return error, xp.stack([one, *result.polynomial]), xp.stack(result.reflection)
+
+
+def normalised(b: Array) -> tuple[list[Array], Array]:
+    """Divide moments by the largest of them, which is b_0 for every physical pixel.
+
+    Returns
+    -------
+    planes : list of m + 1 planes
+        The first one is real: 1, or less where b_0 is not the largest moment.
+    scale : real plane
+        What the planes have to be multiplied with; 0 where everything is 0.
+
+    Notes
+    -----
+    Tiny and huge pixels are brought into the middle of the exponent range first: the reciprocal
+    of either would leave it.
+    """
+    xp = namespace(b)
+    limits = np.finfo(real_type(b))
+    middle = 2.0 ** (limits.maxexp * 3 // 4)
+    scale = abs(b[0].real)
+    for plane in b[1:]:
+        scale = xp.maximum(scale, xp.maximum(abs(plane.real), abs(plane.imag)))
+    planes = [b[0].real, *b[1:]]
+    near = scale
+    outside = (scale < 1 / middle) | (scale > middle)
+    if some(outside):
+        lift = xp.where(scale < 1 / middle, middle, xp.where(outside, 1 / middle, 1.0))
+        lift = lift.astype(scale.dtype)
+        planes = [plane * lift for plane in planes]
+        near = scale * lift
+    inverse = xp.where(near > 0, 1 / near, near)  # 0 and NaN stay what they are
+    return [plane * inverse for plane in planes], scale
+
+
+def _physical(b: list[Array]) -> list[Array]:
+    """Divide by b_0 and bring moments larger than 2 b_0 back to that, so that nothing overflows.
+
+    |b_k| <= b_0 for every density; a pixel that breaks this is projected onto the border of the
+    cone anyway, and only the direction of b_k still says something.
+    """
+    xp = namespace(b[1])
+    b0 = b[0]
+    broken = ~(b0 >= 1)
+    if not some(broken):
+        return b
+    tiny = 4 * float(np.finfo(b0.dtype).tiny)
+    inverse = xp.where(b0 > tiny, 1 / b0, 0 * b0)
+    planes = [b0 * inverse]
+    for plane in b[1:]:
+        size = xp.sqrt(squared(plane))
+        planes.append(plane * xp.where(size > 2 * b0, 2 / size, inverse) * (planes[0] > 0))
+    return planes
+
+
+def recursion(b: list[Array]) -> Recursion:
+    """Run Levinson's recursion over planes with b_0 = 1, or 0 where there is no light (Theorem 1).
+
+    The border of the cone is where E_k would fall to 4 eps or below: less than rounding leaves of
+    it. There g_k is projected onto the disc, and all later ones are zero.
+    """
+    xp = namespace(b[1])
+    floor = 4 * float(np.finfo(b[0].dtype).eps)
+    errors = [b[0]]
+    a: list[Array] = []
+    reflection: list[Array] = []
+    order = xp.full(b[0].shape, len(b), dtype=np.int32)
+    alive = b[0] > 0
+    for k in range(1, len(b)):
+        error = errors[-1]
+        total = b[k]
+        for j in range(1, k):
+            total = total + a[j - 1] * b[k - j]
+        g = total * (-1 / error)
+        remaining = error * (1 - squared(g))
+        outside = ~(remaining > floor) | ~alive
+        if some(outside):
+            onto = xp.sqrt(xp.maximum(1 - floor / error, 0)) / xp.sqrt(squared(g))
+            # NaN belongs to an invalid pixel, which keeps it; what comes after the border is zero
+            g = xp.where(alive, xp.where(remaining > floor, g, g * onto), 0 * b[k])
+            remaining = xp.where(alive, xp.maximum(remaining, floor), error)
+            order = xp.where(outside & alive, k, order)
+            alive = alive & ~outside
+        a = _step_up(a, g)
+        errors.append(remaining)
+        reflection.append(g)
+    return Recursion(errors, a, reflection, order)
+
+
+def _step_up(a: list[Array], g: Array) -> list[Array]:
+    """Raise the order by one: a_j + g conj(a_{k-j}), a_k = g."""
+    k = len(a) + 1
+    return [a[j - 1] + g * a[k - j - 1].conj() for j in range(1, k)] + [g]

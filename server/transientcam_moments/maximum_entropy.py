@@ -1,0 +1,115 @@
+"""The maximum entropy density at given phases (Theorem 1, Eq. 2)."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from transientcam_moments import _kernels
+from transientcam_moments._arrays import (
+    Array,
+    chosen,
+    flat_planes,
+    namespace,
+    phases,
+    real_type,
+    squared,
+)
+from transientcam_moments.levinson import Coefficients
+
+_BLOCK_VALUES = 1 << 18
+
+
+def density(coefficients: Coefficients, phase_rad: Array, *, evaluation: str = "modulus") -> Array:
+    """Evaluate the density h of every pixel at given phases.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        Of order m, from `levinson` or `from_reflection`.
+    phase_rad : array, shape (T,)
+        Phases phi in radian, any order and any turn; a single number counts as T = 1.
+    evaluation : {"modulus", "fourier"}
+        Evaluate the denominator as the squared modulus of a polynomial, whose relative error near
+        a peak of relative depth d grows like eps / sqrt(d), or as a real Fourier series, which is
+        half the work and errs like eps / d.
+
+    Returns
+    -------
+    array, shape (T, ...)
+        h in the unit of b_0 per radian, >= 0. Per second: g(tau) = 2 pi f h(2 pi f tau).
+
+    Raises
+    ------
+    ParameterError
+        For another `evaluation`.
+    ShapeError
+        When `phase_rad` has more than one axis or isn't real.
+
+    Notes
+    -----
+    Eq. (2) with B^-1 e_0 = a / E. Nothing is larger than b_0 / (2 pi eps): peaks narrower than
+    rounding resolves have no meaningful height.
+    """
+    chosen("evaluation", evaluation, ("modulus", "fourier"))
+    error, a = coefficients.error, coefficients.polynomial
+    phase = phases(phase_rad, like=a)
+    planes = flat_planes(a)
+    out = None
+    if evaluation == "modulus":
+        lane = _kernels.find("density", planes)
+        if lane is not None:
+            out = lane(planes, error.reshape(-1), phase, None)
+    if out is None:
+        fill = _density if evaluation == "modulus" else _density_fourier
+        floor = _floor(coefficients).reshape(-1)
+        out = _by_blocks(fill, planes, error.reshape(-1), floor, phase)
+    return out.reshape((phase.shape[0], *error.shape))
+
+
+def _floor(coefficients: Coefficients) -> Array:
+    """Return the smallest squared modulus that is told from rounding: eps prod (1 - |g_k|^2)."""
+    product = 1 - squared(coefficients.reflection[0])
+    for g in coefficients.reflection[1:]:
+        product = product * (1 - squared(g))
+    return float(np.finfo(product.dtype).eps) * product
+
+
+def _by_blocks(
+    fill: Callable[..., Array], planes: Array, error: Array, floor: Array, phase: Array
+) -> Array:
+    """Fill blocks of pixels that stay in cache with all their phases."""
+    xp = namespace(planes)
+    if xp is not np:
+        return fill(planes, error, floor, phase)
+    out = np.empty((phase.shape[0], planes.shape[1]), real_type(planes))
+    pixels = max(256, _BLOCK_VALUES // max(1, phase.shape[0]))
+    for start in range(0, planes.shape[1], pixels):
+        part = slice(start, start + pixels)
+        out[:, part] = fill(planes[:, part], error[part], floor[part], phase)
+    return out
+
+
+def _density(a: Array, error: Array, floor: Array, phase: Array) -> Array:
+    """Planar statement of Eq. (2): two real matrix products, then a reciprocal."""
+    xp = namespace(a)
+    angles = phase[:, None] * xp.arange(a.shape[0])
+    cos, sin = xp.cos(angles).astype(error.dtype), xp.sin(angles).astype(error.dtype)
+    # conj(a_j) exp(i j phi) = (re cos + im sin) + i (re sin - im cos)
+    parts = xp.concatenate([a.real, a.imag])
+    real = xp.concatenate([cos, sin], axis=1) @ parts
+    imag = xp.concatenate([sin, -cos], axis=1) @ parts
+    with np.errstate(all="ignore"):
+        return error / (2 * np.pi) / xp.maximum(real * real + imag * imag, floor)
+
+
+def _density_fourier(a: Array, error: Array, floor: Array, phase: Array) -> Array:
+    """Evaluate |sum conj(a_j) e^{ij phi}|^2 = r_0 + 2 Re sum_k r_k e^{ik phi}."""
+    xp = namespace(a)
+    size = a.shape[0]
+    r = [sum(a[j] * a[j + k].conj() for j in range(size - k)) for k in range(size)]
+    angles = phase[:, None] * xp.arange(size)
+    cos, sin = xp.cos(angles).astype(error.dtype), xp.sin(angles).astype(error.dtype)
+    parts = xp.stack([r[0].real] + [2 * p.real for p in r[1:]] + [-2 * p.imag for p in r[1:]])
+    with np.errstate(all="ignore"):
+        series = xp.concatenate([cos, sin[:, 1:]], axis=1) @ parts
+        return error / (2 * np.pi) / xp.maximum(series, floor)
