@@ -1,4 +1,4 @@
-import { BACKDROP_GAIN, DECADES } from "./tone";
+import { BACKDROP_GAIN, DECADES, FULL_LIGHT } from "./tone";
 
 /** One triangle that covers the canvas, from the vertex number alone. */
 export const VERTEX_SHADER = `#version 300 es
@@ -59,7 +59,7 @@ void main() {
   if (backdropWhite > 0.0) {
     float scene = texelFetch(backdrop, at, 0).r / backdropWhite;
     float grey = scene > 0.0 ? ${BACKDROP_GAIN.toFixed(3)} * sqrt(min(scene, 1.0)) : 0.0;
-    light = mix(vec3(grey), light, smoothstep(0.0, 0.35, place));
+    light = 1.0 - (1.0 - grey) * (1.0 - light * smoothstep(0.0, ${FULL_LIGHT.toFixed(3)}, place));
   }
   colour = vec4(light, 1.0);
 }`;

@@ -31,11 +31,19 @@ export function toned(kind: ToneKind, share: number): number {
   return bounded > 0 ? Math.max(0, 1 + Math.log10(bounded) / DECADES) : 0;
 }
 
-/** How far the colour of the light covers the still scene behind it, by its place on the map. */
-export function coverage(place: number): number {
-  const x = Math.min(1, Math.max(0, place / 0.35));
+/** Place on the colour map from which light over a still scene has its full colour. */
+export const FULL_LIGHT = 0.35;
+
+/** Share of its colour that light at `place` adds to the still scene behind it: GLSL's smoothstep. */
+export function strength(place: number): number {
+  const x = Math.min(1, Math.max(0, place / FULL_LIGHT));
   return x * x * (3 - 2 * x);
 }
 
 /** Brightest grey of the still scene behind the light. */
 export const BACKDROP_GAIN = 0.42;
+
+/** Grey of the still scene, 0 to 1, where `share` is its brightness over white; the root brings out what is dim. */
+export function backdropGrey(share: number): number {
+  return share > 0 ? BACKDROP_GAIN * Math.sqrt(Math.min(1, share)) : 0;
+}

@@ -1,7 +1,7 @@
 import { densityImage, type Coefficients } from "../physics/maximumEntropy";
 import { colourTable, levelOf } from "../ui/colourMaps";
 import type { DensityRenderer, Exposure } from "./renderer";
-import { BACKDROP_GAIN, coverage, toned } from "./tone";
+import { backdropGrey, strength, toned } from "./tone";
 
 /** Draws with typed arrays on a 2D canvas, for browsers that refuse WebGL2. */
 export class TypedArrayRenderer implements DensityRenderer {
@@ -28,10 +28,11 @@ export class TypedArrayRenderer implements DensityRenderer {
       const place = share >= 0 ? toned(tone.kind, share) : 0; // NaN: no density, no light
       const level = 4 * levelOf(place);
       const grey = backdrop === null ? 0 : backdropGrey(backdrop.values[pixel] / backdrop.white);
-      const cover = backdrop === null ? 1 : coverage(place);
-      data[4 * pixel] = grey + cover * (table[level] - grey);
-      data[4 * pixel + 1] = grey + cover * (table[level + 1] - grey);
-      data[4 * pixel + 2] = grey + cover * (table[level + 2] - grey);
+      const added = backdrop === null ? 1 : strength(place);
+      for (let channel = 0; channel < 3; channel++) {
+        const light = (added * table[level + channel]) / 255;
+        data[4 * pixel + channel] = 255 * (1 - (1 - grey) * (1 - light));
+      }
       data[4 * pixel + 3] = 255;
     }
     this.#context.putImageData(this.#imageOf(width, height), 0, 0);
@@ -65,9 +66,4 @@ export class TypedArrayRenderer implements DensityRenderer {
     }
     return this.#image;
   }
-}
-
-/** Grey of the still scene, 0 to 255; the root brings out what is dim. */
-function backdropGrey(share: number): number {
-  return share > 0 ? 255 * BACKDROP_GAIN * Math.sqrt(Math.min(1, share)) : 0;
 }

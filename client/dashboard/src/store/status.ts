@@ -17,8 +17,8 @@ export class Status {
   readonly connection = signal<Connection>({ kind: "connecting" });
   /** The camera's state in the service's word; null until it was told. */
   readonly cameraState = signal<string | null>(null);
-  /** When the camera was lost, in s of unix time; null while it is there. */
-  readonly cameraLostAt_s = signal<number | null>(null);
+  /** When the camera was lost, in s of unix time, and why if that is known; null while it is there. */
+  readonly cameraLoss = signal<{ readonly at_s: number; readonly reason: string | null } | null>(null);
   readonly newest = signal<FrameMeta | null>(null);
   readonly rate_hz = signal<number | null>(null);
   readonly latency_s = signal<number | null>(null);
@@ -29,7 +29,7 @@ export class Status {
   /** Frames the service left out for this page, which was slower than the camera. */
   readonly dropped = computed(() => Math.max(0, ...this.#drops.value.values()));
   /** What is on screen is not what the camera sees now. */
-  readonly stale = computed(() => this.connection.value.kind !== "open" || this.cameraLostAt_s.value !== null);
+  readonly stale = computed(() => this.connection.value.kind !== "open" || this.cameraLoss.value !== null);
   #arrivals: number[] = [];
 
   /** A new session with the service: it counts anew. */
@@ -43,12 +43,17 @@ export class Status {
   cameraIs(state: string, now_s: number): void {
     this.cameraState.value = state;
     if (LOST_STATES.has(state)) this.cameraLost(now_s);
-    else this.cameraLostAt_s.value = null;
+    else this.cameraBack();
   }
 
-  cameraLost(now_s: number): void {
-    if (this.cameraLostAt_s.peek() === null) this.cameraLostAt_s.value = now_s;
+  cameraLost(now_s: number, reason: string | null = null): void {
+    const known = this.cameraLoss.peek();
+    this.cameraLoss.value = { at_s: known?.at_s ?? now_s, reason: reason ?? known?.reason ?? null };
     this.#forgetRate();
+  }
+
+  cameraBack(): void {
+    this.cameraLoss.value = null;
   }
 
   connectionLost(reason: string, retryAt_s: number): void {

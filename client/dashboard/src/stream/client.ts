@@ -134,10 +134,10 @@ export class StreamClient {
         status.lostImages.value += notice.count;
         break;
       case "camera-lost":
-        status.cameraLost(this.#now_s());
+        status.cameraLost(this.#now_s(), notice.reason);
         break;
       case "camera-back":
-        status.cameraLostAt_s.value = null;
+        status.cameraBack();
         void this.#readDocuments();
         break;
       case "sequence-changed":

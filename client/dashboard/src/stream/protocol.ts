@@ -87,7 +87,8 @@ export type Notice =
       readonly total: number;
     }
   | { readonly type: "notice"; readonly kind: "lost-images"; readonly count: number }
-  | { readonly type: "notice"; readonly kind: "camera-lost" | "camera-back" }
+  | { readonly type: "notice"; readonly kind: "camera-lost"; readonly reason?: string }
+  | { readonly type: "notice"; readonly kind: "camera-back" }
   | { readonly type: "notice"; readonly kind: "sequence-changed"; readonly sequence: AppliedSequence };
 
 export interface ErrorMessage {

@@ -29,9 +29,10 @@ export function engineering(value: number | null | undefined, unit: string, digi
   if (value === 0) return withUnit("0", unit);
   const size = Math.abs(value);
   const [factor, prefix] = PREFIXES.find(([f]) => size >= f * 0.9995) ?? PREFIXES[PREFIXES.length - 1];
-  const scaled = value / factor;
+  // Rounding first: 999.9999 has as many digits before the point as 1000.
+  const scaled = Number((value / factor).toPrecision(digits));
   const decimals = Math.max(0, digits - 1 - Math.floor(Math.log10(Math.abs(scaled)) + 1e-9));
-  return withUnit(scaled.toFixed(Math.min(decimals, 6)).replace("-", "−"), prefix + unit);
+  return withUnit(scaled.toFixed(decimals).replace("-", "−"), prefix + unit);
 }
 
 /** `value` with `digits` significant digits, without a prefix; powers of ten where it is far from one. */

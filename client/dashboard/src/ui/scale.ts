@@ -55,7 +55,8 @@ export function ticks(scale: Scale, count: number): number[] {
   }
   const step = niceStep(scale.high - low, count);
   const values: number[] = [];
-  for (let n = Math.ceil(low / step - 1e-9); n * step <= scale.high + 1e-9 * step; n++) values.push(n * step);
+  const first = Math.ceil(low / step - 1e-9);
+  for (let n = first; n * step <= scale.high + 1e-9 * step; n++) values.push(n * step + 0); // no minus zero
   return values;
 }
 

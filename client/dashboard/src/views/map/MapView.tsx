@@ -1,4 +1,4 @@
-import { computed, useComputed } from "@preact/signals";
+import { computed, useComputed, type ReadonlySignal } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 
 import type { Frame } from "../../store/frames";
@@ -31,6 +31,8 @@ export function MapView() {
     [store],
   );
   const shown = MAP_PRODUCTS.find(({ product }) => product === choice.value) ?? MAP_PRODUCTS[0];
+  const frame = store.frames.of(shown.product);
+  const look = useMemo(() => new MapLook(shown, frame, store.shelf), [shown, frame, store]);
   return (
     <Panel
       name="map"
@@ -42,17 +44,38 @@ export function MapView() {
           onChange={(product) => (choice.value = product)}
         />
       }
+      tools={
+        <>
+          <Toggle
+            pressed={look.kind.value === "logarithmic"}
+            title="Logarithmic scale"
+            onToggle={() => (look.kind.value = look.kind.peek() === "linear" ? "logarithmic" : "linear")}
+          >
+            log
+          </Toggle>
+          <Choice
+            label="Colours"
+            value={look.colours.value}
+            options={COLOUR_MAPS.map((name) => ({ value: name, text: name }))}
+            onChange={(name) => (look.colours.value = name)}
+          />
+        </>
+      }
     >
-      <Map key={shown.product} shown={shown} />
+      <Map key={shown.product} shown={shown} frame={frame} look={look} />
     </Panel>
   );
 }
 
-function Map({ shown }: { shown: MapProduct }) {
+interface MapProps {
+  readonly shown: MapProduct;
+  readonly frame: ReadonlySignal<Frame | null>;
+  readonly look: MapLook;
+}
+
+function Map({ shown, frame, look }: MapProps) {
   const store = useStore();
   useProducts([shown.product, AMPLITUDE]);
-  const frame = store.frames.of(shown.product);
-  const look = useMemo(() => new MapLook(shown, frame, store.shelf), [shown, frame, store]);
   const size = useComputed(() => {
     const [height, width] = frame.value?.shape ?? [120, 163];
     return `${width}x${height}`;
@@ -89,22 +112,7 @@ function Map({ shown }: { shown: MapProduct }) {
         <ColourBar scale={look.scale.value} colours={look.colours.value} unit={shown.unit} marked={marked} />
         <div class="panel-row">
           <Readout shown={shown} frame={frame} looked={looked} marked={marked} />
-          <div class="panel-tools">
-            <LimitFields look={look} unit={shown.unit} />
-            <Toggle
-              pressed={look.kind.value === "logarithmic"}
-              title="Logarithmic scale"
-              onToggle={() => (look.kind.value = look.kind.peek() === "linear" ? "logarithmic" : "linear")}
-            >
-              log
-            </Toggle>
-            <Choice
-              label="Colours"
-              value={look.colours.value}
-              options={COLOUR_MAPS.map((name) => ({ value: name, text: name }))}
-              onChange={(name) => (look.colours.value = name)}
-            />
-          </div>
+          <LimitFields look={look} unit={shown.unit} />
         </div>
       </footer>
     </>
@@ -113,9 +121,9 @@ function Map({ shown }: { shown: MapProduct }) {
 
 interface ReadoutProps {
   readonly shown: MapProduct;
-  readonly frame: { readonly value: Frame | null };
-  readonly looked: { readonly value: Pixel | null };
-  readonly marked: { readonly value: number };
+  readonly frame: ReadonlySignal<Frame | null>;
+  readonly looked: ReadonlySignal<Pixel | null>;
+  readonly marked: ReadonlySignal<number>;
 }
 
 /** The value under the pointer, and how much light it rests on. */

@@ -3,16 +3,18 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 import "uplot/dist/uPlot.min.css";
 
 import { rangeOfTime_m } from "../../physics/constants";
-import { impulseResponse, peaks, type Peak } from "../../physics/maximumEntropy";
+import { impulseResponse, peaks, type Peak } from "../../physics/impulseResponse";
+import { aBoolean, remembered } from "../../store/settings";
 import { useStore } from "../../store/store";
+import { Toggle } from "../../ui/controls";
 import { fixed } from "../../ui/format";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { autoLimits, type Span } from "../../ui/scale";
 import { responsePlot, type ResponsePlot } from "./plot";
 
-/** Samples of the curve: a quarter of what a narrow peak at m = 8 spans. */
-const SAMPLES = 1537;
+/** Even samples of the curve, beside those around its peaks. */
+const SAMPLES = 513;
 /** Returns listed beside the plot, and the least share of the light that makes one worth it. */
 const LISTED = 4;
 const LEAST_SHARE = 0.02;
@@ -30,8 +32,8 @@ export function ResponseView() {
         if (!coefficients || pixel === null) return null;
         if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return null;
         const index = pixel.y * coefficients.width + pixel.x;
-        const response = impulseResponse(coefficients, index, SAMPLES);
-        const found = peaks(coefficients, index, response).filter(({ share }) => share >= LEAST_SHARE);
+        const found = peaks(coefficients, index).filter(({ share }) => share >= LEAST_SHARE);
+        const response = impulseResponse(coefficients, index, SAMPLES, found);
         return { pixel, response, peaks: found.slice(0, LISTED).sort((a, b) => a.time_s - b.time_s) };
       }),
     [frame, store],
@@ -53,10 +55,11 @@ export function ResponseView() {
     };
   }, [dark]);
 
+  const logarithmic = useMemo(() => remembered(store.shelf, "response.logarithmic", false, aBoolean), [store]);
   const top = useRef<Span | null>(null);
   useEffect(() => {
     if (box.current === null) return undefined;
-    const made = responsePlot(box.current, () => top.current?.high ?? 1, (time_ns) => {
+    const made = responsePlot(box.current, logarithmic.value, () => top.current?.high ?? 1, (time_ns) => {
       store.player.playing.value = false;
       store.player.seek((time_ns * 1e-9) / store.period_s.peek());
     });
@@ -65,7 +68,7 @@ export function ResponseView() {
       plot.value = null;
       made.plot.destroy();
     };
-  }, [store, dark.value]);
+  }, [store, dark.value, logarithmic.value]);
 
   useDrawing(() => {
     const { width, height } = size.value;
@@ -98,6 +101,15 @@ export function ResponseView() {
         <h2>
           Impulse response <span class="quiet">{place.value === null ? "" : `of pixel ${place.value}`}</span>
         </h2>
+      }
+      tools={
+        <Toggle
+          pressed={logarithmic.value}
+          title="Logarithmic density"
+          onToggle={() => (logarithmic.value = !logarithmic.peek())}
+        >
+          log
+        </Toggle>
       }
     >
       <div class="response">

@@ -1,6 +1,7 @@
 import uPlot from "uplot";
 
 import { rangeOfTime_m } from "../../physics/constants";
+import { grouped, significant } from "../../ui/format";
 
 /** The plot, and the line that marks the player's time in it. */
 export interface ResponsePlot {
@@ -9,11 +10,11 @@ export interface ResponsePlot {
 }
 
 /** A plot of density in DN/ns over time of flight in ns, with the range it stands for on top. */
-export function responsePlot(box: HTMLElement, top: () => number, seek: (time_ns: number) => void): ResponsePlot {
+export function responsePlot(box: HTMLElement, logarithmic: boolean, top: () => number, seek: (time_ns: number) => void): ResponsePlot {
   const style = getComputedStyle(box);
   const ink = style.getPropertyValue("--quiet");
   const hairline = style.getPropertyValue("--hairline");
-  const line = style.getPropertyValue("--light");
+  const line = style.getPropertyValue("--curve");
   const font = `11px ${style.fontFamily}`;
   const axis = { stroke: ink, font, labelFont: font, grid: { stroke: hairline, width: 1 }, ticks: { stroke: hairline, width: 1, size: 4 } };
   const plot = new uPlot(
@@ -25,11 +26,13 @@ export function responsePlot(box: HTMLElement, top: () => number, seek: (time_ns
       padding: [0, 12, 0, 0],
       scales: {
         x: { time: false, range: (_plot, low, high) => [low ?? 0, high ?? 1] },
-        y: { range: () => [0, top()] },
+        y: logarithmic
+          ? { distr: 3, range: () => [top() * 10 ** -LOG_DECADES, top()] }
+          : { range: () => [0, top()] },
       },
       axes: [
-        { ...axis, size: 34, gap: 2, label: "time of flight (ns)", labelSize: 14, labelGap: 0 },
-        { ...axis, size: 52, gap: 4, label: "DN/ns", labelSize: 16, labelGap: 0, space: 28 },
+        { ...axis, size: 20, gap: 2, label: "time of flight (ns)", labelSize: 16, labelGap: 0 },
+        { ...axis, size: 52, gap: 4, label: "DN/ns", labelSize: 16, labelGap: 0, space: 28, values: (_plot, splits) => splits.map((value) => tickText(value)) },
         {
           ...axis,
           scale: "x",
@@ -44,7 +47,7 @@ export function responsePlot(box: HTMLElement, top: () => number, seek: (time_ns
       ],
       series: [
         {},
-        { stroke: line, width: 1.5, fill: style.getPropertyValue("--light-wash"), points: { show: false }, spanGaps: false },
+        { stroke: line, width: 1.5, fill: style.getPropertyValue("--curve-wash"), points: { show: false }, spanGaps: false },
       ],
     },
     [[], []],
@@ -58,6 +61,16 @@ export function responsePlot(box: HTMLElement, top: () => number, seek: (time_ns
   head.className = "response-head";
   plot.over.append(head);
   return { plot, head };
+}
+
+/** Decades that the logarithmic axis shows. */
+const LOG_DECADES = 5;
+
+/** Thousands apart, powers of ten where they are short; uPlot leaves out ticks by null. */
+function tickText(value: number | null): string {
+  if (value === null) return "";
+  if (value >= 1) return value < 10 ? String(Number(value.toFixed(1))) : grouped(value);
+  return significant(value, 1);
 }
 
 const METRES_PER_NS = rangeOfTime_m(1e-9);

@@ -38,16 +38,20 @@ export function documentOf(draft: Draft, base: SequenceDocument): SequenceDocume
   ].map((text) => (text.trim() === "" ? NaN : Number(text)));
   if (![frequency_mhz, harmonics, exposure_ms, takes].every(Number.isFinite)) return null;
   return {
-    base_frequency_hz: frequency_mhz * 1e6,
+    base_frequency_hz: exact(frequency_mhz * 1e6),
     harmonics,
     zeroth: draft.zeroth,
-    exposure_s: exposure_ms / 1e3,
+    exposure_s: exact(exposure_ms / 1e3),
     takes,
     sub_phases: base.sub_phases,
   };
 }
 
-/** A number without the tail that binary fractions leave: 1.92, not 1.9200000000000002. */
+/** A number without the tail that binary fractions leave: 1.92, not 1.9199999999999998. */
+function exact(value: number): number {
+  return Number(value.toPrecision(12));
+}
+
 function tidy(value: number): string {
-  return String(Number(value.toPrecision(9)));
+  return String(exact(value));
 }

@@ -18,12 +18,12 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
       </div>
     );
   }
-  const lostAt_s = status.cameraLostAt_s.value;
-  if (lostAt_s !== null && connection.kind === "open") {
+  const loss = status.cameraLoss.value;
+  if (loss !== null && connection.kind === "open") {
     return (
       <div class="banner" role="alert" data-banner="camera">
-        <strong>Camera lost.</strong> It went away at {new Date(1000 * lostAt_s).toLocaleTimeString()}. The service looks
-        for it and goes on by itself; what you see is the last frame.
+        <strong>Camera lost</strong> at {new Date(1000 * loss.at_s).toLocaleTimeString()}. The service looks for it and
+        goes on by itself; what you see is the last frame. <span class="quiet">{loss.reason}</span>
       </div>
     );
   }

@@ -29,7 +29,7 @@ function StateChip() {
   const state = useComputed((): { tone: Tone; word: string } => {
     if (status.connection.value.kind === "connecting") return { tone: "waiting", word: "Connecting" };
     if (status.connection.value.kind === "waiting") return { tone: "bad", word: "Reconnecting" };
-    if (status.cameraLostAt_s.value !== null) return { tone: "bad", word: "Camera lost" };
+    if (status.cameraLoss.value !== null) return { tone: "bad", word: "Camera lost" };
     if (held.value) return { tone: "still", word: "Held" };
     if (running.value === false) return { tone: "still", word: "Stopped" };
     if (status.newest.value === null) return { tone: "waiting", word: "Waiting" };

@@ -76,8 +76,8 @@ export function TimeReadout() {
   return (
     <p class="readout">
       <output ref={time} class="readout-value readout-time" data-field="time" aria-live="off" />
-      <span>
-        <span class="quiet">there and back from</span> <span ref={range} data-field="range" />
+      <span title="Where light comes from that goes there and back in this time">
+        <span class="quiet">range</span> <span ref={range} data-field="range" />
       </span>
     </p>
   );

@@ -7,7 +7,7 @@ import { SPEEDS_NS } from "../../store/player";
 import { useStore } from "../../store/store";
 import { COLOUR_MAPS } from "../../ui/colourMaps";
 import { Choice, Toggle } from "../../ui/controls";
-import { significant, superscript } from "../../ui/format";
+import { significant, superscript, withUnit } from "../../ui/format";
 import { useProducts } from "../../ui/hooks";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
@@ -40,7 +40,7 @@ export function TransientView() {
           <Choice
             label="Exposure"
             value={look.stops.value}
-            options={STOPS.map((stops) => ({ value: stops, text: stops > 0 ? `+${stops}` : String(stops).replace("-", "−") }))}
+            options={STOPS.map((stops) => ({ value: stops, text: stopsText(stops) }))}
             onChange={(stops) => (look.stops.value = stops)}
           />
           <Toggle
@@ -77,15 +77,15 @@ export function TransientView() {
           <TimeReadout />
           <DensityReadout />
           <div class="panel-tools">
+            <span class="quiet slowed" title="How many times slower than light really is">
+              1 : {slowness(player.speed_ns.value)}
+            </span>
             <Choice
               label="Speed"
               value={player.speed_ns.value}
               options={SPEEDS_NS.map((speed) => ({ value: speed, text: `${speed} ns/s` }))}
               onChange={(speed) => (player.speed_ns.value = speed)}
             />
-            <span class="quiet slowed" title="How many times slower than light really is">
-              1 : {slowness(player.speed_ns.value)}
-            </span>
           </div>
         </div>
       </footer>
@@ -93,7 +93,11 @@ export function TransientView() {
   );
 }
 
-const STOPS = [-4, -3, -2, -1, 0, 1, 2, 3, 4];
+const STOPS = [-4, -3, -2, -1, 0, 1, 2, 3, 4, 6, 8];
+
+function stopsText(stops: number): string {
+  return withUnit(stops > 0 ? `+${stops}` : String(stops).replace("-", "−"), "EV");
+}
 
 /** Times slower than real: 5 ns of flight in a second are 2·10⁸. */
 function slowness(speed_ns: number): string {

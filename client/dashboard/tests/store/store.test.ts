@@ -1,0 +1,181 @@
+import { effect, signal } from "@preact/signals";
+import { describe, expect, test } from "vitest";
+
+import { Api, RequestError } from "../../src/store/api";
+import { type Frame, Frames } from "../../src/store/frames";
+import { Player } from "../../src/store/player";
+import { oneOf, remembered, type Shelf } from "../../src/store/settings";
+import { Status } from "../../src/store/status";
+import type { FrameMeta } from "../../src/stream/protocol";
+
+const meta = (frame: number, host_time_s = 0): FrameMeta => ({ frame, host_time_s }) as FrameMeta;
+const frame = (product: string, number: number): Frame => ({ product, meta: meta(number) }) as Frame;
+
+describe("frames", () => {
+  test("what two views want is streamed once, until both have gone", () => {
+    const frames = new Frames();
+    const first = frames.claim(["range", "brightness"]);
+    const second = frames.claim(["coefficients", "brightness"]);
+    expect(frames.wanted.value).toEqual(["brightness", "coefficients", "range"]);
+    first();
+    expect(frames.wanted.value).toEqual(["brightness", "coefficients"]);
+    second();
+    expect(frames.wanted.value).toEqual([]);
+  });
+
+  test("only the newest of a product is kept, and nothing of what nobody wants", () => {
+    const frames = new Frames();
+    const giveBack = frames.claim(["range"]);
+    frames.put(frame("range", 1));
+    frames.put(frame("range", 2));
+    frames.put(frame("direct", 2));
+    expect(frames.of("range").value?.meta.frame).toBe(2);
+    expect(frames.of("direct").value).toBeNull();
+    giveBack();
+    expect(frames.of("range").value).toBeNull();
+  });
+
+  test("a claim that changes nothing does not subscribe anew", () => {
+    const frames = new Frames();
+    frames.claim(["range"]);
+    let told = 0;
+    effect(() => {
+      told += frames.wanted.value.length;
+    });
+    frames.claim(["range"]);
+    expect(told).toBe(1);
+  });
+});
+
+describe("the player", () => {
+  const period_s = signal(40e-9);
+  const player = new Player(period_s);
+
+  test("lets flight pass at its speed while it plays, around the period", () => {
+    player.speed_ns.value = 10;
+    expect(player.advance(1)).toBe(false);
+    player.toggle();
+    expect(player.advance(1)).toBe(true);
+    expect(player.time_s.value).toBeCloseTo(10e-9, 15);
+    player.advance(3.5);
+    expect(player.time_s.value).toBeCloseTo(5e-9, 15);
+    expect(player.phase_rad.value).toBeCloseTo(Math.PI / 4, 9);
+  });
+
+  test("steps back over the start to the end", () => {
+    player.seek(0);
+    player.step(-1e-9);
+    expect(player.time_s.value).toBeCloseTo(39e-9, 15);
+  });
+
+  test("seeks no further than the period", () => {
+    player.seek(1.7);
+    expect(player.time_s.value).toBe(40e-9);
+    player.seek(-3);
+    expect(player.time_s.value).toBe(0);
+  });
+});
+
+describe("the status", () => {
+  test("counts a frame once, however many of its products are drawn", () => {
+    const status = new Status();
+    for (let n = 1; n <= 21; n++) {
+      status.frameDrawn(meta(n), 0, 10 + n / 20);
+      status.frameDrawn(meta(n), 0, 10 + n / 20 + 0.001);
+    }
+    expect(status.rate_hz.value).toBeCloseTo(20, 6);
+  });
+
+  test("tells how old frames are when they are drawn", () => {
+    const status = new Status();
+    for (let n = 1; n < 50; n++) status.frameDrawn(meta(n, 100 + n), 0, 100 + n + 0.08);
+    expect(status.latency_s.value).toBeCloseTo(0.08, 6);
+  });
+
+  test("a lost camera is stale at once, keeps the time it went, and is forgotten when it is back", () => {
+    const status = new Status();
+    status.connection.value = { kind: "open" };
+    status.frameDrawn(meta(1), 0, 10);
+    status.frameDrawn(meta(2), 0, 10.1);
+    status.cameraLost(11);
+    status.cameraIs("disconnected", 12);
+    expect(status.stale.value).toBe(true);
+    expect(status.cameraLoss.value?.at_s).toBe(11);
+    expect(status.rate_hz.value).toBeNull();
+    status.cameraIs("streaming", 13);
+    expect(status.stale.value).toBe(false);
+  });
+
+  test("drops of several channels are those of the worst, and start anew with a session", () => {
+    const status = new Status();
+    status.dropNotice(0, 3);
+    status.dropNotice(1, 5);
+    status.dropNotice(0, 4);
+    expect(status.dropped.value).toBe(5);
+    status.sessionOpened("streaming", 0);
+    expect(status.dropped.value).toBe(0);
+  });
+});
+
+describe("settings", () => {
+  class MemoryShelf implements Shelf {
+    readonly items = new Map<string, string>();
+    getItem(key: string): string | null {
+      return this.items.get(key) ?? null;
+    }
+    setItem(key: string, value: string): void {
+      this.items.set(key, value);
+    }
+  }
+  const accepts = oneOf(["linear", "root"]);
+
+  test("are found again", () => {
+    const shelf = new MemoryShelf();
+    remembered(shelf, "tone", "linear", accepts).value = "root";
+    expect(remembered(shelf, "tone", "linear", accepts).value).toBe("root");
+  });
+
+  test("that are damaged, or of another version, are as if they were not there", () => {
+    const shelf = new MemoryShelf();
+    for (const damaged of ['"cubic"', "{", "null"]) {
+      shelf.items.set("transientcam.tone", damaged);
+      expect(remembered(shelf, "tone", "linear", accepts).value).toBe("linear");
+    }
+  });
+
+  test("work where the browser keeps nothing", () => {
+    const refuse = (): never => {
+      throw new Error("denied");
+    };
+    const setting = remembered({ getItem: refuse, setItem: refuse }, "tone", "linear", accepts);
+    setting.value = "root";
+    expect(setting.value).toBe("root");
+  });
+});
+
+describe("requests", () => {
+  const answering = (body: string, status: number, type: string): Api =>
+    new Api(() => Promise.resolve(new Response(body, { status, headers: { "Content-Type": type } })));
+
+  test("a problem becomes its own words, and keeps the field it names", async () => {
+    const problem = { title: "Invalid sequence", detail: "harmonics is 99, but must be from 1 to 32.", field: "harmonics" };
+    const api = answering(JSON.stringify(problem), 422, "application/problem+json");
+    const refusal = await api.sequence().catch((error: unknown) => error);
+    expect(refusal).toBeInstanceOf(RequestError);
+    expect((refusal as RequestError).message).toBe(problem.detail);
+    expect((refusal as RequestError).problem).toMatchObject({ status: 422, field: "harmonics" });
+  });
+
+  test("a proxy's page says at least its status", async () => {
+    await expect(answering("<html>", 502, "text/html").sequence()).rejects.toThrow(/502/);
+  });
+
+  test("a service that cannot be reached says that", async () => {
+    const api = new Api(() => Promise.reject(new TypeError("Failed to fetch")));
+    await expect(api.sequence()).rejects.toThrow("The service cannot be reached.");
+  });
+
+  test("no frame yet is nothing, not an error", async () => {
+    expect(await answering("{}", 503, "application/problem+json").latest("range")).toBeNull();
+  });
+});

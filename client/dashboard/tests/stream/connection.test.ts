@@ -1,0 +1,220 @@
+import { decode, encode } from "@msgpack/msgpack";
+import { beforeEach, describe, expect, test } from "vitest";
+
+import { type ConnectionEvent, CREDITS, type Socket, StreamConnection } from "../../src/stream/connection";
+
+class FakeSocket implements Socket {
+  binaryType: BinaryType = "blob";
+  onopen: Socket["onopen"] = null;
+  onmessage: Socket["onmessage"] = null;
+  onclose: Socket["onclose"] = null;
+  readonly sent: Record<string, unknown>[] = [];
+  closed = false;
+
+  send(data: Uint8Array<ArrayBuffer>): void {
+    this.sent.push(decode(data) as Record<string, unknown>);
+  }
+
+  close(): void {
+    this.closed = true;
+  }
+
+  opens(): void {
+    this.onopen?.({} as Event);
+  }
+
+  closes(code: number): void {
+    this.onclose?.({ code, reason: "" } as CloseEvent);
+  }
+
+  receives(message: unknown): void {
+    this.onmessage?.({ data: encode(message).slice().buffer } as MessageEvent<ArrayBuffer>);
+  }
+}
+
+/** A world in which time passes when told to. */
+class World {
+  readonly sockets: FakeSocket[] = [];
+  readonly events: ConnectionEvent[] = [];
+  answer: () => Promise<string> = () => Promise.resolve("streaming");
+  probes = 0;
+  #now_s = 0;
+  #timers = new Map<number, { due_s: number; action: () => void }>();
+  #next = 1;
+  readonly connection = new StreamConnection(
+    "ws://camera/api/v1/stream",
+    {
+      openSocket: () => {
+        const socket = new FakeSocket();
+        this.sockets.push(socket);
+        return socket;
+      },
+      setTimer: (action, delay_s) => {
+        this.#timers.set(this.#next, { due_s: this.#now_s + delay_s, action });
+        return this.#next++;
+      },
+      clearTimer: (timer) => {
+        this.#timers.delete(timer);
+      },
+      random: () => 0.5,
+      probe: () => {
+        this.probes += 1;
+        return this.answer();
+      },
+    },
+    (event) => this.events.push(event),
+  );
+
+  get socket(): FakeSocket {
+    return this.sockets[this.sockets.length - 1];
+  }
+
+  async passes(span_s: number): Promise<void> {
+    const end_s = this.#now_s + span_s;
+    for (;;) {
+      const due = [...this.#timers].filter(([, { due_s }]) => due_s <= end_s).sort((a, b) => a[1].due_s - b[1].due_s);
+      if (due.length === 0) break;
+      const [timer, { due_s, action }] = due[0];
+      this.#timers.delete(timer);
+      this.#now_s = due_s;
+      action();
+      await Promise.resolve();
+      await Promise.resolve();
+    }
+    this.#now_s = end_s;
+  }
+
+  get pauses_s(): number[] {
+    return this.events.filter((event) => event.type === "waiting").map((event) => event.retry_s);
+  }
+}
+
+const frame = (number: number): unknown => ({
+  type: "frame",
+  product: "range",
+  meta: { frame: number },
+  array: { dtype: "|u1", shape: [1], data: new Uint8Array(1) },
+});
+
+let world: World;
+beforeEach(() => {
+  world = new World();
+  world.connection.want(["range"]);
+});
+
+describe("a stream", () => {
+  test("subscribes once it is open, and again when something else is wanted", () => {
+    expect(world.socket.sent).toEqual([]);
+    world.socket.opens();
+    world.connection.want(["coefficients", "range"]);
+    const wanted = world.socket.sent.map((message) => message["subscriptions"]);
+    expect(wanted).toEqual([
+      [{ product: "range", max_rate_hz: null }],
+      [
+        { product: "coefficients", max_rate_hz: null },
+        { product: "range", max_rate_hz: null },
+      ],
+    ]);
+    expect(world.sockets).toHaveLength(1);
+  });
+
+  test("hands on what arrives and acknowledges what was drawn", () => {
+    world.socket.opens();
+    world.socket.receives(frame(7));
+    expect(world.events.map((event) => event.type)).toEqual(["connecting", "open", "message"]);
+    world.connection.acknowledge(7);
+    expect(world.socket.sent.at(-1)).toEqual({ type: "ack", frame: 7 });
+  });
+
+  test("survives a message it cannot read", () => {
+    world.socket.opens();
+    world.socket.receives([1, 2, 3]);
+    world.socket.receives(frame(8));
+    expect(world.events.slice(-2).map((event) => event.type)).toEqual(["unreadable", "message"]);
+    expect(world.socket.closed).toBe(false);
+  });
+});
+
+describe("a lost stream", () => {
+  test("comes back after pauses that double up to a limit", async () => {
+    for (let attempt = 0; attempt < 7; attempt++) {
+      world.socket.closes(1006);
+      await world.passes(10);
+    }
+    expect(world.pauses_s).toEqual(expect.arrayContaining([0.5, 1, 2, 4, 8]));
+    expect(Math.max(...world.pauses_s)).toBe(8);
+  });
+
+  test("starts with short pauses again once a message arrived", async () => {
+    world.socket.closes(1006);
+    await world.passes(0.6);
+    world.socket.closes(1006);
+    await world.passes(1.1);
+    world.socket.opens();
+    world.socket.receives({ type: "hello" });
+    world.socket.closes(1001);
+    expect(world.pauses_s).toEqual([0.5, 1, 0.5]);
+    expect(world.events.at(-1)).toMatchObject({ reason: "The service is shutting down." });
+  });
+
+  test("is tried at once on request", async () => {
+    world.socket.closes(1006);
+    world.connection.retryNow();
+    expect(world.sockets).toHaveLength(2);
+    await world.passes(1);
+    expect(world.sockets).toHaveLength(2); // the pause that was waited out is over
+  });
+
+  test("an attempt that nobody answers is given up", async () => {
+    await world.passes(8);
+    expect(world.socket.closed).toBe(true);
+    expect(world.events.at(-1)).toMatchObject({ type: "waiting", reason: "The service does not answer." });
+  });
+
+  test("subscribes anew to what is wanted now", async () => {
+    world.socket.opens();
+    world.connection.want(["direct"]);
+    world.socket.closes(1006);
+    await world.passes(0.5);
+    world.socket.opens();
+    expect(world.socket.sent).toMatchObject([{ type: "subscribe", subscriptions: [{ product: "direct" }] }]);
+  });
+});
+
+describe("silence", () => {
+  test("makes it ask for the camera, and tell what it hears", async () => {
+    world.answer = () => Promise.resolve("disconnected");
+    world.socket.opens();
+    await world.passes(3);
+    expect(world.events.at(-1)).toEqual({ type: "camera", state: "disconnected" });
+    expect(world.socket.closed).toBe(false);
+  });
+
+  test("of a service that does not answer either ends the connection", async () => {
+    world.answer = () => Promise.reject(new Error("gone"));
+    world.socket.opens();
+    await world.passes(3);
+    expect(world.sockets[0].closed).toBe(true);
+    expect(world.events.at(-1)).toMatchObject({ type: "waiting" });
+  });
+
+  test("is no reason to ask while this page has not drawn what it was sent", async () => {
+    world.socket.opens();
+    for (let number = 1; number <= CREDITS; number++) world.socket.receives(frame(number));
+    await world.passes(60);
+    expect(world.probes).toBe(0);
+    world.connection.acknowledge(CREDITS);
+    await world.passes(6);
+    expect(world.probes).toBeGreaterThan(0);
+  });
+
+  test("is not noticed while frames arrive", async () => {
+    world.socket.opens();
+    for (let number = 1; number < 40; number++) {
+      world.socket.receives(frame(number));
+      world.connection.acknowledge(number);
+      await world.passes(0.5);
+    }
+    expect(world.probes).toBe(0);
+  });
+});

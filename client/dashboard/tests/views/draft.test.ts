@@ -1,0 +1,29 @@
+import { describe, expect, test } from "vitest";
+
+import type { SequenceDocument } from "../../src/stream/protocol";
+import { documentOf, draftOf } from "../../src/views/sequence/draft";
+
+const SEQUENCE: SequenceDocument = {
+  base_frequency_hz: 23e6,
+  harmonics: 3,
+  zeroth: "low-frequency",
+  exposure_s: 0.00192,
+  takes: 1,
+  sub_phases: { scheme: "arccos", n: 8 },
+};
+
+describe("a sequence being typed", () => {
+  test("shows the units people use", () => {
+    expect(draftOf(SEQUENCE)).toMatchObject({ base_frequency_mhz: "23", exposure_ms: "1.92" });
+  });
+
+  test("comes back as the document it was made from, with what is not edited", () => {
+    expect(documentOf(draftOf(SEQUENCE), SEQUENCE)).toEqual(SEQUENCE);
+  });
+
+  test("is no document while a field is empty or no number", () => {
+    for (const harmonics of ["", "  ", "three", "1e999"]) {
+      expect(documentOf({ ...draftOf(SEQUENCE), harmonics }, SEQUENCE)).toBeNull();
+    }
+  });
+});
