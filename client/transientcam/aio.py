@@ -294,7 +294,7 @@ class AsyncStream:
             connection: ClientConnection = await self._stack.enter_async_context(
                 connect(self._url, **stream_options(timeout_s=self._timeout_s))
             )
-            await connection.send(self._state.opening())
+            await connection.send(self._state.opening(connection.subprotocol))
         self._connection = connection
         return connection
 

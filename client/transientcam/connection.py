@@ -11,7 +11,7 @@ from transientcam.translation import media_type
 from transientcam.wire import MAX_SERVER_MESSAGE_BYTES, SUBPROTOCOL
 
 USER_AGENT: Final = f"transientcam/{version('transientcam')}"
-_CLOSE_WITHIN_S = 2.0
+_CLOSE_WITHIN_S = 1.0
 _QUEUED_MESSAGES = 256
 
 

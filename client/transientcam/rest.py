@@ -175,7 +175,9 @@ def problem(answer: Answer) -> ProblemError:
             return problem_error(_object(answer.body), status=answer.status)
         except ProtocolError:
             pass  # a broken problem is still a refusal
-    text = answer.body[:200].decode("utf-8", "replace").strip()
+    # some proxy's page: its reason is enough, unless it is made to be read as it is
+    plain = answer.body[:200] if answer.media_type == "text/plain" else b""
+    text = plain.decode("utf-8", "replace").strip()
     return ProblemError(status=answer.status, title=answer.reason, detail=text)
 
 

@@ -141,7 +141,7 @@ class Stream:
             connection: ClientConnection = self._stack.enter_context(
                 connect(self._url, **stream_options(timeout_s=self._timeout_s))
             )
-            connection.send(self._state.opening())
+            connection.send(self._state.opening(connection.subprotocol))
         self._connection = connection
         return connection
 

@@ -22,6 +22,7 @@ from transientcam.frame import Frame
 from transientcam.rest import problem_error
 from transientcam.wire import (
     MAX_CREDITS,
+    SUBPROTOCOL,
     Ack,
     Channel,
     CloseCode,
@@ -121,8 +122,16 @@ class StreamState:
         self._attempt = 0
         self._owed: int | None = None
 
-    def opening(self) -> bytes:
-        """Return the first message of a connection."""
+    def opening(self, subprotocol: str | None) -> bytes:
+        """Return the first message of a connection for which the server chose ``subprotocol``.
+
+        Raises
+        ------
+        ProtocolError
+            If it chose none: a server that knows nothing of this protocol may do so.
+        """
+        if subprotocol != SUBPROTOCOL:
+            raise ProtocolError("subprotocol", subprotocol, SUBPROTOCOL)
         self._owed = None
         return encode(self.subscribe)
 
@@ -164,8 +173,9 @@ class StreamState:
 
     def _follow(self, notice: Notice) -> None:
         if notice.kind == "sequence-changed":
-            self.sequence = fields.mapping(notice.details, "sequence")
+            sequence = fields.mapping(notice.details, "sequence")
             self.channels = parse_channels(notice.details)
+            self.sequence = sequence
 
     def _refused(self, message: ErrorMessage) -> None:
         # one product that fails is no reason to lose the others: only what answers a message of

@@ -1,0 +1,255 @@
+"""`Camera` and `AsyncCamera` against a transport that records: both ask the same."""
+
+import asyncio
+import inspect
+import json
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import httpx
+import pytest
+import transientcam
+from transientcam import AsyncCamera, AsyncStream, Camera, Stream
+from transientcam.errors import ParameterError, ProblemError, ServerUnreachable
+
+from tests.client.conftest import Recording
+
+_URL = "http://lidar.example:8000"
+_SEQUENCE = {"harmonics": 3, "takes": 1, "sequence_id": 4, "images": 12}
+
+
+class _Daemon:
+    """Answers every path as the real one does, and keeps the requests."""
+
+    def __init__(self, frame: bytes) -> None:
+        self.requests: list[httpx.Request] = []
+        self._frame = frame
+
+    def __call__(self, request: httpx.Request) -> httpx.Response:
+        self.requests.append(request)
+        if request.url.path.endswith(".msgpack"):
+            headers = {"content-type": "application/vnd.msgpack"}
+            return httpx.Response(200, content=self._frame, headers=headers)
+        if request.url.path.endswith(".png"):
+            return httpx.Response(200, content=b"\x89PNG", headers={"content-type": "image/png"})
+        return httpx.Response(200, json=_SEQUENCE)
+
+    @property
+    def last(self) -> tuple[str, str, str, Any]:
+        request = self.requests[-1]
+        return (
+            request.method,
+            request.url.path,
+            request.url.query.decode(),
+            json.loads(request.content) if request.content else None,
+        )
+
+
+@pytest.fixture
+def daemon(recorded: dict[str, Recording]) -> _Daemon:
+    return _Daemon(recorded["frame"].data)
+
+
+def _set_sequence(camera: Camera) -> None:
+    camera.sequence = {"harmonics": 4}
+
+
+_CALLS: dict[
+    str,
+    tuple[Callable[[Camera], object], Callable[[AsyncCamera], Awaitable[object]], tuple[Any, ...]],
+] = {
+    "info": (lambda c: c.info, lambda c: c.info(), ("GET", "info", "", None)),
+    "camera": (lambda c: c.camera, lambda c: c.camera(), ("GET", "camera", "", None)),
+    "sequence": (lambda c: c.sequence, lambda c: c.sequence(), ("GET", "sequence", "", None)),
+    "set": (
+        _set_sequence,
+        lambda c: c.set_sequence({"harmonics": 4}),
+        ("PUT", "sequence", "", {"harmonics": 4}),
+    ),
+    "configure": (
+        lambda c: c.configure(takes=2),
+        lambda c: c.configure(takes=2),
+        ("PUT", "sequence", "", {"harmonics": 3, "takes": 2}),
+    ),
+    "validate": (
+        lambda c: c.validate({"takes": 2}),
+        lambda c: c.validate({"takes": 2}),
+        ("POST", "sequence/validate", "", {"takes": 2}),
+    ),
+    "acquisition": (
+        lambda c: c.acquisition,
+        lambda c: c.acquisition(),
+        ("GET", "acquisition", "", None),
+    ),
+    "start": (
+        lambda c: c.start(),
+        lambda c: c.start(),
+        ("PUT", "acquisition", "", {"running": True}),
+    ),
+    "stop": (
+        lambda c: c.stop(),
+        lambda c: c.stop(),
+        ("PUT", "acquisition", "", {"running": False}),
+    ),
+    "latest": (
+        lambda c: c.latest(wait_s=2.0, after=4),
+        lambda c: c.latest(wait_s=2.0, after=4),
+        ("GET", "frames/latest", "wait_s=2.0&after=4", None),
+    ),
+    "frame": (
+        lambda c: c.frame("transient", time_s=[1e-9, 2e-9]),
+        lambda c: c.frame("transient", time_s=[1e-9, 2e-9]),
+        ("GET", "frames/latest/transient.msgpack", "time_s=1e-09&time_s=2e-09", None),
+    ),
+    "bins": (
+        lambda c: c.frame("cumulative", bins=8, wait_s=1.0, after=3),
+        lambda c: c.frame("cumulative", bins=8, wait_s=1.0, after=3),
+        ("GET", "frames/latest/cumulative.msgpack", "bins=8&wait_s=1.0&after=3", None),
+    ),
+    "picture": (
+        lambda c: c.picture("range", colour=True),
+        lambda c: c.picture("range", colour=True),
+        ("GET", "frames/latest/range.png", "view=colour", None),
+    ),
+    "pixel": (
+        lambda c: c.pixel(x=80, y=0, bins=16),
+        lambda c: c.pixel(x=80, y=0, bins=16),
+        ("GET", "frames/latest/pixel", "x=80&y=0&bins=16", None),
+    ),
+    "simulation": (
+        lambda c: c.simulation,
+        lambda c: c.simulation(),
+        ("GET", "simulation", "", None),
+    ),
+    "cause": (
+        lambda c: c.cause("unplug"),
+        lambda c: c.cause("unplug"),
+        ("POST", "simulation/faults", "", {"fault": "unplug"}),
+    ),
+}
+
+
+def _awaited(daemon: _Daemon, call: Callable[[AsyncCamera], Awaitable[object]]) -> object:
+    async def run() -> object:
+        transport = httpx.MockTransport(daemon)
+        async with AsyncCamera(_URL, token="secret", transport=transport) as camera:
+            return await call(camera)
+
+    return asyncio.run(run())
+
+
+@pytest.mark.parametrize("name", _CALLS)
+def test_both_cameras_ask_for_the_same(name: str, daemon: _Daemon) -> None:
+    call, async_call, (method, path, query, body) = _CALLS[name]
+    expected = (method, f"/api/v1/{path}", query, body)
+
+    with Camera(_URL, token="secret", transport=httpx.MockTransport(daemon)) as camera:
+        result = call(camera)
+    assert daemon.last == expected
+
+    async_result = _awaited(daemon, async_call)
+    assert daemon.last == expected
+    assert name == "set" or repr(result) == repr(async_result)
+
+
+def test_every_request_says_who_asks(daemon: _Daemon) -> None:
+    with Camera(_URL, token="secret", transport=httpx.MockTransport(daemon)) as camera:
+        camera.info  # noqa: B018 - reading it asks
+    _awaited(daemon, lambda camera: camera.info())
+
+    for request in daemon.requests:
+        assert request.headers["authorization"] == "Bearer secret"
+        assert request.headers["user-agent"] == f"transientcam/{transientcam.__version__}"
+
+
+def test_nothing_is_sent_to_prove_who_asks_without_a_token(daemon: _Daemon) -> None:
+    with Camera(_URL, transport=httpx.MockTransport(daemon)) as camera:
+        camera.info  # noqa: B018 - reading it asks
+
+    assert "authorization" not in daemon.requests[0].headers
+
+
+def _public(kind: type) -> set[str]:
+    return {name for name, _ in inspect.getmembers(kind) if not name.startswith("_")}
+
+
+def test_the_twins_have_the_same_face() -> None:
+    assert _public(AsyncCamera) == _public(Camera) | {"set_sequence"}
+    assert _public(AsyncStream) == _public(Stream)
+
+
+@pytest.mark.parametrize("name", sorted(_public(Camera) & _public(AsyncCamera)))
+def test_the_twins_take_the_same_arguments(name: str) -> None:
+    one, other = getattr(Camera, name), getattr(AsyncCamera, name)
+    if inspect.isfunction(one) and inspect.isfunction(other):
+        assert inspect.signature(one).parameters == inspect.signature(other).parameters
+
+
+def test_a_refusal_reaches_the_caller_of_either() -> None:
+    def refuse(request: httpx.Request) -> httpx.Response:
+        problem = {"type": "/problems/unknown-product", "detail": "No.", "known": ["range"]}
+        headers = {"content-type": "application/problem+json"}
+        return httpx.Response(404, content=json.dumps(problem).encode(), headers=headers)
+
+    async def asynchronous() -> None:
+        async with AsyncCamera(_URL, transport=httpx.MockTransport(refuse)) as camera:
+            await camera.frame("rang")
+
+    with Camera(_URL, transport=httpx.MockTransport(refuse)) as camera:
+        with pytest.raises(ProblemError) as caught:
+            camera.frame("rang")
+        assert caught.value.document["known"] == ["range"]
+    with pytest.raises(ProblemError, match="No"):
+        asyncio.run(asynchronous())
+
+
+def test_a_network_that_fails_reaches_the_caller_of_either_as_one_error() -> None:
+    def fail(request: httpx.Request) -> httpx.Response:
+        raise httpx.ConnectError("Connection refused", request=request)
+
+    async def asynchronous() -> None:
+        async with AsyncCamera(_URL, transport=httpx.MockTransport(fail)) as camera:
+            await camera.info()
+
+    with (
+        Camera(_URL, transport=httpx.MockTransport(fail)) as camera,
+        pytest.raises(ServerUnreachable, match=f"{_URL}: Connection refused"),
+    ):
+        camera.info  # noqa: B018 - reading it asks
+    with pytest.raises(ServerUnreachable, match=f"{_URL}: Connection refused"):
+        asyncio.run(asynchronous())
+
+
+def test_nobody_there_is_told_as_such_over_the_real_network() -> None:
+    with Camera("http://127.0.0.1:1", timeout_s=5.0) as camera:
+        with pytest.raises(ServerUnreachable, match=r"http://127\.0\.0\.1:1: Connection refused"):
+            camera.frame("range")
+        with pytest.raises(ServerUnreachable, match="Connection refused"):
+            next(iter(camera.stream("range")))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "field"),
+    [
+        ((), {}, "products"),
+        (("range",), {"credits": 0}, "credits"),
+        (("range",), {"credits": 65}, "credits"),
+        (("range",), {"max_rate_hz": 0.0}, "max_rate_hz"),
+        (("range",), {"max_rate_hz": float("nan")}, "max_rate_hz"),
+        (("range",), {"max_rate_hz": float("inf")}, "max_rate_hz"),
+        ((transientcam.Subscription("range", -1.0),), {}, "max_rate_hz"),
+    ],
+)
+def test_a_stream_that_cannot_be_is_refused_before_it_connects(
+    arguments: tuple[Any, ...], options: dict[str, Any], field: str
+) -> None:
+    with Camera(_URL) as camera, pytest.raises(ParameterError) as caught:
+        camera.stream(*arguments, **options)
+
+    assert caught.value.field == field
+
+
+def test_a_camera_shows_where_it_is() -> None:
+    with Camera("lidar.example:8000/") as camera:
+        assert repr(camera) == f"<Camera {_URL}>"
+        assert repr(AsyncCamera(_URL)) == f"<AsyncCamera {_URL}>"

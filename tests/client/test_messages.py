@@ -1,0 +1,304 @@
+"""The messages of docs/stream.md."""
+
+import contextlib
+import math
+from typing import Any
+
+import msgpack  # type: ignore[import-untyped]  # it ships no types
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from transientcam import wire
+from transientcam.errors import ProtocolError
+
+from tests.client.conftest import SPECIFICATION, Recording
+
+_MESSAGES: dict[str, Any] = {
+    "subscribe": wire.Subscribe(
+        (wire.Subscription("range"), wire.Subscription("coefficients", 5.0)), credits=2
+    ),
+    "ack": wire.Ack(17),
+    "hello": wire.Hello(
+        session="5f0c",
+        server={"name": "transientcam", "version": "0.1.0"},
+        channels=(wire.Channel(0, "range", "m", ("y", "x"), "<f4", (2, 2)),),
+        sequence={"harmonics": 3},
+        camera={"state": "streaming"},
+    ),
+    "notice": wire.Notice("dropped", {"channel": 0, "count": 3, "total": 17}),
+    "error": wire.ErrorMessage(
+        {"type": "/problems/bad-message", "status": 422, "field": "v", "value": 2, "limit": "1"}
+    ),
+}
+
+
+def _parse(name: str, data: bytes) -> object:
+    from_client = name in ("subscribe", "ack")
+    return wire.parse_client_message(data) if from_client else wire.parse_server_message(data)
+
+
+@pytest.mark.parametrize("name", _MESSAGES)
+def test_recorded_bytes_say_what_the_specification_prints_beside_them(
+    name: str, recorded: dict[str, Recording]
+) -> None:
+    assert msgpack.unpackb(recorded[name].data) == recorded[name].document
+
+
+@pytest.mark.parametrize("name", _MESSAGES)
+def test_recorded_bytes_are_parsed(name: str, recorded: dict[str, Recording]) -> None:
+    assert _parse(name, recorded[name].data) == _MESSAGES[name]
+
+
+@pytest.mark.parametrize("name", _MESSAGES)
+def test_messages_are_encoded_as_recorded(name: str, recorded: dict[str, Recording]) -> None:
+    assert wire.encode(_MESSAGES[name]) == recorded[name].data
+
+
+_RANGE_M = np.array([[1.5, math.nan], [2.25, -0.0]], dtype="<f4")
+
+
+def test_a_recorded_frame_says_what_the_specification_prints_beside_it(
+    recorded: dict[str, Recording],
+) -> None:
+    document = msgpack.unpackb(recorded["frame"].data)
+    array = document.pop("array")
+    printed = dict(recorded["frame"].document)
+    printed_array = printed.pop("array")
+
+    assert document.pop("pad").decode() == printed.pop("pad")
+    assert document == printed
+    values = np.array([float(value) for value in printed_array.pop("data")], dtype="<f4")
+    assert array.pop("data") == values.tobytes()
+    assert array == printed_array
+
+
+def test_a_recorded_frame_is_parsed(recorded: dict[str, Recording]) -> None:
+    frame = wire.parse_server_message(recorded["frame"].data)
+
+    assert isinstance(frame, wire.Frame)
+    assert (frame.frame, frame.channel, frame.product, frame.unit) == (17, 0, "range", "m")
+    assert (frame.axes, frame.encode_s, frame.extra) == (("y", "x"), 0.001, {})
+    np.testing.assert_array_equal(frame.array, _RANGE_M)
+
+
+def test_a_frame_is_encoded_as_recorded(recorded: dict[str, Recording]) -> None:
+    data = wire.encode_frame(
+        product="range",
+        unit="m",
+        axes=("y", "x"),
+        meta={"frame": 17},
+        array=_RANGE_M,
+        encode_s=0.001,
+        channel=0,
+    )
+
+    assert data == recorded["frame"].data
+
+
+def test_a_frame_without_channel_keeps_what_only_its_product_has() -> None:
+    data = wire.encode_frame(
+        product="transient",
+        unit="DN/s",
+        axes=("time", "y", "x"),
+        meta={"frame": 1},
+        array=np.zeros((2, 1, 1), "<f4"),
+        extra={"time_s": [0.0, 1e-9]},
+    )
+
+    frame = wire.parse_frame(data)
+
+    assert frame.channel is None
+    assert frame.time_s is not None
+    np.testing.assert_array_equal(frame.time_s, [0.0, 1e-9])
+
+
+@pytest.mark.parametrize("name", ["subscribe", "ack"])
+def test_a_server_reads_no_long_message(name: str) -> None:
+    data = wire.pack({**_MESSAGES[name].to_document(), "more": "x" * 65536})
+
+    with pytest.raises(ProtocolError, match="must be at most 65536 bytes"):
+        wire.parse_client_message(data)
+
+
+def test_unknown_keys_are_passed_over() -> None:
+    for name, message in _MESSAGES.items():
+        if name not in ("notice", "error"):
+            data = wire.pack({**message.to_document(), "of-a-later-version": [1]})
+            assert _parse(name, data) == message
+
+
+def test_left_out_options_of_a_subscription_mean_nil() -> None:
+    data = wire.pack({"type": "subscribe", "v": 1, "subscriptions": [{"product": "range"}]})
+
+    assert wire.parse_client_message(data) == wire.Subscribe((wire.Subscription("range"),))
+
+
+def test_a_token_is_not_shown() -> None:
+    assert "secret" not in repr(wire.Subscribe((wire.Subscription("range"),), token="secret"))
+
+
+_SUBSCRIBE = _MESSAGES["subscribe"].to_document()
+_HELLO = _MESSAGES["hello"].to_document()
+_CHANNEL = _HELLO["channels"][0]
+_FRAME = {
+    "v": 1,
+    "type": "frame",
+    "product": "range",
+    "unit": "m",
+    "axes": ["y", "x"],
+    "meta": {"frame": 1},
+    "encode_s": 0.0,
+    "array": {"dtype": "|u1", "shape": [1, 1], "data": b"\0"},
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"type": None}, "type"),
+        ({"type": "unsubscribe"}, "type"),
+        ({"v": 2}, "v"),
+        ({"v": None}, "v"),
+        ({"subscriptions": None}, "subscriptions"),
+        ({"subscriptions": []}, "subscriptions"),
+        ({"subscriptions": [{"product": "range"}] * 17}, "subscriptions"),
+        ({"subscriptions": ["range"]}, "subscriptions[0]"),
+        ({"subscriptions": [{}]}, "subscriptions[0].product"),
+        ({"subscriptions": [{"product": 3}]}, "subscriptions[0].product"),
+        ({"subscriptions": [{"product": "x" * 65}]}, "subscriptions[0].product"),
+        (
+            {"subscriptions": [{"product": "range"}, {"product": "raw", "max_rate_hz": 0}]},
+            "subscriptions[1].max_rate_hz",
+        ),
+        (
+            {"subscriptions": [{"product": "range", "max_rate_hz": math.nan}]},
+            "subscriptions[0].max_rate_hz",
+        ),
+        (
+            {"subscriptions": [{"product": "range", "max_rate_hz": math.inf}]},
+            "subscriptions[0].max_rate_hz",
+        ),
+        (
+            {"subscriptions": [{"product": "range", "max_rate_hz": True}]},
+            "subscriptions[0].max_rate_hz",
+        ),
+        ({"token": 5}, "token"),
+        ({"token": "x" * 5000}, "token"),
+        ({"credits": 0}, "credits"),
+        ({"credits": 65}, "credits"),
+        ({"credits": 2.0}, "credits"),
+        ({"credits": True}, "credits"),
+        ({"start": 0}, "start"),
+        ({"start": 2**53}, "start"),
+    ],
+)
+def test_a_bad_subscription_is_refused_by_name(change: dict[str, Any], field: str) -> None:
+    with pytest.raises(ProtocolError) as caught:
+        wire.parse_client_message(wire.pack(_SUBSCRIBE | change))
+
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize("number", [None, -1, 2**53, 1.0, "1", True])
+def test_a_bad_acknowledgement_is_refused(number: object) -> None:
+    with pytest.raises(ProtocolError, match="frame is"):
+        wire.parse_client_message(wire.pack({"type": "ack", "frame": number}))
+
+
+@pytest.mark.parametrize(
+    ("document", "field"),
+    [
+        ({}, "type"),
+        ({"type": "farewell"}, "type"),
+        (_HELLO | {"v": 2}, "v"),
+        (_HELLO | {"session": 1}, "session"),
+        (_HELLO | {"sequence": []}, "sequence"),
+        (_HELLO | {"channels": {}}, "channels"),
+        (_HELLO | {"channels": [_CHANNEL] * 65}, "channels"),
+        (_HELLO | {"channels": [None]}, "channels[0]"),
+        (_HELLO | {"channels": [_CHANNEL | {"dtype": "O"}]}, "channels[0].dtype"),
+        (_HELLO | {"channels": [_CHANNEL | {"shape": [-1]}]}, "channels[0].shape[0]"),
+        (_HELLO | {"channels": [_CHANNEL | {"axes": [1]}]}, "channels[0].axes[0]"),
+        (_FRAME | {"v": 0}, "v"),
+        (_FRAME | {"meta": None}, "meta"),
+        (_FRAME | {"meta": {}}, "meta.frame"),
+        (_FRAME | {"axes": ["x"]}, "array.shape"),
+        (_FRAME | {"array": b"\0"}, "array"),
+        (_FRAME | {"encode_s": "fast"}, "encode_s"),
+        (_FRAME | {"channel": -1}, "channel"),
+        ({"type": "notice"}, "kind"),
+        ({"type": "error"}, "problem"),
+    ],
+)
+def test_a_bad_message_of_a_server_is_refused_by_name(document: dict[str, Any], field: str) -> None:
+    with pytest.raises(ProtocolError) as caught:
+        wire.parse_server_message(wire.pack(document))
+
+    assert caught.value.field == field
+
+
+def test_a_message_that_is_no_frame_is_no_frame() -> None:
+    with pytest.raises(ProtocolError, match="type is 'notice', but must be frame"):
+        wire.parse_frame(wire.encode(_MESSAGES["notice"]))
+
+
+_ANYTHING = st.recursive(
+    st.none() | st.booleans() | st.integers(-5, 2**60) | st.floats() | st.text() | st.binary(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=6,
+)
+
+
+def _mutations(document: dict[str, Any]) -> st.SearchStrategy[dict[str, Any]]:
+    """Return ``document`` with some value, at any depth, replaced by anything."""
+
+    def paths(value: object, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+        match value:
+            case dict():
+                return [path, *(p for k, v in value.items() for p in paths(v, (*path, k)))]
+            case list():
+                return [path, *(p for i, v in enumerate(value) for p in paths(v, (*path, i)))]
+            case _:
+                return [path]
+
+    def replaced(value: Any, path: tuple[Any, ...], new: object) -> Any:
+        if not path:
+            return new
+        copy = value.copy()
+        copy[path[0]] = replaced(value[path[0]], path[1:], new)
+        return copy
+
+    places = [path for path in paths(document) if path]
+    return st.builds(
+        lambda path, new: replaced(document, path, new), st.sampled_from(places), _ANYTHING
+    )
+
+
+@given(
+    document=st.one_of(*map(_mutations, [_SUBSCRIBE, _HELLO, _FRAME, {"type": "ack", "frame": 1}]))
+)
+def test_no_message_of_any_content_raises_anything_but_one_kind_of_error(
+    document: dict[str, Any],
+) -> None:
+    data = msgpack.packb(document)
+    for parse in (wire.parse_client_message, wire.parse_server_message, wire.parse_frame):
+        with contextlib.suppress(ProtocolError):
+            parse(data)
+
+
+def test_every_product_is_in_the_specification_as_it_is_in_the_code() -> None:
+    text = SPECIFICATION.read_text("utf-8").replace("\\|", "|")
+
+    for product in wire.PRODUCTS.values():
+        axes = ", ".join(product.axes)
+        row = (f"`{product.name}`", axes, f"`{product.dtype}`", product.unit, product.summary)
+        assert f"| {' | '.join(row)} |" in text
+
+
+def test_every_close_code_is_in_the_specification() -> None:
+    text = SPECIFICATION.read_text("utf-8")
+
+    never_sent = {wire.CloseCode.ABNORMAL, wire.CloseCode.INTERNAL_ERROR}
+    for code in set(wire.CloseCode) - never_sent:
+        assert f"| {code} |" in text
