@@ -43,10 +43,12 @@ _ARGUMENTS: dict[str, Any] = {
 
 def _made(kind: type[Exception]) -> Exception:
     """Return an instance of any kind, each required argument filled in."""
-    if kind.__init__ is Exception.__init__:
+    try:
+        parameters = inspect.signature(kind).parameters
+    except ValueError:  # one without a constructor of its own
         return kind("told so")
     given, named = [], {}
-    for name, parameter in inspect.signature(kind).parameters.items():
+    for name, parameter in parameters.items():
         value = _ARGUMENTS.get(name, "told so")
         if parameter.default is parameter.empty and parameter.kind is parameter.KEYWORD_ONLY:
             named[name] = value
