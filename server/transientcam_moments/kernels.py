@@ -1,13 +1,146 @@
-"""Compiled lanes for the hot algorithms: what is ready, and how to make it ready."""
+"""Compiled lanes for the hot algorithms: what is ready, and how to make it ready.
 
-from transientcam_moments._kernels import registry
+Nothing has to be called: every algorithm runs on NumPy and gives the same results. A process that
+wants them faster calls `compile_in_background` when it starts and goes on; each algorithm changes
+over as soon as its lane is there.
+
+The environment variable ``TRANSIENTCAM_KERNELS=off`` leaves everything to NumPy. Compiled code is
+kept for the next process in ``NUMBA_CACHE_DIR``, else in ``transientcam/kernels`` below
+``XDG_CACHE_HOME`` or ``~/.cache``, else (nothing there can be written to) not at all.
+"""
+
+import threading
+from collections.abc import Callable, Sequence
+from typing import TypedDict
+
+from transientcam_moments._arrays import MAX_HARMONICS
+from transientcam_moments._kernels.registry import PRECISION_NAMES, REGISTRY, Key
+from transientcam_moments.errors import ParameterError
+
+LANES = ("smallest_eigenvalue", "density")
+
+Progress = Callable[[int, int, str], None]
+"""Takes lanes done, lanes in all, and the name of the lane that is next ("" after the last)."""
 
 
-def state() -> dict[str, object]:
-    """Return what is compiled: ``enabled``, ``compiled``, ``compiling``, ``failed``."""
+class State(TypedDict):
+    """What `state` returns."""
+
+    enabled: bool
+    compiled: list[str]
+    compiling: str | None
+    failed: list[str]
+
+
+def state() -> State:
+    """Say which lanes this process has.
+
+    Returns
+    -------
+    State
+        ``enabled``: False when ``TRANSIENTCAM_KERNELS=off``. ``compiled``: names of the lanes in
+        use, as in "levinson m=4 float32". ``compiling``: the one being compiled now, or None.
+        ``failed``: those that could not be compiled, with the reason; NumPy stands in for them.
+    """
+    compiling = REGISTRY.compiling
     return {
-        "enabled": True,
-        "compiled": [f"{name} m={m} {p}" for name, m, p in sorted(registry.compiled)],
-        "compiling": None,
-        "failed": [],
+        "enabled": REGISTRY.enabled,
+        "compiled": [str(key) for key in list(REGISTRY.compiled)],
+        "compiling": None if compiling is None else str(compiling),
+        "failed": [f"{key}: {reason}" for key, reason in list(REGISTRY.failed.items())],
     }
+
+
+def compile(  # noqa: A001  # tm.kernels.compile says it best, and the builtin isn't used here
+    *,
+    harmonics: Sequence[int] = (3, 4, 8),
+    precisions: Sequence[str] = ("float32", "float64"),
+    progress: Progress | None = None,
+) -> None:
+    """Compile all lanes, or load them from the cache, before returning.
+
+    Parameters
+    ----------
+    harmonics : sequence of int
+        Orders m, each 1 to 32, the most urgent first.
+    precisions : sequence of {"float32", "float64"}
+        Most urgent first; all orders of one before the next.
+    progress : callable, optional
+        Called as ``progress(done, total, name)`` before each lane and after the last.
+
+    Raises
+    ------
+    ParameterError
+        For another order or precision.
+
+    Notes
+    -----
+    A lane that fails to compile is noted in `state`; the others are compiled all the same. Does
+    nothing when kernels are off. Safe to call from several threads: each lane is compiled once.
+    """
+    _compile(_keys(harmonics, precisions), progress, lambda: True)
+
+
+def compile_in_background(
+    *,
+    harmonics: Sequence[int] = (3, 4, 8),
+    precisions: Sequence[str] = ("float32", "float64"),
+) -> threading.Thread:
+    """Start compiling on a thread and return it; arguments and errors as in `compile`.
+
+    The thread is named "transientcam-compile", and can be joined. A process that ends in the
+    meantime waits at most for the lane that is being compiled.
+    """
+    keys = _keys(harmonics, precisions)
+    main = threading.main_thread()
+    # not a daemon: those are frozen at exit wherever they are, which a compiler doesn't survive
+    thread = threading.Thread(
+        target=_compile, args=(keys, None, main.is_alive), name="transientcam-compile"
+    )
+    thread.start()
+    return thread
+
+
+def _keys(harmonics: Sequence[int], precisions: Sequence[str]) -> list[Key]:
+    for m in harmonics:
+        if not 1 <= m <= MAX_HARMONICS:
+            raise ParameterError("harmonics", m, f"1 to {MAX_HARMONICS}")
+    for precision in precisions:
+        if precision not in PRECISION_NAMES:
+            raise ParameterError("precisions", precision, "float32 or float64")
+    return [
+        Key(name, m, PRECISION_NAMES[precision])
+        for precision in precisions
+        for m in dict.fromkeys(harmonics)
+        for name in LANES
+    ]
+
+
+def _compile(keys: list[Key], progress: Progress | None, go_on: Callable[[], bool]) -> None:
+    if not REGISTRY.enabled:
+        return
+    for done, key in enumerate(keys):
+        if not go_on():
+            return
+        if progress is not None:
+            progress(done, len(keys), str(key))
+        _compile_one(key)
+    if progress is not None:
+        progress(len(keys), len(keys), "")
+
+
+def _compile_one(key: Key) -> None:
+    with REGISTRY.lock:
+        if key in REGISTRY.compiled or key in REGISTRY.failed:
+            return
+        REGISTRY.compiling = key
+        try:
+            from transientcam_moments._kernels.compiler import compile_lane
+
+            REGISTRY.compiled[key] = compile_lane(key)
+        except Exception as error:
+            # whatever stops a compiler (a missing one, a full disk, an unknown processor) must
+            # stop nothing else: the planar statement goes on serving
+            REGISTRY.failed[key] = f"{type(error).__name__}: {error}".splitlines()[0]
+        finally:
+            REGISTRY.compiling = None

@@ -9,12 +9,14 @@ A planar function asks ``find`` once and uses what it gets::
 The lanes and their signatures, each that of the planar statement it stands beside
 (``b`` complex (m+1, ...), NumPy arrays with any trailing shape, strided or not):
 
-============================  ==============================================================
-``levinson``                  ``(b) -> (error (...), polynomial (m+1, ...), reflection (m, ...))``
-``density``                   ``(polynomial, error, phase_rad (T,), out (T, ...) | None) -> out``
-``smallest_eigenvalue``       ``(b) -> (...)``
-``pisarenko``                 ``(b) -> (phase_rad (m, ...), weight (m, ...), uniform (...), count (...))``
-============================  ==============================================================
+``levinson(b) -> error (...), polynomial (m+1, ...), reflection (m, ...)``
+
+``density(polynomial, error, phase_rad (T,), out (T, ...) or None, *, floor (...) or None) -> out``
+    ``floor`` is the least squared modulus.
+
+``smallest_eigenvalue(b) -> (...)``
+
+``pisarenko(b) -> phase_rad (m, ...), weight (m, ...), uniform (...), count (...)``
 
 Importing this package imports no compiler: numba is imported by the thread that compiles.
 """
@@ -24,9 +26,11 @@ from typing import Any
 
 import numpy as np
 
-from transientcam_moments._kernels import registry
+from transientcam_moments._kernels.registry import PRECISIONS, REGISTRY, Key
 
 __all__ = ["find"]
+
+_LEAST_PIXELS = 64  # what the widest lane takes at a time
 
 
 def find(name: str, planes: object) -> Callable[..., Any] | None:
@@ -35,7 +39,7 @@ def find(name: str, planes: object) -> Callable[..., Any] | None:
     Parameters
     ----------
     name
-        ``"levinson"``, ``"density"``, ``"smallest_eigenvalue"`` or ``"pisarenko"``.
+        One of the lanes of the module's table.
     planes
         Array (m+1, ...) whose length and dtype choose the lane. Anything but a NumPy array of
         float32, float64, complex64 or complex128 finds nothing.
@@ -43,13 +47,12 @@ def find(name: str, planes: object) -> Callable[..., Any] | None:
     Returns
     -------
     lane
-        Callable as in the table of the module, or None where the planar statement is to be used:
-        the lane isn't compiled in this process (yet), kernels are off, or there are too few pixels
-        for a lane to pay.
+        Callable as in the table, or None where the planar statement is to be used: the lane isn't
+        compiled in this process (yet), kernels are off, or there are fewer than 64 pixels.
     """
     if not isinstance(planes, np.ndarray) or planes.ndim == 0:
         return None
-    precision = registry.PRECISIONS.get(planes.dtype.char)
-    if precision is None:
+    precision = PRECISIONS.get(planes.dtype.char)
+    if precision is None or planes.size < _LEAST_PIXELS * planes.shape[0]:
         return None
-    return registry.compiled.get((name, planes.shape[0] - 1, precision))
+    return REGISTRY.compiled.get(Key(name, planes.shape[0] - 1, precision))

@@ -1,11 +1,42 @@
 """Which lanes this process has: read by every call, written by the thread that compiles."""
 
-from collections.abc import Callable
-from typing import Any
+import os
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
-# A lane is looked up by (name, m, precision); precision is the character of the real type.
-Key = tuple[str, int, str]
+PRECISIONS = {"f": "f", "F": "f", "d": "d", "D": "d"}  # of an array's type, by its character
+PRECISION_NAMES = {"float32": "f", "float64": "d"}
 
-PRECISIONS = {"f": "f", "F": "f", "d": "d", "D": "d"}
 
-compiled: dict[Key, Callable[..., Any]] = {}
+class Key(NamedTuple):
+    """What a lane is compiled for."""
+
+    name: str
+    harmonics: int
+    precision: str
+
+    def __str__(self) -> str:
+        """As in "levinson m=4 float32"."""
+        precision = {code: name for name, code in PRECISION_NAMES.items()}[self.precision]
+        return f"{self.name} m={self.harmonics} {precision}"
+
+
+class Registry:
+    """The compiled lanes of a process and how far compiling has come.
+
+    Written under ``lock`` by one compiling thread at a time; ``compiled`` is read without it.
+    """
+
+    def __init__(self, environ: Mapping[str, str]) -> None:
+        """Read ``TRANSIENTCAM_KERNELS``: "off" (or 0, no, false) leaves everything to NumPy."""
+        setting = environ.get("TRANSIENTCAM_KERNELS", "on").strip().lower()
+        self.enabled = setting not in ("off", "0", "no", "false")
+        self.lock = threading.Lock()
+        self.compiled: dict[Key, Callable[..., Any]] = {}
+        self.compiling: Key | None = None
+        self.failed: dict[Key, str] = {}
+
+
+# The one place that reads the environment; a process has one set of machine code.
+REGISTRY = Registry(os.environ)

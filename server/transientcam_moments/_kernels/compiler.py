@@ -1,0 +1,19 @@
+"""Every lane by its name. Importing this module imports numba, so only who compiles may."""
+
+from collections.abc import Callable
+from typing import Any
+
+from transientcam_moments._kernels.density import density_lane
+from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue_lane
+from transientcam_moments._kernels.registry import Key
+
+# From the one that gains most to the one that gains least.
+LANES: dict[str, Callable[[int, str], Callable[..., Any]]] = {
+    "smallest_eigenvalue": smallest_eigenvalue_lane,
+    "density": density_lane,
+}
+
+
+def compile_lane(key: Key) -> Callable[..., Any]:
+    """Compile one lane, or load it from the cache."""
+    return LANES[key.name](key.harmonics, key.precision)

@@ -1,0 +1,54 @@
+"""The smallest eigenvalue of every pixel's Toeplitz matrix."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from transientcam_moments._kernels import simd, toeplitz
+from transientcam_moments._kernels.entries import (
+    PIXELS,
+    complex_arrays,
+    entry,
+    order_type,
+    real_arrays,
+)
+
+_INTERLEAVE = 4
+
+
+@njit(nogil=True, error_model="numpy")
+def _smallest_eigenvalue(order: Any, b: Any, out: Any, start: int, stop: int) -> None:
+    one = simd.ones(out, _INTERLEAVE)
+    step = simd.width(one)
+    re, im = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    h = simd.matrix(one, order, 1)
+    d, e = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    for left in range(start, stop, step):
+        p = min(left, stop - step)
+        scale = toeplitz.load_relative(order, b, p, re, im)
+        simd.store(out, p, scale * toeplitz.smallest_eigenvalue(order, re, im, h, d, e))
+
+
+def smallest_eigenvalue_lane(m: int, precision: str) -> Callable[..., Any]:
+    """Compile the smallest eigenvalue of order m; see the table in ``_kernels``."""
+    order = (0,) * m
+    real, cplx = real_arrays(precision), complex_arrays(precision)
+    run = entry(
+        _smallest_eigenvalue,
+        order_type(m),
+        cplx[2],
+        real[1],
+        PIXELS,
+        PIXELS,
+    )
+
+    def lane(b: Any) -> Any:
+        pixels = b[0].size
+        planes = np.ascontiguousarray(b).reshape(m + 1, pixels)
+        out = np.empty(pixels, precision)
+        run(order, planes, out, 0, pixels)
+        return out.reshape(b.shape[1:])
+
+    return lane

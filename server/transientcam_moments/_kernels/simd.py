@@ -1,0 +1,501 @@
+"""Short vectors of pixels as a numba type: a kernel reads like the scalar algorithm.
+
+A ``Lanes`` value holds the same quantity for as many pixels as one register of this machine takes
+(16 in float32 with AVX-512, 8 with AVX, 4 with SSE or NEON), so vectorisation doesn't depend on
+what an optimiser can prove about a loop, and a group of pixels may leave an iteration as soon as
+all of them have converged.
+
+Arithmetic is IEEE: the only freedom given to the compiler is ``contract``, to fuse a product and a
+sum into one rounding, so NaN and infinities behave as in NumPy. Comparisons with NaN are False.
+"""
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import binding, ir  # type: ignore[import-untyped]  # it has no annotations
+from numba import extending as numba_extending
+from numba import types as numba_types
+from numba.core import cgutils as numba_cgutils
+from numba.core.typeconv.castgraph import Conversion
+from numba.core.typing import templates as numba_templates
+
+# numba is only partly annotated, and what its decorators return isn't what they decorate
+cgutils: Any = numba_cgutils
+extending: Any = numba_extending
+templates: Any = numba_templates
+types: Any = numba_types
+intrinsic = extending.intrinsic
+
+_INDEX = ir.IntType(32)
+_FUSE = ("contract",)
+
+
+def _register_bytes() -> int:
+    features = binding.get_host_cpu_features()
+    return 64 if features.get("avx512f") else 32 if features.get("avx") else 16
+
+
+REGISTER_BYTES = _register_bytes()
+
+
+class Lanes(types.Type):  # type: ignore[misc]  # numba is untyped
+    """``count`` numbers of type ``element``, one a pixel."""
+
+    def __init__(self, element: Any, count: int) -> None:
+        self.element, self.count = element, count
+        super().__init__(name=f"Lanes({element}x{count})")
+
+    def can_convert_from(self, typingctx: Any, other: Any) -> Conversion | None:
+        """Numbers spread over all lanes."""
+        return Conversion.safe if isinstance(other, types.Float | types.Integer) else None
+
+
+class Mask(types.Type):  # type: ignore[misc]  # numba is untyped
+    """``count`` truth values, one a pixel."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        super().__init__(name=f"Mask({count})")
+
+
+class Registers(types.Type):  # type: ignore[misc]  # numba is untyped
+    """``size`` lanes addressed by index: a small array that lives in registers or on the stack."""
+
+    def __init__(self, item: Lanes, size: int) -> None:
+        self.item, self.size = item, size
+        super().__init__(name=f"Registers({item}x{size})")
+
+
+@extending.register_model(Lanes)
+class _LanesModel(extending.models.PrimitiveModel):  # type: ignore[misc]  # numba is untyped
+    def __init__(self, dmm: Any, fe_type: Lanes) -> None:
+        element = dmm.lookup(fe_type.element).get_value_type()
+        super().__init__(dmm, fe_type, ir.VectorType(element, fe_type.count))
+
+
+@extending.register_model(Mask)
+class _MaskModel(extending.models.PrimitiveModel):  # type: ignore[misc]  # numba is untyped
+    def __init__(self, dmm: Any, fe_type: Mask) -> None:
+        super().__init__(dmm, fe_type, ir.VectorType(ir.IntType(1), fe_type.count))
+
+
+@extending.register_model(Registers)
+class _RegistersModel(extending.models.PrimitiveModel):  # type: ignore[misc]  # numba is untyped
+    def __init__(self, dmm: Any, fe_type: Registers) -> None:
+        item = dmm.lookup(fe_type.item).get_value_type()
+        super().__init__(dmm, fe_type, item.as_pointer())
+
+
+def _spread(builder: Any, vector: Any, scalar: Any) -> Any:
+    first = builder.insert_element(ir.Constant(vector, ir.Undefined), scalar, _INDEX(0))
+    zeros = ir.Constant(ir.VectorType(_INDEX, vector.count), [0] * vector.count)
+    return builder.shuffle_vector(first, ir.Constant(vector, ir.Undefined), zeros)
+
+
+@extending.lower_cast(types.Float, Lanes)
+@extending.lower_cast(types.Integer, Lanes)
+def _cast(context: Any, builder: Any, fromty: Any, toty: Any, val: Any) -> Any:
+    scalar = context.cast(builder, val, fromty, toty.element)
+    return _spread(builder, context.get_value_type(toty), scalar)
+
+
+def _operator(op: Any, kind: type, count: int, emit: Callable[..., Any], result: Any) -> None:
+    """Give ``op`` a meaning for ``count`` operands of ``kind``, or of numbers spread to match."""
+
+    @templates.infer_global(op)
+    class _Template(templates.AbstractTemplate):  # type: ignore[misc]  # numba is untyped
+        def generic(self, args: Any, kws: Any) -> Any:
+            vectors = {arg for arg in args if isinstance(arg, kind)}
+            others = [arg for arg in args if not isinstance(arg, kind)]
+            numbers = kind is Lanes and all(
+                isinstance(arg, types.Float | types.Integer) for arg in others
+            )
+            if len(args) != count or len(vectors) != 1 or not (numbers or not others):
+                return None
+            vector = vectors.pop()
+            return templates.signature(result(vector), *(vector,) * count)
+
+    @extending.lower_builtin(op, *(kind,) * count)
+    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return emit(builder, *args)
+
+
+def _same(vector: Any) -> Any:
+    return vector
+
+
+def _truth(vector: Any) -> Mask:
+    return Mask(vector.count)
+
+
+def _compare(code: str) -> Callable[..., Any]:
+    return lambda builder, x, y: builder.fcmp_ordered(code, x, y)
+
+
+_operator(operator.add, Lanes, 2, lambda b, x, y: b.fadd(x, y, flags=_FUSE), _same)
+_operator(operator.sub, Lanes, 2, lambda b, x, y: b.fsub(x, y, flags=_FUSE), _same)
+_operator(operator.mul, Lanes, 2, lambda b, x, y: b.fmul(x, y, flags=_FUSE), _same)
+_operator(operator.truediv, Lanes, 2, lambda b, x, y: b.fdiv(x, y), _same)
+_operator(operator.neg, Lanes, 1, lambda b, x: b.fneg(x), _same)
+_operator(operator.lt, Lanes, 2, _compare("<"), _truth)
+_operator(operator.le, Lanes, 2, _compare("<="), _truth)
+_operator(operator.gt, Lanes, 2, _compare(">"), _truth)
+_operator(operator.ge, Lanes, 2, _compare(">="), _truth)
+_operator(operator.and_, Mask, 2, lambda b, x, y: b.and_(x, y), _same)
+_operator(operator.or_, Mask, 2, lambda b, x, y: b.or_(x, y), _same)
+_operator(operator.invert, Mask, 1, lambda b, x: b.not_(x), _same)
+
+
+@templates.infer_global(operator.getitem)
+class _Get(templates.AbstractTemplate):  # type: ignore[misc]  # numba is untyped
+    def generic(self, args: Any, kws: Any) -> Any:
+        if isinstance(args[0], Registers) and isinstance(args[1], types.Integer):
+            return templates.signature(args[0].item, args[0], types.intp)
+        return None
+
+
+@templates.infer_global(operator.setitem)
+class _Set(templates.AbstractTemplate):  # type: ignore[misc]  # numba is untyped
+    def generic(self, args: Any, kws: Any) -> Any:
+        if isinstance(args[0], Registers) and isinstance(args[1], types.Integer):
+            return templates.signature(types.void, args[0], types.intp, args[0].item)
+        return None
+
+
+@extending.lower_builtin(operator.getitem, Registers, types.Integer)
+def _getitem(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.load(builder.gep(args[0], [args[1]]))
+
+
+@extending.lower_builtin(operator.setitem, Registers, types.Integer, types.Any)
+def _setitem(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    builder.store(args[2], builder.gep(args[0], [args[1]]))
+    return context.get_dummy_value()
+
+
+def _room(size: Callable[[int, int], int]) -> Any:
+    """Return an intrinsic ``(like, order, extra)`` that makes room for ``size(m, extra)`` lanes."""
+
+    @intrinsic
+    def function(typingctx: Any, like: Any, order: Any, extra: Any) -> Any:
+        if not isinstance(extra, types.IntegerLiteral):
+            return None
+        bank = Registers(like, size(len(order), extra.literal_value))
+
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            return cgutils.alloca_once(builder, context.get_value_type(like), size=bank.size)
+
+        return bank(like, order, extra), codegen
+
+    return function
+
+
+# Room for lanes of the type of ``like``; ``order`` is a tuple of length m and ``extra`` a literal,
+# so that all sizes are known when compiled.
+registers = _room(lambda m, extra: m + extra)
+matrix = _room(lambda m, extra: (m + extra) * (m + extra))
+planes = _room(lambda m, extra: (2 * m + 2) * extra)
+
+
+@intrinsic
+def ones(typingctx: Any, array: Any, interleave: Any) -> Any:
+    """Return lanes of 1 in the real type of ``array``: ``interleave`` registers taken as one.
+
+    Several registers hide the latency of long chains of dependent operations.
+    """
+    if not isinstance(interleave, types.IntegerLiteral):
+        return None
+    real = getattr(array.dtype, "underlying_float", array.dtype)
+    lanes = Lanes(real, interleave.literal_value * REGISTER_BYTES // (real.bitwidth // 8))
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return ir.Constant(context.get_value_type(lanes), [1.0] * lanes.count)
+
+    return lanes(array, interleave), codegen
+
+
+@intrinsic
+def width(typingctx: Any, like: Any) -> Any:
+    """Return how many pixels there are in lanes of the type of ``like``."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return context.get_constant(types.intp, like.count)
+
+    return types.intp(like), codegen
+
+
+@intrinsic
+def spread(typingctx: Any, like: Any, value: Any) -> Any:
+    """Return a number in every lane."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return args[1]
+
+    return like(like, like), codegen
+
+
+def _pointer(
+    context: Any, builder: Any, array_type: Any, array: Any, index: Any, vector: Any
+) -> Any:
+    """Address of element ``index`` of the contiguous array ``array``, as vectors."""
+    struct = cgutils.create_struct_proxy(array_type)(context, builder, array)
+    return builder.bitcast(builder.gep(struct.data, [index]), vector.as_pointer())
+
+
+@intrinsic
+def load(typingctx: Any, like: Any, array: Any, index: Any) -> Any:
+    """Return the pixels from ``index`` on, converted to the type of ``like``."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        stored = context.get_value_type(array.dtype)
+        vector = ir.VectorType(stored, like.count)
+        pointer = _pointer(context, builder, array, args[1], args[2], vector)
+        value = builder.load(pointer, align=array.dtype.bitwidth // 8)
+        if isinstance(stored, ir.IntType):
+            return builder.uitofp(value, context.get_value_type(like))
+        return value
+
+    return like(like, array, types.intp), codegen
+
+
+@intrinsic
+def store(typingctx: Any, array: Any, index: Any, value: Any) -> Any:
+    """Write the pixels from ``index`` on; into an array of integers, truncated."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        stored = context.get_value_type(array.dtype)
+        vector = ir.VectorType(stored, value.count)
+        pointer = _pointer(context, builder, array, args[0], args[1], vector)
+        lanes = args[2]
+        if isinstance(stored, ir.IntType):
+            lanes = builder.fptoui(lanes, vector)
+        builder.store(lanes, pointer, align=array.dtype.bitwidth // 8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, value), codegen
+
+
+@intrinsic
+def stream(typingctx: Any, array: Any, index: Any, value: Any) -> Any:
+    """Write pixels past the caches, for results larger than these; aligned to a register."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        vector = context.get_value_type(value)
+        pointer = _pointer(context, builder, array, args[0], args[1], vector)
+        instruction = builder.store(args[2], pointer, align=REGISTER_BYTES)
+        instruction.set_metadata("nontemporal", builder.module.add_metadata([_INDEX(1)]))
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, value), codegen
+
+
+@intrinsic
+def load_within(typingctx: Any, bank: Any, index: Any) -> Any:
+    """Return the lanes from element ``index`` of a bank of registers on."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        vector = context.get_value_type(bank.item)
+        elements = builder.bitcast(args[0], vector.element.as_pointer())
+        pointer = builder.bitcast(builder.gep(elements, [args[1]]), vector.as_pointer())
+        return builder.load(pointer, align=bank.item.element.bitwidth // 8)
+
+    return bank.item(bank, types.intp), codegen
+
+
+@intrinsic
+def store_within(typingctx: Any, bank: Any, index: Any, value: Any) -> Any:
+    """Write lanes from element ``index`` of a bank of registers on."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        vector = context.get_value_type(bank.item)
+        elements = builder.bitcast(args[0], vector.element.as_pointer())
+        pointer = builder.bitcast(builder.gep(elements, [args[1]]), vector.as_pointer())
+        builder.store(args[2], pointer, align=bank.item.element.bitwidth // 8)
+        return context.get_dummy_value()
+
+    return types.void(bank, types.intp, bank.item), codegen
+
+
+@intrinsic
+def store_first(typingctx: Any, array: Any, index: Any, value: Any, count: Any) -> Any:
+    """Write only the first ``count`` lanes."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        vector = args[2].type
+        numbers = ir.VectorType(ir.IntType(64), vector.count)
+        lane = ir.Constant(numbers, list(range(vector.count)))
+        mask = builder.icmp_signed("<", lane, _spread(builder, numbers, args[3]))
+        pointer = _pointer(context, builder, array, args[0], args[1], vector)
+        align = value.element.bitwidth // 8
+        kind = [vector, pointer.type, _INDEX, mask.type]
+        name = f"llvm.masked.store.v{vector.count}f{value.element.bitwidth}.p0"
+        callee = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(ir.VoidType(), kind), name
+        )
+        builder.call(callee, [args[2], pointer, _INDEX(align), mask])
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, value, types.intp), codegen
+
+
+@intrinsic
+def before_boundary(typingctx: Any, array: Any, index: Any) -> Any:
+    """Return how many elements from ``index`` on lie before the next boundary of a register."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        size = array.dtype.bitwidth // 8
+        struct = cgutils.create_struct_proxy(array)(context, builder, args[0])
+        word = ir.IntType(64)
+        address = builder.ptrtoint(builder.gep(struct.data, [args[1]]), word)
+        short = builder.and_(builder.neg(address), word(REGISTER_BYTES - 1))
+        return builder.udiv(short, word(size))
+
+    return types.intp(array, types.intp), codegen
+
+
+@intrinsic
+def fence(typingctx: Any) -> Any:
+    """Wait until what was written past the caches is seen by other threads."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        builder.fence("seq_cst")
+        return context.get_dummy_value()
+
+    return types.void(), codegen
+
+
+def _shuffle(builder: Any, x: Any, y: Any, order: list[int]) -> Any:
+    return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(_INDEX, len(order)), order))
+
+
+@intrinsic
+def load_complex(typingctx: Any, like: Any, array: Any, index: Any) -> Any:
+    """Return real and imaginary lanes of the complex pixels from ``index`` on."""
+    pair = types.UniTuple(like, 2)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        vector = context.get_value_type(like)
+        pointer = _pointer(context, builder, array, args[1], args[2], vector)
+        align = like.element.bitwidth // 8
+        low = builder.load(pointer, align=align)
+        high = builder.load(builder.gep(pointer, [_INDEX(1)]), align=align)
+        re = _shuffle(builder, low, high, list(range(0, 2 * like.count, 2)))
+        im = _shuffle(builder, low, high, list(range(1, 2 * like.count, 2)))
+        return context.make_tuple(builder, pair, (re, im))
+
+    return pair(like, array, types.intp), codegen
+
+
+@intrinsic
+def store_complex(typingctx: Any, array: Any, index: Any, re: Any, im: Any) -> Any:
+    """Write complex pixels from ``index`` on."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        count = re.count
+        zipped = [part for lane in range(count) for part in (lane, count + lane)]
+        pointer = _pointer(context, builder, array, args[0], args[1], args[2].type)
+        align = re.element.bitwidth // 8
+        builder.store(_shuffle(builder, args[2], args[3], zipped[:count]), pointer, align=align)
+        high = builder.gep(pointer, [_INDEX(1)])
+        builder.store(_shuffle(builder, args[2], args[3], zipped[count:]), high, align=align)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, re, re), codegen
+
+
+def _llvm(name: str) -> Any:
+    """Return LLVM's vector intrinsic ``name`` of one operand."""
+
+    @intrinsic
+    def function(typingctx: Any, x: Any) -> Any:
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            vector = args[0].type
+            kind = ir.FunctionType(vector, [vector])
+            full = f"llvm.{name}.v{vector.count}f{x.element.bitwidth}"
+            callee = cgutils.get_or_insert_function(builder.module, kind, full)
+            return builder.call(callee, args)
+
+        return x(x), codegen
+
+    return function
+
+
+sqrt = _llvm("sqrt")
+absolute = _llvm("fabs")
+
+
+@intrinsic
+def select(typingctx: Any, mask: Any, x: Any, y: Any) -> Any:
+    """Return ``x`` where the mask is true, else ``y``."""
+    lanes = x if isinstance(x, Lanes) else y
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.select(*args)
+
+    return lanes(mask, lanes, lanes), codegen
+
+
+def _smaller(code: str) -> Any:
+    @intrinsic
+    def function(typingctx: Any, x: Any, y: Any) -> Any:
+        lanes = x if isinstance(x, Lanes) else y
+
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            return builder.select(builder.fcmp_ordered(code, *args), *args)
+
+        return lanes(lanes, lanes), codegen
+
+    return function
+
+
+# Of a NaN and a number both return their second argument.
+minimum = _smaller("<")
+maximum = _smaller(">")
+
+
+@intrinsic
+def some(typingctx: Any, mask: Any) -> Any:
+    """Return whether the mask is true for at least one pixel."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        bits = ir.IntType(mask.count)
+        return builder.icmp_unsigned("!=", builder.bitcast(args[0], bits), bits(0))
+
+    return types.boolean(mask), codegen
+
+
+@intrinsic
+def bits(typingctx: Any, mask: Any) -> Any:
+    """Return the truth values as the low bits of an integer, the first pixel lowest."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        packed = builder.bitcast(args[0], ir.IntType(mask.count))
+        return builder.zext(packed, ir.IntType(64))
+
+    return types.uint64(mask), codegen
+
+
+def _constant(value: Callable[[Any], float]) -> Any:
+    """Return an intrinsic that gives a number depending on the precision of its argument."""
+
+    @intrinsic
+    def function(typingctx: Any, like: Any) -> Any:
+        limits = np.finfo(np.float32 if like.element.bitwidth == 32 else np.float64)
+
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            vector = context.get_value_type(like)
+            return ir.Constant(vector, [float(value(limits))] * like.count)
+
+        return like(like), codegen
+
+    return function
+
+
+eps = _constant(lambda limits: limits.eps)
+tiny = _constant(lambda limits: limits.tiny)
+nan = _constant(lambda limits: np.nan)
+# The powers of two between which a number and its reciprocal are far from the ends of the range.
+large = _constant(lambda limits: 2.0 ** (limits.maxexp * 3 // 4))
+small = _constant(lambda limits: 2.0 ** -(limits.maxexp * 3 // 4))

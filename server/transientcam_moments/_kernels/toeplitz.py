@@ -1,0 +1,115 @@
+"""What all lanes need of a Hermitian Toeplitz matrix, for one register of pixels at a time.
+
+These are the bodies of the kernels, expanded in place: they take and fill banks of registers,
+``order`` is a tuple of length m, and moments are already divided by the largest of them.
+"""
+
+from typing import Any
+
+from numba import njit
+
+from transientcam_moments._kernels import simd
+
+_EIGENVALUE_STEPS = 30  # five are usual; a cluster of m equal eigenvalues takes thirteen
+
+
+@njit(forceinline=True, error_model="numpy")
+def load_relative(order: Any, b: Any, p: int, re: Any, im: Any) -> Any:
+    """Load moments b_0 .. b_m divided by the largest of them, and return that one.
+
+    A pixel of zeros stays zero. One with a NaN or an infinity becomes NaN in all of its moments.
+    """
+    m = len(order)
+    re[0], im[0] = simd.load_complex(re[0], b[0], p)
+    im[0] = re[0] * 0.0
+    scale, poison = simd.absolute(re[0]), im[0]
+    for j in range(1, m + 1):
+        re[j], im[j] = simd.load_complex(re[0], b[j], p)
+        poison = poison + re[j] * 0.0 + im[j] * 0.0
+        scale = simd.maximum(scale, simd.maximum(simd.absolute(re[j]), simd.absolute(im[j])))
+    scale = scale + poison
+    # the reciprocal of tiny and huge pixels would leave the exponent range: into its middle first
+    low, high = scale < simd.small(scale), scale > simd.large(scale)
+    near = scale
+    if simd.some(low | high):
+        lift = simd.select(low, simd.large(scale), simd.select(high, simd.small(scale), 1.0))
+        near = scale * lift
+        for j in range(m + 1):
+            re[j], im[j] = re[j] * lift, im[j] * lift
+    inverse = simd.select(near > 0.0, 1.0 / near, near)
+    for j in range(m + 1):
+        re[j], im[j] = re[j] * inverse, im[j] * inverse + poison
+    return scale
+
+
+@njit(forceinline=True, error_model="numpy")
+def smallest_eigenvalue(order: Any, re: Any, im: Any, h: Any, d: Any, e: Any) -> Any:
+    """Return the smallest eigenvalue of B; ``h`` has room for a matrix, ``d`` and ``e`` for a row.
+
+    B is unitarily similar to the real symmetric matrix Re b_{j-k} - Im b_{j+k-m} (transform by
+    (I + i J) / sqrt 2). Householder reflections make it tridiagonal, and Laguerre's iteration
+    climbs from Gershgorin's bound to the smallest root of its characteristic polynomial, which it
+    never passes because all roots are real.
+    """
+    m = len(order)
+    n = m + 1
+    for i in range(n):
+        for j in range(i + 1):
+            k = i + j - m
+            h[i * n + j] = re[i - j] - im[k] if k >= 0 else re[i - j] + im[-k]
+    for i in range(n - 2):
+        norm2 = h[(i + 1) * n + i] * h[(i + 1) * n + i]
+        for j in range(i + 2, n):
+            norm2 = norm2 + h[j * n + i] * h[j * n + i]
+        norm = simd.sqrt(norm2)
+        first = h[(i + 1) * n + i]
+        half = norm2 + simd.absolute(first) * norm  # v'v / 2
+        h[(i + 1) * n + i] = simd.select(first < 0.0, first - norm, first + norm)
+        inverse = simd.select(half > simd.small(half), 1.0 / half, 0.0)
+        inner = re[0] * 0.0
+        for j in range(i + 1, n):  # row j of p = A v / (v'v / 2), kept in e for the moment
+            row = h[j * n + i + 1] * h[(i + 1) * n + i]
+            for k in range(i + 2, n):
+                row = row + h[max(j, k) * n + min(j, k)] * h[k * n + i]
+            e[j] = row * inverse
+            inner = inner + e[j] * h[j * n + i]
+        inner = inner * inverse * 0.5
+        for j in range(i + 1, n):
+            e[j] = e[j] - inner * h[j * n + i]
+        for j in range(i + 1, n):
+            for k in range(i + 1, j + 1):
+                h[j * n + k] = h[j * n + k] - h[j * n + i] * e[k] - e[j] * h[k * n + i]
+        d[i] = h[i * n + i]
+        e[i] = norm
+    d[n - 2], d[n - 1] = h[(n - 2) * n + n - 2], h[(n - 1) * n + n - 1]
+    e[n - 2] = simd.absolute(h[(n - 1) * n + n - 2])
+    x = d[0] - e[0]
+    for i in range(1, n - 1):
+        x = simd.minimum(x, d[i] - e[i] - e[i - 1])
+    x = simd.minimum(x, d[n - 1] - e[n - 2])
+    for i in range(n - 1):
+        e[i] = e[i] * e[i]
+    tolerance = 2.0 * simd.eps(x)
+    last = x * 0.0
+    for _ in range(_EIGENVALUE_STEPS):
+        # p = det(T - x I) and its first two derivatives by the recurrence over leading blocks
+        p0, q0, r0 = x * 0.0 + 1.0, x * 0.0, x * 0.0
+        p1, q1, r1 = d[0] - x, q0 - 1.0, r0
+        for k in range(1, n):
+            t = d[k] - x
+            p2 = t * p1 - e[k - 1] * p0
+            q2 = t * q1 - p1 - e[k - 1] * q0
+            r2 = t * r1 - 2.0 * q1 - e[k - 1] * r0
+            p0, q0, r0, p1, q1, r1 = p1, q1, r1, p2, q2, r2
+        g = q1 / p1
+        root = (n - 1.0) * ((n - 1.0) * g * g - n * r1 / p1)
+        climb = n / (simd.sqrt(simd.maximum(root, x * 0.0)) - g)
+        # rounding may carry the last step past the root: from there Newton's comes back
+        back = simd.maximum(-1.0 / g, -0.25 * last)
+        left = (p1 > 0.0) & (q1 < 0.0)
+        step = simd.select(left, climb, simd.select((p1 < 0.0) & (q1 < 0.0), back, 0.0))
+        x = x + step
+        last = simd.absolute(step)
+        if not simd.some(last > tolerance):
+            break
+    return x
