@@ -1,1 +1,72 @@
-"""."""
+"""A camera in this process: an AMCW lidar on USB, or its simulation behind the same cable.
+
+>>> from transientcam_driver import Sequence, open_camera
+>>> with open_camera("sim:mirrors") as camera:
+...     applied = camera.configure(Sequence(harmonics=3, zeroth="estimated", exposure_s=0.5e-3))
+...     camera.start()
+...     frame = camera.read_frame(timeout_s=5.0)
+>>> frame.images.shape
+(12, 120, 163)
+"""
+
+from transientcam_driver.camera import Camera, CameraState
+from transientcam_driver.capabilities import AppliedSequence, Capabilities
+from transientcam_driver.errors import (
+    CameraBusy,
+    CameraClosed,
+    CameraError,
+    CameraFault,
+    CameraLost,
+    CameraNotFound,
+    DeviceRefused,
+    DriverError,
+    FirmwareTooOld,
+    FrameTimeout,
+    LibusbMissing,
+    NotStreaming,
+    PermissionDenied,
+    ProtocolError,
+    SceneError,
+    SequenceError,
+    SpecError,
+)
+from transientcam_driver.frames import Counters, RawFrame
+from transientcam_driver.opening import open_camera
+from transientcam_driver.protocol import Status
+from transientcam_driver.sequence import ImageLabel, Sequence, SubPhases
+from transientcam_driver.simulation import SceneInfo, Simulation, Truth, list_scenes
+
+__all__ = [
+    "AppliedSequence",
+    "Camera",
+    "CameraBusy",
+    "CameraClosed",
+    "CameraError",
+    "CameraFault",
+    "CameraLost",
+    "CameraNotFound",
+    "CameraState",
+    "Capabilities",
+    "Counters",
+    "DeviceRefused",
+    "DriverError",
+    "FirmwareTooOld",
+    "FrameTimeout",
+    "ImageLabel",
+    "LibusbMissing",
+    "NotStreaming",
+    "PermissionDenied",
+    "ProtocolError",
+    "RawFrame",
+    "SceneError",
+    "SceneInfo",
+    "Sequence",
+    "SequenceError",
+    "Simulation",
+    "SpecError",
+    "Status",
+    "SubPhases",
+    "Truth",
+    "list_scenes",
+    "open_camera",
+]

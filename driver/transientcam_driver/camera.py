@@ -1,0 +1,430 @@
+"""A camera in this process: configure it, start it, take its frames."""
+
+import math
+import threading
+import warnings
+import weakref
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from enum import StrEnum
+from types import TracebackType
+
+from transientcam_driver.capabilities import IMAGE_HEADER_BYTES, AppliedSequence, Capabilities
+from transientcam_driver.errors import (
+    CameraClosed,
+    CameraError,
+    CameraFault,
+    CameraLost,
+    DeviceRefused,
+    FrameTimeout,
+    NotStreaming,
+    ProtocolError,
+    TransferOverflow,
+    TransferStalled,
+)
+from transientcam_driver.frames import Counters, FrameAssembler, RawFrame
+from transientcam_driver.framing import PacketDecoder
+from transientcam_driver.protocol import (
+    CAPS_BYTES,
+    LAST_ERROR_BYTES,
+    TIME_BYTES,
+    Commitment,
+    DeviceState,
+    Request,
+    SequenceWords,
+    Status,
+    unpack_capabilities,
+    unpack_last_error,
+    unpack_time,
+)
+from transientcam_driver.sequence import Sequence
+from transientcam_driver.simulation import Simulation
+from transientcam_driver.simulation.clock import Clock, RealClock
+from transientcam_driver.usb import Transport
+
+READ_S = 0.1
+"""Longest single read: how long a stop or an interrupt may have to wait for a reader."""
+_BEATS_PER_TIMEOUT = 4
+
+
+class CameraState(StrEnum):
+    """Where a camera stands."""
+
+    DISCONNECTED = "disconnected"
+    CONNECTING = "connecting"
+    IDLE = "idle"
+    STREAMING = "streaming"
+    FAULTED = "faulted"
+
+
+class Camera:
+    """An AMCW lidar, real or simulated, owned by this process.
+
+    Methods may be called from any thread, ``read_frame`` from one at a time. Images are read on
+    the thread that calls ``read_frame``, which also keeps the heartbeat: the light burns only
+    while somebody takes the frames. When nobody does for longer than the device's heartbeat, the
+    device switches itself off, and the next ``read_frame`` starts it anew.
+
+    The light goes off with ``stop``, ``safe_off`` and ``close``, when the object is collected or
+    the interpreter ends, and by the device's own watchdog when the process dies.
+
+    Parameters
+    ----------
+    connect
+        Finds and claims the device with a serial number, or any when it is None.
+    clock
+        Time; the world's by default.
+    simulation
+        Handle on the simulated world, when there is one behind the cable.
+    sequence
+        What to configure first.
+    """
+
+    def __init__(
+        self,
+        connect: Callable[[str | None], Transport],
+        *,
+        clock: Clock | None = None,
+        simulation: Simulation | None = None,
+        sequence: Sequence | None = None,
+    ) -> None:
+        self._connect = connect
+        self._clock = clock or RealClock()
+        self.simulation = simulation
+        self.counters = Counters()
+        self._control = threading.RLock()  # requests and the state
+        self._assembly = threading.Lock()  # decoder and assembler; never held while waiting
+        self._reading = threading.Lock()  # held by the reader
+        self._wanted = sequence or Sequence()
+        self._resume = False
+        self._closed = False
+        self._heartbeat_s = -math.inf
+        self._stalled = False
+        self._frames: deque[RawFrame] = deque()
+        self._state = CameraState.CONNECTING
+        self._applied: AppliedSequence | None = None
+        self._open(None)
+
+    # --- what it is and what it does -------------------------------------------------------
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """The camera's own account of itself."""
+        return self._capabilities
+
+    @property
+    def state(self) -> CameraState:
+        """Where the camera stands."""
+        return self._state
+
+    @property
+    def applied(self) -> AppliedSequence:
+        """What is really set."""
+        assert self._applied is not None  # noqa: S101  (set before the constructor returns)
+        return self._applied
+
+    def validate(self, sequence: Sequence) -> AppliedSequence:
+        """Say what would be set, without asking the device; the epoch is 0.
+
+        Raises
+        ------
+        SequenceError
+            Naming the field, its value and the limit of this camera.
+        """
+        return self._capabilities.apply(sequence)
+
+    def configure(self, sequence: Sequence) -> AppliedSequence:
+        """Set a sequence; while streaming, the next frame is the new sequence's.
+
+        Frames of the sequence before are not delivered any more once this returns.
+
+        Raises
+        ------
+        SequenceError
+            The sequence is not possible; nothing was changed.
+        CameraLost
+            The camera is gone; the sequence is not remembered.
+        """
+        self._capabilities.validate(sequence)
+        with self._control:
+            applied = self._configure(sequence)
+            self._wanted = sequence
+            return applied
+
+    def start(self) -> None:
+        """Switch the light on and capture frames back to back."""
+        with self._control:
+            self._start()
+            self._resume = True
+
+    def stop(self) -> None:
+        """Switch the light off; a ``read_frame`` that is waiting raises NotStreaming."""
+        self._off(Request.STOP)
+
+    def safe_off(self) -> None:
+        """Switch the light off by the request that a device always honours."""
+        self._off(Request.SAFE_OFF)
+
+    def status(self) -> Status:
+        """Ask the device how it is."""
+        with self._control:
+            return Status.unpack(self._ask(Request.GET_STATUS, length=Status.BYTES))
+
+    def device_time_s(self) -> float:
+        """Ask the device for its clock: seconds since power-up."""
+        with self._control:
+            return unpack_time(self._ask(Request.GET_TIME, length=TIME_BYTES))
+
+    def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
+        """Wait for the next complete frame.
+
+        Raises
+        ------
+        FrameTimeout
+            None was complete in time; the camera goes on.
+        NotStreaming
+            The camera was not started, or was stopped meanwhile.
+        CameraLost
+            It was unplugged or does not answer; see ``reconnect``.
+        CameraFault
+            The device switched itself off.
+        """
+        with self._reading:
+            end_s = self._clock.now_s() + timeout_s
+            while True:
+                self._keep_alive()
+                while self._frames:
+                    frame = self._frames.popleft()
+                    if frame.epoch == self.applied.epoch:
+                        return frame
+                left_s = end_s - self._clock.now_s()
+                if left_s <= 0:
+                    raise FrameTimeout(timeout_s)
+                if not self._read(min(left_s, READ_S)):
+                    self._look_after_silence()
+
+    def reconnect(self) -> None:
+        """After CameraLost: find the same device again, restore the sequence, resume streaming.
+
+        Raises
+        ------
+        CameraNotFound
+            It is still absent; try again later.
+        """
+        with self._reading, self._control:
+            self._require_open()
+            if self._state is not CameraState.DISCONNECTED:
+                return
+            resume = self._resume
+            self._open(self._capabilities.serial)
+            if resume:
+                self._start()
+
+    def close(self) -> None:
+        """Switch the light off and give the device back; may be called twice."""
+        with self._control:
+            if self._closed:
+                return
+            self._closed = True
+            self._resume = False
+            with suppress(CameraError):  # the light of a lost camera is the watchdog's
+                self._transport.control_out(Request.SAFE_OFF)
+            self._state = CameraState.DISCONNECTED
+        with self._reading:  # the device may not vanish under a reader
+            self._release.detach()
+            self._transport.close()
+
+    def __enter__(self) -> "Camera":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    # --- connection ------------------------------------------------------------------------
+
+    def _open(self, serial: str | None) -> None:
+        self._state = CameraState.CONNECTING
+        try:
+            self._transport = self._connect(serial)
+        except CameraError:
+            self._state = CameraState.DISCONNECTED
+            raise
+        self._release = weakref.finalize(self, _release, self._transport)
+        try:
+            self._transport.control_out(Request.SAFE_OFF)  # whatever its last owner left
+            self._capabilities = unpack_capabilities(
+                self._transport.control_in(Request.GET_CAPS, length=CAPS_BYTES)
+            )
+            image_bytes = self._capabilities.image_bytes
+            self._transport.expect_transfers(IMAGE_HEADER_BYTES + image_bytes)
+            self._decoder = PacketDecoder(payload_bytes=image_bytes)
+            self._configure(self._wanted)
+        except BaseException:
+            self._lose()
+            raise
+        self._stalled = False
+        self._state = CameraState.IDLE
+
+    def _lose(self) -> None:
+        """Let go of a device that is gone."""
+        if self._state is not CameraState.DISCONNECTED:
+            self._state = CameraState.DISCONNECTED
+            self._release.detach()
+            self._transport.close()
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise CameraClosed
+
+    # --- requests (under _control) ---------------------------------------------------------
+
+    def _ask(self, request: Request, *, value: int = 0, length: int) -> bytes:
+        with self._answering():
+            return self._transport.control_in(request, value=value, length=length)
+
+    def _tell(self, request: Request, data: bytes = b"") -> None:
+        with self._answering():
+            self._transport.control_out(request, data)
+
+    @contextmanager
+    def _answering(self) -> Iterator[None]:
+        """Around a request: a stall becomes DeviceRefused, a loss disconnects the camera."""
+        self._require_open()
+        if self._state is CameraState.DISCONNECTED:
+            raise CameraLost("it is disconnected")
+        try:
+            try:
+                yield
+            except TransferStalled as stall:
+                answer = self._transport.control_in(Request.GET_LAST_ERROR, length=LAST_ERROR_BYTES)
+                raise DeviceRefused(*unpack_last_error(answer)) from stall
+        except CameraLost:
+            self._lose()
+            raise
+
+    def _configure(self, sequence: Sequence) -> AppliedSequence:
+        words = SequenceWords.of(sequence, self._capabilities)
+        self._tell(Request.SET_SEQUENCE, words.pack())
+        # No image of the new epoch may be looked at before its labels are known.
+        with self._assembly:
+            above = 0 if self._applied is None else self._applied.epoch
+            answer = Commitment.unpack(
+                self._ask(Request.COMMIT, value=above, length=Commitment.BYTES)
+            )
+            really_set = answer.words.sequence(self._capabilities)
+            if answer.images != really_set.images or answer.epoch <= above:
+                raise ProtocolError(f"COMMIT answered with {answer}")
+            self._applied = self._capabilities.describe(really_set, epoch=answer.epoch)
+            self._assembler = FrameAssembler(self._applied, self._capabilities, self.counters)
+            self._assembler.restart(answer.first_image)
+            self._decoder.reset()
+        return self._applied
+
+    def _start(self) -> None:
+        self._require_open()
+        with self._assembly:
+            self._tell(Request.STOP)
+            first_image = self.status().next_image
+            self._decoder.reset()
+            self._frames.clear()
+            self._assembler.restart(first_image)
+            self._tell(Request.START)
+            self._heartbeat_s = self._clock.now_s()
+            self._state = CameraState.STREAMING
+
+    def _off(self, request: Request) -> None:
+        with self._control:
+            self._resume = False
+            self._tell(request)
+            self._state = CameraState.IDLE
+
+    # --- images (under _reading) -----------------------------------------------------------
+
+    def _keep_alive(self) -> None:
+        """Send the heartbeat when it is due; start anew when it was missed."""
+        with self._control:
+            self._require_open()
+            if self._state is not CameraState.STREAMING:
+                if self._state is CameraState.DISCONNECTED:
+                    raise CameraLost("it is disconnected")
+                raise NotStreaming(self._state)
+            silent_s = self._clock.now_s() - self._heartbeat_s
+            if silent_s >= self._capabilities.heartbeat_s:
+                self._start()  # the device is off by now, and its images are stale
+            elif silent_s >= self._capabilities.heartbeat_s / _BEATS_PER_TIMEOUT:
+                self._tell(Request.HEARTBEAT)
+                self._heartbeat_s = self._clock.now_s()
+
+    def _read(self, timeout_s: float) -> bool:
+        """Take one transfer; return whether anything came."""
+        try:
+            data = self._transport.read(timeout_s=timeout_s)
+        except TransferStalled:
+            self._clear_stall()
+            return True
+        except TransferOverflow:
+            with self._assembly:
+                self._decoder.reset()
+                self.counters.resyncs += 1
+            return True
+        except CameraLost:
+            with self._control:
+                self._require_open()  # closed under the reader: no loss
+                self._lose()
+            raise
+        if not data:
+            return False
+        self._stalled = False
+        with self._assembly:
+            resyncs = self._decoder.resyncs
+            for packet in self._decoder.feed(data):
+                frame = self._assembler.push(packet, host_time_s=self._clock.unix_s())
+                if frame is not None:
+                    self._frames.append(frame)
+            self.counters.resyncs += self._decoder.resyncs - resyncs
+        return True
+
+    def _clear_stall(self) -> None:
+        """Clear the halt once; a second one in a row resets the device."""
+        with self._control:
+            try:
+                if not self._stalled:
+                    self._stalled = True
+                    self._transport.clear_halt()
+                    return
+                self._transport.reset()
+            except CameraLost:
+                self._lose()
+                raise
+            self._lose()
+            raise CameraLost("the image endpoint stalled twice; the device was reset")
+
+    def _look_after_silence(self) -> None:
+        """No image for a whole read: ask why."""
+        with self._control:
+            if self._state is not CameraState.STREAMING:
+                return  # stopped meanwhile; _keep_alive says so
+            status = self.status()
+            if status.state is DeviceState.STREAMING:
+                return
+            if status.watchdog_tripped:
+                self._start()
+                return
+            self._state = CameraState.FAULTED
+            raise CameraFault(
+                "it stopped by itself" if status.interlock_closed else "the interlock was opened"
+            )
+
+
+def _release(transport: Transport) -> None:
+    """Light off when a camera is collected, or the interpreter ends, without close()."""
+    warnings.warn("a camera was left open; use close() or `with`", ResourceWarning, stacklevel=2)
+    with suppress(CameraError):
+        transport.control_out(Request.SAFE_OFF)
+    transport.close()

@@ -1,0 +1,153 @@
+"""What a camera can do, and what it made of a sequence that was asked for."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from transientcam_driver.errors import SequenceError
+from transientcam_driver.sequence import ImageLabel, Sequence
+
+IMAGE_HEADER_BYTES = 64
+BYTES_PER_PIXEL = 2
+
+
+@dataclass(frozen=True, slots=True)
+class AppliedSequence:
+    """What was really set, after rounding to the grid of the camera's synthesiser and timer.
+
+    ``epoch`` is the number the camera gave this configuration; every image carries it. It is 0
+    when a sequence was only checked.
+    """
+
+    sequence: Sequence
+    epoch: int
+    images: int
+    capture_s: float
+    frame_rate_hz: float
+    unambiguous_range_m: float
+    data_rate_bytes_s: float
+    low_frequency_hz: float
+
+    @property
+    def labels(self) -> tuple[ImageLabel, ...]:
+        """The images in the order of capture, with the frequencies really set."""
+        return self.sequence.labels_at(self.low_frequency_hz)
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the sequence's document, what was derived from it, and ``sequence_id``."""
+        return self.sequence.to_document() | {
+            "sequence_id": self.epoch,
+            "images": self.images,
+            "capture_s": self.capture_s,
+            "frame_rate_hz": self.frame_rate_hz,
+            "unambiguous_range_m": self.unambiguous_range_m,
+            "data_rate_bytes_s": self.data_rate_bytes_s,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Capabilities:
+    """A camera's own account of itself (GET_CAPS).
+
+    Frequencies are multiples of ``tuning_step_hz``, exposures of 1 ns. A single capture reads an
+    image out in ``readout_s``; back-to-back frames take ``streaming_readout_s`` an image.
+    """
+
+    model: str
+    serial: str
+    firmware: str
+    protocol_version: int
+    width: int
+    height: int
+    bits: int
+    readout_s: float
+    streaming_readout_s: float
+    tuning_step_hz: float
+    min_frequency_hz: float
+    max_frequency_hz: float
+    low_frequency_hz: float
+    max_harmonics: int
+    min_exposure_s: float
+    max_exposure_s: float
+    max_takes: int
+    max_sub_phases: int
+    max_images: int
+    schemes: tuple[str, ...]
+    zeroths: tuple[str, ...]
+    fifo_bytes: int
+    heartbeat_s: float
+
+    @property
+    def image_bytes(self) -> int:
+        """Size of one image's pixels on the wire."""
+        return self.width * self.height * BYTES_PER_PIXEL
+
+    def validate(self, sequence: Sequence) -> None:
+        """Hold a sequence against what this camera can do.
+
+        Raises
+        ------
+        SequenceError
+            Naming the field, its value and the limit.
+        """
+        f_hz, m = sequence.base_frequency_hz, sequence.harmonics
+        if m > self.max_harmonics:
+            raise SequenceError("harmonics", m, f"at most {self.max_harmonics} on this camera")
+        if f_hz < self.min_frequency_hz:
+            raise SequenceError("base_frequency_hz", f_hz, f"at least {self.min_frequency_hz:g} Hz")
+        if self.tuning_word(f_hz) * m > self.tuning_word(self.max_frequency_hz):
+            limit = (
+                f"at most {self.max_frequency_hz / m:g} Hz: "
+                f"{m} harmonics have to stay below {self.max_frequency_hz:g} Hz"
+            )
+            raise SequenceError("base_frequency_hz", f_hz, limit)
+        if not self.min_exposure_s <= sequence.exposure_s <= self.max_exposure_s:
+            limit = f"from {self.min_exposure_s:g} to {self.max_exposure_s:g} s"
+            raise SequenceError("exposure_s", sequence.exposure_s, limit)
+        if sequence.zeroth not in self.zeroths:
+            limit = f"one of {', '.join(self.zeroths)} on this camera"
+            raise SequenceError("zeroth", sequence.zeroth, limit)
+        if sequence.sub_phases.scheme not in self.schemes:
+            limit = f"one of {', '.join(self.schemes)} on this camera"
+            raise SequenceError("sub_phases.scheme", sequence.sub_phases.scheme, limit)
+        if sequence.sub_phases.n > self.max_sub_phases:
+            limit = f"at most {self.max_sub_phases} on this camera"
+            raise SequenceError("sub_phases.n", sequence.sub_phases.n, limit)
+        most_takes = min(self.max_takes, self.max_images // sequence.images_per_take)
+        if sequence.takes > most_takes:
+            limit = f"at most {most_takes} with {sequence.images_per_take} images a take"
+            raise SequenceError("takes", sequence.takes, limit)
+
+    def apply(self, sequence: Sequence, *, epoch: int = 0) -> AppliedSequence:
+        """Say what this camera makes of a sequence, without asking it."""
+        self.validate(sequence)
+        return self.describe(
+            replace(
+                sequence,
+                base_frequency_hz=self.frequency_hz(self.tuning_word(sequence.base_frequency_hz)),
+                exposure_s=round(sequence.exposure_s * 1e9) / 1e9,
+            ),
+            epoch=epoch,
+        )
+
+    def describe(self, sequence: Sequence, *, epoch: int) -> AppliedSequence:
+        """Add to a sequence that is set already what follows from it."""
+        streaming_s = sequence.capture_s(self.streaming_readout_s)
+        frame_bytes = sequence.images * (IMAGE_HEADER_BYTES + self.image_bytes)
+        return AppliedSequence(
+            sequence=sequence,
+            epoch=epoch,
+            images=sequence.images,
+            capture_s=sequence.capture_s(self.readout_s),
+            frame_rate_hz=1 / streaming_s,
+            unambiguous_range_m=sequence.unambiguous_range_m,
+            data_rate_bytes_s=frame_bytes / streaming_s,
+            low_frequency_hz=self.low_frequency_hz,
+        )
+
+    def frequency_hz(self, tuning_word: int) -> float:
+        """Frequency the synthesiser makes from a tuning word."""
+        return tuning_word * self.tuning_step_hz
+
+    def tuning_word(self, frequency_hz: float) -> int:
+        """Nearest tuning word of a frequency; harmonics use multiples of the base's word."""
+        return round(frequency_hz / self.tuning_step_hz)

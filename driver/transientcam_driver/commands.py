@@ -1,0 +1,28 @@
+"""Verbs of the ``transientcam`` command that the driver brings along."""
+
+import json
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from transientcam_driver.simulation import list_scenes
+
+
+def scenes(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """List the scenes that the simulated camera knows."""
+    infos = list_scenes()
+    if as_json:
+        fields = [
+            {"name": info.name, "description": info.description, "path": str(info.path)}
+            for info in infos
+        ]
+        typer.echo(json.dumps(fields, indent=2))
+        return
+    table = Table("scene", "what it shows", box=None)
+    for info in infos:
+        table.add_row(f"sim:{info.name}", info.description)
+    Console().print(table)

@@ -1,0 +1,80 @@
+"""Find image packets in a stream of bytes, whatever the read boundaries."""
+
+from dataclasses import dataclass
+
+from transientcam_driver.capabilities import IMAGE_HEADER_BYTES
+from transientcam_driver.protocol import IMAGE_MAGIC, ImageHeader, payload_checksum
+
+
+@dataclass(frozen=True, slots=True)
+class ImagePacket:
+    """One image as it arrived; ``intact`` is false when its pixels fail their checksum."""
+
+    header: ImageHeader
+    payload: bytes
+    intact: bool = True
+
+
+class PacketDecoder:
+    """Turn bytes into image packets; never raises, whatever the bytes.
+
+    A packet is found by its magic and its header's checksum. A header that announces another
+    payload than ``payload_bytes`` is taken for noise, so that a damaged length can neither
+    swallow the packets behind it nor hold them up. After pixels with a wrong checksum the search
+    goes on right behind the header, because a shortened image has its successor inside.
+    """
+
+    def __init__(self, *, payload_bytes: int) -> None:
+        self._payload_bytes = payload_bytes
+        self._buffer = bytearray()
+        self._lost_track = False
+        self.resyncs = 0
+
+    def reset(self) -> None:
+        """Forget the bytes of a stream that was cut off."""
+        self._buffer.clear()
+        self._lost_track = False
+
+    def feed(self, data: bytes | bytearray | memoryview) -> list[ImagePacket]:
+        """Take the next bytes and return the packets they complete."""
+        self._buffer += data
+        packets: list[ImagePacket] = []
+        start = 0
+        while (header := self._header_at(start)) is not None:
+            start, found = header
+            if found is None:
+                break
+            end = start + IMAGE_HEADER_BYTES + self._payload_bytes
+            if end > len(self._buffer):
+                break
+            payload = bytes(self._buffer[start + IMAGE_HEADER_BYTES : end])
+            intact = payload_checksum(payload) == found.payload_crc
+            packets.append(ImagePacket(found, payload, intact))
+            start = end if intact else start + IMAGE_HEADER_BYTES
+            self._lost_track = not intact
+        del self._buffer[:start]
+        return packets
+
+    def _header_at(self, start: int) -> tuple[int, ImageHeader | None] | None:
+        """Find the next header at or after ``start``; without one, where to go on searching."""
+        while True:
+            found = self._buffer.find(IMAGE_MAGIC, start)
+            if found < 0:
+                # the magic's first bytes may be the last that came
+                found = max(start, len(self._buffer) - len(IMAGE_MAGIC) + 1)
+                self._skip(start, found)
+                return found, None
+            self._skip(start, found)
+            if found + IMAGE_HEADER_BYTES > len(self._buffer):
+                return found, None
+            header = ImageHeader.unpack(bytes(self._buffer[found : found + IMAGE_HEADER_BYTES]))
+            if header is not None and header.payload_bytes == self._payload_bytes:
+                self._lost_track = False
+                return found, header
+            self._skip(found, found + 1)
+            start = found + 1
+
+    def _skip(self, start: int, end: int) -> None:
+        if end > start and not self._lost_track:
+            self._lost_track = True
+            self.resyncs += 1

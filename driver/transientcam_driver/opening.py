@@ -1,0 +1,150 @@
+"""Open a camera by its name: ``usb``, ``usb:SERIAL``, ``sim:SCENE?width=320&height=240``."""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, get_args
+from urllib.parse import parse_qsl
+
+from transientcam_driver.camera import Camera
+from transientcam_driver.errors import SpecError
+from transientcam_driver.simulation.backend import SimulatedBus
+from transientcam_driver.simulation.build import (
+    DEFAULT_HEIGHT,
+    DEFAULT_WIDTH,
+    MEASURED,
+    RESOLUTIONS,
+    build,
+    find_scene,
+    measured_scene,
+    without_noise,
+)
+from transientcam_driver.simulation.clock import Clock, RealClock
+from transientcam_driver.simulation.scene import Background, Scene, TimeZero
+from transientcam_driver.usb import open_transport
+
+DEFAULT_SPEC = "sim:mirrors"
+_OF_FILE = f"{MEASURED}:"
+_OPTIONS_OF_FILE = ("background", "time_zero")
+_OPTIONS = ("width", "height", "noise", "seed", *_OPTIONS_OF_FILE)
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSpec:
+    """A camera's name, taken apart.
+
+    ``scene`` is None for a real camera, ``serial`` for a simulated one or any real one.
+    """
+
+    serial: str | None = None
+    scene: str | None = None
+    width: int = DEFAULT_WIDTH
+    height: int = DEFAULT_HEIGHT
+    noise: bool = True
+    seed: int | None = None
+    background: Background = "none"
+    time_zero: TimeZero = "start"
+
+
+def open_camera(spec: str = DEFAULT_SPEC, *, clock: Clock | None = None) -> Camera:
+    """Open a real or a simulated camera; the caller closes it.
+
+    Parameters
+    ----------
+    spec
+        ``usb``, ``usb:SERIAL``, or ``sim:SCENE`` with the name of a built-in scene, a path to a
+        scene's .toml, or ``measured:PATH.npz``. A simulated camera takes ``?width=640&height=480``
+        (163 x 120, 320 x 240 or 640 x 480), ``noise=off`` and ``seed=3``; a measured one also
+        ``background=median`` and ``time_zero=peak``.
+    clock
+        The time a simulated camera lives in; the world's by default.
+
+    Raises
+    ------
+    SpecError
+        The name cannot be read.
+    SceneError
+        The scene says something that cannot be.
+    CameraError
+        The camera is absent, busy, or may not be opened.
+    """
+    wanted = parse_spec(spec)
+    if wanted.scene is None:
+        return Camera(lambda serial: open_transport(serial or wanted.serial), clock=clock)
+    clock = clock or RealClock()
+    scene = _scene(wanted)
+    device, simulation = build(
+        scene if wanted.noise else without_noise(scene),
+        width=wanted.width,
+        height=wanted.height,
+        seed=wanted.seed,
+        clock=clock,
+    )
+    connect = partial(open_transport, backend=SimulatedBus([device]))
+    return Camera(connect, clock=clock, simulation=simulation)
+
+
+def parse_spec(spec: str) -> CameraSpec:
+    """Take a camera's name apart.
+
+    Raises
+    ------
+    SpecError
+        Saying what cannot be read.
+    """
+    kind, _, rest = spec.partition(":")
+    if kind == "usb":
+        return CameraSpec(serial=rest or None)
+    if kind != "sim" or not rest:
+        raise SpecError(spec, "neither a USB camera nor a simulated one")
+    scene, _, query = rest.partition("?")
+    options = dict(parse_qsl(query, keep_blank_values=True))
+    for name in options:
+        if name not in _OPTIONS:
+            raise SpecError(spec, f"unknown option {name!r}; known are {', '.join(_OPTIONS)}")
+    width, height = _resolution(spec, options)
+    if not scene.startswith(_OF_FILE) and not options.keys().isdisjoint(_OPTIONS_OF_FILE):
+        raise SpecError(spec, f"{', '.join(_OPTIONS_OF_FILE)} belong to sim:measured:PATH.npz")
+    return CameraSpec(
+        scene=scene,
+        width=width,
+        height=height,
+        noise=_choice(spec, options, "noise", ("on", "off")) == "on",
+        seed=_integer(spec, options, "seed") if "seed" in options else None,
+        background=_choice(spec, options, "background", get_args(Background)),
+        time_zero=_choice(spec, options, "time_zero", get_args(TimeZero)),
+    )
+
+
+def _scene(wanted: CameraSpec) -> Scene:
+    assert wanted.scene is not None  # noqa: S101  (the caller has looked)
+    if not wanted.scene.startswith(_OF_FILE):
+        return find_scene(wanted.scene)
+    path = Path(wanted.scene.removeprefix(_OF_FILE))
+    return measured_scene(path, background=wanted.background, time_zero=wanted.time_zero)
+
+
+def _resolution(spec: str, options: dict[str, str]) -> tuple[int, int]:
+    if "width" not in options and "height" not in options:
+        return DEFAULT_WIDTH, DEFAULT_HEIGHT
+    if "width" not in options or "height" not in options:
+        raise SpecError(spec, "width and height come together")
+    resolution = _integer(spec, options, "width"), _integer(spec, options, "height")
+    if resolution not in RESOLUTIONS:
+        known = ", ".join(f"{width} x {height}" for width, height in RESOLUTIONS)
+        raise SpecError(spec, f"resolution {resolution[0]} x {resolution[1]}: known are {known}")
+    return resolution
+
+
+def _integer(spec: str, options: dict[str, str], name: str) -> int:
+    text = options[name]
+    if not (text.isascii() and text.isdigit()):
+        raise SpecError(spec, f"{name} = {text!r}: must be an integer of at least 0")
+    return int(text)
+
+
+def _choice(spec: str, options: dict[str, str], name: str, allowed: tuple[str, ...]) -> Any:
+    value = options.get(name, allowed[0])
+    if value not in allowed:
+        raise SpecError(spec, f"{name} = {value!r}: must be one of {', '.join(allowed)}")
+    return value

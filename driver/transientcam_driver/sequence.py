@@ -1,0 +1,252 @@
+"""What the camera captures for one transient image: frequencies, phases, exposures, takes."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from numbers import Integral, Real
+from typing import Any, Literal, get_args
+
+from transientcam_driver.errors import SequenceError
+
+SPEED_OF_LIGHT_M_S = 299_792_458.0
+LOW_FREQUENCY_HZ = 0.9e6
+"""Where the zeroth moment is measured when the sensor cannot go unmodulated (Sec. 4.3)."""
+MAX_HARMONICS = 32
+PHASE_STEPS_RAD = (0.0, math.pi / 2, math.pi, 3 * math.pi / 2)
+"""Four-bucket sampling."""
+
+Zeroth = Literal["low-frequency", "on-off", "estimated"]
+Scheme = Literal["arccos", "harmonic-cancellation", "none"]
+
+# What an applied sequence adds to its document; a client may send it back unchanged.
+DERIVED_FIELDS = frozenset(
+    {
+        "sequence_id",
+        "images",
+        "capture_s",
+        "frame_rate_hz",
+        "unambiguous_range_m",
+        "data_rate_bytes_s",
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SubPhases:
+    """How one exposure is divided between phases to make the modulation sinusoidal (Sec. 4.1).
+
+    ``arccos`` divides it evenly, ``harmonic-cancellation`` by sine weights, ``none`` not at all
+    (and ``n`` is then 1).
+    """
+
+    scheme: Scheme = "arccos"
+    n: int = 8
+
+    def __post_init__(self) -> None:
+        _one_of("sub_phases.scheme", self.scheme, get_args(Scheme))
+        _integer("sub_phases.n", self.n, "an integer from 1 to 255", least=1, most=255)
+        if self.scheme == "none":
+            object.__setattr__(self, "n", 1)
+
+    @property
+    def phases_rad(self) -> tuple[float, ...]:
+        """Phase of each part of the exposure."""
+        if self.scheme == "arccos":
+            # Eq. (3)
+            return tuple(math.acos(1 - (2 * k + 1) / self.n) for k in range(self.n))
+        if self.scheme == "harmonic-cancellation":
+            return tuple(k * math.pi / (self.n + 1) for k in range(self.n))
+        return (0.0,)
+
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """Share of the exposure spent at each phase; their sum is 1."""
+        if self.scheme == "harmonic-cancellation":
+            # Sec. 4.1, after Payne et al. 2010
+            sines = [math.sin((k + 1) * math.pi / (self.n + 1)) for k in range(self.n)]
+            total = sum(sines)
+            return tuple(sine / total for sine in sines)
+        return (1 / self.n,) * self.n
+
+    def to_document(self) -> dict[str, Any]:
+        """Return ``{"scheme", "n"}``."""
+        return {"scheme": self.scheme, "n": self.n}
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> "SubPhases":
+        """Build from ``{"scheme", "n"}``; what is absent keeps its default."""
+        _known_keys("sub_phases", document, {"scheme", "n"})
+        return cls(**document)
+
+
+@dataclass(frozen=True, slots=True)
+class ImageLabel:
+    """What one image of a sequence shows.
+
+    ``harmonic`` j means modulation at j times the base frequency, 0 the image for the zeroth
+    moment; ``frequency_hz`` is 0 when nothing is modulated; without ``illumination`` the light
+    stays off.
+    """
+
+    index: int
+    take: int
+    harmonic: int
+    frequency_hz: float
+    phase_rad: float
+    exposure_s: float
+    illumination: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """The images of one transient image, as asked for: a frozen value, checked when it is made.
+
+    Attributes
+    ----------
+    base_frequency_hz
+        f; measured are f, 2f, ..., ``harmonics`` times f.
+    harmonics
+        m, from 1 to 32.
+    zeroth
+        Where the zeroth moment comes from (Sec. 4.3): four images at 0.9 MHz, two unmodulated
+        ones with the light on and off, or none (it is then estimated).
+    exposure_s
+        Of one image.
+    takes
+        How often the whole set is captured, for averaging.
+    sub_phases
+        Division of each exposure.
+    """
+
+    base_frequency_hz: float = 23e6
+    harmonics: int = 3
+    zeroth: Zeroth = "low-frequency"
+    exposure_s: float = 0.00192
+    takes: int = 1
+    sub_phases: SubPhases = field(default_factory=SubPhases)
+
+    def __post_init__(self) -> None:
+        _positive("base_frequency_hz", self.base_frequency_hz, "a number of hertz above 0")
+        _integer(
+            "harmonics",
+            self.harmonics,
+            f"an integer from 1 to {MAX_HARMONICS}",
+            least=1,
+            most=MAX_HARMONICS,
+        )
+        _one_of("zeroth", self.zeroth, get_args(Zeroth))
+        _positive("exposure_s", self.exposure_s, "a number of seconds above 0")
+        _integer("takes", self.takes, "an integer of at least 1", least=1, most=None)
+        if not isinstance(self.sub_phases, SubPhases):
+            raise SequenceError("sub_phases", self.sub_phases, "an object {scheme, n}")
+        object.__setattr__(self, "base_frequency_hz", float(self.base_frequency_hz))
+        object.__setattr__(self, "exposure_s", float(self.exposure_s))
+
+    @property
+    def images_per_take(self) -> int:
+        """How many images one take holds."""
+        zeroth = {"low-frequency": len(PHASE_STEPS_RAD), "on-off": 2, "estimated": 0}
+        return zeroth[self.zeroth] + len(PHASE_STEPS_RAD) * self.harmonics
+
+    @property
+    def images(self) -> int:
+        """How many images a transient image takes."""
+        return self.images_per_take * self.takes
+
+    @property
+    def labels(self) -> tuple[ImageLabel, ...]:
+        """The images in the order of capture, the zeroth moment measured at 0.9 MHz if at all."""
+        return self.labels_at(LOW_FREQUENCY_HZ)
+
+    def labels_at(self, low_frequency_hz: float) -> tuple[ImageLabel, ...]:
+        """Label the images in the order of capture: takes, then frequencies, then phases."""
+        of_a_take: list[tuple[int, float, float, bool]] = []
+        if self.zeroth == "on-off":
+            of_a_take += [(0, 0.0, 0.0, True), (0, 0.0, 0.0, False)]
+        elif self.zeroth == "low-frequency":
+            of_a_take += [(0, low_frequency_hz, phase_rad, True) for phase_rad in PHASE_STEPS_RAD]
+        for j in range(1, self.harmonics + 1):
+            frequency_hz = j * self.base_frequency_hz
+            of_a_take += [(j, frequency_hz, phase_rad, True) for phase_rad in PHASE_STEPS_RAD]
+        return tuple(
+            ImageLabel(
+                index=take * len(of_a_take) + k,
+                take=take,
+                harmonic=harmonic,
+                frequency_hz=frequency_hz,
+                phase_rad=phase_rad,
+                exposure_s=self.exposure_s,
+                illumination=illumination,
+            )
+            for take in range(self.takes)
+            for k, (harmonic, frequency_hz, phase_rad, illumination) in enumerate(of_a_take)
+        )
+
+    def capture_s(self, readout_s: float) -> float:
+        """Time from the first exposure to the last read-out."""
+        return self.images * (self.exposure_s + readout_s)
+
+    @property
+    def unambiguous_range_m(self) -> float:
+        """Range c / (2 f) beyond which a target appears nearer by a multiple of it."""
+        return SPEED_OF_LIGHT_M_S / (2 * self.base_frequency_hz)
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the sequence as the JSON document of the REST interface."""
+        return {
+            "base_frequency_hz": self.base_frequency_hz,
+            "harmonics": self.harmonics,
+            "zeroth": self.zeroth,
+            "exposure_s": self.exposure_s,
+            "takes": self.takes,
+            "sub_phases": self.sub_phases.to_document(),
+        }
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> "Sequence":
+        """Build from a JSON document; what is absent keeps its default.
+
+        What only an applied sequence can say (``images``, ``capture_s``...) is ignored, so that
+        a document that was read can be changed and sent back.
+
+        Raises
+        ------
+        SequenceError
+            Naming the field, its value and the limit.
+        """
+        known = {"base_frequency_hz", "harmonics", "zeroth", "exposure_s", "takes", "sub_phases"}
+        _known_keys("", document, known | DERIVED_FIELDS)
+        fields = {name: value for name, value in document.items() if name in known}
+        if "sub_phases" in fields:
+            fields["sub_phases"] = SubPhases.from_document(fields["sub_phases"])
+        return cls(**fields)
+
+
+def _known_keys(prefix: str, document: object, known: set[str] | frozenset[str]) -> None:
+    if not isinstance(document, Mapping):
+        raise SequenceError(prefix or "sequence", document, "an object")
+    for key in document:
+        if key not in known:
+            name = f"{prefix}.{key}" if prefix else str(key)
+            raise SequenceError(
+                name, document[key], f"absent; known are {', '.join(sorted(known))}"
+            )
+
+
+def _positive(name: str, value: object, limit: str) -> None:
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise SequenceError(name, value, limit)
+    if not 0 < float(value) < math.inf:
+        raise SequenceError(name, value, limit)
+
+
+def _integer(name: str, value: object, limit: str, *, least: int, most: int | None) -> None:
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise SequenceError(name, value, limit)
+    if not least <= int(value) <= (math.inf if most is None else most):
+        raise SequenceError(name, value, limit)
+
+
+def _one_of(name: str, value: object, allowed: tuple[str, ...]) -> None:
+    if not isinstance(value, str) or value not in allowed:
+        raise SequenceError(name, value, f"one of {', '.join(allowed)}")

@@ -1,0 +1,91 @@
+"""From a scene to a simulated camera on a simulated bus."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from transientcam_driver.errors import SceneError
+from transientcam_driver.simulation.clock import Clock
+from transientcam_driver.simulation.device import EmulatedDevice
+from transientcam_driver.simulation.effects import EFFECTS
+from transientcam_driver.simulation.firmware import Firmware
+from transientcam_driver.simulation.handle import Simulation
+from transientcam_driver.simulation.light import trace
+from transientcam_driver.simulation.measured import load_responses
+from transientcam_driver.simulation.profile import prototype
+from transientcam_driver.simulation.responses import Responses
+from transientcam_driver.simulation.scene import (
+    BUILT_IN,
+    Background,
+    Scene,
+    TimeZero,
+    list_scenes,
+    load_scene,
+)
+from transientcam_driver.simulation.world import World
+
+MEASURED = "measured"
+DEFAULT_WIDTH, DEFAULT_HEIGHT = 163, 120
+RESOLUTIONS = ((DEFAULT_WIDTH, DEFAULT_HEIGHT), (320, 240), (640, 480))
+
+
+def find_scene(name: str) -> Scene:
+    """Load a built-in scene by its name, or a scene file by its path.
+
+    Raises
+    ------
+    SceneError
+        There is no such scene, or it says something that cannot be.
+    """
+    if name.endswith(".toml"):
+        return load_scene(Path(name))
+    built_in = {info.name: info.path for info in list_scenes()}
+    if name not in built_in:
+        allowed = f"one of {', '.join([*built_in, 'measured:PATH.npz'])}, or a path to a .toml"
+        raise SceneError(BUILT_IN, "scene", name, allowed)
+    if name == MEASURED:
+        allowed = "measured:PATH.npz with a file, or a path to a .toml with [[response]]"
+        raise SceneError(built_in[name], "scene", name, allowed)
+    return load_scene(built_in[name])
+
+
+def measured_scene(path: Path, *, background: Background, time_zero: TimeZero) -> Scene:
+    """Put the built-in scene ``measured`` around one file of impulse responses."""
+    template = load_scene(BUILT_IN / f"{MEASURED}.toml")
+    (response,) = template.responses
+    response = replace(response, path=path, background=background, time_zero=time_zero)
+    return replace(template, responses=(response,))
+
+
+def without_noise(scene: Scene) -> Scene:
+    """Return the same scene before a sensor whose only error is the rounding to 16 bits."""
+    effects = {effect.name: "off" for effect in EFFECTS if effect.optional}
+    return replace(scene, sensor=scene.sensor.ideal(), effects=effects)
+
+
+def responses_of(scene: Scene, *, width: int, height: int) -> Responses:
+    """Compute or read the impulse responses of a scene."""
+    if scene.responses:
+        return load_responses(scene, width=width, height=height)
+    return trace(scene, width=width, height=height)
+
+
+def build(
+    scene: Scene, *, width: int, height: int, seed: int | None, clock: Clock
+) -> tuple[EmulatedDevice, Simulation]:
+    """Put a camera in front of a scene."""
+    world = World(
+        responses_of(scene, width=width, height=height),
+        scene.sensor,
+        electrons_per_s=scene.light.electrons_per_s,
+        effects=scene.effects,
+        seed=scene.seed if seed is None else seed,
+    )
+    capabilities = prototype(
+        serial=f"SIM-{scene.name}"[:32], width=width, height=height, bits=scene.sensor.bits
+    )
+
+    def power_on(now_s: float) -> Firmware:
+        return Firmware(capabilities, world, power_on_s=now_s)
+
+    device = EmulatedDevice(capabilities, power_on, clock=clock)
+    return device, Simulation(scene.name, world, device)

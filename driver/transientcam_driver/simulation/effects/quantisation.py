@@ -1,0 +1,35 @@
+"""Quantisation: the converter gives whole numbers, from 0 to its highest code."""
+
+import math
+
+import numpy as np
+
+from transientcam_driver.simulation.effects.effect import Call, Conditions, Effect, Electrons
+
+_COST_S_PER_PIXEL = 3e-9
+
+
+class Quantisation(Effect):
+    """Round to the nearest code. Always there: an image holds integers."""
+
+    name = "quantisation"
+    optional = False
+
+    def __init__(self, conditions: Conditions) -> None:
+        super().__init__(conditions)
+        self._dn_per_e = np.float32(1 / conditions.sensor.gain_e_per_dn)
+        self._dark_dn = np.float32(conditions.sensor.dark_dn)
+        self._highest_dn = np.float32(conditions.sensor.highest_dn)
+
+    @classmethod
+    def called_for(cls, conditions: Conditions) -> Call:
+        """Say always; its error is that of rounding, 1 / sqrt(12)."""
+        reason = f"{conditions.sensor.bits} bits of {conditions.sensor.gain_e_per_dn:g} electrons"
+        return Call(True, reason, 1 / math.sqrt(12), conditions.pixels * _COST_S_PER_PIXEL)
+
+    def apply(self, image: Electrons, random: np.random.Generator) -> None:
+        """Turn electrons into codes."""
+        image *= self._dn_per_e
+        image += self._dark_dn
+        np.rint(image, out=image)
+        np.clip(image, np.float32(0), self._highest_dn, out=image)

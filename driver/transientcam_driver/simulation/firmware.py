@@ -1,0 +1,360 @@
+"""The device's side of the protocol: vendor requests in, answers and image packets out.
+
+Pure: time is passed in, images come from a renderer, and nothing here knows how the bytes travel.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver.capabilities import IMAGE_HEADER_BYTES, Capabilities
+from transientcam_driver.errors import DriverError, ProtocolError
+from transientcam_driver.protocol import (
+    Commitment,
+    DeviceState,
+    ErrorCode,
+    ImageFlag,
+    ImageHeader,
+    Request,
+    SequenceWords,
+    Status,
+    StatusFlag,
+    pack_capabilities,
+    pack_last_error,
+    pack_time,
+    payload_checksum,
+    phase_word,
+)
+from transientcam_driver.sequence import ImageLabel, Sequence
+
+
+class Refusal(Exception):  # noqa: N818  (a refusal is an answer of the device, not a failure)
+    """The device stalls the request; GET_LAST_ERROR tells why."""
+
+    def __init__(self, code: ErrorCode, detail: str) -> None:
+        super().__init__(code, detail)
+        self.code = code
+        self.detail = detail
+
+
+class Renderer(Protocol):
+    """What the sensor sees."""
+
+    def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
+        """Prepare for the images of a sequence."""
+        ...
+
+    def image(self, label: ImageLabel, *, number: int, device_time_s: float) -> NDArray[np.uint16]:
+        """Return the digital numbers (H, W) of the image with this sequence number."""
+        ...
+
+    def temperature_c(self, device_time_s: float) -> float:
+        """Temperature of the sensor."""
+        ...
+
+
+@dataclass(slots=True)
+class _Run:
+    """Images exposed back to back since START, or since a COMMIT while streaming."""
+
+    start_s: float
+    period_s: float
+    first_image: int
+    first_frame: int
+    exposed: int = 0
+
+
+class Firmware:
+    """A camera without its cable.
+
+    Images are produced by the clock alone: image k of a run is exposed from ``start + k T`` and
+    stands in the FIFO at ``start + (k + 1) T``, T being exposure plus streaming read-out. The
+    FIFO is bounded; an image without room in it is lost, as its successors are until the host
+    reads. Only images that are read are rendered.
+    """
+
+    def __init__(
+        self, capabilities: Capabilities, renderer: Renderer, *, power_on_s: float
+    ) -> None:
+        self.capabilities = capabilities
+        self._renderer = renderer
+        self._power_on_s = power_on_s
+        self._packet_bytes = IMAGE_HEADER_BYTES + capabilities.image_bytes
+        self._room = capabilities.fifo_bytes // self._packet_bytes
+        self._staged: SequenceWords | None = None
+        self._words: SequenceWords | None = None
+        self._labels: tuple[ImageLabel, ...] = ()
+        self._epoch = 0
+        self._run: _Run | None = None
+        self._fifo_run: _Run | None = None  # the run whose images stand in the FIFO
+        self._next_image = 0
+        self._next_frame = 0
+        self._fifo: deque[tuple[int, ImageFlag]] = deque()  # (k of the run, flags)
+        self._overflowed = False
+        self._high_water = 0
+        self._dropped = 0
+        self._heartbeat_s = power_on_s
+        self._watchdog_tripped = False
+        self._interlock_closed = True
+        self._faulted = False
+        self._last_error = (ErrorCode.NONE, 0, "")
+        self._ready: tuple[int, bytes] | None = None  # an image rendered ahead: (number, packet)
+        self._to_corrupt = 0
+        self._to_drop = 0
+
+    # --- faults that a test or a demonstration asks for -----------------------------------
+
+    def corrupt_next(self, images: int) -> None:
+        """Damage the pixels of the next images on their way out."""
+        self._to_corrupt += images
+
+    def drop_next(self, images: int) -> None:
+        """Lose the next images on their way out."""
+        self._to_drop += images
+
+    def set_interlock(self, now_s: float, *, closed: bool) -> None:
+        """Open or close the safety interlock; opening it switches the light off."""
+        self._advance(now_s)
+        self._interlock_closed = closed
+        if not closed and self._run is not None:
+            self._end_run()
+            self._faulted = True
+
+    # --- requests -------------------------------------------------------------------------
+
+    def control_in(self, request: int, value: int, index: int, *, now_s: float) -> bytes:
+        """Answer a vendor request from device to host; raise Refusal for a stall."""
+        self._advance(now_s)
+        if request == Request.GET_LAST_ERROR:
+            code, of, detail = self._last_error
+            return pack_last_error(code, of, detail)
+        with_answer = {
+            Request.GET_CAPS: lambda: pack_capabilities(self.capabilities),
+            Request.COMMIT: lambda: self._commit(value | index << 16, now_s).pack(),
+            Request.GET_STATUS: lambda: self._status(now_s).pack(),
+            Request.GET_TIME: lambda: pack_time(now_s - self._power_on_s),
+        }
+        try:
+            if request not in with_answer:
+                raise Refusal(ErrorCode.UNKNOWN_REQUEST, f"no request {request:#04x} to read")
+            return with_answer[Request(request)]()
+        except Refusal as refusal:
+            self._last_error = (refusal.code, request, refusal.detail)
+            raise
+
+    def control_out(self, request: int, data: bytes, *, now_s: float) -> None:
+        """Obey a vendor request from host to device; raise Refusal for a stall."""
+        self._advance(now_s)
+        try:
+            match request:
+                case Request.SET_SEQUENCE:
+                    self._stage(data)
+                case Request.START:
+                    self._start(now_s)
+                case Request.STOP | Request.SAFE_OFF:
+                    self._end_run()
+                case Request.FLUSH:
+                    self._flush()
+                case Request.HEARTBEAT:
+                    self._heartbeat_s = now_s
+                case _:
+                    raise Refusal(ErrorCode.UNKNOWN_REQUEST, f"no request {request:#04x} to write")
+        except Refusal as refusal:
+            self._last_error = (refusal.code, request, refusal.detail)
+            raise
+
+    def _stage(self, data: bytes) -> None:
+        if len(data) != SequenceWords.BYTES:
+            detail = f"{len(data)} bytes, {SequenceWords.BYTES} needed"
+            raise Refusal(ErrorCode.BAD_LENGTH, detail)
+        try:
+            words = SequenceWords.unpack(data)
+            self.capabilities.validate(words.sequence(self.capabilities))
+        except ProtocolError as error:
+            raise Refusal(ErrorCode.BAD_VALUE, error.detail) from error
+        except DriverError as error:
+            raise Refusal(ErrorCode.BAD_VALUE, str(error)) from error
+        self._staged = words
+
+    def _commit(self, epoch_above: int, now_s: float) -> Commitment:
+        if self._staged is None and self._words is None:
+            raise Refusal(ErrorCode.NOT_CONFIGURED, "no sequence staged")
+        if self._staged is not None:
+            self._words, self._staged = self._staged, None
+            sequence = self._words.sequence(self.capabilities)
+            self._labels = sequence.labels_at(self.capabilities.low_frequency_hz)
+            self._renderer.configure(sequence, self._labels)
+            self._epoch = max(self._epoch, epoch_above) + 1
+            streaming = self._run is not None
+            self._end_run()
+            self._flush()
+            if streaming:
+                self._begin_run(now_s)
+        assert self._words is not None  # noqa: S101  (refused above otherwise)
+        return Commitment(
+            epoch=self._epoch,
+            images=len(self._labels),
+            first_image=self._next_image,
+            image_period_ns=round(self._period_s() * 1e9),
+            words=self._words,
+        )
+
+    def _start(self, now_s: float) -> None:
+        if self._words is None:
+            raise Refusal(ErrorCode.NOT_CONFIGURED, "no sequence committed")
+        if not self._interlock_closed:
+            raise Refusal(ErrorCode.INTERLOCK_OPEN, "the interlock is open")
+        self._end_run()
+        self._flush()
+        self._faulted = False
+        self._watchdog_tripped = False
+        self._heartbeat_s = now_s
+        self._begin_run(now_s)
+
+    def _status(self, now_s: float) -> Status:
+        flags = StatusFlag(0)
+        state = DeviceState.FAULTED if self._faulted else DeviceState.IDLE
+        if self._run is not None:
+            state = DeviceState.STREAMING
+            flags |= StatusFlag.LIGHT_ON
+        if self._interlock_closed:
+            flags |= StatusFlag.INTERLOCK_CLOSED
+        if self._watchdog_tripped:
+            flags |= StatusFlag.WATCHDOG_TRIPPED
+        if self._staged is not None:
+            flags |= StatusFlag.SEQUENCE_STAGED
+        device_time_s = now_s - self._power_on_s
+        return Status(
+            state=state,
+            flags=flags,
+            epoch=self._epoch,
+            next_image=self._next_image,
+            device_time_s=device_time_s,
+            dropped_images=self._dropped,
+            fifo_bytes=len(self._fifo) * self._packet_bytes,
+            fifo_high_water_bytes=self._high_water * self._packet_bytes,
+            temperature_c=self._renderer.temperature_c(device_time_s),
+        )
+
+    # --- images ---------------------------------------------------------------------------
+
+    def due_s(self) -> float | None:
+        """When there is an image to read: in the past if there is one already, None if never."""
+        run = self._run
+        if self._fifo and self._fifo_run is not None:
+            return self._due_of(self._fifo_run, self._fifo[0][0])
+        return None if run is None else self._due_of(run, run.exposed)
+
+    def prepare(self) -> None:
+        """Render the image that is read next, ahead of its time."""
+        run = self._fifo_run if self._fifo else self._run
+        if run is not None and not self._to_drop:
+            flag = ImageFlag.OVERFLOW if self._overflowed else ImageFlag(0)
+            k, flags = self._fifo[0] if self._fifo else (run.exposed, flag)
+            self._packet(run, k, flags)
+
+    def read(self, *, now_s: float) -> bytes | None:
+        """Take the oldest image packet out of the FIFO, if there is one."""
+        self._advance(now_s)
+        while self._fifo:
+            k, flags = self._fifo.popleft()
+            assert self._fifo_run is not None  # noqa: S101  (the FIFO holds images of a run)
+            if self._to_drop:
+                self._to_drop -= 1
+                continue
+            packet = self._packet(self._fifo_run, k, flags)
+            self._ready = None
+            if self._to_corrupt:
+                self._to_corrupt -= 1
+                damaged = bytearray(packet)
+                damaged[IMAGE_HEADER_BYTES + len(damaged) // 2] ^= 0x55
+                packet = bytes(damaged)
+            return packet
+        return None
+
+    def _begin_run(self, now_s: float) -> None:
+        self._run = _Run(now_s, self._period_s(), self._next_image, self._next_frame)
+        self._fifo_run = self._run
+
+    def _end_run(self) -> None:
+        """Switch the light off; the images exposed so far stay in the FIFO."""
+        if self._run is not None and self._run.exposed % len(self._labels):
+            self._next_frame += 1
+        self._run = None
+
+    def _flush(self) -> None:
+        self._fifo.clear()
+        self._ready = None
+        self._overflowed = False
+
+    def _period_s(self) -> float:
+        assert self._words is not None  # noqa: S101  (callers have a sequence)
+        return self._words.exposure_ns / 1e9 + self.capabilities.streaming_readout_s
+
+    @staticmethod
+    def _due_of(run: _Run, k: int) -> float:
+        return run.start_s + (k + 1) * run.period_s
+
+    def _advance(self, now_s: float) -> None:
+        """Let happen what the time up to now brings: exposures, overflow, the watchdog."""
+        run = self._run
+        if run is None:
+            return
+        trip_s = self._heartbeat_s + self.capabilities.heartbeat_s
+        # half a nanosecond, so that a wait until the due time finds the image there
+        until_s = min(now_s, trip_s) + 0.5e-9
+        exposed = max(run.exposed, int((until_s - run.start_s) / run.period_s))
+        stored = min(exposed - run.exposed, self._room - len(self._fifo))
+        for k in range(run.exposed, run.exposed + stored):
+            flag = ImageFlag.OVERFLOW if self._overflowed else ImageFlag(0)
+            self._overflowed = False
+            self._fifo.append((k, flag))
+        lost = exposed - run.exposed - stored
+        self._overflowed |= lost > 0
+        self._dropped += lost
+        self._high_water = max(self._high_water, len(self._fifo))
+        run.exposed = exposed
+        self._next_image = run.first_image + exposed
+        self._next_frame = run.first_frame + exposed // len(self._labels)
+        if now_s > trip_s:
+            self._watchdog_tripped = True
+            self._end_run()
+
+    def _packet(self, run: _Run, k: int, flags: ImageFlag) -> bytes:
+        number = run.first_image + k
+        if self._ready is not None and self._ready[0] == number:
+            return self._ready[1]
+        count = len(self._labels)
+        label = self._labels[k % count]
+        device_time_s = run.start_s + k * run.period_s - self._power_on_s
+        pixels = self._renderer.image(label, number=number, device_time_s=device_time_s)
+        payload = pixels.astype("<u2", copy=False).tobytes()
+        assert self._words is not None  # noqa: S101  (a run has a sequence)
+        if label.illumination:
+            flags |= ImageFlag.ILLUMINATION
+        if label.index == 0:
+            flags |= ImageFlag.FIRST_OF_FRAME
+        if label.index == count - 1:
+            flags |= ImageFlag.LAST_OF_FRAME
+        header = ImageHeader(
+            flags=flags,
+            epoch=self._epoch,
+            frame=run.first_frame + k // count,
+            number=number,
+            index=label.index,
+            count=count,
+            tuning_word=self._words.word(label.harmonic),
+            phase=phase_word(label.phase_rad),
+            harmonic=label.harmonic,
+            exposure_ns=self._words.exposure_ns,
+            device_time_ns=round(device_time_s * 1e9),
+            temperature_c=self._renderer.temperature_c(device_time_s),
+            payload_bytes=len(payload),
+            payload_crc=payload_checksum(payload),
+        )
+        packet = header.pack() + payload
+        self._ready = (number, packet)
+        return packet

@@ -1,0 +1,56 @@
+"""The simulated world as a program sees it: its truth, and its faults."""
+
+from transientcam_driver.errors import CameraError
+from transientcam_driver.simulation.device import EmulatedDevice
+from transientcam_driver.simulation.responses import Truth
+from transientcam_driver.simulation.world import World
+
+
+class Simulation:
+    """What only a simulated camera offers.
+
+    Attributes
+    ----------
+    scene
+        Name of the scene.
+    """
+
+    def __init__(self, scene: str, world: World, device: EmulatedDevice) -> None:
+        self.scene = scene
+        self._world = world
+        self._device = device
+
+    def truth(self) -> Truth:
+        """Ground truth of the scene, at the exposure set."""
+        return self._world.truth()
+
+    @property
+    def plugged(self) -> bool:
+        """Whether the cable is in."""
+        return self._device.plugged
+
+    def unplug(self) -> None:
+        """Pull the cable; the camera raises CameraLost."""
+        self._device.unplug()
+
+    def replug(self) -> None:
+        """Plug the cable in again; ``Camera.reconnect`` finds the camera."""
+        self._device.replug()
+
+    def corrupt_next(self, images: int = 1) -> None:
+        """Damage the pixels of the next images on the wire."""
+        self._device.corrupt_next(_count(images))
+
+    def drop_next(self, images: int = 1) -> None:
+        """Lose the next images on the wire."""
+        self._device.drop_next(_count(images))
+
+    def set_interlock(self, *, closed: bool) -> None:
+        """Open or close the safety interlock of the light."""
+        self._device.set_interlock(closed=closed)
+
+
+def _count(images: int) -> int:
+    if images < 1:
+        raise CameraError(f"images = {images}: must be at least 1")
+    return images

@@ -1,0 +1,139 @@
+"""Read a TOML table key by key, with errors that name file, key, value and what is allowed."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver.errors import SceneError
+
+
+class Table:
+    """A table of a scene file. ``done`` refuses the keys that nobody asked for."""
+
+    def __init__(self, file: str | Path, prefix: str, content: object) -> None:
+        self.file = file
+        self._prefix = prefix
+        self._left: dict[str, Any] = {}
+        if not isinstance(content, Mapping):
+            raise self.error("", content, "a table")
+        self._left = dict(content)
+        self._known: list[str] = []
+
+    def error(self, key: str, value: object, allowed: str) -> SceneError:
+        """Name a key of this table in an error."""
+        full = ".".join(part for part in (self._prefix, key) if part)
+        return SceneError(self.file, full or "the file", value, allowed)
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._left
+
+    def _take(self, key: str, default: Any) -> Any:
+        self._known.append(key)
+        if key in self._left:
+            return self._left.pop(key)
+        if default is None:
+            raise self.error(key, None, "present")
+        return default
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """Read a string."""
+        value = self._take(key, default)
+        if not isinstance(value, str):
+            raise self.error(key, value, "a text")
+        return value
+
+    def choice(self, key: str, allowed: tuple[str, ...], default: str | None = None) -> Any:
+        """Read one of a few words; the caller knows their type."""
+        value = self._take(key, default)
+        if value not in allowed:
+            raise self.error(key, value, f"one of {', '.join(allowed)}")
+        return value
+
+    def number(
+        self,
+        key: str,
+        default: float | None = None,
+        *,
+        least: float = -math.inf,
+        most: float = math.inf,
+        above: float = -math.inf,
+    ) -> float:
+        """Read a finite number within limits."""
+        value = self._take(key, default)
+        fits = isinstance(value, int | float) and not isinstance(value, bool)
+        if not (fits and math.isfinite(value) and least <= value <= most and value > above):
+            raise self.error(key, value, "a number" + _limits(least, most, above))
+        return float(value)
+
+    def integer(self, key: str, default: int | None = None, *, least: int, most: int) -> int:
+        """Read an integer within limits."""
+        value = self._take(key, default)
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise self.error(key, value, f"an integer from {least} to {most}")
+        return value
+
+    def switch(self, key: str, default: bool) -> bool:
+        """Read true or false."""
+        value = self._take(key, default)
+        if not isinstance(value, bool):
+            raise self.error(key, value, "true or false")
+        return value
+
+    def vector(self, key: str, default: tuple[float, ...] | None = None) -> NDArray[np.float64]:
+        """Read three finite numbers."""
+        value = self._numbers(key, default, 3)
+        return np.array(value, dtype=np.float64)
+
+    def size(self, key: str) -> tuple[float, float]:
+        """Read two positive numbers, width and height."""
+        width, height = self._numbers(key, None, 2)
+        if width <= 0 or height <= 0:
+            raise self.error(key, [width, height], "two numbers above 0: width and height")
+        return width, height
+
+    def _numbers(self, key: str, default: tuple[float, ...] | None, count: int) -> list[float]:
+        value = self._take(key, default)
+        fits = isinstance(value, list | tuple) and len(value) == count
+        if not fits or not all(
+            isinstance(item, int | float) and not isinstance(item, bool) and math.isfinite(item)
+            for item in value
+        ):
+            raise self.error(key, value, f"a list of {count} numbers")
+        return [float(item) for item in value]
+
+    def table(self, key: str) -> "Table":
+        """Enter a table inside this one; empty when absent."""
+        return Table(self.file, self._path(key), self._take(key, {}))
+
+    def tables(self, key: str) -> list["Table"]:
+        """Enter a list of tables (``[[key]]``); empty when absent."""
+        value = self._take(key, [])
+        if not isinstance(value, list):
+            raise self.error(key, value, f"a list of tables, written [[{key}]]")
+        return [
+            Table(self.file, f"{self._path(key)}[{index}]", item)
+            for index, item in enumerate(value)
+        ]
+
+    def done(self) -> None:
+        """Refuse what was not asked for: most likely a misspelt key."""
+        for key, value in self._left.items():
+            raise self.error(key, value, f"absent; known here are {', '.join(self._known)}")
+
+    def _path(self, key: str) -> str:
+        return f"{self._prefix}.{key}" if self._prefix else key
+
+
+def _limits(least: float, most: float, above: float) -> str:
+    words = []
+    if above > -math.inf:
+        words.append(f"above {above:g}")
+    if least > -math.inf:
+        words.append(f"of at least {least:g}")
+    if most < math.inf:
+        words.append(f"of at most {most:g}")
+    return " " + " and ".join(words) if words else ""
