@@ -1,49 +1,50 @@
 /** What tests and measurements reach the page by; loaded only where the address asks for `?debug`. */
 import { createRenderer, type DensityRenderer } from "./gl/renderer";
 import type { Coefficients } from "./physics/maximumEntropy";
-import { decodeMessage } from "./stream/protocol";
-import { coefficientsOf } from "./stream/summary";
+import { decodeMessage, type FrameMessage } from "./stream/protocol";
+import { frameOf } from "./stream/client";
+import { coefficientsOf, summarised } from "./stream/summary";
 import type { Store } from "./store/store";
-import type { StreamClient } from "./stream/client";
 
-/** Reads the density of a frame back from a renderer, as the page's own pictures are made. */
+/** A density read back from the renderer that the page's own pictures are made with. */
+interface Reading {
+  readonly renderer: string;
+  readonly values: number[];
+}
+
 class Bench {
-  readonly store: Store;
-  readonly #stream: StreamClient;
   #renderer: DensityRenderer | null = null;
 
-  constructor(store: Store, stream: StreamClient) {
-    this.store = store;
-    this.#stream = stream;
-  }
+  constructor(readonly store: Store) {}
 
-  /** Hands the body of a frame message to the page as if it had come over HTTP. */
+  /** Shows a frame message as if it had been streamed. */
   show(body: ArrayBuffer): void {
-    this.#stream.decode(body);
+    this.store.frames.put(frameOf(summarised(frameMessage(body))));
   }
 
-  /** Density of every pixel of a frame message, and what computed it. */
-  density(body: ArrayBuffer, phase_rad: number): { renderer: string; values: number[] } {
-    const message = decodeMessage(body);
-    const coefficients = message?.type === "frame" ? coefficientsOf(message) : null;
-    if (coefficients === null) throw new Error("That is no frame of coefficients.");
-    return this.#read(coefficients, phase_rad);
+  /** Density of every pixel of a frame of coefficients. */
+  density(body: ArrayBuffer, phase_rad: number): Reading {
+    return this.#read(coefficientsOf(frameMessage(body)), phase_rad);
   }
 
   /** The same for the frame on screen. */
-  shownDensity(phase_rad: number): { renderer: string; values: number[] } {
-    const coefficients = this.store.frames.of("coefficients").peek()?.coefficients;
-    if (!coefficients) throw new Error("No coefficients are on screen.");
-    return this.#read(coefficients, phase_rad);
+  shownDensity(phase_rad: number): Reading {
+    return this.#read(this.store.frames.of("coefficients").peek()?.coefficients ?? null, phase_rad);
   }
 
-  #read(coefficients: Coefficients, phase_rad: number): { renderer: string; values: number[] } {
+  #read(coefficients: Coefficients | null, phase_rad: number): Reading {
+    if (coefficients === null) throw new Error("There are no coefficients.");
     this.#renderer ??= createRenderer(document.createElement("canvas"), true);
-    const values = [...this.#renderer.readDensity(coefficients, phase_rad)];
-    return { renderer: this.#renderer.kind, values };
+    return { renderer: this.#renderer.kind, values: [...this.#renderer.readDensity(coefficients, phase_rad)] };
   }
 }
 
-export function expose(store: Store, stream: StreamClient): void {
-  Object.assign(window, { transientcam: new Bench(store, stream) });
+function frameMessage(body: ArrayBuffer): FrameMessage {
+  const message = decodeMessage(body);
+  if (message?.type !== "frame") throw new Error("That is no frame.");
+  return message;
+}
+
+export function expose(store: Store): void {
+  Object.assign(window, { transientcam: new Bench(store) });
 }

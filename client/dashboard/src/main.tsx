@@ -37,6 +37,6 @@ stream.open(address.href);
 
 if (new URLSearchParams(window.location.search).has("debug")) {
   void import("./debug").then(({ expose }) => {
-    expose(store, stream);
+    expose(store);
   });
 }

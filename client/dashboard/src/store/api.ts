@@ -1,5 +1,5 @@
 /** The REST side of the service: requests, and problems in plain words. */
-import type { AppliedSequence, Problem, SequenceDocument } from "../stream/protocol";
+import type { AppliedSequence, CameraDocument, CameraState, Problem, SequenceDocument } from "../stream/protocol";
 
 /** The service refused a request (RFC 9457), or could not be asked at all. */
 export class RequestError extends Error {
@@ -15,14 +15,9 @@ export function plainWords(problem: Problem): string {
   return problem.detail ?? problem.title ?? "The service refused without giving a reason.";
 }
 
-export interface CameraDocument {
-  readonly state?: string;
-  readonly capabilities?: Readonly<Record<string, unknown>>;
-  readonly [field: string]: unknown;
-}
-
 export interface AcquisitionDocument {
   readonly running: boolean;
+  readonly state: CameraState;
 }
 
 type Fetch = typeof fetch;
@@ -38,10 +33,6 @@ export class Api {
     return this.#json("GET", "/camera") as Promise<CameraDocument>;
   }
 
-  sequence(): Promise<AppliedSequence> {
-    return this.#json("GET", "/sequence") as Promise<AppliedSequence>;
-  }
-
   validate(sequence: SequenceDocument, signal?: AbortSignal): Promise<AppliedSequence> {
     return this.#json("POST", "/sequence/validate", sequence, signal) as Promise<AppliedSequence>;
   }
@@ -50,20 +41,8 @@ export class Api {
     return this.#json("PUT", "/sequence", sequence) as Promise<AppliedSequence>;
   }
 
-  acquisition(): Promise<AcquisitionDocument> {
-    return this.#json("GET", "/acquisition") as Promise<AcquisitionDocument>;
-  }
-
   setAcquisition(running: boolean): Promise<AcquisitionDocument> {
     return this.#json("PUT", "/acquisition", { running }) as Promise<AcquisitionDocument>;
-  }
-
-  /** The newest frame of a product as a stream message; null while there is none. */
-  async latest(product: string): Promise<ArrayBuffer | null> {
-    const answer = await this.#ask("GET", `/frames/latest/${product}.msgpack`);
-    if (answer.status === 503) return null;
-    await refuse(answer);
-    return answer.arrayBuffer();
   }
 
   async #json(method: string, path: string, body?: unknown, signal?: AbortSignal): Promise<unknown> {

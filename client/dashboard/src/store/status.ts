@@ -1,6 +1,6 @@
 import { computed, signal } from "@preact/signals";
 
-import type { FrameMeta } from "../stream/protocol";
+import type { CameraState, FrameMeta } from "../stream/protocol";
 
 /** How this page stands with the service. */
 export type Connection =
@@ -15,14 +15,18 @@ const RATE_WINDOW_S = 3;
 /** What the page knows of connection, camera and the flow of frames. Times are of this page's clock. */
 export class Status {
   readonly connection = signal<Connection>({ kind: "connecting" });
-  /** The camera's state in the service's word; null until it was told. */
-  readonly cameraState = signal<string | null>(null);
+  /** What the camera is doing; null until it was told. */
+  readonly cameraState = signal<CameraState | null>(null);
+  /** Whether the camera is taking frames; null while that is not known. */
+  readonly running = computed(() => {
+    const state = this.cameraState.value;
+    return state === null || state === "lost" ? null : state !== "stopped";
+  });
   /** When the camera was lost, in s of unix time, and why if that is known; null while it is there. */
   readonly cameraLoss = signal<{ readonly at_s: number; readonly reason: string | null } | null>(null);
   readonly newest = signal<FrameMeta | null>(null);
   readonly rate_hz = signal<number | null>(null);
   readonly latency_s = signal<number | null>(null);
-  readonly encode_s = signal<number | null>(null);
   readonly lostImages = signal(0);
   readonly unreadable = signal<string | null>(null);
   readonly #drops = signal<ReadonlyMap<number, number>>(new Map());
@@ -33,27 +37,19 @@ export class Status {
   #arrivals: number[] = [];
 
   /** A new session with the service: it counts anew. */
-  sessionOpened(cameraState: string, now_s: number): void {
+  sessionOpened(cameraState: CameraState, now_s: number): void {
     this.#drops.value = new Map();
     this.lostImages.value = 0;
     this.unreadable.value = null;
     this.cameraIs(cameraState, now_s);
   }
 
-  cameraIs(state: string, now_s: number): void {
+  cameraIs(state: CameraState, now_s: number, reason: string | null = null): void {
     this.cameraState.value = state;
-    if (LOST_STATES.has(state)) this.cameraLost(now_s);
-    else this.cameraBack();
-  }
-
-  cameraLost(now_s: number, reason: string | null = null): void {
     const known = this.cameraLoss.peek();
-    this.cameraLoss.value = { at_s: known?.at_s ?? now_s, reason: reason ?? known?.reason ?? null };
-    this.#forgetRate();
-  }
-
-  cameraBack(): void {
-    this.cameraLoss.value = null;
+    if (state === "lost") this.cameraLoss.value = { at_s: known?.at_s ?? now_s, reason: reason ?? known?.reason ?? null };
+    else this.cameraLoss.value = null;
+    if (state === "lost" || state === "stopped") this.#forgetRate();
   }
 
   connectionLost(reason: string, retryAt_s: number): void {
@@ -66,10 +62,13 @@ export class Status {
   }
 
   /** A frame was drawn at `now_s`; several products of one frame count once. */
-  frameDrawn(meta: FrameMeta, encode_s: number, now_s: number): void {
-    if (this.newest.peek()?.frame === meta.frame) return;
+  frameDrawn(meta: FrameMeta, now_s: number): void {
+    const shown = this.newest.peek();
+    if (shown?.frame === meta.frame) return;
     this.newest.value = meta;
-    this.encode_s.value = encode_s;
+    // Frames that were on their way when the camera went tell nothing of how fast it is; neither does the first,
+    // which may be old.
+    if (this.cameraLoss.peek() !== null || shown === null) return;
     const latency_s = now_s - meta.host_time_s;
     const known = this.latency_s.peek();
     this.latency_s.value = known === null ? latency_s : known + 0.2 * (latency_s - known);
@@ -85,6 +84,3 @@ export class Status {
     this.latency_s.value = null;
   }
 }
-
-/** The driver's words for a camera that is not there. */
-const LOST_STATES = new Set(["disconnected", "connecting", "faulted", "lost"]);

@@ -2,8 +2,8 @@ import { computed, signal } from "@preact/signals";
 import { createContext } from "preact";
 import { useContext } from "preact/hooks";
 
-import type { AppliedSequence } from "../stream/protocol";
-import { Api, type CameraDocument } from "./api";
+import type { AppliedSequence, CameraDocument } from "../stream/protocol";
+import { Api } from "./api";
 import { Frames } from "./frames";
 import { Player } from "./player";
 import { browserShelf, type Shelf } from "./settings";
@@ -23,9 +23,8 @@ export class Store {
   readonly shelf: Shelf | null;
   /** The sequence in use, told by the service; null before. */
   readonly sequence = signal<AppliedSequence | null>(null);
+  /** What the camera is and can do; null before the service told. */
   readonly camera = signal<CameraDocument | null>(null);
-  /** Whether the camera is taking frames; null while that is not known. */
-  readonly running = signal<boolean | null>(null);
   /** The page keeps the frame it shows although newer ones exist. */
   readonly held = signal(false);
   /** The pixel whose impulse response is shown. */

@@ -5,13 +5,13 @@ import type { Frame } from "../store/frames";
 import type { Store } from "../store/store";
 import type { AnimationLoop } from "../ui/animation";
 import type { AppliedSequence, Hello, Notice } from "./protocol";
-import { coefficientsOf } from "./summary";
-import type { Command, FrameReport, Report } from "./worker";
+import { coefficientsOf, type FrameReport } from "./summary";
+import type { Command, Report } from "./worker";
 
 /** What of a Worker is used. */
 export interface WorkerPort {
   onmessage: ((event: MessageEvent<Report>) => void) | null;
-  postMessage(command: Command, transfer: Transferable[]): void;
+  postMessage(command: Command): void;
 }
 
 /** The page's clock in s of unix time. */
@@ -46,20 +46,11 @@ export class StreamClient {
     effect(() => {
       const wanted = this.#store.frames.wanted.value;
       if (wanted === known) return;
-      const added = wanted.filter((product) => !known.includes(product));
       known = wanted;
       this.#send({ type: "want", products: wanted });
-      // A camera that stands still sends nothing: its last frame is asked for.
-      if (this.#store.running.peek() === false) for (const product of added) void this.#fetchLatest(product);
     });
     effect(() => {
       if (!this.#store.held.value) this.#loop.wake();
-    });
-    effect(() => {
-      if (this.#store.running.value !== false) return;
-      for (const product of this.#store.frames.wanted.peek()) {
-        if (this.#store.frames.of(product).peek() === null) void this.#fetchLatest(product);
-      }
     });
   }
 
@@ -67,22 +58,8 @@ export class StreamClient {
     this.#send({ type: "retry" });
   }
 
-  /** Takes the body of a frame message that did not come through the stream. */
-  decode(body: ArrayBuffer): void {
-    this.#send({ type: "decode", body }, [body]);
-  }
-
-  #send(command: Command, transfer: Transferable[] = []): void {
-    this.#worker.postMessage(command, transfer);
-  }
-
-  async #fetchLatest(product: string): Promise<void> {
-    try {
-      const body = await this.#store.api.latest(product);
-      if (body !== null) this.decode(body);
-    } catch {
-      // The views say that there is no frame; the connection says why.
-    }
+  #send(command: Command): void {
+    this.#worker.postMessage(command);
   }
 
   #receive(report: Report): void {
@@ -93,14 +70,14 @@ export class StreamClient {
         break;
       case "open":
         status.connection.value = { kind: "open" };
-        void this.#readDocuments();
+        void this.#readCamera();
         break;
       case "waiting":
         status.connectionLost(report.reason, this.#now_s() + report.retry_s);
         break;
       case "camera":
-        status.cameraIs(report.state, this.#now_s());
-        void this.#readDocuments();
+        this.#store.camera.value = report.document;
+        status.cameraIs(report.document.state, this.#now_s(), report.document.reason);
         break;
       case "unreadable":
         status.unreadable.value = report.reason;
@@ -134,11 +111,11 @@ export class StreamClient {
         status.lostImages.value += notice.count;
         break;
       case "camera-lost":
-        status.cameraLost(this.#now_s(), notice.reason);
+        status.cameraIs("lost", this.#now_s(), notice.reason);
         break;
       case "camera-back":
-        status.cameraBack();
-        void this.#readDocuments();
+        status.cameraIs("streaming", this.#now_s());
+        void this.#readCamera();
         break;
       case "sequence-changed":
         this.#takeSequence(notice.sequence);
@@ -150,13 +127,12 @@ export class StreamClient {
     if (sequence !== null) this.#store.sequence.value = sequence;
   }
 
-  /** What the stream does not tell: the camera's capabilities, and whether it is running. */
-  async #readDocuments(): Promise<void> {
-    const { api, camera, running } = this.#store;
+  /** What the stream does not tell: what the camera is and can do. */
+  async #readCamera(): Promise<void> {
     try {
-      [camera.value, { running: running.value }] = await Promise.all([api.camera(), api.acquisition()]);
+      this.#store.camera.value = await this.#store.api.camera();
     } catch {
-      // Asked again at the next change; the stream itself says whether the service is there.
+      // Asked again when there is a connection again; the stream itself says that there is none.
     }
   }
 
@@ -164,19 +140,18 @@ export class StreamClient {
     if (this.#store.held.peek() || this.#pending.size === 0) return;
     let newest = 0;
     for (const report of this.#pending.values()) {
-      const { message, streamed } = report;
       this.#store.frames.put(frameOf(report));
-      if (!streamed) continue;
-      newest = Math.max(newest, message.meta.frame);
-      this.#store.status.frameDrawn(message.meta, message.encode_s, this.#now_s());
-      this.#store.running.value = true;
+      const { meta } = report.message;
+      newest = Math.max(newest, meta.frame);
+      this.#store.status.frameDrawn(meta, this.#now_s());
     }
     this.#pending.clear();
-    if (newest > 0) this.#send({ type: "acknowledge", frame: newest });
+    this.#send({ type: "acknowledge", frame: newest });
   }
 }
 
-function frameOf({ message, map, light }: FrameReport): Frame {
+/** A frame as views see it. */
+export function frameOf({ message, map, light }: FrameReport): Frame {
   const { product, unit, meta, array } = message;
   const coefficients = product === "coefficients" ? coefficientsOf(message) : null;
   return { product, unit, meta, shape: array.shape, values: array.data, map, light, coefficients };

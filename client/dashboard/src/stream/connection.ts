@@ -3,7 +3,15 @@
  *
  * Knows no worker and no page. The socket, the clock, chance and the probe are arguments.
  */
-import { decodeMessage, encodeAck, encodeSubscribe, ProtocolError, SUBPROTOCOL, type ServerMessage } from "./protocol";
+import {
+  type CameraDocument,
+  decodeMessage,
+  encodeAck,
+  encodeSubscribe,
+  ProtocolError,
+  type ServerMessage,
+  SUBPROTOCOL,
+} from "./protocol";
 
 /** What of a WebSocket is used. */
 export interface Socket {
@@ -21,16 +29,16 @@ export interface Surroundings {
   clearTimer(timer: number): void;
   /** A number in [0, 1). */
   random(): number;
-  /** Asks the service whether it is there; resolves to the camera's state, rejects if it is not. */
-  probe(): Promise<string>;
+  /** Asks the service whether it is there; resolves to what it says of the camera, rejects if it is not. */
+  probe(): Promise<CameraDocument>;
 }
 
 export type ConnectionEvent =
   | { readonly type: "connecting" }
   | { readonly type: "open" }
   | { readonly type: "waiting"; readonly retry_s: number; readonly reason: string }
-  | { readonly type: "message"; readonly message: ServerMessage; readonly bytes: number }
-  | { readonly type: "camera"; readonly state: string }
+  | { readonly type: "message"; readonly message: ServerMessage }
+  | { readonly type: "camera"; readonly document: CameraDocument }
   | { readonly type: "unreadable"; readonly reason: string };
 
 /** Frames the service may send ahead of what was drawn. */
@@ -115,11 +123,10 @@ export class StreamConnection {
     this.#attempts = 0;
     this.#listen();
     try {
-      const bytes = data.byteLength;
       const message = decodeMessage(data);
       if (message === null) return;
       if (message.type === "frame") this.#inFlight.add(message.meta.frame);
-      this.#emit({ type: "message", message, bytes });
+      this.#emit({ type: "message", message });
     } catch (error) {
       if (!(error instanceof ProtocolError)) throw error;
       this.#emit({ type: "unreadable", reason: error.message });
@@ -138,9 +145,9 @@ export class StreamConnection {
   async #probe(): Promise<void> {
     const socket = this.#socket;
     try {
-      const state = await this.#around.probe();
+      const document = await this.#around.probe();
       if (this.#socket !== socket) return;
-      this.#emit({ type: "camera", state });
+      this.#emit({ type: "camera", document });
       this.#listen();
     } catch {
       if (this.#socket === socket) this.#lost("The service does not answer.");

@@ -60,12 +60,24 @@ export interface SequenceDocument {
   readonly sub_phases: { readonly scheme: string; readonly n: number };
 }
 
+/** What the camera is doing, in the service's words. */
+export type CameraState = "starting" | "streaming" | "stopped" | "lost";
+
+/** What `GET /api/v1/camera` answers. */
+export interface CameraDocument {
+  readonly state: CameraState;
+  /** Why it is lost. */
+  readonly reason: string | null;
+  readonly simulated: boolean;
+  readonly capabilities: Readonly<Record<string, unknown>>;
+}
+
 export interface Hello {
   readonly type: "hello";
   readonly session: string;
   readonly server: { readonly name: string; readonly version: string };
   readonly sequence: AppliedSequence | null;
-  readonly camera: { readonly state: string };
+  readonly camera: { readonly state: CameraState };
 }
 
 export interface FrameMessage {
@@ -139,7 +151,12 @@ export function decodeMessage(buffer: ArrayBuffer): ServerMessage | null {
   }
 }
 
-/** The first message of a client, and every later change of what it wants. */
+/**
+ * The first message of a client, and every later change of what it wants.
+ *
+ * Any frame there is will do to begin with: a camera that stands still, or takes seconds for a frame, is
+ * shown at once.
+ */
 export function encodeSubscribe(products: readonly string[], credits: number): Uint8Array<ArrayBuffer> {
   return encode({
     type: "subscribe",
@@ -147,7 +164,7 @@ export function encodeSubscribe(products: readonly string[], credits: number): U
     token: null,
     subscriptions: products.map((product) => ({ product, max_rate_hz: null })),
     credits,
-    start: null,
+    start: 1,
   }) as Uint8Array<ArrayBuffer>;
 }
 

@@ -72,3 +72,22 @@ export function coefficientsOf({ array, meta }: FrameMessage): Coefficients | nu
     baseFrequency_hz: meta.base_frequency_hz,
   };
 }
+
+/** A frame on its way to the page, with what views need to know of it as a whole. */
+export interface FrameReport {
+  readonly type: "frame";
+  readonly message: FrameMessage;
+  readonly map: MapSummary | null;
+  readonly light: LightSummary | null;
+}
+
+/** A frame with what its views need to know of it as a whole. */
+export function summarised(message: FrameMessage): FrameReport {
+  const coefficients = message.product === "coefficients" ? coefficientsOf(message) : null;
+  return {
+    type: "frame",
+    message,
+    map: message.array.shape.length === 2 ? summariseMap(message.array.data) : null,
+    light: coefficients === null ? null : summariseLight(coefficients),
+  };
+}

@@ -1,26 +1,14 @@
 /** The worker: owns the socket, decodes, summarises, and hands buffers to the page without copying. */
 import { StreamConnection, type ConnectionEvent } from "./connection";
-import { decodeMessage, type FrameMessage } from "./protocol";
-import { coefficientsOf, summariseLight, summariseMap, type LightSummary, type MapSummary } from "./summary";
+import type { CameraDocument } from "./protocol";
+import { type FrameReport, summarised } from "./summary";
 
 /** From the page to the worker. */
 export type Command =
   | { readonly type: "open"; readonly url: string; readonly products: readonly string[] }
   | { readonly type: "want"; readonly products: readonly string[] }
   | { readonly type: "acknowledge"; readonly frame: number }
-  | { readonly type: "retry" }
-  /** A message body fetched over HTTP: the newest frame of a product that no longer streams. */
-  | { readonly type: "decode"; readonly body: ArrayBuffer };
-
-/** A frame on its way to the page, with what views need to know of it as a whole. */
-export interface FrameReport {
-  readonly type: "frame";
-  readonly message: FrameMessage;
-  readonly bytes: number;
-  readonly streamed: boolean;
-  readonly map: MapSummary | null;
-  readonly light: LightSummary | null;
-}
+  | { readonly type: "retry" };
 
 /** From the worker to the page. */
 export type Report = FrameReport | ConnectionEvent;
@@ -34,28 +22,18 @@ interface WorkerScope {
 const scope = self as unknown as WorkerScope;
 let connection: StreamConnection | null = null;
 
-function report(message: FrameMessage, bytes: number, streamed: boolean): void {
-  const coefficients = message.product === "coefficients" ? coefficientsOf(message) : null;
-  const frame: FrameReport = {
-    type: "frame",
-    message,
-    bytes,
-    streamed,
-    map: message.array.shape.length === 2 ? summariseMap(message.array.data) : null,
-    light: coefficients === null ? null : summariseLight(coefficients),
-  };
-  scope.postMessage(frame, [message.array.data.buffer as ArrayBuffer]);
-}
-
 function onEvent(event: ConnectionEvent): void {
-  if (event.type === "message" && event.message.type === "frame") report(event.message, event.bytes, true);
-  else scope.postMessage(event, []);
+  if (event.type === "message" && event.message.type === "frame") {
+    scope.postMessage(summarised(event.message), [event.message.array.data.buffer as ArrayBuffer]);
+  } else {
+    scope.postMessage(event, []);
+  }
 }
 
-async function cameraState(): Promise<string> {
+async function askForCamera(): Promise<CameraDocument> {
   const answer = await fetch("/api/v1/camera", { signal: AbortSignal.timeout(4000) });
-  const document = (await answer.json()) as { state?: unknown };
-  return String(document.state ?? "unknown");
+  if (!answer.ok) throw new Error(`the service answered ${answer.status}`);
+  return (await answer.json()) as CameraDocument;
 }
 
 scope.onmessage = ({ data: command }) => {
@@ -70,7 +48,7 @@ scope.onmessage = ({ data: command }) => {
             clearTimeout(timer);
           },
           random: Math.random,
-          probe: cameraState,
+          probe: askForCamera,
         },
         onEvent,
       );
@@ -85,11 +63,5 @@ scope.onmessage = ({ data: command }) => {
     case "retry":
       connection?.retryNow();
       break;
-    case "decode": {
-      const bytes = command.body.byteLength;
-      const message = decodeMessage(command.body);
-      if (message?.type === "frame") report(message, bytes, false);
-      break;
-    }
   }
 };

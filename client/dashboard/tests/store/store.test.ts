@@ -80,27 +80,27 @@ describe("the status", () => {
   test("counts a frame once, however many of its products are drawn", () => {
     const status = new Status();
     for (let n = 1; n <= 21; n++) {
-      status.frameDrawn(meta(n), 0, 10 + n / 20);
-      status.frameDrawn(meta(n), 0, 10 + n / 20 + 0.001);
+      status.frameDrawn(meta(n), 10 + n / 20);
+      status.frameDrawn(meta(n), 10 + n / 20 + 0.001);
     }
     expect(status.rate_hz.value).toBeCloseTo(20, 6);
   });
 
   test("tells how old frames are when they are drawn", () => {
     const status = new Status();
-    for (let n = 1; n < 50; n++) status.frameDrawn(meta(n, 100 + n), 0, 100 + n + 0.08);
+    for (let n = 1; n < 50; n++) status.frameDrawn(meta(n, 100 + n), 100 + n + 0.08);
     expect(status.latency_s.value).toBeCloseTo(0.08, 6);
   });
 
   test("a lost camera is stale at once, keeps the time it went, and is forgotten when it is back", () => {
     const status = new Status();
     status.connection.value = { kind: "open" };
-    status.frameDrawn(meta(1), 0, 10);
-    status.frameDrawn(meta(2), 0, 10.1);
-    status.cameraLost(11);
-    status.cameraIs("disconnected", 12);
+    status.frameDrawn(meta(1), 10);
+    status.frameDrawn(meta(2), 10.1);
+    status.cameraIs("lost", 11, "unplugged");
+    status.cameraIs("lost", 12);
     expect(status.stale.value).toBe(true);
-    expect(status.cameraLoss.value?.at_s).toBe(11);
+    expect(status.cameraLoss.value).toEqual({ at_s: 11, reason: "unplugged" });
     expect(status.rate_hz.value).toBeNull();
     status.cameraIs("streaming", 13);
     expect(status.stale.value).toBe(false);
@@ -160,22 +160,18 @@ describe("requests", () => {
   test("a problem becomes its own words, and keeps the field it names", async () => {
     const problem = { title: "Invalid sequence", detail: "harmonics is 99, but must be from 1 to 32.", field: "harmonics" };
     const api = answering(JSON.stringify(problem), 422, "application/problem+json");
-    const refusal = await api.sequence().catch((error: unknown) => error);
+    const refusal = await api.camera().catch((error: unknown) => error);
     expect(refusal).toBeInstanceOf(RequestError);
     expect((refusal as RequestError).message).toBe(problem.detail);
     expect((refusal as RequestError).problem).toMatchObject({ status: 422, field: "harmonics" });
   });
 
   test("a proxy's page says at least its status", async () => {
-    await expect(answering("<html>", 502, "text/html").sequence()).rejects.toThrow(/502/);
+    await expect(answering("<html>", 502, "text/html").camera()).rejects.toThrow(/502/);
   });
 
   test("a service that cannot be reached says that", async () => {
     const api = new Api(() => Promise.reject(new TypeError("Failed to fetch")));
-    await expect(api.sequence()).rejects.toThrow("The service cannot be reached.");
-  });
-
-  test("no frame yet is nothing, not an error", async () => {
-    expect(await answering("{}", 503, "application/problem+json").latest("range")).toBeNull();
+    await expect(api.camera()).rejects.toThrow("The service cannot be reached.");
   });
 });

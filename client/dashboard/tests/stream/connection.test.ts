@@ -1,6 +1,7 @@
 import { decode, encode } from "@msgpack/msgpack";
 import { beforeEach, describe, expect, test } from "vitest";
 
+import type { CameraDocument, CameraState } from "../../src/stream/protocol";
 import { type ConnectionEvent, CREDITS, type Socket, StreamConnection } from "../../src/stream/connection";
 
 class FakeSocket implements Socket {
@@ -32,11 +33,13 @@ class FakeSocket implements Socket {
   }
 }
 
+const camera = (state: CameraState): CameraDocument => ({ state, reason: null, simulated: true, capabilities: {} });
+
 /** A world in which time passes when told to. */
 class World {
   readonly sockets: FakeSocket[] = [];
   readonly events: ConnectionEvent[] = [];
-  answer: () => Promise<string> = () => Promise.resolve("streaming");
+  answer: () => Promise<CameraDocument> = () => Promise.resolve(camera("streaming"));
   probes = 0;
   #now_s = 0;
   #timers = new Map<number, { due_s: number; action: () => void }>();
@@ -183,10 +186,10 @@ describe("a lost stream", () => {
 
 describe("silence", () => {
   test("makes it ask for the camera, and tell what it hears", async () => {
-    world.answer = () => Promise.resolve("disconnected");
+    world.answer = () => Promise.resolve(camera("lost"));
     world.socket.opens();
     await world.passes(3);
-    expect(world.events.at(-1)).toEqual({ type: "camera", state: "disconnected" });
+    expect(world.events.at(-1)).toEqual({ type: "camera", document: camera("lost") });
     expect(world.socket.closed).toBe(false);
   });
 

@@ -7,7 +7,7 @@ import { impulseResponse, peaks, type Peak } from "../../physics/impulseResponse
 import { aBoolean, remembered } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { Toggle } from "../../ui/controls";
-import { fixed } from "../../ui/format";
+import { fixed, significant } from "../../ui/format";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { autoLimits, type Span } from "../../ui/scale";
@@ -56,12 +56,18 @@ export function ResponseView() {
   }, [dark]);
 
   const logarithmic = useMemo(() => remembered(store.shelf, "response.logarithmic", false, aBoolean), [store]);
+  const pointed = useSignal("");
   const top = useRef<Span | null>(null);
   useEffect(() => {
     if (box.current === null) return undefined;
-    const made = responsePlot(box.current, logarithmic.value, () => top.current?.high ?? 1, (time_ns) => {
-      store.player.playing.value = false;
-      store.player.seek((time_ns * 1e-9) / store.period_s.peek());
+    const made = responsePlot(box.current, {
+      logarithmic: logarithmic.value,
+      top: () => top.current?.high ?? 1,
+      seek: (time_ns) => {
+        store.player.playing.value = false;
+        store.player.seek((time_ns * 1e-9) / store.period_s.peek());
+      },
+      point: (sample) => (pointed.value = sample === null ? "" : sampleText(sample.time_ns, sample.density)),
     });
     plot.value = made;
     return () => {
@@ -103,13 +109,16 @@ export function ResponseView() {
         </h2>
       }
       tools={
-        <Toggle
-          pressed={logarithmic.value}
-          title="Logarithmic density"
-          onToggle={() => (logarithmic.value = !logarithmic.peek())}
-        >
-          log
-        </Toggle>
+        <>
+          <span data-field="sample">{pointed}</span>
+          <Toggle
+            pressed={logarithmic.value}
+            title="Logarithmic density"
+            onToggle={() => (logarithmic.value = !logarithmic.peek())}
+          >
+            log
+          </Toggle>
+        </>
       }
     >
       <div class="response">
@@ -120,6 +129,11 @@ export function ResponseView() {
       </div>
     </Panel>
   );
+}
+
+function sampleText(time_ns: number, density: number): string {
+  const range_m = rangeOfTime_m(time_ns * 1e-9);
+  return `${fixed(time_ns, 2, "ns")} · ${fixed(range_m, 2, "m")} · ${significant(density, 3, "DN/ns")}`;
 }
 
 function PeakTable({ peaks: listed }: { peaks: readonly Peak[] }) {

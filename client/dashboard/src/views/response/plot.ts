@@ -9,8 +9,18 @@ export interface ResponsePlot {
   readonly head: HTMLElement;
 }
 
+export interface PlotOptions {
+  readonly logarithmic: boolean;
+  /** Upper end of the density's axis. */
+  readonly top: () => number;
+  /** Called with the time that was clicked. */
+  readonly seek: (time_ns: number) => void;
+  /** Called with the sample under the pointer; null when it leaves. */
+  readonly point: (sample: { readonly time_ns: number; readonly density: number } | null) => void;
+}
+
 /** A plot of density in DN/ns over time of flight in ns, with the range it stands for on top. */
-export function responsePlot(box: HTMLElement, logarithmic: boolean, top: () => number, seek: (time_ns: number) => void): ResponsePlot {
+export function responsePlot(box: HTMLElement, { logarithmic, top, seek, point }: PlotOptions): ResponsePlot {
   const style = getComputedStyle(box);
   const ink = style.getPropertyValue("--quiet");
   const hairline = style.getPropertyValue("--hairline");
@@ -24,15 +34,23 @@ export function responsePlot(box: HTMLElement, logarithmic: boolean, top: () => 
       legend: { show: false },
       cursor: { drag: { x: false, y: false }, points: { size: 6 }, y: false },
       padding: [0, 12, 0, 0],
+      hooks: {
+        setCursor: [
+          ({ cursor: { idx }, data: [times, densities] }) => {
+            const density = idx == null ? null : densities[idx];
+            point(idx == null || density == null ? null : { time_ns: times[idx], density });
+          },
+        ],
+      },
       scales: {
         x: { time: false, range: (_plot, low, high) => [low ?? 0, high ?? 1] },
         y: logarithmic
-          ? { distr: 3, range: () => [top() * 10 ** -LOG_DECADES, top()] }
+          ? { distr: 3, range: () => [10 ** (decade(top()) - LOG_DECADES), top()] }
           : { range: () => [0, top()] },
       },
       axes: [
         { ...axis, size: 20, gap: 2, label: "time of flight (ns)", labelSize: 16, labelGap: 0 },
-        { ...axis, size: 52, gap: 4, label: "DN/ns", labelSize: 16, labelGap: 0, space: 28, values: (_plot, splits) => splits.map((value) => tickText(value)) },
+        { ...axis, size: 52, gap: 4, label: "DN/ns", labelSize: 16, labelGap: 0, space: 28, values: (_plot, splits) => splits.map(tickText), ...(logarithmic ? { splits: powersOfTen } : {}) },
         {
           ...axis,
           scale: "x",
@@ -66,9 +84,16 @@ export function responsePlot(box: HTMLElement, logarithmic: boolean, top: () => 
 /** Decades that the logarithmic axis shows. */
 const LOG_DECADES = 5;
 
-/** Thousands apart, powers of ten where they are short; uPlot leaves out ticks by null. */
-function tickText(value: number | null): string {
-  if (value === null) return "";
+function decade(value: number): number {
+  return Math.floor(Math.log10(value) + 1e-9);
+}
+
+function powersOfTen(_plot: uPlot, _axis: number, low: number, high: number): number[] {
+  const count = decade(high) - decade(low) + 1;
+  return Array.from({ length: count }, (_, n) => 10 ** (decade(low) + n));
+}
+
+function tickText(value: number): string {
   if (value >= 1) return value < 10 ? String(Number(value.toFixed(1))) : grouped(value);
   return significant(value, 1);
 }

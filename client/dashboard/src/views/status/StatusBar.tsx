@@ -25,13 +25,13 @@ export function StatusBar() {
 type Tone = "good" | "waiting" | "bad" | "still";
 
 function StateChip() {
-  const { status, held, running } = useStore();
+  const { status, held } = useStore();
   const state = useComputed((): { tone: Tone; word: string } => {
     if (status.connection.value.kind === "connecting") return { tone: "waiting", word: "Connecting" };
     if (status.connection.value.kind === "waiting") return { tone: "bad", word: "Reconnecting" };
     if (status.cameraLoss.value !== null) return { tone: "bad", word: "Camera lost" };
     if (held.value) return { tone: "still", word: "Held" };
-    if (running.value === false) return { tone: "still", word: "Stopped" };
+    if (status.running.value === false) return { tone: "still", word: "Stopped" };
     if (status.newest.value === null) return { tone: "waiting", word: "Waiting" };
     return { tone: "good", word: "Live" };
   });
@@ -46,13 +46,12 @@ function StateChip() {
 
 function CameraName() {
   const { camera } = useStore();
-  const { capabilities } = camera.value ?? {};
-  const model = capabilities?.["model"] ?? camera.value?.["model"];
-  const serial = capabilities?.["serial"] ?? camera.value?.["serial"];
-  if (model === undefined) return null;
+  if (camera.value === null) return null;
+  const { capabilities, simulated } = camera.value;
   return (
-    <span class="camera-name" title={serial === undefined ? undefined : `Serial number ${String(serial)}`}>
-      {String(model)}
+    <span class="camera-name" title={`Serial number ${String(capabilities["serial"])}`}>
+      {String(capabilities["model"])}
+      {simulated && ", simulated"}
     </span>
   );
 }
@@ -116,10 +115,11 @@ function Figure({ name, field, title, children }: FigureProps) {
 
 function Steering() {
   const store = useStore();
-  const running = store.running.value;
+  const running = store.status.running.value;
   const toggle = async (): Promise<void> => {
     try {
-      store.running.value = (await store.api.setAcquisition(running !== true)).running;
+      const { state } = await store.api.setAcquisition(running !== true);
+      store.status.cameraIs(state, Date.now() / 1000);
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;
       store.status.unreadable.value = error.message;
