@@ -1,0 +1,65 @@
+"""The service as one ASGI application."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Final
+
+from fastapi import APIRouter, FastAPI
+from transientcam_driver import Camera
+
+from transientcam_server import pages, problems, stream
+from transientcam_server.routes import (
+    acquisition,
+    camera,
+    frames,
+    health,
+    info,
+    sequence,
+    simulation,
+)
+from transientcam_server.security import BodyLimit, SameSite, SecurityHeaders
+from transientcam_server.service import VERSION, Service
+from transientcam_server.settings import Settings
+
+API: Final = "/api/v1"
+_RESOURCES = (info, camera, sequence, acquisition, frames, simulation)
+
+
+def build_app(camera: Camera, settings: Settings) -> FastAPI:
+    """Return the application that serves ``camera``; it captures while its lifespan lasts.
+
+    The camera stays the caller's: it is neither opened nor closed here.
+    """
+    service = Service(camera, settings)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        async with service.running():
+            yield
+
+    app = FastAPI(
+        title="transientcam",
+        version=VERSION,
+        summary="A networked camera for transient imaging",
+        description=pages.DESCRIPTION,
+        license_info={"name": "BSD-3-Clause", "identifier": "BSD-3-Clause"},
+        lifespan=lifespan,
+        docs_url=None,  # pages.router has one that needs no other host
+        redoc_url=None,
+        swagger_ui_oauth2_redirect_url=None,
+    )
+    app.state.service = service
+    api = APIRouter(prefix=API)
+    for resource in _RESOURCES:
+        api.include_router(resource.router)
+    api.include_router(stream.router)
+    app.include_router(api)
+    for router in (info.versions, health.router, pages.router):
+        app.include_router(router)
+    pages.add_dashboard(app)
+    problems.install(app)
+    # the last one added is the first to see a request
+    app.add_middleware(BodyLimit)
+    app.add_middleware(SameSite, settings=settings)
+    app.add_middleware(SecurityHeaders)
+    return app

@@ -1,0 +1,178 @@
+"""The verbs ``serve``, ``reconstruct`` and ``compile`` of the ``transientcam`` command.
+
+What is heavy is imported when a verb runs, so that ``transientcam --help`` stays quick.
+"""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+if TYPE_CHECKING:
+    from transientcam_server.reconstruct import Measurement, Reconstruction
+
+
+def serve(
+    camera: Annotated[
+        str | None,
+        typer.Option(help="usb[:SERIAL], sim:SCENE or measured:FILE  [default: sim:mirrors]"),
+    ] = None,
+    host: Annotated[
+        str | None, typer.Option(help="Address to listen on.  [default: 127.0.0.1]")
+    ] = None,
+    port: Annotated[
+        int | None, typer.Option(help="TCP port; 0 takes any free one.  [default: 8000]")
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option(help="Settings in TOML.  [default: ./transientcam.toml]")
+    ] = None,
+    insecure: Annotated[
+        bool,
+        typer.Option("--insecure", help="Let anybody who reaches the port control the camera."),
+    ] = False,
+    log_level: Annotated[str | None, typer.Option(help="debug, info, warning or error.")] = None,
+) -> None:
+    """Run the daemon: a camera on the network, with its dashboard."""
+    from transientcam_server.settings import load_settings
+
+    command_line = {
+        "camera": camera,
+        "host": host,
+        "port": port,
+        "insecure": insecure or None,
+        "log_level": log_level,
+    }
+    settings = load_settings(command_line, file=config, environment=os.environ)
+
+    import transientcam_moments as tm
+    from transientcam_driver import open_camera
+
+    from transientcam_server import run
+    from transientcam_server.app import build_app
+
+    run.configure_logging(settings)
+    with open_camera(settings.camera) as opened:
+        # NumPy serves until the compiled kernels are ready
+        tm.kernels.compile_in_background()
+        app = build_app(opened, settings)
+        run.serve(app, settings, on_listening=lambda url: _announce(url, settings.camera))
+
+
+def _announce(url: str, camera: str) -> None:
+    console = Console()
+    console.print(f"transientcam serves {camera} at [bold link={url}]{url}[/] (Ctrl-C ends it)")
+
+
+def reconstruct(
+    input: Annotated[  # noqa: A002 - it is what the argument is called in the help
+        Path,
+        typer.Argument(
+            help="An .npz with moments and base_frequency_hz, counts and bin_s, or h with "
+            "start_opl_m and bin_opl_m."
+        ),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The .npz to write.")],
+    frequency_hz: Annotated[
+        float | None, typer.Option(help="Base frequency for impulse responses.  [default: 23e6]")
+    ] = None,
+    harmonics: Annotated[
+        int | None,
+        typer.Option(help="How many multiples of it; at most those of the moments.  [default: 4]"),
+    ] = None,
+    bins: Annotated[int, typer.Option(min=1, max=65536, help="Times of flight.")] = 256,
+    bias: Annotated[
+        float, typer.Option(help="Least uniform part of a pixel, over its brightness (Sec. 4.3).")
+    ] = 4e-3,
+    smoothing_px: Annotated[
+        float, typer.Option(min=0.0, max=10.0, help="Standard deviation of a Gaussian smoothing.")
+    ] = 0.0,
+    threshold: Annotated[
+        float, typer.Option(min=0.0, help="Weight of the first return, over the strongest.")
+    ] = 0.1,
+    subtract_background: Annotated[
+        bool,
+        typer.Option("--subtract-background", help="Subtract the median of counts first."),
+    ] = False,
+    plot: Annotated[Path | None, typer.Option(help="Also draw a picture into this .png.")] = None,
+) -> None:
+    """Reconstruct a measurement in a file: density, cumulative density, range, direct, indirect."""
+    from pydantic import ValidationError
+
+    from transientcam_server import plot as pictures
+    from transientcam_server import reconstruct as offline
+    from transientcam_server.settings import ReconstructionSettings
+
+    if plot is not None:
+        pictures.require()
+    try:
+        settings = ReconstructionSettings(
+            smoothing_px=smoothing_px, bias=bias, return_threshold=threshold
+        )
+    except ValidationError as error:
+        mistake = error.errors()[0]
+        raise typer.BadParameter(f"{mistake['loc'][0]}: {mistake['msg']}") from error
+    measurement = offline.load(
+        input, frequency_hz=frequency_hz, harmonics=harmonics, background=subtract_background
+    )
+    console = Console(stderr=True)
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+        console=console,
+    ) as progress:
+        task = progress.add_task("reconstructing", total=None)
+
+        def advance(done: int, total: int) -> None:
+            progress.update(task, completed=done, total=total)
+
+        result = offline.reconstruct(measurement, bins=bins, settings=settings, progress=advance)
+        progress.update(task, description="writing")
+        offline.save(output, result)
+        if plot is not None:
+            progress.update(task, description="drawing")
+            pictures.save_picture(plot, result)
+    _tell(console, measurement, result, output)
+
+
+def _tell(
+    console: Console, measurement: "Measurement", result: "Reconstruction", output: Path
+) -> None:
+    import numpy as np
+    import transientcam_moments as tm
+
+    height, width = result.flags.shape
+    console.print(
+        f"{output}: {width} x {height} pixels, m = {measurement.harmonics} at "
+        f"{measurement.base_frequency_hz / 1e6:g} MHz, {result.time_s.size} times of flight"
+    )
+    for flag in tm.Flags:
+        count = int(np.count_nonzero(result.flags & flag.value))
+        if count:
+            console.print(f"  {count} pixels flagged {str(flag.name).lower().replace('_', ' ')}")
+
+
+def compile_kernels() -> None:
+    """Compile the kernels of the reconstruction now, for images and packages."""
+    import transientcam_moments as tm
+
+    with Progress(
+        TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=Console()
+    ) as progress:
+        task = progress.add_task("compiling", total=None)
+
+        def advance(done: int, total: int, name: str) -> None:
+            progress.update(task, completed=done, total=total, description=name)
+
+        tm.kernels.compile(progress=advance)

@@ -1,0 +1,308 @@
+"""From a captured frame to the bytes of its products, on workers, each thing once.
+
+A `Frame` remembers every stage, product and encoding as a task: the first who asks starts it, all
+others wait for the same one. Everything here lives on the event loop and computes nothing there.
+"""
+
+import asyncio
+import logging
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Coroutine, Hashable, Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from transientcam_driver import AppliedSequence, Camera, RawFrame
+
+from transientcam_server import problem_kinds as kinds
+from transientcam_server.encoding import Encoding
+from transientcam_server.errors import Problem
+from transientcam_server.products import PRODUCTS, STAGES, Product, Recipe, pixel_counts
+from transientcam_server.settings import ReconstructionSettings
+
+_log = logging.getLogger(__name__)
+_T = TypeVar("_T")
+_Array = NDArray[Any]
+_MAX_ANSWER_BYTES = 512 * 1024 * 1024
+_REMEMBERED_TIME_AXES = 2
+
+
+class Pipeline:
+    """Makes frames of captures and computes on ``executor`` what is asked of them."""
+
+    def __init__(
+        self, camera: Camera, settings: ReconstructionSettings, executor: Executor, *, workers: int
+    ) -> None:
+        self._settings = settings
+        self._executor = executor
+        self._tasks: set[asyncio.Task[Any]] = set()
+        self._frames = 0
+        self._full_scale = 2.0**camera.capabilities.bits - 1.0
+        # what may take long leaves one worker to everything else
+        self._long = asyncio.Semaphore(workers - 1)
+        self._truth = None if camera.simulation is None else camera.simulation.truth
+        self.products = {
+            name: product
+            for name, product in PRODUCTS.items()
+            if name != "truth" or self._truth is not None
+        }
+
+    def frame(self, raw: RawFrame, applied: AppliedSequence) -> "Frame":
+        """Return the next frame, counted from 1."""
+        self._frames += 1
+        recipe = Recipe(applied, self._settings, self._full_scale)
+        return Frame(self, self._frames, raw, recipe)
+
+    def product(self, name: str) -> Product:
+        """Return a product this camera has.
+
+        Raises
+        ------
+        Problem
+            ``unknown-product``, with the list of known ones.
+        """
+        try:
+            return self.products[name]
+        except KeyError:
+            known = sorted(self.products)
+            raise Problem(
+                kinds.UNKNOWN_PRODUCT,
+                f"There is no product {name[:64]!r}; there are {', '.join(known)}.",
+                field="product",
+                value=name[:64],
+                known=known,
+            ) from None
+
+    async def run(self, compute: Callable[..., _T], *arguments: Any) -> tuple[_T, float]:
+        """Return what ``compute`` gives on a worker, and the seconds it took there."""
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._executor, _timed, compute, *arguments)
+
+    async def run_long(self, compute: Callable[..., _T], *arguments: Any) -> tuple[_T, float]:
+        """Do as `run` does, but never on the last free worker."""
+        async with self._long:
+            return await self.run(compute, *arguments)
+
+    def start(self, work: Coroutine[Any, Any, _T]) -> "asyncio.Task[_T]":
+        """Start something that several may wait for."""
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._finished)
+        return task
+
+    async def close(self) -> None:
+        """Abandon everything that is still being computed."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    def truth(self) -> Any:
+        """Return the ground truth of the simulated scene; runs on a worker."""
+        assert self._truth is not None  # noqa: S101 - such a camera has no product that asks
+        return self._truth()
+
+    def _finished(self, task: "asyncio.Task[Any]") -> None:
+        self._tasks.discard(task)
+        if not task.cancelled():
+            task.exception()  # whoever waits sees it; nobody waiting is no reason to complain
+
+
+class Frame:
+    """One capture and everything computed from it so far.
+
+    Attributes
+    ----------
+    number
+        Counted from 1, never reset.
+    raw
+        The labelled images.
+    recipe
+        Sequence and settings that its products are computed with.
+    """
+
+    def __init__(self, pipeline: Pipeline, number: int, raw: RawFrame, recipe: Recipe) -> None:
+        self.number = number
+        self.raw = raw
+        self.recipe = recipe
+        self._pipeline = pipeline
+        self._reconstruct_s: float | None = None
+        self._pixels: dict[str, int] | None = None
+        self._known: dict[Hashable, asyncio.Task[Any]] = {}
+        self._over_time: OrderedDict[Hashable, asyncio.Task[Any]] = OrderedDict()
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width in pixels."""
+        height, width = self.raw.images.shape[-2:]
+        return height, width
+
+    def meta(self) -> dict[str, Any]:
+        """Return what is known of the frame, as the wire contract has it."""
+        sequence = self.recipe.applied.sequence
+        height, width = self.shape
+        return {
+            "frame": self.number,
+            "sequence_id": self.raw.epoch,
+            "calibration_id": "nominal",
+            "device_time_s": self.raw.device_time_s,
+            "host_time_s": self.raw.host_time_s,
+            "capture_s": self.raw.capture_s,
+            "reconstruct_s": self._reconstruct_s,
+            "base_frequency_hz": sequence.base_frequency_hz,
+            "harmonics": sequence.harmonics,
+            "zeroth": sequence.zeroth,
+            "exposure_s": sequence.exposure_s,
+            "takes": sequence.takes,
+            "width": width,
+            "height": height,
+            "temperature_c": self.raw.temperature_c,
+            "lost_images": self.raw.lost_images,
+            "pixels": self._pixels,
+        }
+
+    async def stage(self, name: str) -> Any:
+        """Return an intermediate result."""
+        return await self._once(("stage", name), lambda: self._compute_stage(name))
+
+    async def product(self, product: Product, time_s: tuple[float, ...] = ()) -> _Array:
+        """Return a product; ``time_s`` only for one over time.
+
+        Raises
+        ------
+        Problem
+            ``product-failed`` if its computation raised, ``answer-too-large`` if nobody would
+            want to wait for it.
+        """
+        key = ("product", product.name, time_s)
+        array: _Array = await self._once(
+            key, lambda: self._compute_product(product, time_s), over_time=product.over_time
+        )
+        return array
+
+    async def encoded(
+        self,
+        product: Product,
+        encoding: Encoding,
+        time_s: tuple[float, ...] = (),
+        *,
+        channel: int | None = None,
+    ) -> bytes:
+        """Return a product as bytes, encoded once for all who ask for the same ones."""
+        key = ("encoded", product.name, time_s, encoding.name, channel)
+        data: bytes = await self._once(
+            key,
+            lambda: self._encode(product, encoding, time_s, channel),
+            over_time=product.over_time,
+        )
+        return data
+
+    async def pixel(self, compute: Callable[..., _T], *arguments: Any) -> _T:
+        """Return what ``compute(recipe, moments, *arguments)`` gives on a worker."""
+        moments = await self.stage("moments")
+        value, _ = await self._pipeline.run(compute, self.recipe, moments, *arguments)
+        return value
+
+    async def _once(
+        self, key: Hashable, work: Callable[[], Coroutine[Any, Any, _T]], *, over_time: bool = False
+    ) -> _T:
+        known = self._over_time if over_time else self._known
+        task = known.get(key)
+        if task is None:
+            task = known[key] = self._pipeline.start(work())
+            # the last frame may stay for long, and times of flight are endless
+            while len(self._over_time) > 2 * _REMEMBERED_TIME_AXES:
+                self._over_time.popitem(last=False)
+        # one who stops waiting must not stop it for the others
+        result: _T = await asyncio.shield(task)
+        return result
+
+    async def _compute_stage(self, name: str) -> Any:
+        if name == "raw":
+            return self.raw
+        if name == "truth":
+            result, _ = await self._pipeline.run(self._pipeline.truth)
+            return result
+        stage = STAGES[name]
+        needs = await asyncio.gather(*map(self.stage, stage.needs))
+        result, elapsed_s = await self._pipeline.run(stage.compute, self.recipe, *needs)
+        self._reconstruct_s = (self._reconstruct_s or 0.0) + elapsed_s
+        if name == "moments":
+            self._pixels, _ = await self._pipeline.run(pixel_counts, result)
+        return result
+
+    async def _compute_product(self, product: Product, time_s: tuple[float, ...]) -> _Array:
+        with self._failure_of(product):
+            needs = await asyncio.gather(*map(self.stage, product.needs))
+            if product.over_time:
+                self._refuse_too_large(len(time_s))
+                run, needs = self._pipeline.run_long, [np.asarray(time_s), *needs]
+            else:
+                run = self._pipeline.run
+            array, _ = await run(product.compute, self.recipe, *needs)
+        return array
+
+    async def _encode(
+        self, product: Product, encoding: Encoding, time_s: tuple[float, ...], channel: int | None
+    ) -> bytes:
+        array = await self.product(product, time_s)
+        run = self._pipeline.run_long if product.over_time else self._pipeline.run
+        extra = self._extra(product, time_s)
+        with self._failure_of(product):
+            data, _ = await run(encoding.encode, product, array, self.meta(), extra, channel)
+        return data
+
+    @contextmanager
+    def _failure_of(self, product: Product) -> Iterator[None]:
+        """Around the making of a product: what goes wrong is that product's problem alone."""
+        try:
+            yield
+        except Problem:
+            raise
+        except Exception as error:
+            _log.exception("frame %d: making %s failed", self.number, product.name)
+            raise Problem(
+                kinds.PRODUCT_FAILED,
+                f"Computing {product.name} of frame {self.number} failed.",
+                product=product.name,
+                frame=self.number,
+            ) from error
+
+    def _extra(self, product: Product, time_s: tuple[float, ...]) -> dict[str, Any]:
+        if product.over_time:
+            return {"time_s": list(time_s)}
+        if product.name == "raw":
+            return {"labels": [_label_document(label) for label in self.raw.labels]}
+        return {}
+
+    def _refuse_too_large(self, times: int) -> None:
+        height, width = self.shape
+        limit = _MAX_ANSWER_BYTES // (4 * height * width)
+        if times > limit:
+            raise Problem(
+                kinds.ANSWER_TOO_LARGE,
+                f"{times} times of flight were asked for, but an answer holds at most {limit}.",
+                field="time_s",
+                value=times,
+                limit=f"at most {limit}",
+            )
+
+
+def _label_document(label: Any) -> dict[str, Any]:
+    return {
+        "index": label.index,
+        "take": label.take,
+        "harmonic": label.harmonic,
+        "frequency_hz": label.frequency_hz,
+        "phase_rad": label.phase_rad,
+        "exposure_s": label.exposure_s,
+        "illumination": label.illumination,
+    }
+
+
+def _timed(compute: Callable[..., _T], *arguments: Any) -> tuple[_T, float]:
+    begin_s = time.perf_counter()
+    value = compute(*arguments)
+    return value, time.perf_counter() - begin_s

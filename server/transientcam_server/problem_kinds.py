@@ -1,0 +1,159 @@
+"""Every kind of problem this service answers with, each with a page of its own."""
+
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True)
+class ProblemKind:
+    """A kind of problem: the last part of its type URI, its HTTP status, and what it means."""
+
+    slug: str
+    status: int
+    title: str
+    meaning: str
+
+    @property
+    def type(self) -> str:
+        """The URI that identifies the kind; the service answers it with a page."""
+        return f"/problems/{self.slug}"
+
+
+BAD_REQUEST: Final = ProblemKind(
+    "bad-request", 400, "The request cannot be understood", "The request is not valid HTTP or JSON."
+)
+HOST_NOT_ALLOWED: Final = ProblemKind(
+    "host-not-allowed",
+    403,
+    "This name is not served",
+    "The Host header names none of the hosts this service answers to. It protects a service on "
+    "the loopback interface from pages that rebind their own name to it. Add the name to the "
+    "setting allowed_hosts.",
+)
+ORIGIN_NOT_ALLOWED: Final = ProblemKind(
+    "origin-not-allowed",
+    403,
+    "Pages of this origin may not control the camera",
+    "A page of another site tried to change something or to open the stream. Add its origin to "
+    "the setting allowed_origins if that is meant.",
+)
+NOT_FOUND: Final = ProblemKind(
+    "not-found", 404, "There is nothing here", "No resource has this path. /docs lists all of them."
+)
+UNKNOWN_PRODUCT: Final = ProblemKind(
+    "unknown-product",
+    404,
+    "This camera has no such product",
+    "The product is not among those a frame of this camera has; `known` lists them. `truth` "
+    "exists only where the camera is simulated.",
+)
+NOT_SIMULATED: Final = ProblemKind(
+    "not-simulated",
+    404,
+    "The camera is a real one",
+    "The request is about the simulated world behind a simulated camera, and this camera has none.",
+)
+METHOD_NOT_ALLOWED: Final = ProblemKind(
+    "method-not-allowed",
+    405,
+    "The method does not apply here",
+    "The path exists, but not for this method; the Allow header lists those that do.",
+)
+NOT_ACCEPTABLE: Final = ProblemKind(
+    "not-acceptable",
+    406,
+    "The product has no such format",
+    "Neither the suffix nor the Accept header names a format this product has; `supported` lists "
+    "them. Only products with one value a pixel can be a PNG.",
+)
+TOO_LARGE: Final = ProblemKind(
+    "too-large", 413, "The request is too large", "The body is longer than `limit` bytes."
+)
+INVALID_REQUEST: Final = ProblemKind(
+    "invalid-request",
+    422,
+    "A value of the request cannot be used",
+    "`field` names the value, `value` repeats it and `limit` says what would do. `errors` lists "
+    "all of them where there are several. Nothing was changed.",
+)
+INVALID_SEQUENCE: Final = ProblemKind(
+    "invalid-sequence",
+    422,
+    "The camera cannot run this sequence",
+    "`field` of the sequence is out of the range of this camera, which `limit` states. The "
+    "sequence that was running before is still running.",
+)
+ANSWER_TOO_LARGE: Final = ProblemKind(
+    "answer-too-large",
+    422,
+    "The answer would be too large",
+    "The product at this many times of flight would exceed the limit on one answer. Ask for "
+    "fewer times, or take `coefficients` and evaluate them where they are needed.",
+)
+INTERNAL_ERROR: Final = ProblemKind(
+    "internal-error",
+    500,
+    "The service failed",
+    "This is a mistake of the service, not of the request; its log says more.",
+)
+PRODUCT_FAILED: Final = ProblemKind(
+    "product-failed",
+    500,
+    "The product could not be computed",
+    "Computing this product of this frame failed. Other products and other frames are not "
+    "affected; the service's log says more.",
+)
+CAMERA_FAILED: Final = ProblemKind(
+    "camera-failed", 502, "The camera refused", "The camera answered the command with an error."
+)
+CAMERA_LOST: Final = ProblemKind(
+    "camera-lost",
+    503,
+    "The camera is not connected",
+    "The camera was unplugged or does not answer. The service looks for it and carries on by "
+    "itself when it is back.",
+)
+NO_FRAME_YET: Final = ProblemKind(
+    "no-frame-yet",
+    503,
+    "There is no such frame yet",
+    "No frame was captured since the service started, or none newer than the one asked for. "
+    "`wait_s` lets the request wait for it.",
+)
+NOT_READY: Final = ProblemKind(
+    "not-ready", 503, "The camera delivers no frames", "`reasons` says why."
+)
+SHUTTING_DOWN: Final = ProblemKind(
+    "shutting-down", 503, "The service shuts down", "Connect again in a while."
+)
+TOO_MANY_CLIENTS: Final = ProblemKind(
+    "too-many-clients",
+    503,
+    "The stream is fully booked",
+    "As many clients as the setting stream.max_clients allows are connected. The stream closes "
+    "with code 1013.",
+)
+SUBPROTOCOL_REQUIRED: Final = ProblemKind(
+    "subprotocol-required",
+    400,
+    "The stream speaks one subprotocol",
+    "The WebSocket handshake must offer the subprotocol that `supported` names.",
+)
+BAD_MESSAGE: Final = ProblemKind(
+    "bad-message",
+    422,
+    "A message of the stream cannot be used",
+    "`field` names the part of the message, `value` repeats it and `limit` says what would do. "
+    "The stream closes with code 4001 if it was the first message, and carries on otherwise.",
+)
+FIRST_MESSAGE_LATE: Final = ProblemKind(
+    "first-message-late",
+    408,
+    "No subscription arrived",
+    "The first message of a stream must be a subscription and arrive within `limit` seconds.",
+)
+
+KINDS: Final[dict[str, ProblemKind]] = {
+    kind.slug: kind for kind in list(globals().values()) if isinstance(kind, ProblemKind)
+}
+"""Every kind by its slug."""

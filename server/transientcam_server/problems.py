@@ -1,0 +1,230 @@
+"""Errors as RFC 9457 problem documents, and the one place where foreign errors become problems."""
+
+import logging
+import math
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse, Response
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.exceptions import HTTPException
+from transientcam.errors import ProtocolError
+from transientcam.wire import PROBLEM_MEDIA_TYPE
+from transientcam_driver import CameraError, CameraLost, CameraNotFound, DriverError, SequenceError
+from transientcam_moments import ParameterError
+
+from transientcam_server import problem_kinds as kinds
+from transientcam_server.errors import Problem
+from transientcam_server.problem_kinds import ProblemKind
+
+_log = logging.getLogger(__name__)
+_SHOWN_CHARACTERS = 200
+_KIND_OF_STATUS = {
+    kind.status: kind
+    for kind in (kinds.BAD_REQUEST, kinds.NOT_FOUND, kinds.METHOD_NOT_ALLOWED, kinds.TOO_LARGE)
+}
+
+
+class ProblemDocument(BaseModel):
+    """A problem as RFC 9457 describes it."""
+
+    model_config = ConfigDict(extra="allow")
+
+    type: str = Field(description="identifies the kind of problem; a page of this service")
+    title: str = Field(description="the kind of problem in one sentence")
+    status: int = Field(description="the HTTP status")
+    detail: str = Field(description="this occurrence in one sentence")
+    instance: str | None = Field(default=None, description="the path that was asked for")
+    field: str | None = Field(default=None, description="the part of the request that was refused")
+    value: Any = Field(default=None, description="what it was")
+    limit: Any = Field(default=None, description="what it may be")
+
+
+def problem_document(problem: Problem, *, instance: str | None = None) -> dict[str, Any]:
+    """Return a problem as the map that travels as JSON and inside stream messages."""
+    document: dict[str, Any] = {
+        "type": problem.kind.type,
+        "title": problem.kind.title,
+        "status": problem.kind.status,
+        "detail": problem.detail,
+    }
+    if instance is not None:
+        document["instance"] = instance
+    return document | {key: _plain(value) for key, value in problem.extensions.items()}
+
+
+def problem_of(error: Exception) -> Problem:
+    """Return the problem that stands for any error of this project.
+
+    An error that belongs to none of its packages becomes ``internal-error``, without its text:
+    that goes to the log alone.
+    """
+    match error:
+        case Problem():
+            return error
+        case SequenceError():
+            return Problem(
+                kinds.INVALID_SEQUENCE,
+                str(error),
+                field=error.field,
+                value=error.value,
+                limit=error.limit,
+            )
+        case CameraLost() | CameraNotFound():
+            return Problem(kinds.CAMERA_LOST, str(error))
+        case CameraError() | DriverError():
+            return Problem(kinds.CAMERA_FAILED, str(error))
+        case ParameterError():
+            return Problem(
+                kinds.INVALID_REQUEST,
+                str(error),
+                field=error.field,
+                value=error.value,
+                limit=error.limit,
+            )
+        case ProtocolError():
+            return Problem(
+                kinds.BAD_MESSAGE,
+                str(error),
+                field=error.field,
+                value=error.value,
+                limit=error.limit,
+            )
+        case _:
+            return Problem(kinds.INTERNAL_ERROR, "The service failed; its log says more.")
+
+
+def problem_response(problem: Problem, *, instance: str | None = None) -> Response:
+    """Return a problem as an HTTP answer."""
+    return JSONResponse(
+        problem_document(problem, instance=instance),
+        status_code=problem.kind.status,
+        media_type=PROBLEM_MEDIA_TYPE,
+        headers={"Cache-Control": "no-store"},
+    )
+
+
+def documented(*problem_kinds: ProblemKind) -> dict[int | str, dict[str, Any]]:
+    """Return what a route's OpenAPI entry says of the problems it may answer with."""
+    responses: dict[int | str, dict[str, Any]] = {}
+    for kind in problem_kinds:
+        entry = responses.setdefault(
+            kind.status,
+            {
+                "model": ProblemDocument,
+                "description": "",
+                "content": {PROBLEM_MEDIA_TYPE: {"examples": {}}},
+            },
+        )
+        entry["description"] = "; ".join(filter(None, (entry["description"], kind.title)))
+        entry["content"][PROBLEM_MEDIA_TYPE]["examples"][kind.slug] = {
+            "summary": kind.title,
+            "value": problem_document(Problem(kind, kind.meaning)),
+        }
+    return responses
+
+
+def install(app: FastAPI) -> None:
+    """Let every error of ``app`` be answered as a problem."""
+
+    async def known(request: Request, error: Exception) -> Response:
+        return problem_response(problem_of(error), instance=request.url.path)
+
+    async def unknown(request: Request, error: Exception) -> Response:
+        # the middleware that calls this re-raises the error for the server to log
+        return problem_response(problem_of(error), instance=request.url.path)
+
+    async def invalid(request: Request, error: Exception) -> Response:
+        assert isinstance(error, RequestValidationError)  # noqa: S101 - registered for it below
+        return problem_response(_of_validation(error), instance=request.url.path)
+
+    async def http(request: Request, error: Exception) -> Response:
+        assert isinstance(error, HTTPException)  # noqa: S101 - registered for it below
+        response = problem_response(_of_http(error, request), instance=request.url.path)
+        response.headers.update(error.headers or {})
+        return response
+
+    for kind in (Problem, DriverError, ParameterError):
+        app.add_exception_handler(kind, known)
+    app.add_exception_handler(RequestValidationError, invalid)
+    app.add_exception_handler(HTTPException, http)
+    app.add_exception_handler(Exception, unknown)
+
+
+def _of_http(error: HTTPException, request: Request) -> Problem:
+    kind = _KIND_OF_STATUS.get(error.status_code)
+    if kind is None:
+        status = HTTPStatus(error.status_code)
+        kind = ProblemKind(status.phrase.lower().replace(" ", "-"), status, status.phrase, "")
+    if kind is kinds.NOT_FOUND:
+        return Problem(kind, f"Nothing is at {_shortened(request.url.path)}.")
+    if kind is kinds.METHOD_NOT_ALLOWED:
+        detail = f"{_shortened(request.url.path)} does not answer {request.method}."
+        return Problem(kind, detail)
+    return Problem(kind, str(error.detail))
+
+
+def _of_validation(error: RequestValidationError) -> Problem:
+    mistakes = [_mistake(each) for each in error.errors()]
+    first = mistakes[0]
+    detail = f"{first['field']} is {_shown(first['value'])}, but must be {first['limit']}"
+    more = {"errors": mistakes} if len(mistakes) > 1 else {}
+    return Problem(kinds.INVALID_REQUEST, detail, **first, **more)
+
+
+def _mistake(each: dict[str, Any]) -> dict[str, Any]:
+    # the first part of the place says only whether it was body, query or path
+    parts = [str(part) for part in each["loc"][1:]] or [str(each["loc"][0])]
+    kind, context = each["type"], each.get("ctx") or {}
+    limits = {
+        "missing": "given",
+        "extra_forbidden": "left out",
+        "json_invalid": f"valid JSON ({context.get('error', '')})",
+        "model_attributes_type": "a JSON object",
+        "finite_number": "a finite number",
+        "literal_error": str(context.get("expected")),
+        "greater_than_equal": f"at least {context.get('ge')}",
+        "greater_than": f"greater than {context.get('gt')}",
+        "less_than_equal": f"at most {context.get('le')}",
+        "less_than": f"less than {context.get('lt')}",
+        "too_long": f"at most {context.get('max_length')} items",
+        "int_parsing": "an integer",
+        "int_type": "an integer",
+        "int_from_float": "an integer",
+        "float_parsing": "a number",
+        "float_type": "a number",
+        "bool_type": "true or false",
+        "bool_parsing": "true or false",
+    }
+    value = None if kind == "missing" else _plain(each.get("input"))
+    if kind == "json_invalid":
+        parts, value = ["body"], None
+    limit = limits.get(kind) or str(each["msg"])
+    return {"field": ".".join(parts), "value": value, "limit": limit}
+
+
+def _plain(value: object) -> object:
+    """Return a value as JSON can carry it: no NaN, nothing long, no foreign type."""
+    match value:
+        case None | bool() | int():
+            return value
+        case float():
+            return value if math.isfinite(value) else str(value)
+        case str():
+            return _shortened(value)
+        case dict():
+            return {str(key): _plain(each) for key, each in list(value.items())[:64]}
+        case list() | tuple():
+            return [_plain(each) for each in value[:64]]
+        case _:
+            return _shortened(str(value))
+
+
+def _shown(value: object) -> str:
+    return "missing" if value is None else _shortened(repr(value))
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"

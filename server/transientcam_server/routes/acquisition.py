@@ -1,0 +1,41 @@
+"""The acquisition: whether frames are captured."""
+
+import asyncio
+
+from fastapi import APIRouter
+
+from transientcam_server import problem_kinds as kinds
+from transientcam_server.problems import documented
+from transientcam_server.routes.models import AcquisitionDocument, AcquisitionRequest
+from transientcam_server.service import Service, ServiceOf
+
+router = APIRouter(tags=["acquisition"])
+
+
+@router.get("/acquisition", summary="Whether frames are captured")
+async def read_acquisition(service: ServiceOf) -> AcquisitionDocument:
+    """Say whether frames are captured, and how fast."""
+    return _document(service)
+
+
+@router.put(
+    "/acquisition",
+    summary="Start or stop capturing",
+    responses=documented(kinds.INVALID_REQUEST, kinds.CAMERA_FAILED, kinds.CAMERA_LOST),
+)
+async def change_acquisition(service: ServiceOf, wanted: AcquisitionRequest) -> AcquisitionDocument:
+    """Start or stop capturing; the camera's light is off while it does not."""
+    await asyncio.wrap_future(service.acquisition.set_running(wanted.running))
+    return _document(service)
+
+
+def _document(service: Service) -> AcquisitionDocument:
+    status = service.acquisition.status()
+    return AcquisitionDocument(
+        running=status.running,
+        state=status.state,
+        rate_hz=status.rate_hz,
+        frames=status.frames,
+        frame_age_s=status.frame_age_s,
+        stalled=status.stalled,
+    )

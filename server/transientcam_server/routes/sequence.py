@@ -1,0 +1,77 @@
+"""The sequence: what the camera captures for one transient image."""
+
+import asyncio
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body
+from pydantic import WithJsonSchema
+from transientcam_driver import Sequence
+
+from transientcam_server import problem_kinds as kinds
+from transientcam_server.problems import documented
+from transientcam_server.routes.models import AppliedDocument, SequenceDocument
+from transientcam_server.service import ServiceOf
+
+router = APIRouter(tags=["sequence"])
+
+
+def _schema() -> dict[str, Any]:
+    schema = SequenceDocument.model_json_schema()
+    # one document by itself: what it refers to stands inside
+    definitions = schema.pop("$defs")
+    schema["properties"]["sub_phases"] = definitions["SubPhasesDocument"]
+    return schema
+
+
+# The driver checks a sequence and knows the limits of its camera; the schema is for the reader.
+_Sequence = Annotated[
+    dict[str, Any],
+    WithJsonSchema(_schema()),
+    Body(
+        openapi_examples={
+            "video": {
+                "summary": "The paper's video setting: 18.6 frames/s",
+                "value": {"harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005},
+            },
+            "still": {
+                "summary": "Four harmonics, four takes",
+                "value": {"harmonics": 4, "takes": 4, "exposure_s": 0.00192},
+            },
+        }
+    ),
+]
+
+
+@router.get("/sequence", summary="The running sequence")
+async def read_sequence(service: ServiceOf) -> AppliedDocument:
+    """Return the sequence as the camera really set it, and what follows from it."""
+    return AppliedDocument.model_validate(service.applied.to_document())
+
+
+@router.put(
+    "/sequence",
+    summary="Change the sequence",
+    responses=documented(
+        kinds.INVALID_REQUEST, kinds.INVALID_SEQUENCE, kinds.CAMERA_FAILED, kinds.CAMERA_LOST
+    ),
+)
+async def change_sequence(service: ServiceOf, sequence: _Sequence) -> AppliedDocument:
+    """Set the camera to a sequence, between two frames; what is absent takes its default.
+
+    A document read from here may be changed and sent back: what only the camera can say is
+    ignored. Streams are told with a `sequence-changed` notice.
+    """
+    wanted = Sequence.from_document(sequence)
+    applied = await asyncio.wrap_future(service.acquisition.configure(wanted))
+    return AppliedDocument.model_validate(applied.to_document())
+
+
+@router.post(
+    "/sequence/validate",
+    summary="Check a sequence",
+    responses=documented(kinds.INVALID_REQUEST, kinds.INVALID_SEQUENCE),
+)
+async def validate_sequence(service: ServiceOf, sequence: _Sequence) -> AppliedDocument:
+    """Say what the camera would make of a sequence, without touching it."""
+    applied = service.camera.validate(Sequence.from_document(sequence))
+    return AppliedDocument.model_validate(applied.to_document())

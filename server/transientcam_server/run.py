@@ -1,0 +1,147 @@
+"""The service as a process: its socket, its server, its signals."""
+
+import logging
+import signal
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Final
+
+import uvicorn
+from fastapi import FastAPI
+from transientcam.wire import MAX_CLIENT_MESSAGE_BYTES
+
+from transientcam_server.service import Service
+from transientcam_server.settings import Settings
+
+USER_TIMEOUT_MS: Final = 20_000
+"""A client that acknowledges nothing for so long is gone, whatever its WebSocket says."""
+NOTSENT_LOWAT_BYTES: Final = 128 * 1024
+"""What the kernel keeps of a message beyond what is on the wire: frames wait here, not there."""
+PING_S: Final = 10.0
+SHUTDOWN_S: Final = 3
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """Return a listening socket; its connections inherit its options.
+
+    Raises
+    ------
+    OSError
+        If the address cannot be listened on.
+    """
+    family, kind, protocol, _, address = socket.getaddrinfo(
+        host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+    )[0]
+    listener = socket.socket(family, kind, protocol)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for option, value in (
+            ("TCP_USER_TIMEOUT", USER_TIMEOUT_MS),
+            ("TCP_NOTSENT_LOWAT", NOTSENT_LOWAT_BYTES),
+        ):
+            if hasattr(socket, option):  # Linux; elsewhere the pings have to do
+                listener.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
+        listener.bind(address)
+        listener.listen(1024)
+        listener.setblocking(False)
+    except OSError:
+        listener.close()
+        raise
+    return listener
+
+
+def address(listener: socket.socket) -> str:
+    """Return the URL of the service behind a listening socket."""
+    host, port = listener.getsockname()[:2]
+    if host in ("0.0.0.0", "::"):  # noqa: S104 - compared with, not bound to
+        host = socket.gethostname()
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+
+
+class Server(uvicorn.Server):
+    """uvicorn, which says when it listens and lets streams say goodbye before it closes them."""
+
+    def __init__(
+        self, app: FastAPI, settings: Settings, *, on_listening: Callable[[], None]
+    ) -> None:
+        super().__init__(
+            uvicorn.Config(
+                app,
+                lifespan="on",
+                ws="websockets-sansio",
+                ws_per_message_deflate=False,  # 17 ms a frame for a tenth of its size
+                ws_ping_interval=PING_S,
+                ws_ping_timeout=PING_S,
+                ws_max_size=MAX_CLIENT_MESSAGE_BYTES,
+                log_config=None,
+                log_level="info" if settings.log_level == "debug" else "warning",
+                access_log=settings.log_level == "debug",
+                server_header=False,
+                proxy_headers=False,
+                timeout_graceful_shutdown=SHUTDOWN_S,
+            )
+        )
+        self._service: Service = app.state.service
+        self._on_listening = on_listening
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start, then say so."""
+        await super().startup(sockets)
+        if self.started:
+            self._on_listening()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Let every stream be told that it ends, then stop."""
+        await self._service.say_goodbye()
+        await super().shutdown(sockets)
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Take SIGINT and SIGTERM as a wish to end, which is then fulfilled and forgotten.
+
+        uvicorn's own raises them once more at the end, which would kill this process before it
+        closed its camera.
+        """
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        wishes = (signal.SIGINT, signal.SIGTERM)
+        before = {wish: signal.signal(wish, self.handle_exit) for wish in wishes}
+        try:
+            yield
+        finally:
+            for wish, handler in before.items():
+                signal.signal(wish, handler)
+
+    @property
+    def signals(self) -> tuple[int, ...]:
+        """Which signals asked it to end."""
+        return tuple(self._captured_signals)
+
+
+def serve(app: FastAPI, settings: Settings, *, on_listening: Callable[[str], None]) -> None:
+    """Serve until a signal ends it; ``on_listening`` is told the URL once it answers there.
+
+    Raises
+    ------
+    OSError
+        If the address cannot be listened on.
+    KeyboardInterrupt
+        If the signal was SIGINT.
+    """
+    with listen(settings.host, settings.port) as listener:
+        url = address(listener)
+        server = Server(app, settings, on_listening=lambda: on_listening(url))
+        server.run(sockets=[listener])
+    if signal.SIGINT in server.signals:
+        raise KeyboardInterrupt
+
+
+def configure_logging(settings: Settings) -> None:
+    """Log to standard error, one line a message."""
+    logging.basicConfig(
+        level=settings.log_level.upper(), format="%(asctime)s %(levelname)-7s %(name)s: %(message)s"
+    )

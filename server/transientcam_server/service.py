@@ -1,0 +1,132 @@
+"""The parts of one running service and their life: what a request or a stream finds here."""
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import AsyncIterator, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from importlib.metadata import version
+from typing import Annotated, Final
+
+from fastapi import Depends, Request
+from transientcam import wire
+from transientcam_driver import AppliedSequence, Camera
+
+from transientcam_server.acquisition import (
+    Acquisition,
+    Back,
+    Captured,
+    Event,
+    Lost,
+    SequenceChanged,
+)
+from transientcam_server.hub import Channel, Hub
+from transientcam_server.pipeline import Pipeline
+from transientcam_server.settings import Settings
+
+_log = logging.getLogger(__name__)
+VERSION: Final = version("transientcam")
+_GOODBYE_S = 1.0
+
+
+class Service:
+    """A camera, its acquisition, its pipeline and its clients.
+
+    Attributes
+    ----------
+    applied
+        The sequence that frames are captured with from now on.
+    """
+
+    def __init__(self, camera: Camera, settings: Settings) -> None:
+        self.camera = camera
+        self.settings = settings
+        self.hub = Hub()
+        self._executor = ThreadPoolExecutor(settings.workers, thread_name_prefix="worker")
+        self.pipeline = Pipeline(
+            camera, settings.reconstruction, self._executor, workers=settings.workers
+        )
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self.acquisition = Acquisition(camera, report=self._from_acquisition)
+        self.applied: AppliedSequence = camera.applied
+        self.identity = {"name": "transientcam", "version": VERSION}
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[None]:
+        """Capture from entry to exit."""
+        self._loop = asyncio.get_running_loop()
+        self.acquisition.start()
+        try:
+            yield
+        finally:
+            self.hub.close()
+            await self._loop.run_in_executor(self._executor, self.acquisition.stop)
+            await self.pipeline.close()
+            self._executor.shutdown(wait=True, cancel_futures=True)
+
+    async def say_goodbye(self) -> None:
+        """Tell every stream that it ends, and give those that listen the time to hear it."""
+        self.hub.close()
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_GOODBYE_S):
+                await self.hub.deserted.wait()
+
+    def channel_table(self, channels: Iterable[Channel]) -> tuple[wire.Channel, ...]:
+        """Return what frames of these channels look like with the present sequence."""
+        capabilities = self.camera.capabilities
+        return tuple(
+            wire.Channel(
+                channel=channel.number,
+                product=channel.product.name,
+                unit=channel.product.description.unit,
+                axes=channel.product.description.axes,
+                dtype=channel.product.description.dtype,
+                shape=channel.product.shape(self.applied, capabilities.height, capabilities.width),
+            )
+            for channel in channels
+        )
+
+    def not_ready(self) -> list[str]:
+        """Return why no frames can be had; empty where they can."""
+        status = self.acquisition.status()
+        reasons = []
+        if status.state == "lost":
+            reasons.append(f"the camera is lost: {status.reason}")
+        if status.state == "starting" and self.hub.latest is None:
+            reasons.append("the camera is starting")
+        if status.stalled:
+            reasons.append(f"no frame arrived for {status.frame_age_s:.1f} s")
+        return reasons
+
+    def _from_acquisition(self, event: Event) -> None:
+        """Carry an event from the acquisition's thread to the loop."""
+        assert self._loop is not None  # noqa: S101 - the thread is started after it is set
+        self._loop.call_soon_threadsafe(self._happened, event)
+
+    def _happened(self, event: Event) -> None:
+        match event:
+            case Captured(raw, applied):
+                self.hub.publish(self.pipeline.frame(raw, applied))
+            case Lost(reason):
+                self.hub.tell("camera-lost", {"reason": reason})
+            case Back():
+                self.hub.tell("camera-back", {})
+            case SequenceChanged(applied):
+                self.applied = applied
+                self._tell_sequence_changed()
+
+    def _tell_sequence_changed(self) -> None:
+        sequence = self.applied.to_document()
+        for outbox in self.hub.subscribers:
+            channels = [each.to_document() for each in self.channel_table(outbox.channels)]
+            notice = wire.Notice("sequence-changed", {"sequence": sequence, "channels": channels})
+            outbox.put(notice)
+
+
+def _service(request: Request) -> Service:
+    service: Service = request.app.state.service
+    return service
+
+
+ServiceOf = Annotated[Service, Depends(_service)]
+"""The service that a route belongs to."""

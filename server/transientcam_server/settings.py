@@ -1,0 +1,190 @@
+"""What can be set, and where: command line over environment over file over default.
+
+``TRANSIENTCAM_PORT=8765`` sets ``port``, ``TRANSIENTCAM_STREAM__MAX_CLIENTS=8`` the value
+``max_clients`` of the table ``[stream]``. The file is the one given with ``--config``, else
+``./transientcam.toml``, else ``/etc/transientcam/transientcam.toml``.
+"""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from ipaddress import ip_address
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_settings import (
+    BaseSettings,
+    EnvSettingsSource,
+    InitSettingsSource,
+    PydanticBaseSettingsSource,
+    SettingsConfigDict,
+)
+from pydantic_settings import SettingsError as UnreadableVariable
+from transientcam.wire import FIRST_MESSAGE_WITHIN_S
+
+from transientcam_server.errors import SettingsError, SettingsMistake
+
+ENVIRONMENT_PREFIX: Final = "TRANSIENTCAM_"
+DEFAULT_FILES: Final = (Path("transientcam.toml"), Path("/etc/transientcam/transientcam.toml"))
+
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class _Group(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+
+class ReconstructionSettings(_Group):
+    """How images become moments and moments become returns."""
+
+    smoothing_px: _Finite = Field(default=0.6, ge=0.0, le=10.0)
+    """Standard deviation of the Gaussian that smooths the moments, in pixels; 0 for none."""
+    bias: _Finite = Field(default=4e-3, gt=0.0, le=1.0)
+    """Smallest eigenvalue every pixel's moments are raised to, over its brightness (Sec. 4.3)."""
+    return_threshold: _Finite = Field(default=0.1, ge=0.0, lt=1.0)
+    """Weight from which a return counts as the first, over the pixel's strongest return."""
+
+
+class StreamSettings(_Group):
+    """How many clients may look, and how far one may fall behind."""
+
+    max_clients: int = Field(default=256, ge=1, le=100_000)
+    """Streams open at the same time; one more is told to try again later."""
+    queue_frames: int = Field(default=2, ge=1, le=16)
+    """Frames that wait for one client before the oldest is dropped."""
+    first_message_s: _Finite = Field(default=FIRST_MESSAGE_WITHIN_S, gt=0.0, le=300.0)
+    """Time a client has to subscribe."""
+
+
+class Settings(_Group):
+    """Everything that can be set."""
+
+    camera: str = Field(default="sim:mirrors", min_length=1)
+    """Which camera: ``usb``, ``usb:SERIAL``, ``sim:SCENE`` or ``measured:FILE``."""
+    host: str = Field(default="127.0.0.1", min_length=1)
+    """Address to listen on."""
+    port: int = Field(default=8000, ge=0, le=65535)
+    """TCP port to listen on; 0 takes any free one."""
+    insecure: bool = False
+    """Serve other machines although anybody who reaches the port controls the camera."""
+    allowed_hosts: tuple[str, ...] = ()
+    """Names, beside the address listened on, that clients may call this service by."""
+    allowed_origins: tuple[str, ...] = ()
+    """Origins of foreign pages that may control the camera, as in ``https://lab.example``."""
+    log_level: Literal["debug", "info", "warning", "error"] = "info"
+    """The least important messages to log."""
+    workers: int = Field(default_factory=lambda: max(2, os.cpu_count() or 2), ge=2, le=256)
+    """Threads that reconstruct and encode; at least 2, so that one long answer delays nobody."""
+    reconstruction: ReconstructionSettings = ReconstructionSettings()
+    stream: StreamSettings = StreamSettings()
+
+    @property
+    def on_loopback(self) -> bool:
+        """Whether only this machine can reach the service."""
+        if self.host == "localhost":
+            return True
+        try:
+            return ip_address(self.host).is_loopback
+        except ValueError:
+            return False
+
+
+def load_settings(
+    command_line: Mapping[str, Any], *, file: Path | None = None, environment: Mapping[str, str]
+) -> Settings:
+    """Return the settings of this process.
+
+    ``command_line`` holds what was given there (None: not given), ``file`` the file named there.
+
+    Raises
+    ------
+    SettingsError
+        Naming every value that cannot be used and where it was given.
+    """
+    given = {name: value for name, value in command_line.items() if value is not None}
+    path = file if file is not None else next((p for p in DEFAULT_FILES if p.is_file()), None)
+    from_file = _read(path) if path is not None else {}
+    layers = _layers(given, from_file)
+    try:
+        settings = Settings.model_validate(layers().model_dump())
+    except UnreadableVariable as error:
+        raise SettingsError([SettingsMistake("environment", None, str(error))]) from error
+    except ValidationError as error:
+        places = _Places(given, environment, from_file, path)
+        raise SettingsError([_mistake(each, places) for each in error.errors()]) from error
+    if not (settings.on_loopback or settings.insecure):
+        raise SettingsError(
+            [
+                SettingsMistake(
+                    _Places(given, environment, from_file, path).of(("host",)),
+                    settings.host,
+                    "other machines can reach this address and nothing asks them who they are; "
+                    "add --insecure to accept that, or listen on 127.0.0.1",
+                )
+            ]
+        )
+    return settings
+
+
+def _layers(given: Mapping[str, Any], from_file: Mapping[str, Any]) -> type[BaseSettings]:
+    class Layers(Settings, BaseSettings):
+        model_config = SettingsConfigDict(
+            env_prefix=ENVIRONMENT_PREFIX, env_nested_delimiter="__", frozen=True, extra="forbid"
+        )
+
+        @classmethod
+        def settings_customise_sources(
+            cls, settings_cls: type[BaseSettings], *_: Any, **__: Any
+        ) -> tuple[PydanticBaseSettingsSource, ...]:
+            return (
+                InitSettingsSource(settings_cls, init_kwargs=dict(given)),
+                EnvSettingsSource(settings_cls),
+                InitSettingsSource(settings_cls, init_kwargs=dict(from_file)),
+            )
+
+    return Layers
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        reason = f"cannot be read: {error.strerror}"
+        raise SettingsError([SettingsMistake(str(path), None, reason)]) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SettingsError([SettingsMistake(str(path), None, f"is no TOML: {error}")]) from error
+
+
+class _Places:
+    """Where a setting came from: the layer that wins, in the order they are asked."""
+
+    def __init__(
+        self,
+        given: Mapping[str, Any],
+        environment: Mapping[str, str],
+        from_file: Mapping[str, Any],
+        path: Path | None,
+    ) -> None:
+        self._given = given
+        self._environment = {name.upper() for name in environment}
+        self._from_file = from_file
+        self._path = path
+
+    def of(self, location: tuple[str, ...]) -> str:
+        if location[0] in self._given:
+            return f"--{location[0].replace('_', '-')}"
+        for length in range(len(location), 0, -1):
+            variable = ENVIRONMENT_PREFIX + "__".join(location[:length]).upper()
+            if variable in self._environment:
+                return variable
+        if location[0] in self._from_file:
+            return f"{self._path}: {'.'.join(location)}"
+        return ".".join(location)
+
+
+def _mistake(each: Any, places: _Places) -> SettingsMistake:
+    location = tuple(str(part) for part in each["loc"])
+    unknown = each["type"] == "extra_forbidden"
+    reason = "there is no such setting" if unknown else str(each["msg"])
+    return SettingsMistake(places.of(location), each["input"], reason)

@@ -1,0 +1,56 @@
+"""A real daemon for tests: uvicorn on a port of its own, on a thread, with a simulated camera."""
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from fastapi import FastAPI
+from transientcam_driver import Camera, open_camera
+from transientcam_server.app import build_app
+from transientcam_server.run import Server, address, listen
+from transientcam_server.service import Service
+from transientcam_server.settings import Settings
+
+START_S = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Served:
+    """A running daemon: where it is, and its parts for those who look inside."""
+
+    url: str
+    app: FastAPI
+    camera: Camera
+    settings: Settings
+
+    @property
+    def stream_url(self) -> str:
+        """Address of the stream."""
+        return self.url.replace("http", "ws", 1) + "/api/v1/stream"
+
+    @property
+    def service(self) -> Service:
+        """Acquisition, pipeline and hub of the daemon."""
+        service: Service = self.app.state.service
+        return service
+
+
+@contextmanager
+def serving(camera: str = "sim:mirrors?noise=off", **settings: Any) -> Iterator[Served]:
+    """Serve a camera on an ephemeral port until the end of the block; leave nothing behind."""
+    with open_camera(camera) as opened:
+        chosen = Settings(camera=camera, port=0, log_level="warning", **settings)
+        app = build_app(opened, chosen)
+        with listen(chosen.host, chosen.port) as listener:
+            listening = threading.Event()
+            server = Server(app, chosen, on_listening=listening.set)
+            thread = threading.Thread(target=server.run, args=([listener],), name="served")
+            thread.start()
+            try:
+                assert listening.wait(START_S), "the daemon did not start"
+                yield Served(address(listener), app, opened, chosen)
+            finally:
+                server.should_exit = True
+                thread.join()
