@@ -23,7 +23,8 @@ class Sample:
     latency_s
         From the arrival of the last image at the daemon to here, if both clocks agree.
     median
-        Of the product's values where there are any; None for complex products or no values.
+        Over the pixels that have a value; None where there are none, or the product has more than
+        one value a pixel.
     """
 
     frame: int
@@ -84,7 +85,7 @@ class Statistics:
 
 
 def _median(frame: Frame) -> float | None:
-    if frame.array.dtype.kind == "c":
+    if frame.axes != ("y", "x"):
         return None
     finite = frame.array[np.isfinite(frame.array)]
     return float(np.median(finite)) if finite.size else None

@@ -88,7 +88,7 @@ class _Screen:
     def sample(self, sample: Sample) -> None:
         self._rows[sample.product] = sample
         if self._live is None:
-            self._console.print(_line(sample))
+            self._console.print(_line(sample), soft_wrap=True)
         else:
             self._live.update(Text("\n".join(map(_line, self._rows.values()))))
 
@@ -98,14 +98,15 @@ class _Screen:
             for name, value in notice.details.items()
             if name not in ("sequence", "channels")
         )
-        self._console.print(Text(f"{notice.kind}  {details}".rstrip(), style="yellow"))
+        text = Text(f"{notice.kind}  {details}".rstrip(), style="yellow")
+        self._console.print(text, soft_wrap=True)
 
 
 def _line(sample: Sample) -> str:
     rate = "  –  " if sample.rate_hz is None else f"{sample.rate_hz:5.1f}"
-    median = "no values" if sample.median is None else f"median {sample.median:.4g} {sample.unit}"
+    median = "" if sample.median is None else f"  median {sample.median:.4g} {sample.unit}"
+    lost = f"  lost images {sample.lost_images}" if sample.lost_images else ""
     return (
-        f"{sample.product:<12} frame {sample.frame:<7} {rate} Hz  "
-        f"{sample.latency_s * 1e3:6.1f} ms  {median}  "
-        f"dropped {sample.dropped}  lost images {sample.lost_images}"
+        f"{sample.product:<12} #{sample.frame:<6} {rate} Hz  {sample.latency_s * 1e3:6.1f} ms"
+        f"  dropped {sample.dropped}{lost}{median}"
     )

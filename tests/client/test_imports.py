@@ -1,0 +1,51 @@
+"""What importing the package gives, and what it costs."""
+
+import subprocess
+import sys
+
+import pytest
+import transientcam
+from transientcam import wire
+
+
+def test_the_public_names_are_these() -> None:
+    assert transientcam.__all__ == [
+        "AsyncCamera",
+        "AsyncStream",
+        "Camera",
+        "Frame",
+        "FrameTimeout",
+        "Notice",
+        "ParameterError",
+        "ProblemError",
+        "ProtocolError",
+        "Reconnect",
+        "ServerUnreachable",
+        "Stream",
+        "StreamClosed",
+        "Subscription",
+        "TransientcamError",
+        "__version__",
+        "density",
+        "transient",
+    ]
+
+
+@pytest.mark.parametrize("module", [transientcam, wire], ids=lambda module: module.__name__)
+def test_public_names_are_sorted_and_exist(module: object) -> None:
+    names: list[str] = module.__all__  # type: ignore[attr-defined]  # both have one
+
+    # as ruff sorts them: constants, then classes, then the rest
+    assert (
+        sorted(names, key=lambda name: (not name.isupper(), not name[:1].isupper(), name)) == names
+    )
+    assert all(hasattr(module, name) for name in names)
+
+
+@pytest.mark.parametrize(
+    "heavy", ["fastapi", "numba", "pydantic", "scipy", "typer", "usb", "uvicorn", "matplotlib"]
+)
+def test_importing_the_client_does_not_import(heavy: str) -> None:
+    program = f"import sys, transientcam, transientcam.wire; sys.exit({heavy!r} in sys.modules)"
+
+    subprocess.run([sys.executable, "-c", program], check=True)
