@@ -43,6 +43,7 @@ from transientcam_moments.modulation import (
 from transientcam_moments.peaks import Peaks, peaks
 from transientcam_moments.pisarenko import Returns, Separation, pisarenko, separate
 from transientcam_moments.ranging import SPEED_OF_LIGHT_M_S, range_m
+from transientcam_moments.reconstruction import Reconstruction, Settings, reconstruct
 from transientcam_moments.smoothing import smooth
 from transientcam_moments.takes import Average, average_takes
 
@@ -56,8 +57,10 @@ __all__ = [
     "MomentsError",
     "ParameterError",
     "Peaks",
+    "Reconstruction",
     "Returns",
     "Separation",
+    "Settings",
     "ShapeError",
     "arccos_sub_phases",
     "average_takes",
@@ -84,6 +87,7 @@ __all__ = [
     "peaks",
     "pisarenko",
     "range_m",
+    "reconstruct",
     "saturated",
     "separate",
     "smallest_eigenvalue",

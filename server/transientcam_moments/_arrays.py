@@ -148,6 +148,31 @@ def squared(z: Array) -> Array:
     return z.real * z.real + z.imag * z.imag
 
 
+def below_one(g: Array) -> Array:
+    """Return 1 - |g|^2 with an error relative to itself, also where |g| is close to 1.
+
+    Notes
+    -----
+    Squares are split into their rounded value and its rounding error (Dekker 1971). Computed
+    naively the difference has the absolute error of |g|^2, which close to the border of the disc
+    is all of it: errors and polynomials of the recursion would no longer belong to each other.
+    """
+    re, re_error = _square(g.real)
+    im, im_error = _square(g.imag)
+    larger, smaller = namespace(g).maximum(re, im), namespace(g).minimum(re, im)
+    return ((1 - larger) - smaller) - (re_error + im_error)
+
+
+def _square(x: Array) -> tuple[Array, Array]:
+    """Return x^2 rounded and what rounding took away."""
+    digits = np.finfo(x.dtype).nmant + 1
+    shifted = x * float(2 ** ((digits + 1) // 2) + 1)
+    high = shifted - (shifted - x)
+    low = x - high
+    square = x * x
+    return square, ((high * high - square) + 2 * (high * low)) + low * low
+
+
 def to_complex(real: Array, imag: Array) -> Array:
     """Return real + i imag in the precision of its parts."""
     if namespace(real) is not np:

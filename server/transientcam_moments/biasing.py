@@ -77,7 +77,13 @@ def smallest_eigenvalue(b: Array) -> Array:
     return by_blocks(lambda part: (_smallest_eigenvalue(part),), planes)[0].reshape(trailing)
 
 
-def bias(b: Array, epsilon: float = EPSILON, *, keep: str = "harmonics") -> Biased:
+def bias(
+    b: Array,
+    epsilon: float = EPSILON,
+    *,
+    keep: str = "harmonics",
+    eigenvalue: Array | None = None,
+) -> Biased:
     """Make moments valid wherever they are not: smallest eigenvalue >= epsilon b_0 afterwards.
 
     Parameters
@@ -89,6 +95,8 @@ def bias(b: Array, epsilon: float = EPSILON, *, keep: str = "harmonics") -> Bias
     keep : {"harmonics", "brightness"}
         What stays as it is: b_1 .. b_m while b_0 is raised, or b_0 while the others are scaled
         down. Both give the same density up to its brightness.
+    eigenvalue : array, shape (...), optional
+        Smallest eigenvalue of `b`, where it is at hand already.
 
     Returns
     -------
@@ -110,8 +118,8 @@ def bias(b: Array, epsilon: float = EPSILON, *, keep: str = "harmonics") -> Bias
     in_range("epsilon", epsilon, 0.0, float(np.nextafter(1.0, 0.0)), "0 <= epsilon < 1")
     chosen("keep", keep, ("harmonics", "brightness"))
     planes, trailing = moment_planes(b)
-    eigenvalue = smallest_eigenvalue(planes)
-    moments, biased = _bias(planes, eigenvalue, epsilon, keep)
+    smallest: Array = smallest_eigenvalue(planes) if eigenvalue is None else eigenvalue
+    moments, biased = _bias(planes, smallest.reshape(-1), epsilon, keep)
     return Biased(moments.reshape((-1, *trailing)), biased.reshape(trailing))
 
 

@@ -16,6 +16,7 @@ from transientcam_moments._arrays import (
     MAX_HARMONICS,
     Array,
     as_array,
+    below_one,
     by_blocks,
     moment_planes,
     namespace,
@@ -48,7 +49,7 @@ class Coefficients(NamedTuple):
         """b_0 = E / prod (1 - |g_k|^2), shape (...), in the unit of b_0."""
         scale = self.error
         for g in self.reflection:
-            scale = scale / (1 - squared(g))
+            scale = scale / below_one(g)
         return scale
 
 
@@ -139,7 +140,7 @@ def from_reflection(b0: Array, reflection: Array) -> Coefficients:
     a: list[Array] = []
     for g in reflection:
         a = _step_up(a, g)
-        error = error * (1 - squared(g))
+        error = error * below_one(g)
     return Coefficients(error, xp.stack([xp.ones_like(reflection[0]), *a]), reflection)
 
 
@@ -190,7 +191,7 @@ def _moments(coefficients: Coefficients) -> list[Array]:
         inner = sum((a[j - 1] * b[k - j] for j in range(1, k)), start=g * error)
         b.append(-inner)
         a = _step_up(a, g)
-        error = error * (1 - squared(g))
+        error = error * below_one(g)
     return b
 
 
@@ -284,7 +285,7 @@ def recursion(b: list[Array]) -> Recursion:
         for j in range(1, k):
             total = total + a[j - 1] * b[k - j]
         g = total * (-1 / error)
-        remaining = error * (1 - squared(g))
+        remaining = error * below_one(g)
         outside = ~(remaining > floor) | ~alive
         if some(outside):
             onto = xp.sqrt(xp.maximum(1 - floor / error, 0)) / xp.sqrt(squared(g))

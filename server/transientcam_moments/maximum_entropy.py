@@ -58,7 +58,7 @@ def density(coefficients: Coefficients, phase_rad: Array, *, evaluation: str = "
     if evaluation == "modulus":
         lane = _kernels.find("density", planes)
         if lane is not None:
-            out = lane(planes, error.reshape(-1), phase, None)
+            out = lane(planes, flat_planes(coefficients.reflection), error.reshape(-1), phase, None)
     if out is None:
         fill = _density if evaluation == "modulus" else _density_fourier
         floor = _floor(coefficients).reshape(-1)

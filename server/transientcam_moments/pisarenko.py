@@ -7,6 +7,7 @@ import numpy as np
 from transientcam_moments import _kernels
 from transientcam_moments._arrays import (
     Array,
+    below_one,
     by_blocks,
     in_range,
     moment_planes,
@@ -152,16 +153,18 @@ def _returns(b: list[Array], uniform: Array) -> tuple[Array, Array, Array]:
     inverse = xp.where(total > 0, 1 / total, 0.0).astype(total.dtype)
     errors, a, reflection, count, last = _singular([p * inverse for p in b[1:]], total > 0)
     roots = circle_roots(a, count, last)
+    noise = 4 * len(a) * float(np.finfo(total.dtype).eps)
     phases, weights = [], []
     for index, u in enumerate(roots):
-        used = count > index
         angle = xp.arctan2(-u.imag, u.real)  # z = 1 / u
         angle = xp.where(angle < 0, angle + 2 * np.pi, angle)
         angle = xp.where(angle >= np.asarray(2 * np.pi, angle.dtype), 0, angle)
         weight = 1 / _christoffel(errors, reflection, count, u)
+        used = (count > index) & (weight > noise)
         phases.append(xp.where(used, angle, np.nan).astype(total.dtype))
         weights.append(xp.where(used, weight * total, 0).astype(total.dtype))
     phase, weight = xp.stack(phases), xp.stack(weights)
+    count = (weight > 0).sum(axis=0).astype(np.int32)
     order = xp.argsort(phase, axis=0)  # NaN comes last
     return (
         xp.take_along_axis(phase, order, axis=0),
@@ -206,7 +209,7 @@ def _singular(
             inner = inner + a[j - 1] * b[k - j - 1]
         g = inner * xp.where(alive, -1 / error, 0).astype(one.dtype)
         size = squared(g)
-        remaining = error * (1 - size)
+        remaining = error * below_one(g)
         ends = alive if k == m else alive & ~(remaining > floor)
         unit = g * xp.where(size > 0, 1 / xp.sqrt(size), 0).astype(one.dtype)
         unit = xp.where(size > 0, unit, xp.ones_like(unit))

@@ -38,11 +38,10 @@ def circle_roots(a: Sequence[Array], count: Array, last: Array) -> list[Array]:
     xp = namespace(last)
     degree = len(a)
     starts, actives = _spread(last, count, degree)
-    tolerance = 4 * float(np.finfo(starts[0].real.dtype).eps)
 
     def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
-        roots, poly = state[1 : degree + 1], state[degree + 1 : 2 * degree + 1]
-        active = state[2 * degree + 1 :]
+        roots, poly = state[2 : degree + 2], state[degree + 2 : 2 * degree + 2]
+        active = state[2 * degree + 2 :]
         repulsion = _repulsion(roots, active)
         largest = xp.zeros_like(state[0])
         moved = []
@@ -57,16 +56,12 @@ def circle_roots(a: Sequence[Array], count: Array, last: Array) -> list[Array]:
             shrink = 1 / (1 + half * half)
             moved.append(root * to_complex((1 - half * half) * shrink, turn * shrink))
             largest = xp.maximum(largest, abs(turn))
-        return (largest, *moved, *poly, *active)
+        return (largest, state[0], *moved, *poly, *active)
 
-    infinite = xp.full(last.shape, np.inf, dtype=starts[0].real.dtype)
-    state = repeat(
-        step,
-        (infinite, *starts, *a, *actives),
-        times=_STEPS,
-        done=lambda state: ~(state[0] > tolerance),
-    )
-    return list(state[1 : degree + 1])
+    infinite = xp.full(last.shape, np.inf, dtype=actives[0].dtype)
+    start = (infinite, infinite, *starts, *a, *actives)
+    state = repeat(step, start, times=_STEPS, done=_settled)
+    return list(state[2 : degree + 2])
 
 
 def disc_roots(a: Sequence[Array]) -> list[Array]:
@@ -93,11 +88,9 @@ def disc_roots(a: Sequence[Array]) -> list[Array]:
     radius = xp.minimum(xp.sqrt(largest), 0.9) + 0.05
     angle = 2 * np.pi * np.arange(degree) / degree + 0.4
     starts = [radius * one * complex(np.exp(1j * x)) for x in angle]
-    tolerance = 4 * float(np.finfo(radius.dtype).eps)
-    backwards = list(a)
 
     def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
-        roots, poly = state[1 : degree + 1], state[degree + 1 :]
+        roots, poly = state[2 : degree + 2], state[degree + 2 :]
         repulsion = _repulsion(roots, None)
         furthest = xp.zeros_like(state[0])
         moved = []
@@ -109,16 +102,21 @@ def disc_roots(a: Sequence[Array]) -> list[Array]:
             change = value * below.conj() * xp.where(size == 0, 0, 1 / size).astype(size.dtype)
             moved.append(root - change)
             furthest = xp.maximum(furthest, squared(change))
-        return (xp.sqrt(furthest), *moved, *poly)
+        return (xp.sqrt(furthest), state[0], *moved, *poly)
 
     infinite = xp.full(a[0].shape, np.inf, dtype=radius.dtype)
-    state = repeat(
-        step,
-        (infinite, *starts, *backwards),
-        times=_STEPS,
-        done=lambda state: ~(state[0] > tolerance),
-    )
-    return list(state[1 : degree + 1])
+    start = (infinite, infinite, *starts, *a)
+    return list(repeat(step, start, times=_STEPS, done=_settled)[2 : degree + 2])
+
+
+def _settled(state: tuple[Array, ...]) -> Array:
+    """Say where the last step was rounding: tiny, or small and no longer shrinking.
+
+    Close roots are known to eps over their distance only, and steps of that size go on for ever.
+    """
+    last, before = state[:2]
+    eps = float(np.finfo(last.dtype).eps)
+    return ~(last > 4 * eps) | ((last < eps ** (2 / 3)) & (last > before / 4))
 
 
 def _spread(last: Array, count: Array, degree: int) -> tuple[list[Array], list[Array]]:

@@ -1,0 +1,279 @@
+"""The whole way from images or moments to range, each stage computed when it is first asked for."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from transientcam_moments._arrays import Array, as_array, chosen, in_range, namespace
+from transientcam_moments.biasing import EPSILON, bias, estimate_zeroth, smallest_eigenvalue
+from transientcam_moments.calibration import calibrate
+from transientcam_moments.cumulative import cumulative
+from transientcam_moments.errors import ParameterError
+from transientcam_moments.flags import INVALID, Flags, flags
+from transientcam_moments.four_bucket import ZEROTH_IMAGES, measure, saturated
+from transientcam_moments.levinson import Coefficients, levinson
+from transientcam_moments.maximum_entropy import density
+from transientcam_moments.peaks import Peaks, peaks
+from transientcam_moments.pisarenko import (
+    DIRECT_THRESHOLD,
+    Returns,
+    Separation,
+    pisarenko,
+    separate,
+)
+from transientcam_moments.ranging import range_m
+from transientcam_moments.smoothing import SIGMA_PX, smooth
+
+ESTIMATORS = ("pisarenko", "maximum-entropy", "single-frequency")
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How moments become range.
+
+    Attributes
+    ----------
+    base_frequency_hz : float
+        f, of the first harmonic.
+    zeroth : {"low-frequency", "on-off", "estimated"}
+        How b_0 was measured (Sec. 4.3).
+    takes : int
+        Captures in the images, averaged without outliers.
+    epsilon : float
+        Least uniform part relative to b_0 (Sec. 4.3), 0 <= epsilon < 1.
+    keep : {"harmonics", "brightness"}
+        What biasing leaves as it is.
+    smoothing_sigma_px : float
+        Of the Gaussian over neighbouring pixels; 0 for none, and none without two image axes.
+    threshold : float
+        The range is that of the first return, or peak, with this share of the strongest one's
+        weight, or density.
+    estimator : {"pisarenko", "maximum-entropy", "single-frequency"}
+        What the range is taken from; the last one is the usual arg b_1, for comparison.
+    minimum_brightness : float
+        Pixels with b_0 at or below it have no signal, in the unit of the moments.
+    full_scale : float
+        Largest value of a raw image; pixels that reach it are saturated.
+    """
+
+    base_frequency_hz: float = 23e6
+    zeroth: str = "low-frequency"
+    takes: int = 1
+    epsilon: float = EPSILON
+    keep: str = "harmonics"
+    smoothing_sigma_px: float = SIGMA_PX
+    threshold: float = DIRECT_THRESHOLD
+    estimator: str = "pisarenko"
+    minimum_brightness: float = 0.0
+    full_scale: float = 4095.0
+
+    def __post_init__(self) -> None:
+        """Refuse what no stage could work with (ParameterError)."""
+        if not 0 < self.base_frequency_hz < float("inf"):
+            raise ParameterError("base_frequency_hz", self.base_frequency_hz, "> 0 and finite")
+        chosen("zeroth", self.zeroth, tuple(ZEROTH_IMAGES))
+        if self.takes < 1:
+            raise ParameterError("takes", self.takes, ">= 1")
+        in_range("epsilon", self.epsilon, 0.0, float(np.nextafter(1.0, 0.0)), "0 <= epsilon < 1")
+        chosen("keep", self.keep, ("harmonics", "brightness"))
+        in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
+        in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
+        chosen("estimator", self.estimator, ESTIMATORS)
+
+
+def reconstruct(
+    data: Array | Sequence[Array],
+    settings: Settings | None = None,
+    *,
+    calibration: Array | None = None,
+    saturated_pixels: Array | None = None,
+) -> "Reconstruction":
+    """Prepare the reconstruction of raw images or of moments; nothing is computed yet but moments.
+
+    Parameters
+    ----------
+    data : array
+        Real images (N, ...) in capture order, as `measure` takes them, or complex moments
+        (m + 1, ...).
+    settings : Settings, optional
+        The paper's, when left out.
+    calibration : array, shape (m + 1,) or (m + 1, ...), optional
+        Gains to divide by, as `calibrate` takes them.
+    saturated_pixels : boolean array, shape (...), optional
+        Pixels to be flagged; found in images by themselves.
+
+    Returns
+    -------
+    Reconstruction
+
+    Raises
+    ------
+    ShapeError
+        When the data have no shape that belongs to images or moments.
+    """
+    settings = Settings() if settings is None else settings
+    data = data if isinstance(data, Sequence) else as_array(data)
+    moments: Array = data
+    if isinstance(data, Sequence) or np.dtype(data.dtype).kind != "c":
+        moments = measure(data, zeroth=settings.zeroth, takes=settings.takes)
+        if saturated_pixels is None:
+            stack = np.stack(data) if isinstance(data, Sequence) else data
+            stack = stack.reshape((-1, *moments.shape[1:]))
+            saturated_pixels = saturated(stack, full_scale=settings.full_scale)
+    if calibration is not None:
+        moments = calibrate(moments, calibration)
+    return Reconstruction(moments, settings, saturated_pixels)
+
+
+class Reconstruction:
+    """A transient image and all that follows from it.
+
+    Every property is computed when it is first asked for, from the ones it needs, and kept. All
+    have the shape of the pixels; brightnesses are in the unit of the moments, and direct +
+    indirect + uniform = brightness.
+
+    Parameters
+    ----------
+    moments : array, shape (m + 1, ...)
+        Calibrated.
+    settings : Settings
+        How to go on.
+    saturated_pixels : boolean array, shape (...), optional
+        Pixels to be flagged.
+    """
+
+    def __init__(
+        self, moments: Array, settings: Settings, saturated_pixels: Array | None = None
+    ) -> None:
+        self.settings = settings
+        self.measured = moments
+        self._saturated = saturated_pixels
+
+    @cached_property
+    def smoothed(self) -> Array:
+        """Moments (m + 1, ...) smoothed over pixels, b_0 estimated where it wasn't measured."""
+        moments = self.measured
+        if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
+            moments = smooth(moments, self.settings.smoothing_sigma_px)
+        if self.settings.zeroth == "estimated":
+            moments = estimate_zeroth(moments, self.settings.epsilon)
+        return moments
+
+    @cached_property
+    def eigenvalue(self) -> Array:
+        """Smallest eigenvalue of the Toeplitz matrix before biasing."""
+        return smallest_eigenvalue(self.smoothed)
+
+    @cached_property
+    def validity(self) -> Array:
+        """Smallest eigenvalue over b_0 before biasing; NaN without signal."""
+        xp = namespace(self.eigenvalue)
+        b0 = self.smoothed[0].real
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return xp.where(b0 > 0, self.eigenvalue / b0, np.nan).astype(b0.dtype)
+
+    @cached_property
+    def _biased(self) -> tuple[Array, Array]:
+        if self.settings.zeroth == "estimated":  # has its uniform part by construction
+            return self.smoothed, self.smoothed[0].real < 0
+        return bias(
+            self.smoothed,
+            self.settings.epsilon,
+            keep=self.settings.keep,
+            eigenvalue=self.eigenvalue,
+        )
+
+    @property
+    def moments(self) -> Array:
+        """Moments (m + 1, ...) with a positive definite Toeplitz matrix wherever there is light."""
+        return self._biased[0]
+
+    @cached_property
+    def flags(self) -> Array:
+        """Flags of every pixel, uint8 of `Flags`."""
+        xp = namespace(self.smoothed)
+        judged = flags(
+            self.smoothed,
+            minimum_brightness=self.settings.minimum_brightness,
+            eigenvalue=self.eigenvalue,
+        )
+        # biasing made the matrix definite; what is left of its defect is the flag for biasing
+        judged = xp.where(judged == int(Flags.DEGENERATE), 0, judged)
+        judged = judged | xp.where(self._biased[1], int(Flags.BIASED), 0)
+        if self._saturated is not None:
+            judged = judged | xp.where(xp.asarray(self._saturated), int(Flags.SATURATED), 0)
+        return judged.astype(xp.uint8)
+
+    @property
+    def has_range(self) -> Array:
+        """Where there is light and all moments are finite."""
+        return (self.flags & int(INVALID)) == 0
+
+    @cached_property
+    def coefficients(self) -> Coefficients:
+        """Coefficients of the maximum entropy density."""
+        return levinson(self.moments)
+
+    @cached_property
+    def returns(self) -> Returns:
+        """Sharp returns and the uniform part (Pisarenko)."""
+        return pisarenko(self.moments)
+
+    @cached_property
+    def peaks(self) -> Peaks:
+        """Local maxima of the maximum entropy density above the threshold."""
+        return peaks(self.coefficients, threshold=self.settings.threshold)
+
+    @cached_property
+    def _separation(self) -> Separation:
+        return separate(self.returns, self.settings.threshold)
+
+    @property
+    def brightness(self) -> Array:
+        """b_0, after biasing."""
+        return self.moments[0].real
+
+    @property
+    def uniform(self) -> Array:
+        """Brightness of the uniform part."""
+        return self.returns.uniform
+
+    @property
+    def direct(self) -> Array:
+        """Brightness of the direct return."""
+        return self._separation.direct
+
+    @property
+    def indirect(self) -> Array:
+        """Brightness of all later returns, and of earlier ones below the threshold."""
+        return self._separation.indirect
+
+    @cached_property
+    def phase_rad(self) -> Array:
+        """Phase of the direct return by the estimator of the settings; NaN where there is none."""
+        xp = namespace(self.moments)
+        if self.settings.estimator == "pisarenko":
+            phase = self._separation.phase_rad
+        elif self.settings.estimator == "maximum-entropy":
+            phase = self.peaks.first_rad
+        else:
+            phase = xp.arctan2(self.moments[1].imag, self.moments[1].real) % (2 * np.pi)
+        return xp.where(self.has_range, phase, np.nan).astype(self.brightness.dtype)
+
+    @cached_property
+    def range_m(self) -> Array:
+        """Range in m; NaN where there is none."""
+        return range_m(self.phase_rad, self.settings.base_frequency_hz)
+
+    def density(self, time_s: Array, *, evaluation: str = "modulus") -> Array:
+        """Return the density (T, ...) in the unit of the moments per second at times of flight."""
+        turn = 2 * np.pi * self.settings.base_frequency_hz
+        time = np.asarray(time_s, dtype=float)
+        return turn * density(self.coefficients, turn * time, evaluation=evaluation)
+
+    def cumulative(self, time_s: Array) -> Array:
+        """Return the brightness (T, ...) that has come back until times of flight in s."""
+        turn = 2 * np.pi * self.settings.base_frequency_hz
+        return cumulative(self.coefficients, turn * np.asarray(time_s, dtype=float))
