@@ -72,8 +72,8 @@ class Firmware:
 
     Images are produced by the clock alone: image k of a run is exposed from ``start + k T`` and
     stands in the FIFO at ``start + (k + 1) T``, T being exposure plus streaming read-out. The
-    FIFO is bounded; an image without room in it is lost, as its successors are until the host
-    reads. Only images that are read are rendered.
+    FIFO is bounded; an image without room in it is lost with the rest of its frame. Only images
+    that are read are rendered.
     """
 
     def __init__(
@@ -243,17 +243,16 @@ class Firmware:
 
     def due_s(self) -> float | None:
         """When there is an image to read: in the past if there is one already, None if never."""
-        run = self._run
         if self._fifo and self._fifo_run is not None:
             return self._due_of(self._fifo_run, self._fifo[0][0])
-        return None if run is None else self._due_of(run, run.exposed)
+        return None if self._run is None else self._due_of(self._run, self._next_stored(self._run))
 
     def prepare(self) -> None:
         """Render the image that is read next, ahead of its time."""
         run = self._fifo_run if self._fifo else self._run
         if run is not None and not self._to_drop:
-            flag = ImageFlag.OVERFLOW if self._overflowed else ImageFlag(0)
-            k, flags = self._fifo[0] if self._fifo else (run.exposed, flag)
+            coming = ImageFlag.OVERFLOW if self._overflowed else ImageFlag(0)
+            k, flags = self._fifo[0] if self._fifo else (self._next_stored(run), coming)
             self._packet(run, k, flags)
 
     def read(self, *, now_s: float) -> bytes | None:
@@ -307,14 +306,8 @@ class Firmware:
         # half a nanosecond, so that a wait until the due time finds the image there
         until_s = min(now_s, trip_s) + 0.5e-9
         exposed = max(run.exposed, int((until_s - run.start_s) / run.period_s))
-        stored = min(exposed - run.exposed, self._room - len(self._fifo))
-        for k in range(run.exposed, run.exposed + stored):
-            flag = ImageFlag.OVERFLOW if self._overflowed else ImageFlag(0)
-            self._overflowed = False
-            self._fifo.append((k, flag))
-        lost = exposed - run.exposed - stored
-        self._overflowed |= lost > 0
-        self._dropped += lost
+        for k in range(run.exposed, exposed):
+            self._store(k)
         self._high_water = max(self._high_water, len(self._fifo))
         run.exposed = exposed
         self._next_image = run.first_image + exposed
@@ -322,6 +315,28 @@ class Firmware:
         if now_s > trip_s:
             self._watchdog_tripped = True
             self._end_run()
+
+    def _store(self, k: int) -> None:
+        """Put an image into the FIFO, or drop it and the rest of its frame.
+
+        After that the FIFO takes images again with a frame for which it has room, so that a host
+        that is always too slow still gets whole frames.
+        """
+        free = self._room - len(self._fifo)
+        count = len(self._labels)
+        resumes = k % count == 0 and free >= min(count, self._room // 2)
+        if free == 0 or (self._overflowed and not resumes):
+            self._overflowed = True
+            self._dropped += 1
+            return
+        flag = ImageFlag.OVERFLOW if self._overflowed else ImageFlag(0)
+        self._overflowed = False
+        self._fifo.append((k, flag))
+
+    def _next_stored(self, run: _Run) -> int:
+        """Return which image comes next when the FIFO is empty: after an overflow, a frame's first."""
+        count = len(self._labels)
+        return -(-run.exposed // count) * count if self._overflowed else run.exposed
 
     def _packet(self, run: _Run, k: int, flags: ImageFlag) -> bytes:
         number = run.first_image + k

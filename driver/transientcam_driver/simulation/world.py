@@ -7,7 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.sequence import ImageLabel, Sequence
-from transientcam_driver.simulation.effects import EFFECTS, Call, Conditions, Effect
+from transientcam_driver.simulation.effects import (
+    EFFECTS,
+    Call,
+    Conditions,
+    Effect,
+    Exposure,
+    NormalDraw,
+    Stage,
+)
 from transientcam_driver.simulation.responses import Responses, Truth
 from transientcam_driver.simulation.sensor import Sensor
 
@@ -24,7 +32,7 @@ class _Plan:
     sequence: Sequence
     half_e: NDArray[np.float32]
     quadratures_e: dict[int, tuple[NDArray[np.float32], NDArray[np.float32]]]
-    stages: tuple[Effect, ...]
+    stages: tuple[Stage, ...]
 
 
 class World:
@@ -85,12 +93,12 @@ class World:
 
     def image(self, label: ImageLabel, *, number: int, device_time_s: float) -> NDArray[np.uint16]:
         """Expose and read one image: 1/2 (b_0 + Re(b_j G_1 exp(-i theta))), then the effects."""
-        electrons = self._mean_e(label)
         random = np.random.Generator(np.random.SFC64(np.random.SeedSequence((self._seed, number))))
-        np.minimum(electrons, np.float32(self._sensor.full_well_e), out=electrons)
+        exposure = Exposure(self._mean_e(label), random)
+        np.minimum(exposure.signal, np.float32(self._sensor.full_well_e), out=exposure.signal)
         for stage in self._configured().stages:
-            stage.apply(electrons, random)
-        return electrons.astype(np.uint16)
+            stage.apply(exposure)
+        return exposure.signal.astype(np.uint16)
 
     def temperature_c(self, device_time_s: float) -> float:
         """Return that of a sensor that neither warms up nor drifts."""
@@ -133,12 +141,20 @@ class World:
         np.maximum(electrons, np.float32(0), out=electrons)
         return electrons
 
-    def _build(self, conditions: Conditions) -> tuple[Effect, ...]:
+    def _build(self, conditions: Conditions) -> tuple[Stage, ...]:
+        """Build what is called for, and nothing else."""
+
         def wanted(effect: type[Effect]) -> bool:
             choice = self._effects.get(effect.name, "auto") if effect.optional else "auto"
             return choice == "on" or (choice == "auto" and effect.called_for(conditions).called)
 
-        return tuple(effect(conditions) for effect in EFFECTS if wanted(effect))
+        stages: list[Stage] = []
+        for effect in EFFECTS:
+            if wanted(effect):
+                if stages and stages[-1].adds_variance and not effect.adds_variance:
+                    stages.append(NormalDraw())
+                stages.append(effect(conditions))
+        return tuple(stages)
 
     def _configured(self) -> _Plan:
         assert self._plan is not None, "no sequence committed"  # noqa: S101  (the firmware's order)

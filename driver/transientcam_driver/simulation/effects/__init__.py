@@ -5,7 +5,14 @@ what it costs. One that is not called for is not built: it is never called and d
 number.
 """
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, Effect
+from transientcam_driver.simulation.effects.effect import (
+    Call,
+    Conditions,
+    Effect,
+    Exposure,
+    NormalDraw,
+    Stage,
+)
 from transientcam_driver.simulation.effects.quantisation import Quantisation
 from transientcam_driver.simulation.effects.read_noise import ReadNoise
 from transientcam_driver.simulation.effects.shot_noise import ShotNoise
@@ -13,4 +20,15 @@ from transientcam_driver.simulation.effects.shot_noise import ShotNoise
 EFFECTS: tuple[type[Effect], ...] = (ShotNoise, ReadNoise, Quantisation)
 """In the order in which they happen."""
 
-__all__ = ["EFFECTS", "Call", "Conditions", "Effect", "Quantisation", "ReadNoise", "ShotNoise"]
+__all__ = [
+    "EFFECTS",
+    "Call",
+    "Conditions",
+    "Effect",
+    "Exposure",
+    "NormalDraw",
+    "Quantisation",
+    "ReadNoise",
+    "ShotNoise",
+    "Stage",
+]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from transientcam_driver.sequence import Sequence
 from transientcam_driver.simulation.sensor import Sensor
 
-Electrons = NDArray[np.float32]
+_NONE = np.float32(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +41,43 @@ class Call:
     cost_s: float
 
 
-class Effect(ABC):
-    """A stage of the sensor that works on one image in place."""
+@dataclass(slots=True)
+class Exposure:
+    """One image on its way through the sensor.
+
+    ``signal`` (H, W) is in electrons until it is quantised. Normal noise is not added by each
+    effect: their variances add up in ``variance_e2``, of which ``NormalDraw`` draws once. The sum
+    of independent normal variables is normal, and drawing is what noise costs.
+    """
+
+    signal: NDArray[np.float32]
+    random: np.random.Generator
+    variance_e2: NDArray[np.float32] | np.float32 = _NONE
+
+
+class Stage(ABC):
+    """Something that happens to every image."""
+
+    adds_variance: ClassVar[bool] = False
+
+    @abstractmethod
+    def apply(self, exposure: Exposure) -> None:
+        """Work on one image, in place."""
+
+
+class NormalDraw(Stage):
+    """Draw the normal noise whose variance the stages before have added up."""
+
+    def apply(self, exposure: Exposure) -> None:
+        """Add it to the signal."""
+        noise = exposure.random.standard_normal(exposure.signal.shape, dtype=np.float32)
+        noise *= np.sqrt(exposure.variance_e2)
+        exposure.signal += noise
+        exposure.variance_e2 = _NONE
+
+
+class Effect(Stage):
+    """A stage that says whether a scene calls for it."""
 
     name: ClassVar[str]
     optional: ClassVar[bool] = True
@@ -54,7 +89,3 @@ class Effect(ABC):
     @abstractmethod
     def called_for(cls, conditions: Conditions) -> Call:
         """Say whether these conditions call for the effect."""
-
-    @abstractmethod
-    def apply(self, image: Electrons, random: np.random.Generator) -> None:
-        """Work on one image (H, W), in place."""

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, Effect, Electrons
+from transientcam_driver.simulation.effects.effect import Call, Conditions, Effect, Exposure
 
 _COST_S_PER_PIXEL = 3e-9
 
@@ -27,8 +27,9 @@ class Quantisation(Effect):
         reason = f"{conditions.sensor.bits} bits of {conditions.sensor.gain_e_per_dn:g} electrons"
         return Call(True, reason, 1 / math.sqrt(12), conditions.pixels * _COST_S_PER_PIXEL)
 
-    def apply(self, image: Electrons, random: np.random.Generator) -> None:
+    def apply(self, exposure: Exposure) -> None:
         """Turn electrons into codes."""
+        image = exposure.signal
         image *= self._dn_per_e
         image += self._dark_dn
         np.rint(image, out=image)

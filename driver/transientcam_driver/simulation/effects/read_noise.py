@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, Effect, Electrons
+from transientcam_driver.simulation.effects.effect import Call, Conditions, Effect, Exposure
 
 _COST_S_PER_PIXEL = 8e-9
 
@@ -11,10 +11,11 @@ class ReadNoise(Effect):
     """Normal, the same for every pixel, independent of the light."""
 
     name = "read-noise"
+    adds_variance = True
 
     def __init__(self, conditions: Conditions) -> None:
         super().__init__(conditions)
-        self._sigma_e = np.float32(conditions.sensor.read_noise_e)
+        self._variance_e2 = np.float32(conditions.sensor.read_noise_e**2)
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
@@ -26,8 +27,6 @@ class ReadNoise(Effect):
         size_dn = noise_e / conditions.sensor.gain_e_per_dn
         return Call(True, f"{noise_e:g} electrons at each read-out", size_dn, cost_s)
 
-    def apply(self, image: Electrons, random: np.random.Generator) -> None:
-        """Add it."""
-        noise = random.standard_normal(image.shape, dtype=np.float32)
-        noise *= self._sigma_e
-        image += noise
+    def apply(self, exposure: Exposure) -> None:
+        """Add its variance."""
+        exposure.variance_e2 = exposure.variance_e2 + self._variance_e2

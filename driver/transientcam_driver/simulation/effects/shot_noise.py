@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, Effect, Electrons
+from transientcam_driver.simulation.effects.effect import Call, Conditions, Effect, Exposure
 
 FEW_E = 100.0
 """Below this mean a pixel is drawn from the Poisson distribution itself.
@@ -21,6 +21,7 @@ class ShotNoise(Effect):
     """Variance equal to the mean."""
 
     name = "shot-noise"
+    adds_variance = True
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
@@ -32,12 +33,12 @@ class ShotNoise(Effect):
             return Call(False, "no light reaches the sensor", 0.0, cost_s)
         return Call(True, f"{mean_e:.0f} electrons in a typical pixel", size_dn, cost_s)
 
-    def apply(self, image: Electrons, random: np.random.Generator) -> None:
-        """Draw each pixel around its mean."""
-        few = image < FEW_E
-        drawn = random.poisson(image[few]) if few.any() else None
-        noise = random.standard_normal(image.shape, dtype=np.float32)
-        noise *= np.sqrt(image)
-        image += noise
-        if drawn is not None:
-            image[few] = drawn
+    def apply(self, exposure: Exposure) -> None:
+        """Draw few electrons one by one; give many their variance."""
+        signal = exposure.signal
+        few = signal < FEW_E
+        if few.any():
+            exposure.variance_e2 = exposure.variance_e2 + np.where(few, np.float32(0), signal)
+            signal[few] = exposure.random.poisson(signal[few])
+        else:
+            exposure.variance_e2 = exposure.variance_e2 + signal
