@@ -41,7 +41,7 @@ class Served:
 def serving(camera: str = "sim:mirrors?noise=off", **settings: Any) -> Iterator[Served]:
     """Serve a camera on an ephemeral port until the end of the block; leave nothing behind."""
     with open_camera(camera) as opened:
-        chosen = Settings(camera=camera, port=0, log_level="warning", **settings)
+        chosen = Settings(camera=camera, **{"port": 0, "log_level": "warning", **settings})
         app = build_app(opened, chosen)
         with listen(chosen.host, chosen.port) as listener:
             listening = threading.Event()
