@@ -37,7 +37,7 @@ def watch(
     """Show rate, latency, losses and the median of what a camera streams, until interrupted."""
     wanted = products or ["range"]
     statistics = Statistics()
-    display = _Lines() if as_json else _Screen(Console())
+    display = Lines() if as_json else Screen(Console())
 
     def on_notice(notice: Notice) -> None:
         statistics.notice(notice)
@@ -58,23 +58,26 @@ def watch(
             pass
 
 
-class _Lines:
+class Lines:
     """One JSON document a line."""
 
     def __init__(self, write: Callable[[str], Any] = typer.echo) -> None:
         self._write = write
 
     def shown(self) -> AbstractContextManager[object]:
+        """Return what to show within."""
         return nullcontext()
 
     def sample(self, sample: Sample) -> None:
+        """Show a frame."""
         self._write(json.dumps(sample.to_document()))
 
     def notice(self, notice: Notice) -> None:
+        """Show a notice."""
         self._write(json.dumps(notice.to_document()))
 
 
-class _Screen:
+class Screen:
     """One line a product that changes in place; a line a frame where that cannot be."""
 
     def __init__(self, console: Console) -> None:
@@ -83,9 +86,11 @@ class _Screen:
         self._live = Live(console=console, refresh_per_second=8) if console.is_terminal else None
 
     def shown(self) -> AbstractContextManager[object]:
+        """Return what to show within."""
         return self._live or nullcontext()
 
     def sample(self, sample: Sample) -> None:
+        """Show a frame."""
         self._rows[sample.product] = sample
         if self._live is None:
             self._console.print(_line(sample), soft_wrap=True)
@@ -93,6 +98,7 @@ class _Screen:
             self._live.update(Text("\n".join(map(_line, self._rows.values()))))
 
     def notice(self, notice: Notice) -> None:
+        """Show a notice."""
         details = "  ".join(
             f"{name} {value}"
             for name, value in notice.details.items()
