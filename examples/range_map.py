@@ -14,12 +14,13 @@ SHADES = "@%#*+=-:. "
 COLUMNS, ROWS = 60, 24
 
 
-def picture(range_m: np.ndarray, far_m: float) -> str:
+def picture(range_m: np.ndarray, near_m: float, far_m: float) -> str:
     """Return a range map (H, W) in metres as lines of characters, ``?`` where there is no range."""
     rows = np.linspace(0, range_m.shape[0] - 1, ROWS).round().astype(int)
     columns = np.linspace(0, range_m.shape[1] - 1, COLUMNS).round().astype(int)
     coarse = range_m[np.ix_(rows, columns)]
-    shade = np.clip(np.nan_to_num(coarse / far_m) * len(SHADES), 0, len(SHADES) - 1).astype(int)
+    depth = np.nan_to_num((coarse - near_m) / max(far_m - near_m, 0.01))
+    shade = np.clip(depth * len(SHADES), 0, len(SHADES) - 1).astype(int)
     return "\n".join(
         "".join(SHADES[s] if np.isfinite(r) else "?" for s, r in zip(*line, strict=True))
         for line in zip(shade, coarse, strict=True)
@@ -29,16 +30,17 @@ def picture(range_m: np.ndarray, far_m: float) -> str:
 def main(url: str) -> None:
     """Take one range map and describe it."""
     with transientcam.Camera(url) as camera:
-        far_m = camera.sequence["unambiguous_range_m"]
+        sequence = camera.sequence
         frame = camera.frame("range", wait_s=10.0)
     range_m = frame.array
     valid = np.isfinite(range_m)
     print(f"frame {frame.frame}: {range_m.shape[1]} x {range_m.shape[0]} pixels")
-    print(f"{valid.mean():.1%} have a range; the camera sees {far_m:.2f} m without ambiguity")
+    reach_m = sequence["unambiguous_range_m"]
+    print(f"{valid.mean():.1%} have a range; the camera sees {reach_m:.2f} m without ambiguity")
     if valid.any():
-        near, median, far = np.percentile(range_m[valid], [1, 50, 99])
-        print(f"nearest {near:.3f} {frame.unit}, median {median:.3f}, farthest {far:.3f}")
-    print(picture(range_m, far_m))
+        near_m, median_m, far_m = np.percentile(range_m[valid], [1, 50, 99])
+        print(f"nearest {near_m:.3f} {frame.unit}, median {median_m:.3f}, farthest {far_m:.3f}")
+        print(picture(range_m, near_m, far_m))
 
 
 if __name__ == "__main__":
