@@ -173,6 +173,13 @@ def _square(x: Array) -> tuple[Array, Array]:
     return square, ((high * high - square) + 2 * (high * low)) + low * low
 
 
+def in_turn(angle: Array) -> Array:
+    """Bring angles in [-pi, 2 pi] to [0, 2 pi), also after rounding to their precision."""
+    xp = namespace(angle)
+    angle = xp.where(angle < 0, angle + 2 * np.pi, angle)
+    return xp.where(angle >= np.asarray(2 * np.pi, angle.dtype), 0 * angle, angle)
+
+
 def to_complex(real: Array, imag: Array) -> Array:
     """Return real + i imag in the precision of its parts."""
     if namespace(real) is not np:

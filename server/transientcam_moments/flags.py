@@ -55,7 +55,7 @@ def flags(b: Array, *, minimum_brightness: float = 0.0, eigenvalue: Array | None
     xp = namespace(planes)
     smallest: Array = smallest_eigenvalue(planes) if eigenvalue is None else eigenvalue
     b0 = planes[0].real
-    finite = xp.isfinite(b0)
+    finite = xp.isfinite(planes[0])
     for plane in planes[1:]:
         finite = finite & xp.isfinite(plane)
     dark = finite & ~(b0 > minimum_brightness)

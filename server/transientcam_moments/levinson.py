@@ -54,18 +54,18 @@ class Coefficients(NamedTuple):
 
 
 class Recursion(NamedTuple):
-    """All that Levinson's recursion learns of one block of pixels, in lists of planes.
+    """All that Levinson's recursion learns of one block of pixels with b_0 = 1.
 
     Attributes
     ----------
-    errors : list of real planes
-        E_0 .. E_m of moments with b_0 = 1.
-    polynomial : list of complex planes
+    errors : list of m + 1 real planes
+        E_0 .. E_m.
+    polynomial : list of m complex planes
         a_1 .. a_m (a_0 = 1 is not stored).
-    reflection : list of complex planes
+    reflection : list of m complex planes
         g_1 .. g_m.
     order : integer plane
-        The order at which the recursion was stopped by the border of the cone, else m + 1.
+        The order at which the border was met, 0 where there is no light, m where it never was.
     """
 
     errors: list[Array]
@@ -207,7 +207,7 @@ def _levinson(b: Array) -> tuple[Array, Array, Array]:
     xp = namespace(b)
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
         relative, scale = normalised(b)
-        result = recursion(_physical(relative))
+        result = recursion(_physical(relative), 4 * float(np.finfo(scale.dtype).eps))
         error = result.errors[-1] * (relative[0] * scale)
     one = xp.ones_like(b[0])
     return error, xp.stack([one, *result.polynomial]), xp.stack(result.reflection)
@@ -231,9 +231,11 @@ def normalised(b: Array) -> tuple[list[Array], Array]:
     xp = namespace(b)
     limits = np.finfo(real_type(b))
     middle = 2.0 ** (limits.maxexp * 3 // 4)
-    scale = abs(b[0].real)
+    # an infinity or a NaN anywhere makes all of the pixel NaN
+    scale = abs(b[0].real) + 0 * b[0].imag
     for plane in b[1:]:
         scale = xp.maximum(scale, xp.maximum(abs(plane.real), abs(plane.imag)))
+    scale = scale + 0 * scale
     planes = [b[0].real, *b[1:]]
     near = scale
     outside = (scale < 1 / middle) | (scale > middle)
@@ -266,38 +268,53 @@ def _physical(b: list[Array]) -> list[Array]:
     return planes
 
 
-def recursion(b: list[Array]) -> Recursion:
+def recursion(b: list[Array], floor: float, *, sparse: bool = False) -> Recursion:
     """Run Levinson's recursion over planes with b_0 = 1, or 0 where there is no light (Theorem 1).
 
-    The border of the cone is where E_k would fall to 4 eps or below: less than rounding leaves of
-    it. There g_k is projected onto the disc, and all later ones are zero.
+    Parameters
+    ----------
+    b : list of m + 1 planes
+        The first one real.
+    floor : float
+        The border of the cone is where E_k falls to it: less than rounding leaves of it.
+    sparse : bool
+        At the border g_k is projected onto the disc and all later ones are zero. Inside the disc,
+        so that E_k = floor, is for densities; onto its circle, which ends at order m wherever it
+        has not before, is for sharp returns (Theorem 2), whose number is the order.
     """
     xp = namespace(b[1])
-    floor = 4 * float(np.finfo(b[0].dtype).eps)
-    errors = [b[0]]
+    m = len(b) - 1
+    error = b[0]
+    errors = [error]
     a: list[Array] = []
     reflection: list[Array] = []
-    order = xp.full(b[0].shape, len(b), dtype=np.int32)
-    alive = b[0] > 0
-    for k in range(1, len(b)):
-        error = errors[-1]
-        total = b[k]
+    alive = error > 0
+    order = xp.where(alive, m, 0)
+    for k in range(1, m + 1):
+        inner = b[k]
         for j in range(1, k):
-            total = total + a[j - 1] * b[k - j]
-        g = total * (-1 / error)
+            inner = inner + a[j - 1] * b[k - j]
+        g = inner * (-1 / error)
         remaining = error * below_one(g)
-        outside = ~(remaining > floor) | ~alive
-        if some(outside):
-            onto = xp.sqrt(xp.maximum(1 - floor / error, 0)) / xp.sqrt(squared(g))
+        ends = alive & ~(remaining > floor)
+        if sparse and k == m:
+            ends = alive
+        if some(ends | ~alive):
+            size = xp.sqrt(squared(g))
+            onto = xp.where(size > 0, g * (1 / size).astype(error.dtype), xp.ones_like(g))
+            if not sparse:
+                onto = onto * xp.sqrt(xp.maximum(1 - floor / error, 0))
+            g = xp.where(ends, onto, g)
             # NaN belongs to an invalid pixel, which keeps it; what comes after the border is zero
-            g = xp.where(alive, xp.where(remaining > floor, g, g * onto), 0 * b[k])
+            g = xp.where(alive, g, 0 * b[k])
             remaining = xp.where(alive, xp.maximum(remaining, floor), error)
-            order = xp.where(outside & alive, k, order)
-            alive = alive & ~outside
+            order = xp.where(ends, k, order)
+            alive = alive & ~ends
         a = _step_up(a, g)
-        errors.append(remaining)
+        error = remaining
+        errors.append(error)
         reflection.append(g)
-    return Recursion(errors, a, reflection, order)
+    return Recursion(errors, a, reflection, order.astype(np.int32))
 
 
 def _step_up(a: list[Array], g: Array) -> list[Array]:

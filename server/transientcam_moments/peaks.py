@@ -10,6 +10,7 @@ from transientcam_moments._arrays import (
     by_blocks,
     flat_planes,
     in_range,
+    in_turn,
     namespace,
     squared,
     to_complex,
@@ -95,9 +96,7 @@ def _peaks(a: Array, error: Array, threshold: float) -> tuple[Array, ...]:
         phases, heights = [], []
         for pole in poles:
             top = _climb(pole, poles)
-            angle = xp.arctan2(top.imag, top.real)
-            angle = xp.where(angle < 0, angle + 2 * np.pi, angle).astype(error.dtype)
-            phases.append(xp.where(angle >= np.asarray(2 * np.pi, error.dtype), 0, angle))
+            phases.append(in_turn(xp.arctan2(top.imag, top.real)).astype(error.dtype))
             height = _height(top, poles) * (error / (2 * np.pi))
             heights.append(xp.where(_is_peak(top, poles) & (height > 0), height, 0))
     phase, height = xp.stack(phases), xp.stack(heights).astype(error.dtype)

@@ -7,15 +7,16 @@ import numpy as np
 from transientcam_moments import _kernels
 from transientcam_moments._arrays import (
     Array,
-    below_one,
     by_blocks,
     in_range,
+    in_turn,
     moment_planes,
     namespace,
     squared,
 )
 from transientcam_moments.biasing import search
-from transientcam_moments.levinson import normalised
+from transientcam_moments.levinson import Recursion, normalised, recursion
+from transientcam_moments.polishing import polish, residual, size
 from transientcam_moments.roots import circle_roots
 
 DIRECT_THRESHOLD = 0.1
@@ -62,7 +63,7 @@ class Separation(NamedTuple):
     phase_rad: Array
 
 
-def pisarenko(b: Array) -> Returns:
+def pisarenko(b: Array, *, eigenvalue: Array | None = None) -> Returns:
     """Explain moments by a uniform part and as few returns as there have to be.
 
     Parameters
@@ -70,6 +71,8 @@ def pisarenko(b: Array) -> Returns:
     b : array, shape (m + 1, ...)
         Trigonometric moments; with b_0 = 0 where it was not measured, the returns are those of
         least total brightness.
+    eigenvalue : array, shape (...), optional
+        Smallest eigenvalue of `b`, where it is at hand already.
 
     Returns
     -------
@@ -90,8 +93,16 @@ def pisarenko(b: Array) -> Returns:
     the recursion's polynomials Phi_k, and so never negative.
     """
     planes, trailing = moment_planes(b)
-    run = _kernels.find("pisarenko", planes) or _pisarenko
-    phase, weight, uniform, count = by_blocks(run, planes) if run is _pisarenko else run(planes)
+    lane = _kernels.find("pisarenko", planes)
+    if lane is not None:
+        found = lane(planes)
+    elif eigenvalue is None:
+        found = by_blocks(_pisarenko, planes)
+    else:
+        found = by_blocks(_pisarenko, planes, eigenvalue.reshape(-1))
+    if namespace(planes) is np:
+        found = _improved(planes, found)
+    phase, weight, uniform, count = found
     return Returns(
         phase.reshape((-1, *trailing)),
         weight.reshape((-1, *trailing)),
@@ -137,94 +148,82 @@ def separate(returns: Returns, threshold: float = DIRECT_THRESHOLD) -> Separatio
     return Separation(direct, xp.maximum(weights.sum(axis=0) - direct, 0), phase)
 
 
-def _pisarenko(b: Array) -> tuple[Array, Array, Array, Array]:
-    """Planar statement of `pisarenko`: b (m + 1, P) to phase, weight, uniform, count."""
+def _pisarenko(
+    b: Array, uniform: Array | None = None, *, noise: float | None = None
+) -> tuple[Array, Array, Array, Array]:
+    """Planar statement of `pisarenko`: b (m + 1, P) to phase, weight, uniform, count.
+
+    `uniform` is the smallest eigenvalue where it is known, `noise` the precision of the data where
+    it isn't that of their type.
+    """
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
         planes, scale = normalised(b)
-        uniform = search(planes)
-        phase, weight, count = _returns(planes, uniform)
+        uniform = search(planes) if uniform is None else uniform / scale
+        floor = 4 * len(planes[1:]) * (noise or float(np.finfo(scale.dtype).eps))
+        phase, weight, count = _returns(planes, uniform, floor)
         return phase, weight * scale, uniform * scale, count
 
 
-def _returns(b: list[Array], uniform: Array) -> tuple[Array, Array, Array]:
-    """Find the returns of planes whose largest moment is 1, with a singular B - uniform I."""
+def _improved(b: Array, found: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Redo in double precision, or polish, the pixels that don't reproduce their moments.
+
+    That is where single precision, or the closed form in double precision, isn't enough; by more
+    than rounding the result to `b`'s type explains.
+    """
+    eps = float(np.finfo(found[1].dtype).eps)
+    tolerance = 16 * b.shape[0] * eps
+    (error,) = by_blocks(lambda b, *found: (size(residual(b, *found), b),), b, *found[:3])
+    ill = np.flatnonzero(error > tolerance)  # NaN stays
+    if not ill.size:
+        return found
+    with np.errstate(all="ignore"):
+        wide = b[:, ill].astype(np.complex128)
+        if b.dtype == np.complex64:
+            better = by_blocks(lambda part: _pisarenko(part, noise=eps), wide)
+        else:
+            better = tuple(part[..., ill] for part in found)
+            better = (*polish(wide, *better[:3]), better[3])
+        order = np.argsort(better[0], axis=0)
+        phase = np.take_along_axis(better[0], order, axis=0).astype(found[0].dtype)
+        phase = in_turn(phase)
+        weight = np.take_along_axis(better[1], order, axis=0)
+    result = tuple(np.array(part) for part in found)
+    for part, new in zip(result, (phase, weight, *better[2:]), strict=True):
+        part[..., ill] = new
+    return result
+
+
+def _returns(b: list[Array], uniform: Array, floor: float) -> tuple[Array, Array, Array]:
+    """Find the returns of planes whose largest moment is 1, with a singular B - uniform I.
+
+    Prediction errors and weights below `floor`, relative to the brightness, are rounding.
+    """
     xp = namespace(b[1])
     total = b[0] - uniform
-    inverse = xp.where(total > 0, 1 / total, 0.0).astype(total.dtype)
-    errors, a, reflection, count, last = _singular([p * inverse for p in b[1:]], total > 0)
-    roots = circle_roots(a, count, last)
-    noise = 4 * len(a) * float(np.finfo(total.dtype).eps)
+    inverse = xp.where(total > 0, 1 / total, 0 * total)
+    block = [xp.where(total > 0, 1, 0).astype(total.dtype)] + [part * inverse for part in b[1:]]
+    singular = recursion(block, floor, sparse=True)
+    last = singular.reflection[0]
+    for k, g in enumerate(singular.reflection[1:], start=2):
+        last = xp.where(singular.order == k, g, last)
     phases, weights = [], []
-    for index, u in enumerate(roots):
+    for index, u in enumerate(circle_roots(singular.polynomial, singular.order, last)):
+        weight = 1 / _christoffel(singular, u)
+        used = (singular.order > index) & (weight > floor)
         angle = xp.arctan2(-u.imag, u.real)  # z = 1 / u
-        angle = xp.where(angle < 0, angle + 2 * np.pi, angle)
-        angle = xp.where(angle >= np.asarray(2 * np.pi, angle.dtype), 0, angle)
-        weight = 1 / _christoffel(errors, reflection, count, u)
-        used = (count > index) & (weight > noise)
-        phases.append(xp.where(used, angle, np.nan).astype(total.dtype))
+        phases.append(xp.where(used, in_turn(angle), np.nan).astype(total.dtype))
         weights.append(xp.where(used, weight * total, 0).astype(total.dtype))
     phase, weight = xp.stack(phases), xp.stack(weights)
-    count = (weight > 0).sum(axis=0).astype(np.int32)
     order = xp.argsort(phase, axis=0)  # NaN comes last
     return (
         xp.take_along_axis(phase, order, axis=0),
         xp.take_along_axis(weight, order, axis=0),
-        count,
+        (weight > 0).sum(axis=0).astype(np.int32),
     )
 
 
-def _singular(
-    b: list[Array], lit: Array
-) -> tuple[list[Array], list[Array], list[Array], Array, Array]:
-    """Run Levinson's recursion (b_0 = 1) up to the smallest singular leading block.
-
-    Returns
-    -------
-    errors : list of m real planes
-        E_0 .. E_{m-1}.
-    a : list of m complex planes
-        a_1 .. a_m of the singular block's polynomial, zero beyond its order.
-    reflection : list of m complex planes
-        g_1 .. g_m, the last one that is not zero of modulus 1.
-    count : integer plane
-        Order of the singular block; 0 where there is no light.
-    last : complex plane
-        The reflection coefficient of modulus 1.
-    """
-    xp = namespace(b[0])
-    m = len(b)
-    one = xp.ones_like(b[0].real)
-    floor = 4 * m * float(np.finfo(one.dtype).eps)
-    alive = lit
-    error = one
-    errors: list[Array] = []
-    a: list[Array] = []
-    reflection: list[Array] = []
-    count = xp.zeros(one.shape, dtype=np.int32)
-    last = xp.ones_like(b[0])
-    for k in range(1, m + 1):
-        errors.append(error)
-        inner = b[k - 1]
-        for j in range(1, k):
-            inner = inner + a[j - 1] * b[k - j - 1]
-        g = inner * xp.where(alive, -1 / error, 0).astype(one.dtype)
-        size = squared(g)
-        remaining = error * below_one(g)
-        ends = alive if k == m else alive & ~(remaining > floor)
-        unit = g * xp.where(size > 0, 1 / xp.sqrt(size), 0).astype(one.dtype)
-        unit = xp.where(size > 0, unit, xp.ones_like(unit))
-        g = xp.where(ends, unit, g)
-        last = xp.where(ends, unit, last)
-        count = xp.where(ends, k, count)
-        a = [a[j - 1] + g * a[k - j - 1].conj() for j in range(1, k)] + [g]
-        reflection.append(g)
-        alive = alive & ~ends
-        error = xp.where(alive, remaining, error)
-    return errors, a, reflection, count.astype(np.int32), last
-
-
-def _christoffel(errors: list[Array], reflection: list[Array], count: Array, u: Array) -> Array:
-    """Return s* T^-1 s = sum_{k < count} |Phi_k(z)|^2 / E_k at z = 1 / u on the unit circle.
+def _christoffel(singular: Recursion, u: Array) -> Array:
+    """Return s* T^-1 s = sum_{k < order} |Phi_k(z)|^2 / E_k at z = 1 / u on the unit circle.
 
     On the circle |Phi_k(z)| = |A_k(u)| for the predictor polynomial A_k, which goes up with its
     reversed B_k(u) = u^k conj(A_k): A_k = A_{k-1} + g_k u B_{k-1}, u B_k = u (u B_{k-1} +
@@ -233,9 +232,8 @@ def _christoffel(errors: list[Array], reflection: list[Array], count: Array, u: 
     xp = namespace(u)
     forward = xp.ones_like(u)
     backward = u
-    total = squared(forward) / errors[0]
-    for k in range(1, len(errors)):
-        g = reflection[k - 1]
+    total = squared(forward)
+    for k, g in enumerate(singular.reflection[:-1], start=1):
         forward, backward = forward + g * backward, u * (backward + g.conj() * forward)
-        total = total + xp.where(count > k, squared(forward) / errors[k], 0)
+        total = total + xp.where(singular.order > k, squared(forward) / singular.errors[k], 0)
     return total

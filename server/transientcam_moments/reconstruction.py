@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from transientcam_moments._arrays import Array, as_array, chosen, in_range, namespace
+from transientcam_moments._arrays import Array, as_array, chosen, in_range, in_turn, namespace
 from transientcam_moments.biasing import EPSILON, bias, estimate_zeroth, smallest_eigenvalue
 from transientcam_moments.calibration import calibrate
 from transientcam_moments.cumulative import cumulative
@@ -164,6 +164,8 @@ class Reconstruction:
     @cached_property
     def eigenvalue(self) -> Array:
         """Smallest eigenvalue of the Toeplitz matrix before biasing."""
+        if self.settings.zeroth == "estimated":  # by construction
+            return self.settings.epsilon * self.smoothed[0].real
         return smallest_eigenvalue(self.smoothed)
 
     @cached_property
@@ -177,7 +179,7 @@ class Reconstruction:
     @cached_property
     def _biased(self) -> tuple[Array, Array]:
         if self.settings.zeroth == "estimated":  # has its uniform part by construction
-            return self.smoothed, self.smoothed[0].real < 0
+            return self.smoothed, namespace(self.smoothed).zeros(self.eigenvalue.shape, dtype=bool)
         return bias(
             self.smoothed,
             self.settings.epsilon,
@@ -219,7 +221,16 @@ class Reconstruction:
     @cached_property
     def returns(self) -> Returns:
         """Sharp returns and the uniform part (Pisarenko)."""
-        return pisarenko(self.moments)
+        return pisarenko(self.moments, eigenvalue=self._eigenvalue_after)
+
+    @property
+    def _eigenvalue_after(self) -> Array:
+        """Smallest eigenvalue after biasing, which need not be searched for again."""
+        if self.settings.keep == "harmonics":
+            return self.eigenvalue + (self.moments[0].real - self.smoothed[0].real)
+        xp = namespace(self.moments)
+        least = self.settings.epsilon * self.moments[0].real
+        return xp.where(self._biased[1], least, self.eigenvalue)
 
     @cached_property
     def peaks(self) -> Peaks:
@@ -259,7 +270,7 @@ class Reconstruction:
         elif self.settings.estimator == "maximum-entropy":
             phase = self.peaks.first_rad
         else:
-            phase = xp.arctan2(self.moments[1].imag, self.moments[1].real) % (2 * np.pi)
+            phase = in_turn(xp.arctan2(self.moments[1].imag, self.moments[1].real))
         return xp.where(self.has_range, phase, np.nan).astype(self.brightness.dtype)
 
     @cached_property

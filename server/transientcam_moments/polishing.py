@@ -1,0 +1,83 @@
+"""Newton's method on returns that don't reproduce their moments to the last digits.
+
+Returns that nearly coincide amplify rounding: their nodes are known to eps over their distance, and
+their weights to that over the distance again. The moments as a function of phases, weights and
+uniform part are smooth, so that one or two Newton steps bring what is missing. Few pixels need it.
+"""
+
+import numpy as np
+
+from transientcam_moments._arrays import Array, to_complex
+
+_STEPS = 8
+
+
+def residual(b: Array, phase: Array, weight: Array, uniform: Array) -> Array:
+    """Return what returns and uniform part leave of moments, shape (m + 1, P), NumPy arrays."""
+    turn = np.where(weight > 0, phase, 0)
+    node = to_complex(np.cos(turn), np.sin(turn))
+    power = weight
+    left = np.array(b)
+    left[0] = b[0].real - (weight.sum(axis=0) + uniform)
+    for j in range(1, b.shape[0]):
+        power = power * node
+        left[j] = b[j] - power.sum(axis=0)
+    return left
+
+
+def size(left: Array, b: Array) -> Array:
+    """Return the largest component of a residual relative to the largest moment, shape (P)."""
+    with np.errstate(all="ignore"):
+        scale = np.abs(b).max(axis=0)
+        return np.where(scale > 0, np.abs(left).max(axis=0) / scale, 0)
+
+
+def polish(b: Array, phase: Array, weight: Array, uniform: Array) -> tuple[Array, Array, Array]:
+    """Improve returns (m, P) and uniform part (P) until they reproduce b (m + 1, P).
+
+    Returns
+    -------
+    phase, weight, uniform : array
+        A step is kept where it reduces the residual and leaves all weights positive.
+    """
+    left = residual(b, phase, weight, uniform)
+    error = size(left, b)
+    share = np.ones_like(uniform)
+    for _ in range(_STEPS):
+        turn, gain, lift = (share * part for part in _step(left, phase, weight))
+        used = weight > 0
+        tried = np.where(used, weight + gain, 0), uniform + lift
+        moved = np.where(used, phase + turn, np.nan) % (2 * np.pi)
+        left_now = residual(b, moved, *tried)
+        error_now = size(left_now, b)
+        better = (error_now < error) & ((tried[0] > 0) | ~used).all(axis=0)
+        share = np.where(better, np.minimum(4 * share, 1), share / 4)
+        phase, weight = np.where(better, moved, phase), np.where(better, tried[0], weight)
+        uniform = np.where(better, tried[1], uniform)
+        left, error = np.where(better, left_now, left), np.where(better, error_now, error)
+    return phase, weight, uniform
+
+
+def _step(left: Array, phase: Array, weight: Array) -> tuple[Array, Array, Array]:
+    """Solve the linearised system for the changes of phase, weight and uniform part.
+
+    The derivatives of b_j are exp(i j phi_k) by w_k and i j w_k exp(i j phi_k) by phi_k, and those
+    of b_0 are 1 by the uniform part. Phases enter as w_k dphi_k, so that faint returns count.
+    """
+    m, pixels = weight.shape
+    used = weight > 0
+    j = np.arange(m + 1)[:, None, None]
+    wave = np.where(used, np.exp(1j * j * np.where(used, phase, 0)), 0)
+    columns = np.concatenate([wave, 1j * j * wave, np.zeros((m + 1, 1, pixels))], axis=1)
+    columns[0, -1] = 1
+    system = np.concatenate([columns.real, columns[1:].imag]).transpose(2, 0, 1)
+    right = np.concatenate([left.real, left[1:].imag]).T[..., None]
+    q, r = np.linalg.qr(system)
+    unused = np.concatenate([~used, ~used, np.zeros((1, pixels), bool)]).T
+    with np.errstate(all="ignore"):
+        r = r + unused[:, :, None] * np.eye(2 * m + 1)
+        flat = np.abs(r.diagonal(axis1=1, axis2=2)).min(axis=1) == 0
+        r[flat] = np.eye(2 * m + 1)  # nothing can be solved here; the step will not be kept
+        change = np.linalg.solve(r, q.transpose(0, 2, 1) @ right)[..., 0].T
+        turn = np.where(used, change[m : 2 * m] / np.where(used, weight, 1), 0)
+    return turn, change[:m], change[2 * m]
