@@ -295,6 +295,8 @@ class AsyncStream:
                 connect(self._url, **stream_options(timeout_s=self._timeout_s))
             )
             await connection.send(self._state.opening(connection.subprotocol))
+        if self.closed:  # meanwhile, by another task
+            raise StreamClosed(CloseCode.NORMAL, "it was closed here")
         self._connection = connection
         return connection
 
@@ -315,7 +317,7 @@ class AsyncStream:
                 raise deadline.missed() from None
 
     async def _recover(self, error: TransientcamError, deadline: Deadline) -> None:
-        if isinstance(error, StreamClosed | ServerUnreachable):
+        if self._connection is None or isinstance(error, StreamClosed | ServerUnreachable):
             await self._disconnect()
         if self.closed:
             return

@@ -142,6 +142,8 @@ class Stream:
                 connect(self._url, **stream_options(timeout_s=self._timeout_s))
             )
             connection.send(self._state.opening(connection.subprotocol))
+        if self.closed:  # meanwhile, by another thread
+            raise StreamClosed(CloseCode.NORMAL, "it was closed here")
         self._connection = connection
         return connection
 
@@ -161,7 +163,7 @@ class Stream:
                 raise deadline.missed() from None
 
     def _recover(self, error: TransientcamError, deadline: Deadline) -> None:
-        if isinstance(error, StreamClosed | ServerUnreachable):
+        if self._connection is None or isinstance(error, StreamClosed | ServerUnreachable):
             self._disconnect()
         if self._closed.is_set():
             return

@@ -513,3 +513,30 @@ def test_closing_ends_a_wait_for_a_server_that_is_away(
         thread.join(5.0)
 
         assert not thread.is_alive()
+
+
+def test_closing_while_a_connection_is_made_leaves_no_connection(
+    replay: _Start, recorded: dict[str, Recording]
+) -> None:
+    handshaking, go_on, gone = threading.Event(), threading.Event(), threading.Event()
+
+    def hesitate(connection: ServerConnection, request: object) -> None:
+        handshaking.set()
+        go_on.wait(10.0)
+
+    def handler(connection: ServerConnection) -> None:
+        _until_gone(connection)
+        gone.set()
+
+    with Camera(replay(handler, process_request=hesitate).url) as camera:
+        stream = camera.stream("range")
+        thread = threading.Thread(target=lambda: list(stream))
+        thread.start()
+        assert handshaking.wait(5.0)
+
+        stream.close()
+        go_on.set()
+
+        thread.join(5.0)
+        assert not thread.is_alive()
+        assert gone.wait(5.0)
