@@ -26,7 +26,7 @@ from transientcam_driver.errors import (
 from transientcam_driver.frames import Counters, FrameAssembler, RawFrame
 from transientcam_driver.framing import PacketDecoder
 from transientcam_driver.protocol import (
-    CAPS_BYTES,
+    CAPS_ROOM_BYTES,
     LAST_ERROR_BYTES,
     TIME_BYTES,
     Commitment,
@@ -259,7 +259,7 @@ class Camera:
         try:
             self._transport.control_out(Request.SAFE_OFF)  # whatever its last owner left
             self._capabilities = unpack_capabilities(
-                self._transport.control_in(Request.GET_CAPS, length=CAPS_BYTES)
+                self._transport.control_in(Request.GET_CAPS, length=CAPS_ROOM_BYTES)
             )
             image_bytes = self._capabilities.image_bytes
             self._transport.expect_transfers(IMAGE_HEADER_BYTES + image_bytes)

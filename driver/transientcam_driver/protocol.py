@@ -83,8 +83,10 @@ class ImageFlag(IntFlag):
 # --- capabilities -----------------------------------------------------------------------------
 
 _CAPS_MAGIC = b"TCCP"
-_CAPS = struct.Struct("<4sHH32s32s16sHHBBBBBxHHIIIIIIIIIII")
+_CAPS = struct.Struct("<4sHH32s32s16sHHBBBBBxHHxxIIIIIIIIIII")
 CAPS_BYTES = _CAPS.size + 4
+CAPS_ROOM_BYTES = 512
+"""What a host asks for, so that later fields fit."""
 
 
 def pack_capabilities(capabilities: Capabilities) -> bytes:

@@ -170,7 +170,7 @@ def open_transport(serial: str | None = None, *, backend: Any = None) -> UsbTran
             with _translated("reading the serial number", _node(device)):
                 found = usb.util.get_string(device, device.iSerialNumber, _US_ENGLISH)
             if serial is None or found == serial:
-                return UsbTransport(device, str(found))
+                return UsbTransport(device, found or "")
         except CameraLost:
             pass  # it left while it was looked at
         except CameraError as error:

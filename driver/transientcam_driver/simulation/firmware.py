@@ -334,7 +334,7 @@ class Firmware:
         self._fifo.append((k, flag))
 
     def _next_stored(self, run: _Run) -> int:
-        """Return which image comes next when the FIFO is empty: after an overflow, a frame's first."""
+        """Return the image that comes into the empty FIFO: after an overflow, a frame's first."""
         count = len(self._labels)
         return -(-run.exposed // count) * count if self._overflowed else run.exposed
 

@@ -104,6 +104,6 @@ class Truth:
         return total
 
     def impulse_response(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return times in s of a pixel, with weights in DN (sparse) or the density in DN/s (dense)."""
+        """Return a pixel's times in s, with weights in DN (sparse) or a density in DN/s (dense)."""
         time_s, value = self._responses.of_pixel(x, y)
         return time_s, value * self._scale_dn
