@@ -36,6 +36,13 @@ class Served:
         service: Service = self.app.state.service
         return service
 
+    def start_all_workers(self) -> None:
+        """Let the executor start all its threads now, which it does one by one otherwise."""
+        together = threading.Barrier(self.settings.workers)
+        executor = self.service._executor
+        for each in [executor.submit(together.wait) for _ in range(self.settings.workers)]:
+            each.result()
+
 
 @contextmanager
 def serving(camera: str = "sim:mirrors?noise=off", **settings: Any) -> Iterator[Served]:

@@ -126,6 +126,7 @@ class Acquisition:
         self._moved_s = clock()
         self._arrivals_s: deque[float] = deque(maxlen=_RATE_FRAMES)
         self._applied: dict[int, AppliedSequence] = {}
+        self._remember(camera.applied)
 
     # -- from any thread -----------------------------------------------------------------------
 
@@ -220,7 +221,6 @@ class Acquisition:
             self._camera.status()  # an unplug is noticed also while nothing is read
             self._camera_works()
         elif not self._started:
-            self._remember(self._camera.applied)
             self._camera.start()
             self._started = True
             self._moved_s = self._clock()
@@ -236,11 +236,7 @@ class Acquisition:
         self._frames += 1
         self._moved_s = self._clock()
         self._arrivals_s.append(self._moved_s)
-        applied = self._applied.get(raw.epoch)
-        if applied is None:
-            applied = self._camera.applied
-            self._remember(applied)
-        self._report(Captured(raw, applied))
+        self._report(Captured(raw, self._applied[raw.epoch]))
 
     def _remember(self, applied: AppliedSequence) -> None:
         self._applied[applied.epoch] = applied
@@ -282,6 +278,11 @@ class Acquisition:
         self._camera.reconnect()
         self._connected = True
         self._moved_s = self._clock()
+        applied = self._camera.applied
+        if applied.epoch not in self._applied:
+            # the same sequence, but the device counts it anew
+            self._remember(applied)
+            self._report(SequenceChanged(applied))
 
     def _camera_works(self) -> None:
         """Believe that a lost camera is back only once it does what it should."""

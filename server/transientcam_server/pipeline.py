@@ -26,7 +26,8 @@ from transientcam_server.settings import ReconstructionSettings
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
 _Array = NDArray[Any]
-_MAX_ANSWER_BYTES = 512 * 1024 * 1024
+MAX_ANSWER_BYTES = 512 * 1024 * 1024
+"""A product over time with more than this is not computed."""
 _REMEMBERED_TIME_AXES = 2
 
 
@@ -40,6 +41,7 @@ class Pipeline:
         self._executor = executor
         self._tasks: set[asyncio.Task[Any]] = set()
         self._frames = 0
+        self._failing: set[str] = set()
         self._full_scale = 2.0**camera.capabilities.bits - 1.0
         # what may take long leaves one worker to everything else
         self._long = asyncio.Semaphore(workers - 1)
@@ -98,6 +100,16 @@ class Pipeline:
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    def note_failure(self, product: Product, number: int) -> None:
+        """Log a failure with its cause, the first of a series; call it while handling that."""
+        if product.name not in self._failing:
+            self._failing.add(product.name)
+            _log.exception("frame %d: making %s failed", number, product.name)
+
+    def note_success(self, product: Product) -> None:
+        """Note that a product works, so that its next failure is logged again."""
+        self._failing.discard(product.name)
 
     def truth(self) -> Any:
         """Return the ground truth of the simulated scene; runs on a worker."""
@@ -252,6 +264,7 @@ class Frame:
         extra = self._extra(product, time_s)
         with self._failure_of(product):
             data, _ = await run(encoding.encode, product, array, self.meta(), extra, channel)
+        self._pipeline.note_success(product)
         return data
 
     @contextmanager
@@ -262,7 +275,7 @@ class Frame:
         except Problem:
             raise
         except Exception as error:
-            _log.exception("frame %d: making %s failed", self.number, product.name)
+            self._pipeline.note_failure(product, self.number)
             raise Problem(
                 kinds.PRODUCT_FAILED,
                 f"Computing {product.name} of frame {self.number} failed.",
@@ -279,7 +292,7 @@ class Frame:
 
     def _refuse_too_large(self, times: int) -> None:
         height, width = self.shape
-        limit = _MAX_ANSWER_BYTES // (4 * height * width)
+        limit = MAX_ANSWER_BYTES // (4 * height * width)
         if times > limit:
             raise Problem(
                 kinds.ANSWER_TOO_LARGE,

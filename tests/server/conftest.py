@@ -16,6 +16,29 @@ def served() -> Iterator[Served]:
         yield daemon
 
 
+@pytest.fixture(scope="module")
+def steady_daemon() -> Iterator[Served]:
+    """A daemon that all tests of a module share: for those that change nothing."""
+    with serving("sim:mirrors?noise=off") as daemon:
+        daemon.start_all_workers()  # or a test would be taken to have left them behind
+        yield daemon
+
+
+@pytest.fixture(scope="module")
+def steady(steady_daemon: Served) -> Iterator[httpx.Client]:
+    """A client of the shared daemon, which has a frame already."""
+    with httpx.Client(base_url=steady_daemon.url, timeout=20.0) as client:
+        hold_to_contract(client, steady_daemon.app.openapi())
+        client.get("/api/v1/frames/latest", params={"wait_s": 10.0})
+        yield client
+
+
+@pytest.fixture(scope="module")
+def steady_stream(steady_daemon: Served) -> str:
+    """Address of the shared daemon's stream."""
+    return steady_daemon.stream_url
+
+
 @pytest.fixture
 def http(served: Served) -> Iterator[httpx.Client]:
     """A client whose every answer is checked against the daemon's own OpenAPI document."""

@@ -21,7 +21,9 @@ async def read_acquisition(service: ServiceOf) -> AcquisitionDocument:
 @router.put(
     "/acquisition",
     summary="Start or stop capturing",
-    responses=documented(kinds.INVALID_REQUEST, kinds.CAMERA_FAILED, kinds.CAMERA_LOST),
+    responses=documented(
+        kinds.BAD_REQUEST, kinds.INVALID_REQUEST, kinds.CAMERA_FAILED, kinds.CAMERA_LOST
+    ),
 )
 async def change_acquisition(service: ServiceOf, wanted: AcquisitionRequest) -> AcquisitionDocument:
     """Start or stop capturing; the camera's light is off while it does not."""

@@ -52,7 +52,11 @@ async def read_sequence(service: ServiceOf) -> AppliedDocument:
     "/sequence",
     summary="Change the sequence",
     responses=documented(
-        kinds.INVALID_REQUEST, kinds.INVALID_SEQUENCE, kinds.CAMERA_FAILED, kinds.CAMERA_LOST
+        kinds.BAD_REQUEST,
+        kinds.INVALID_REQUEST,
+        kinds.INVALID_SEQUENCE,
+        kinds.CAMERA_FAILED,
+        kinds.CAMERA_LOST,
     ),
 )
 async def change_sequence(service: ServiceOf, sequence: _Sequence) -> AppliedDocument:
@@ -69,7 +73,7 @@ async def change_sequence(service: ServiceOf, sequence: _Sequence) -> AppliedDoc
 @router.post(
     "/sequence/validate",
     summary="Check a sequence",
-    responses=documented(kinds.INVALID_REQUEST, kinds.INVALID_SEQUENCE),
+    responses=documented(kinds.BAD_REQUEST, kinds.INVALID_REQUEST, kinds.INVALID_SEQUENCE),
 )
 async def validate_sequence(service: ServiceOf, sequence: _Sequence) -> AppliedDocument:
     """Say what the camera would make of a sequence, without touching it."""

@@ -32,7 +32,7 @@ async def read_simulation(service: ServiceOf) -> SimulationDocument:
 @router.post(
     "/simulation/faults",
     summary="Let something go wrong",
-    responses=documented(kinds.NOT_SIMULATED, kinds.INVALID_REQUEST),
+    responses=documented(kinds.NOT_SIMULATED, kinds.BAD_REQUEST, kinds.INVALID_REQUEST),
 )
 async def make_fault(service: ServiceOf, wanted: FaultRequest) -> SimulationDocument:
     """Unplug the simulated camera, plug it in again, or spoil or lose the next image."""

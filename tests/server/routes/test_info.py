@@ -1,0 +1,24 @@
+import httpx
+from transientcam import wire
+
+
+def test_the_service_says_what_it_is_and_what_its_frames_have(http: httpx.Client) -> None:
+    info = http.get("/api/v1/info").json()
+
+    assert info["name"] == "transientcam"
+    assert info["api"] == "v1"
+    assert info["stream"] == {"path": "/api/v1/stream", "subprotocol": wire.SUBPROTOCOL}
+    products = {product["name"]: product for product in info["products"]}
+    assert set(products) == set(wire.PRODUCTS)
+    assert products["range"]["formats"] == ["msgpack", "npy", "png"]
+    assert products["moments"]["formats"] == ["msgpack", "npy"]
+    assert products["transient"]["over_time"]
+    assert not products["transient"]["streamed"]
+
+
+def test_the_versions_of_the_interface_are_told_at_a_path_without_version(
+    http: httpx.Client,
+) -> None:
+    versions = http.get("/api/versions").json()
+
+    assert versions["api"] == [{"name": "v1", "path": "/api/v1"}]
