@@ -32,7 +32,7 @@ export function toned(kind: ToneKind, share: number): number {
 }
 
 /** Place on the colour map from which light over a still scene has its full colour. */
-export const FULL_LIGHT = 0.35;
+export const FULL_LIGHT = 0.18;
 
 /** Share of its colour that light at `place` adds to the still scene behind it: GLSL's smoothstep. */
 export function strength(place: number): number {
@@ -41,7 +41,7 @@ export function strength(place: number): number {
 }
 
 /** Brightest grey of the still scene behind the light. */
-export const BACKDROP_GAIN = 0.42;
+export const BACKDROP_GAIN = 0.3;
 
 /** Grey of the still scene, 0 to 1, where `share` is its brightness over white; the root brings out what is dim. */
 export function backdropGrey(share: number): number {

@@ -57,7 +57,7 @@ export function summariseLight(coefficients: Coefficients): LightSummary {
   if (highest.length === 0) return { peak: NaN, arrivals };
   for (let n = 0; n < ARRIVAL_TIMES; n++) arrivals[n] /= highest.length;
   const sorted = Float64Array.from(highest).sort();
-  return { peak: sorted[Math.round(0.98 * (sorted.length - 1))], arrivals };
+  return { peak: sorted[Math.round(0.9 * (sorted.length - 1))], arrivals };
 }
 
 /** Coefficients of a frame message; null when its shape is not that of coefficients. */

@@ -47,11 +47,10 @@ function StateChip() {
 function CameraName() {
   const { camera } = useStore();
   if (camera.value === null) return null;
-  const { capabilities, simulated } = camera.value;
+  const { capabilities } = camera.value;
   return (
     <span class="camera-name" title={`Serial number ${String(capabilities["serial"])}`}>
       {String(capabilities["model"])}
-      {simulated && ", simulated"}
     </span>
   );
 }

@@ -38,7 +38,7 @@ export function TransientView() {
             onChange={(kind) => (look.tone.value = kind)}
           />
           <Choice
-            label="Exposure"
+            label="Exposure compensation"
             value={look.stops.value}
             options={STOPS.map((stops) => ({ value: stops, text: stopsText(stops) }))}
             onChange={(stops) => (look.stops.value = stops)}

@@ -1,0 +1,95 @@
+"""Debian's Chromium on the real page of a real daemon; a page that complains fails its test."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_playwright
+
+from tests.serving import Served, serving
+
+_ROOT = Path(__file__).resolve().parents[2]
+_SOURCES = _ROOT / "client" / "dashboard"
+_BUILT = _ROOT / "server" / "transientcam_server" / "static" / "index.html"
+
+
+@pytest.fixture(scope="session")
+def built() -> None:
+    """The dashboard as it is in the sources, not as it was some builds ago."""
+    sources = [_SOURCES / "index.html", _SOURCES / "package-lock.json", _SOURCES / "vite.config.ts"]
+    sources += [path for path in (_SOURCES / "src").rglob("*") if path.is_file()]
+    newest = max(path.stat().st_mtime for path in sources)
+    if not _BUILT.exists() or _BUILT.stat().st_mtime < newest:
+        pytest.fail("The built dashboard is missing or older than its sources: make dashboard")
+
+
+@pytest.fixture(scope="session")
+def browser(built: None) -> Iterator[Browser]:
+    """Chromium without a window; needed in CI, and elsewhere skipped where it is not installed."""
+    executable = shutil.which("chromium")
+    if executable is None:
+        message = "these tests need Debian's chromium: apt-get install chromium"
+        if os.environ.get("CI"):
+            pytest.fail(message)
+        pytest.skip(message)
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=executable)
+        yield chromium
+        chromium.close()
+
+
+@dataclass
+class Watch:
+    """What a page did that its tests should know of."""
+
+    host: str
+    complaints: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+    refusals_expected: bool = False
+
+    def on_console(self, message: ConsoleMessage) -> None:
+        """Remember errors; a request that a test wants refused is one to Chromium too."""
+        refused = (
+            self.refusals_expected and "the server responded with a status of 4" in message.text
+        )
+        if message.type == "error" and not refused:
+            self.complaints.append(f"console: {message.text}")
+
+    def on_request(self, request: Request) -> None:
+        """Remember every request, those of the worker included."""
+        self.requests.append(f"{request.method} {request.url}")
+        where = urlsplit(request.url)
+        if where.scheme in ("http", "https", "ws", "wss") and where.netloc != self.host:
+            self.complaints.append(f"request to another host: {request.url}")
+
+
+@pytest.fixture
+def served() -> Iterator[Served]:
+    """A daemon whose frames are all alike, so that a picture has to stay the same by itself."""
+    with serving("sim:mirrors?noise=off") as daemon:
+        yield daemon
+
+
+@pytest.fixture
+def watch(served: Served) -> Watch:
+    """What the test's page does."""
+    return Watch(urlsplit(served.url).netloc)
+
+
+@pytest.fixture
+def page(browser: Browser, served: Served, watch: Watch) -> Iterator[Page]:
+    """A fresh page, at rest until the test opens it; it may not complain until the test ends."""
+    context = browser.new_context(
+        viewport={"width": 1280, "height": 800}, reduced_motion="reduce", base_url=served.url
+    )
+    context.set_default_timeout(20_000)
+    context.on("console", watch.on_console)
+    context.on("weberror", lambda error: watch.complaints.append(f"exception: {error.error}"))
+    context.on("request", watch.on_request)
+    yield context.new_page()
+    context.close()
+    assert watch.complaints == []

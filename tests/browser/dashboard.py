@@ -1,0 +1,121 @@
+"""The page as a test sees it: its pictures as arrays, its figures as text."""
+
+import base64
+import io
+from typing import Any
+
+import matplotlib
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from playwright.sync_api import Locator, Page
+
+# A canvas by way of a 2D copy: one of WebGL can be read only in the task that drew it.
+_READ_CANVAS = """
+(canvas) => {
+  const copy = document.createElement("canvas");
+  [copy.width, copy.height] = [canvas.width, canvas.height];
+  copy.getContext("2d").drawImage(canvas, 0, 0);
+  return copy.toDataURL("image/png").split(",")[1];
+}
+"""
+
+
+def _image(png: str) -> NDArray[np.uint8]:
+    with Image.open(io.BytesIO(base64.b64decode(png))) as image:
+        return np.array(image.convert("RGBA"))
+
+
+def map_canvas(page: Page) -> Locator:
+    """The canvas of the map view."""
+    return page.locator(".panel-map .stage canvas")
+
+
+def transient_canvas(page: Page) -> Locator:
+    """The canvas of the light in flight."""
+    return page.locator("canvas[data-product=transient]")
+
+
+def open_page(page: Page, path: str = "/?debug") -> None:
+    """Open the dashboard and wait until both pictures show a frame."""
+    page.goto(path)
+    page.locator(".panel-map canvas[data-frame]").wait_for()
+    page.locator("canvas[data-product=transient][data-frame]").wait_for()
+    if "debug" in path:
+        page.wait_for_function("() => 'transientcam' in window")
+
+
+def shows_frame(page: Page, frame: int) -> None:
+    """Wait until both pictures show this frame."""
+    page.wait_for_function(
+        """(frame) => [".panel-map .stage canvas", "canvas[data-product=transient]"]
+             .every((each) => document.querySelector(each)?.dataset.frame === String(frame))""",
+        arg=frame,
+    )
+
+
+def map_pixels(page: Page) -> NDArray[np.uint8]:
+    """RGBA of the map as it is drawn, (H, W, 4)."""
+    return _image(map_canvas(page).evaluate(_READ_CANVAS))
+
+
+def transient_pixels(page: Page, turn: float) -> NDArray[np.uint8]:
+    """RGBA of the light after a share of the period, (H, W, 4)."""
+    return _image(
+        transient_canvas(page).evaluate(
+            "(canvas, turn) => { transientcam.store.player.seek(turn === 0.5 ? 0.4 : 0.5);"
+            f"transientcam.store.player.seek(turn); return ({_READ_CANVAS})(canvas); }}",
+            turn,
+        )
+    )
+
+
+def shown_density(page: Page, phase_rad: float) -> tuple[str, NDArray[np.float64]]:
+    """The renderer and the numbers behind its picture: b_0 units per second, flat."""
+    reading = page.evaluate("(phase) => transientcam.shownDensity(phase)", phase_rad)
+    return reading["renderer"], _numbers(reading["values"])
+
+
+def density_of(page: Page, body: bytes, phase_rad: float) -> tuple[str, NDArray[np.float64]]:
+    """The same for a frame message of coefficients."""
+    reading = page.evaluate(
+        "([text, phase]) => transientcam.density("
+        "Uint8Array.from(atob(text), (each) => each.charCodeAt(0)).buffer, phase)",
+        [base64.b64encode(body).decode(), phase_rad],
+    )
+    return reading["renderer"], _numbers(reading["values"])
+
+
+def _numbers(values: list[float | None]) -> NDArray[np.float64]:
+    return np.array([np.nan if value is None else value for value in values])
+
+
+def point_at(page: Page, picture: str, x: int, y: int, *, click: bool = False) -> None:
+    """Move the pointer to the middle of a pixel of a view's picture."""
+    canvas = page.locator(f".panel-{picture} .stage canvas")
+    box = canvas.bounding_box()
+    assert box is not None
+    width, height = canvas.evaluate("(each) => [each.width, each.height]")
+    at = (
+        box["x"] + (x + 0.5) / width * box["width"],
+        box["y"] + (y + 0.5) / height * box["height"],
+    )
+    page.mouse.move(*at)
+    if click:
+        page.mouse.click(*at)
+
+
+def text(page: Page, panel: str, name: str) -> str:
+    """A figure of a view, without the thin spaces before its unit and between thousands."""
+    shown = page.locator(f"{panel} [data-field={name}]").first.text_content()
+    return (shown or "").replace("\u202f", " ").replace("\u2212", "-")
+
+
+def colours(values: NDArray[Any], low: float, high: float, name: str) -> NDArray[np.uint8]:
+    """RGBA that matplotlib gives the values, (..., 4); clear where there is no value."""
+    places = np.clip((values.astype(np.float64) - low) / (high - low), 0.0, 1.0)
+    # matplotlib's maps have 256 colours, each for as much of the scale
+    table = np.round(matplotlib.colormaps[name](np.arange(256)) * 255).astype(np.uint8)
+    levels = np.minimum(np.nan_to_num(places * 256), 255).astype(int)
+    painted: NDArray[np.uint8] = np.where(np.isnan(places)[..., None], 0, table[levels])
+    return painted

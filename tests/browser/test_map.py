@@ -1,0 +1,104 @@
+import io
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from playwright.sync_api import Page, expect
+
+from tests.browser.dashboard import (
+    colours,
+    map_canvas,
+    map_pixels,
+    open_page,
+    point_at,
+    shows_frame,
+    text,
+)
+from tests.serving import Served
+
+NAMES = {"viridis": "viridis", "cividis": "cividis", "inferno": "inferno", "grey": "gray"}
+# The page's maps are straight lines between every fifteenth colour of matplotlib's.
+TOLERANCE = {"viridis": 6, "inferno": 6, "cividis": 12, "grey": 1}
+
+
+def stop(served: Served) -> int:
+    """Stop the camera; the number of its last frame."""
+    httpx.put(f"{served.url}/api/v1/acquisition", json={"running": False}).raise_for_status()
+    number: int = httpx.get(f"{served.url}/api/v1/frames/latest").json()["frame"]
+    return number
+
+
+def product(served: Served, name: str) -> NDArray[Any]:
+    answer = httpx.get(f"{served.url}/api/v1/frames/latest/{name}.npy").raise_for_status()
+    array: NDArray[Any] = np.load(io.BytesIO(answer.content))
+    return array
+
+
+@pytest.mark.parametrize("name", ["Range", "Direct", "Indirect", "Brightness", "Validity"])
+def test_each_map_has_the_colours_of_the_values_the_daemon_serves(
+    page: Page, served: Served, name: str
+) -> None:
+    open_page(page)
+    page.get_by_role("tab", name=name, exact=True).click()
+    page.locator(f"canvas[data-product={name.lower()}][data-frame]").wait_for()
+    shows_frame(page, stop(served))
+
+    canvas = map_canvas(page)
+    low, high, chosen = (
+        str(canvas.get_attribute(f"data-{key}")) for key in ("low", "high", "colours")
+    )
+    painted = map_pixels(page).astype(int)
+    expected = colours(product(served, name.lower()), float(low), float(high), NAMES[chosen])
+
+    assert painted.shape == (120, 163, 4)
+    np.testing.assert_allclose(painted, expected, atol=TOLERANCE[chosen])
+    assert len(np.unique(painted.reshape(-1, 4), axis=0)) > 20, "a picture, not a plane"
+
+
+def test_the_limits_hold_nearly_all_values_and_say_so_in_metres(page: Page, served: Served) -> None:
+    open_page(page)
+    shows_frame(page, stop(served))
+    low, high = (
+        float(str(map_canvas(page).get_attribute(f"data-{key}"))) for key in ("low", "high")
+    )
+    values = product(served, "range")
+    inside = np.mean((values >= low) & (values <= high))
+    assert inside > 0.97
+    assert high - low < 3 * (np.nanpercentile(values, 99) - np.nanpercentile(values, 1))
+    bar = page.locator(".colour-bar")
+    expect(bar).to_have_attribute("aria-label", f"Colour scale from {low:.1f} to {high:.1f}\u202fm")
+
+
+def test_the_value_under_the_pointer_is_that_of_the_pixel(page: Page, served: Served) -> None:
+    open_page(page)
+    shows_frame(page, stop(served))
+    ranges, brightness = product(served, "range"), product(served, "brightness")
+    for x, y in ((40, 30), (100, 70), (0, 0), (162, 119), (125, 60)):
+        point_at(page, "map", x, y)
+        expect(page.locator(".panel-map [data-field=pixel]")).to_have_text(f"{x}, {y}")
+        assert text(page, ".panel-map", "value") == f"{ranges[y, x]:.3f} m"
+        assert text(page, ".panel-map", "amplitude") == f"{brightness[y, x]:.0f} DN"
+
+
+def test_limits_and_colours_that_were_set_stay_across_a_reload(page: Page, served: Served) -> None:
+    open_page(page)
+    page.get_by_label("High end of the scale in m").fill("5")
+    page.get_by_label("Low end of the scale in m").fill("1")
+    page.get_by_label("Low end of the scale in m").press("Enter")
+    page.locator(".panel-map").get_by_label("Colours").select_option("cividis")
+    open_page(page)
+    shows_frame(page, stop(served))
+    expected = colours(product(served, "range"), 1.0, 5.0, "cividis")
+    np.testing.assert_allclose(map_pixels(page).astype(int), expected, atol=TOLERANCE["cividis"])
+
+
+def test_a_map_chosen_while_the_camera_stands_still_shows_its_last_frame(
+    page: Page, served: Served
+) -> None:
+    open_page(page)
+    shows_frame(page, stop(served))
+    page.get_by_role("tab", name="Direct", exact=True).click()
+    page.locator("canvas[data-product=direct][data-frame]").wait_for()
+    expect(page.locator("[data-field=state]")).to_have_text("Stopped")

@@ -1,0 +1,194 @@
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.conftest import Watch
+from tests.browser.dashboard import open_page, text
+from tests.serving import Served
+
+
+def fault(served: Served, name: str) -> None:
+    url = f"{served.url}/api/v1/simulation/faults"
+    httpx.post(url, json={"fault": name}).raise_for_status()
+
+
+def test_a_live_camera_says_so_with_its_figures(page: Page, served: Served) -> None:
+    open_page(page)
+    expect(page.locator("[data-field=state]")).to_have_text("Live")
+    rate = page.locator("[data-field=rate]")
+    expect(rate).to_have_text(re.compile(r"^\d+\.\d\s?Hz$"))
+    sequence = httpx.get(f"{served.url}/api/v1/sequence").json()
+    assert text(page, ".panel-sequence", "harmonics") == str(sequence["harmonics"])
+    assert text(page, ".panel-sequence", "images") == str(sequence["images"])
+    assert text(page, ".panel-sequence", "base_frequency_hz") == "23.00 MHz"
+    assert text(page, ".panel-sequence", "unambiguous_range_m") == "6.52 m"
+    assert text(page, ".panel-sequence", "capture_s") == "90.4 ms"
+
+
+def test_a_lost_camera_is_said_at_once_and_forgotten_when_it_is_back(
+    page: Page, served: Served
+) -> None:
+    open_page(page)
+    banner = page.locator("[data-banner=camera]")
+    expect(banner).to_have_count(0)
+    fault(served, "unplug")
+    expect(banner).to_be_visible()
+    expect(banner).to_have_attribute("role", "alert")
+    expect(page.locator("[data-field=state]")).to_have_text("Camera lost")
+    last = int(text(page, ".bar", "frame").replace(" ", ""))
+    fault(served, "replug")
+    expect(banner).to_have_count(0)
+    expect(page.locator("[data-field=state]")).to_have_text("Live")
+    page.wait_for_function(
+        "(last) => document.querySelector('.panel-map .stage canvas').dataset.frame > last",
+        arg=last,
+    )
+
+
+def test_a_page_opened_while_the_camera_is_away_says_so(page: Page, served: Served) -> None:
+    httpx.get(f"{served.url}/api/v1/frames/latest", params={"wait_s": 10}).raise_for_status()
+    fault(served, "unplug")
+    page.goto("/")
+    expect(page.locator("[data-banner=camera]")).to_be_visible()
+    fault(served, "replug")
+    expect(page.locator("[data-banner=camera]")).to_have_count(0)
+
+
+def test_lost_images_are_counted(page: Page, served: Served) -> None:
+    open_page(page)
+    expect(page.locator("[data-field=lost]")).to_have_text("0")
+    fault(served, "corrupt-image")
+    expect(page.locator("[data-field=lost]")).not_to_have_text("0")
+
+
+def test_the_camera_stops_and_starts_again(page: Page, served: Served) -> None:
+    open_page(page)
+    page.get_by_role("button", name="Stop").click()
+    expect(page.locator("[data-field=state]")).to_have_text("Stopped")
+    assert httpx.get(f"{served.url}/api/v1/acquisition").json()["running"] is False
+    page.get_by_role("button", name="Start").click()
+    expect(page.locator("[data-field=state]")).to_have_text("Live")
+
+
+def test_a_held_page_keeps_its_frame_while_the_camera_goes_on(page: Page, served: Served) -> None:
+    open_page(page)
+    page.keyboard.press("h")
+    expect(page.locator("[data-field=state]")).to_have_text("Held")
+    canvas = page.locator(".panel-map .stage canvas")
+    held = int(str(canvas.get_attribute("data-frame")))
+    after = httpx.get(f"{served.url}/api/v1/frames/latest").json()["frame"]
+    httpx.get(f"{served.url}/api/v1/frames/latest", params={"after": after + 2, "wait_s": 10})
+    assert int(str(canvas.get_attribute("data-frame"))) == held
+    page.keyboard.press("h")
+    page.wait_for_function(
+        "(held) => document.querySelector('.panel-map .stage canvas').dataset.frame > held + 2",
+        arg=held,
+    )
+
+
+def test_the_sequence_is_judged_as_it_is_typed_and_set(
+    page: Page, served: Served, watch: Watch
+) -> None:
+    open_page(page)
+    watch.refusals_expected = True
+    page.get_by_role("button", name="Edit").click()
+    harmonics = page.get_by_label("Harmonics m")
+    harmonics.fill("99")
+    expect(page.locator(".refusal")).to_contain_text("harmonics")
+    expect(harmonics).to_have_attribute("aria-invalid", "true")
+    expect(page.get_by_role("button", name="Apply")).to_be_disabled()
+    harmonics.fill("")
+    expect(page.locator(".refusal")).to_have_text("Every field needs a number.")
+    harmonics.fill("4")
+    page.get_by_role("textbox", name="Exposure").fill("0.5")
+    expect(page.locator(".verdict [data-field=images]")).to_have_text("20")
+    page.get_by_role("button", name="Apply").click()
+    expect(page.locator(".panel-sequence [data-field=exposure_s]")).to_have_text("500\u202fµs")
+    applied = httpx.get(f"{served.url}/api/v1/sequence").json()
+    assert (applied["harmonics"], applied["exposure_s"]) == (4, 0.0005)
+    page.wait_for_function(
+        "() => transientcam.store.frames.of('coefficients').value?.coefficients?.harmonics === 4"
+    )
+
+
+def test_a_sequence_that_somebody_else_sets_is_shown(page: Page, served: Served) -> None:
+    open_page(page)
+    document = httpx.get(f"{served.url}/api/v1/sequence").json() | {"base_frequency_hz": 46e6}
+    for derived in (
+        "sequence_id",
+        "images",
+        "capture_s",
+        "frame_rate_hz",
+        "unambiguous_range_m",
+        "data_rate_bytes_s",
+    ):
+        document.pop(derived)
+    httpx.put(f"{served.url}/api/v1/sequence", json=document).raise_for_status()
+    expect(page.locator("[data-field=base_frequency_hz]")).to_have_text("46.00\u202fMHz")
+    expect(page.locator(".timeline-ticks span").last).to_have_text("20\u202fns")
+
+
+def test_every_control_has_a_name(page: Page) -> None:
+    open_page(page)
+    page.get_by_role("button", name="Edit").click()
+    unnamed = page.evaluate(
+        """() => [...document.querySelectorAll("button, select, input, [role=application]")]
+             .filter((each) => !(each.ariaLabel || each.textContent.trim() || each.labels?.length))
+             .map((each) => each.outerHTML)"""
+    )
+    assert unnamed == []
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_nothing_hangs_over_the_edge(page: Page, width: int) -> None:
+    page.set_viewport_size({"width": width, "height": 800})
+    open_page(page)
+    page.get_by_role("button", name="Edit").click()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+@contextmanager
+def daemon(port: int) -> Iterator[None]:
+    """The `transientcam serve` of this installation, as a process of its own."""
+    executable = str(Path(sys.executable).with_name("transientcam"))
+    command = [executable, "serve", "--port", str(port)]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, env=os.environ | {"COLUMNS": "200"}
+    )
+    try:
+        assert process.stdout is not None
+        assert f":{port}" in process.stdout.readline()
+        yield
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=20)
+
+
+def test_a_page_outlives_its_daemon(browser: Browser) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    context = browser.new_context(base_url=f"http://127.0.0.1:{port}", reduced_motion="reduce")
+    page = context.new_page()
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    with daemon(port):
+        open_page(page)
+    banner = page.locator("[data-banner=connection]")
+    expect(banner).to_contain_text("No connection to the service.")
+    expect(page.locator("[data-field=state]")).to_have_text(re.compile("Reconnecting|Connecting"))
+    with daemon(port):
+        expect(banner).to_have_count(0, timeout=15_000)
+        expect(page.locator("[data-field=state]")).to_have_text("Live")
+    context.close()
+    assert errors == []

@@ -1,0 +1,271 @@
+import io
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+import transientcam_moments as tm
+from numpy.typing import NDArray
+from playwright.sync_api import Page, expect
+from transientcam.wire.codec import pack_with_array
+
+from tests.browser.conftest import Watch
+from tests.browser.dashboard import (
+    density_of,
+    open_page,
+    point_at,
+    shown_density,
+    shows_frame,
+    text,
+    transient_canvas,
+    transient_pixels,
+)
+from tests.serving import Served
+
+F_HZ = 23e6
+LEAST_VALIDITY = 4e-3
+PHASES_RAD = (0.0, 0.7, 1.9, 3.3, 4.4, 6.1)
+WITHOUT_WEBGL = """
+const getContext = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+  return kind === "webgl2" ? null : getContext.call(this, kind, ...rest);
+};
+"""
+
+
+def stop(served: Served) -> int:
+    """Stop the camera; the number of its last frame."""
+    httpx.put(f"{served.url}/api/v1/acquisition", json={"running": False}).raise_for_status()
+    number: int = httpx.get(f"{served.url}/api/v1/frames/latest").json()["frame"]
+    return number
+
+
+def toeplitz(moments: NDArray[Any]) -> NDArray[np.complex128]:
+    """B[j, k] = b_(j-k) of every pixel, (N, m+1, m+1)."""
+    m = moments.shape[0] - 1
+    both = np.concatenate((moments[:0:-1].conj(), moments)).astype(np.complex128)
+    matrices: NDArray[np.complex128] = np.stack(
+        [np.stack([both[m + j - k] for k in range(m + 1)], axis=-1) for j in range(m + 1)], axis=-2
+    )
+    return matrices
+
+
+def moments_of_returns(m: int, *, pixels: int, seed: int) -> NDArray[np.complex128]:
+    """One to three returns a pixel, over as little even light as `LEAST_VALIDITY` allows."""
+    random = np.random.default_rng(seed)
+    phases = random.uniform(0, 2 * np.pi, (3, pixels))
+    weights = random.uniform(50, 1000, (3, pixels)) * (
+        np.arange(3)[:, None] <= np.arange(pixels) % 3
+    )
+    moments = np.stack([(weights * np.exp(1j * j * phases)).sum(axis=0) for j in range(m + 1)])
+    least = np.linalg.eigvalsh(toeplitz(moments))[:, 0]
+    # b_0 raised until the smallest eigenvalue is 1 to 10 times the share that must be met
+    share = LEAST_VALIDITY * 10 ** random.uniform(0.001, 1, pixels)
+    moments[0] += (share * moments[0].real - least) / (1 - share)
+    return moments
+
+
+def dense_coefficients(moments: NDArray[np.complex128]) -> NDArray[np.float32]:
+    """[E, Re a_1, Im a_1, ...] with a / E the first column of the inverse (Theorem 1)."""
+    column = np.linalg.solve(toeplitz(moments), np.eye(moments.shape[0])[:, :1])[..., 0].T
+    energy = 1 / column[0].real
+    a = column[1:] * energy
+    planes = np.stack([energy, *(part for each in a for part in (each.real, each.imag))])
+    return planes.astype(np.float32)
+
+
+def dense_density(moments: NDArray[np.complex128], phase_rad: float) -> NDArray[np.float64]:
+    """Density per second by the dense solve in double precision."""
+    column = np.linalg.solve(toeplitz(moments), np.eye(moments.shape[0])[:, :1])[..., 0].T
+    powers = np.exp(1j * phase_rad * np.arange(moments.shape[0]))[:, None]
+    density: NDArray[np.float64] = (
+        F_HZ * column[0].real / np.abs((column.conj() * powers).sum(0)) ** 2
+    )
+    return density
+
+
+def frame_message(planes: NDArray[np.float32]) -> bytes:
+    return pack_with_array(
+        {
+            "v": 1,
+            "type": "frame",
+            "product": "coefficients",
+            "unit": "DN,1",
+            "axes": ["coefficient", "y", "x"],
+            "meta": {"frame": 1, "base_frequency_hz": F_HZ},
+            "encode_s": 0.0,
+        },
+        planes,
+    )
+
+
+@pytest.mark.parametrize("m", [3, 4, 8])
+def test_the_shader_computes_equation_2(page: Page, m: int) -> None:
+    open_page(page)
+    shape = (30, 41)
+    moments = moments_of_returns(m, pixels=30 * 41, seed=m)
+    validity = np.linalg.eigvalsh(toeplitz(moments))[:, 0] / moments[0].real
+    assert validity.min() >= LEAST_VALIDITY
+    assert np.median(validity) < 5 * LEAST_VALIDITY, "most pixels should be hard ones"
+    body = frame_message(dense_coefficients(moments).reshape(-1, *shape))
+
+    tops = np.angle(moments[1])[:: 30 * 41 // 7] % (2 * np.pi)  # where densities are sharp
+    for phase_rad in (*PHASES_RAD, *tops):
+        renderer, density = density_of(page, body, float(phase_rad))
+        assert renderer == "webgl2"
+        np.testing.assert_allclose(density, dense_density(moments, float(phase_rad)), rtol=1e-3)
+
+
+@pytest.mark.parametrize("m", [3, 4, 8])
+def test_the_shader_agrees_with_the_moments_package(page: Page, m: int) -> None:
+    open_page(page)
+    moments = moments_of_returns(m, pixels=30 * 41, seed=100 + m).reshape(m + 1, 30, 41)
+    coefficients = tm.levinson(moments.astype(np.complex64))
+    planes = [coefficients.error]
+    for a in coefficients.polynomial[1:]:
+        planes += [a.real, a.imag]
+    body = frame_message(np.stack(planes).astype(np.float32))
+    for phase_rad in PHASES_RAD:
+        _, density = density_of(page, body, phase_rad)
+        expected = 2 * np.pi * F_HZ * np.asarray(tm.density(coefficients, phase_rad))
+        np.testing.assert_allclose(density, expected.reshape(-1), rtol=1e-3)
+
+
+@pytest.mark.parametrize("webgl", [True, False], ids=["webgl2", "typed arrays"])
+def test_what_is_drawn_is_the_transient_the_daemon_computes(
+    page: Page, served: Served, webgl: bool
+) -> None:
+    if not webgl:
+        page.add_init_script(WITHOUT_WEBGL)
+    open_page(page)
+    shows_frame(page, stop(served))
+    expected_renderer = "webgl2" if webgl else "typed-array"
+    expect(transient_canvas(page)).to_have_attribute("data-renderer", expected_renderer)
+    for phase_rad in PHASES_RAD:
+        time_s = phase_rad / (2 * np.pi * F_HZ)
+        answer = httpx.get(
+            f"{served.url}/api/v1/frames/latest/transient.npy", params={"time_s": time_s}
+        ).raise_for_status()
+        expected = np.load(io.BytesIO(answer.content)).reshape(-1)
+        renderer, density = shown_density(page, phase_rad)
+        assert renderer == expected_renderer
+        valid = np.isfinite(expected)
+        assert valid.mean() > 0.9
+        np.testing.assert_allclose(density[valid], expected[valid], rtol=2e-3)
+
+
+def test_both_renderers_draw_the_same_picture(page: Page, served: Served) -> None:
+    open_page(page)
+    number = stop(served)
+    shows_frame(page, number)
+    turns = (0.25, 0.28, 0.45)
+    shaded = [transient_pixels(page, turn) for turn in turns]
+    page.add_init_script(WITHOUT_WEBGL)
+    open_page(page)
+    shows_frame(page, number)
+    computed = [transient_pixels(page, turn) for turn in turns]
+    for ours, theirs in zip(shaded, computed, strict=True):
+        difference = np.abs(ours.astype(int) - theirs.astype(int))
+        assert np.mean(difference > 8) < 0.002, "one colour of the map here and there, no more"
+        assert ours[..., :3].std() > 5
+
+
+def test_light_passes_the_pixels_when_their_range_says(page: Page, served: Served) -> None:
+    open_page(page)
+    shows_frame(page, stop(served))
+    ranges = np.load(io.BytesIO(httpx.get(f"{served.url}/api/v1/frames/latest/range.npy").content))
+    page.get_by_role("button", name="scene").click()  # the light alone
+    steps_m = np.arange(1.4, 2.2, 0.04)
+    pictures = np.stack(
+        [
+            transient_pixels(page, 2 * range_m * F_HZ / 299_792_458)[..., :3].sum(-1, dtype=int)
+            for range_m in steps_m
+        ]
+    )
+    inside = (ranges > steps_m[0]) & (ranges < steps_m[-1])
+    brightest_m = steps_m[pictures.argmax(axis=0)]
+    assert inside.mean() > 0.5
+    assert np.median(np.abs(brightest_m - ranges)[inside]) < 0.04
+    assert pictures.max() > 500
+
+
+def test_scrubbing_changes_the_picture_and_asks_the_daemon_for_nothing(
+    page: Page, watch: Watch
+) -> None:
+    open_page(page)
+    slider = page.get_by_label("Time of flight")
+    slider.focus()
+    page.keyboard.press("Home")
+    seen = {transient_canvas(page).screenshot()}
+    box = slider.bounding_box()
+    assert box is not None
+    before = len(watch.requests)
+    for share in (0.255, 0.27, 0.285):
+        page.mouse.click(box["x"] + share * box["width"], box["y"] + box["height"] / 2)
+        seen.add(transient_canvas(page).screenshot())
+    for _ in range(3):
+        page.keyboard.press("Shift+ArrowRight")
+        seen.add(transient_canvas(page).screenshot())
+    assert len(seen) == 7
+    assert watch.requests[before:] == []
+
+
+def test_it_plays_pauses_and_shows_its_time(page: Page) -> None:
+    open_page(page)
+    time = page.locator(".panel-transient [data-field=time]")
+    page.keyboard.press("Home")
+    expect(time).to_have_text("0.00\u202fns")
+    page.keyboard.press("ArrowRight")
+    expect(time).to_have_text("0.10\u202fns")
+    page.keyboard.press("Space")
+    expect(page.get_by_role("button", name="Pause")).to_be_visible()
+    expect(time).not_to_have_text("0.10\u202fns")
+    page.get_by_role("button", name="Pause").click()
+    standing = time.text_content()
+    page.evaluate(
+        "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    )
+    expect(time).to_have_text(str(standing))
+
+
+def test_it_plays_by_itself_unless_motion_is_unwelcome(page: Page) -> None:
+    open_page(page)
+    expect(page.get_by_role("button", name="Play")).to_be_visible()
+    page.emulate_media(reduced_motion="no-preference")
+    open_page(page)
+    expect(page.get_by_role("button", name="Pause")).to_be_visible()
+
+
+def test_a_click_shows_the_pixels_impulse_response(page: Page, served: Served) -> None:
+    open_page(page)
+    shows_frame(page, stop(served))
+    point_at(page, "transient", 81, 20, click=True)
+    expect(page.locator(".panel-response h2")).to_have_text("Impulse response of pixel 81, 20")
+    pixel = httpx.get(
+        f"{served.url}/api/v1/frames/latest/pixel", params={"x": 81, "y": 20, "bins": 4096}
+    ).raise_for_status()
+    density = np.array(pixel.json()["density_per_s"])
+    tops = np.flatnonzero((density > np.roll(density, 1)) & (density >= np.roll(density, -1)))
+    expected_ns = np.array(pixel.json()["time_s"])[tops] * 1e9
+    listed = page.locator(".peaks tbody tr").evaluate_all(
+        "(rows) => rows.map((row) => parseFloat(row.cells[0].textContent))"
+    )
+    assert len(listed) >= 2
+    for time_ns in listed:
+        assert np.min(np.abs(expected_ns - time_ns)) < 0.02
+    ink = page.locator(".response-plot .uplot canvas").evaluate(
+        "(canvas) => new Set(new Uint32Array(canvas.getContext('2d')"
+        ".getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size"
+    )
+    assert ink > 10, "an empty plot has but its axes' few colours"
+
+
+def test_a_click_into_the_response_moves_the_light_there(page: Page) -> None:
+    open_page(page)
+    point_at(page, "map", 81, 20, click=True)
+    over = page.locator(".response-plot .u-over")
+    box = over.bounding_box()
+    assert box is not None
+    over.click(position={"x": box["width"] / 2, "y": box["height"] / 2})
+    shown_ns = float(text(page, ".panel-transient", "time").split()[0])
+    assert abs(shown_ns - 0.5e9 / F_HZ) < 0.1
