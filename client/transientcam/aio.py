@@ -229,7 +229,7 @@ class AsyncStream:
 
     @property
     def notices(self) -> Sequence[Notice]:
-        """The newest 256 notices, oldest first."""
+        """The newest 256 notices, oldest first; see `Stream.notices`."""
         return self._state.notices
 
     @property

@@ -54,7 +54,11 @@ class Stream:
 
     @property
     def notices(self) -> Sequence[Notice]:
-        """The newest 256 notices, oldest first."""
+        """The newest 256 notices, oldest first.
+
+        Beside those of docs/stream.md the client tells ``product-failed`` (with the problem),
+        ``connection-lost`` (``reason``) and ``reconnected`` (``attempts``).
+        """
         return self._state.notices
 
     @property
