@@ -187,7 +187,9 @@ def test_what_an_applied_sequence_adds_is_ignored_when_it_is_sent_back(sequence:
 
 
 def test_integers_are_taken_for_frequencies_and_become_floats() -> None:
-    assert isinstance(Sequence.from_document({"base_frequency_hz": 23_000_000}).base_frequency_hz, float)
+    assert isinstance(
+        Sequence.from_document({"base_frequency_hz": 23_000_000}).base_frequency_hz, float
+    )
 
 
 def test_the_unambiguous_range_at_23_mhz_is_6_52_m() -> None:

@@ -183,14 +183,14 @@ class Firmware:
         if self._staged is None and self._words is None:
             raise Refusal(ErrorCode.NOT_CONFIGURED, "no sequence staged")
         if self._staged is not None:
+            streaming = self._run is not None
+            self._end_run()
+            self._flush()
             self._words, self._staged = self._staged, None
             sequence = self._words.sequence(self.capabilities)
             self._labels = sequence.labels_at(self.capabilities.low_frequency_hz)
             self._renderer.configure(sequence, self._labels)
             self._epoch = max(self._epoch, epoch_above) + 1
-            streaming = self._run is not None
-            self._end_run()
-            self._flush()
             if streaming:
                 self._begin_run(now_s)
         assert self._words is not None  # noqa: S101  (refused above otherwise)
@@ -269,7 +269,7 @@ class Firmware:
             if self._to_corrupt:
                 self._to_corrupt -= 1
                 damaged = bytearray(packet)
-                damaged[IMAGE_HEADER_BYTES + len(damaged) // 2] ^= 0x55
+                damaged[IMAGE_HEADER_BYTES + self.capabilities.image_bytes // 2] ^= 0x55
                 packet = bytes(damaged)
             return packet
         return None
