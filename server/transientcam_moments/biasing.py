@@ -120,7 +120,7 @@ def bias(
     planes, trailing = moment_planes(b)
     smallest: Array = smallest_eigenvalue(planes) if eigenvalue is None else eigenvalue
     moments, biased = _bias(planes, smallest.reshape(-1), epsilon, keep)
-    return Biased(moments.reshape((-1, *trailing)), biased.reshape(trailing))
+    return Biased(moments.reshape((planes.shape[0], *trailing)), biased.reshape(trailing))
 
 
 def estimate_zeroth(b: Array, epsilon: float = EPSILON) -> Array:
@@ -154,7 +154,7 @@ def estimate_zeroth(b: Array, epsilon: float = EPSILON) -> Array:
     without = xp.concatenate([xp.zeros_like(planes[:1]), planes[1:]])
     zeroth = -smallest_eigenvalue(without) / (1 - epsilon)
     zeroth = zeroth.astype(planes.dtype)
-    return xp.concatenate([zeroth[None], planes[1:]]).reshape((-1, *trailing))
+    return xp.concatenate([zeroth[None], planes[1:]]).reshape((planes.shape[0], *trailing))
 
 
 def _bias(b: Array, eigenvalue: Array, epsilon: float, keep: str) -> tuple[Array, Array]:

@@ -47,7 +47,7 @@ def calibrate(moments: Array, calibration: Array) -> Array:
         inverse = 1 / xp.asarray(gain).astype(xp.complex128)
         inverse = xp.where(xp.isfinite(inverse), inverse, np.nan)
     inverse = inverse.astype(planes.dtype).reshape((planes.shape[0], -1))
-    return (planes * inverse).reshape((-1, *trailing))
+    return (planes * inverse).reshape((planes.shape[0], *trailing))
 
 
 def calibration_of(moments: Array) -> Array:
@@ -68,7 +68,7 @@ def calibration_of(moments: Array) -> Array:
     xp = namespace(planes)
     with np.errstate(all="ignore"):
         inverse = xp.where(planes[0].real > 0, 1 / planes[0].real, np.nan)
-    return (planes * inverse.astype(planes.dtype)).reshape((-1, *trailing))
+    return (planes * inverse.astype(planes.dtype)).reshape((planes.shape[0], *trailing))
 
 
 def nominal_calibration(

@@ -104,8 +104,8 @@ def levinson(b: Array) -> Coefficients:
     error, polynomial, reflection = by_blocks(run, planes) if run is _levinson else run(planes)
     return Coefficients(
         error.reshape(trailing),
-        polynomial.reshape((-1, *trailing)),
-        reflection.reshape((-1, *trailing)),
+        polynomial.reshape((polynomial.shape[0], *trailing)),
+        reflection.reshape((reflection.shape[0], *trailing)),
     )
 
 
@@ -307,7 +307,9 @@ def recursion(b: list[Array], floor: float, *, sparse: bool = False) -> Recursio
             g = xp.where(ends, onto, g)
             # NaN belongs to an invalid pixel, which keeps it; what comes after the border is zero
             g = xp.where(alive, g, 0 * b[k])
-            remaining = xp.where(alive, xp.maximum(remaining, floor), error)
+            # E belongs to the rounded g; on the circle it is zero, and nobody asks
+            remaining = xp.where(ends, error if sparse else error * below_one(g), remaining)
+            remaining = xp.where(alive, remaining, error)
             order = xp.where(ends, k, order)
             alive = alive & ~ends
         a = _step_up(a, g)

@@ -104,8 +104,8 @@ def pisarenko(b: Array, *, eigenvalue: Array | None = None) -> Returns:
         found = _improved(planes, found)
     phase, weight, uniform, count = found
     return Returns(
-        phase.reshape((-1, *trailing)),
-        weight.reshape((-1, *trailing)),
+        phase.reshape((phase.shape[0], *trailing)),
+        weight.reshape((weight.shape[0], *trailing)),
         uniform.reshape(trailing),
         count.reshape(trailing),
     )
@@ -158,7 +158,10 @@ def _pisarenko(
     """
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
         planes, scale = normalised(b)
-        uniform = search(planes) if uniform is None else uniform / scale
+        if uniform is None:
+            uniform = search(planes)
+        else:
+            uniform = namespace(b).where(scale > 0, uniform / scale, 0 * scale)
         floor = 4 * len(planes[1:]) * (noise or float(np.finfo(scale.dtype).eps))
         phase, weight, count = _returns(planes, uniform, floor)
         return phase, weight * scale, uniform * scale, count
