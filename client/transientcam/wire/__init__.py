@@ -32,6 +32,8 @@ from transientcam.wire.messages import (
     Subscription,
     encode,
     encode_frame,
+)
+from transientcam.wire.parsing import (
     parse_channels,
     parse_client_message,
     parse_frame,
