@@ -61,16 +61,22 @@ def serve(
     from transientcam_server.app import build_app
 
     run.configure_logging(settings)
-    with open_camera(settings.camera) as opened:
-        # NumPy serves until the compiled kernels are ready
-        tm.kernels.compile_in_background()
-        app = build_app(opened, settings)
-        run.serve(app, settings, on_listening=lambda url: _announce(url, settings.camera))
+    # the address first: where another daemon has it, the camera is not touched
+    with run.listen(settings.host, settings.port) as listener:
+        url = run.address(listener)
+        with open_camera(settings.camera) as opened:
+            # NumPy serves until the compiled kernels are ready
+            tm.kernels.compile_in_background()
+            app = build_app(opened, settings)
+            run.serve(app, settings, listener, on_listening=lambda: _announce(url, settings.camera))
 
 
 def _announce(url: str, camera: str) -> None:
     console = Console()
-    console.print(f"transientcam serves {camera} at [bold link={url}]{url}[/] (Ctrl-C ends it)")
+    console.print(
+        f"transientcam serves {camera} at [bold link={url}]{url}[/] (Ctrl-C ends it)",
+        soft_wrap=True,
+    )
 
 
 def reconstruct(
@@ -155,7 +161,8 @@ def _tell(
     height, width = result.flags.shape
     console.print(
         f"{output}: {width} x {height} pixels, m = {measurement.harmonics} at "
-        f"{measurement.base_frequency_hz / 1e6:g} MHz, {result.time_s.size} times of flight"
+        f"{measurement.base_frequency_hz / 1e6:g} MHz, {result.time_s.size} times of flight",
+        soft_wrap=True,
     )
     for flag in tm.Flags:
         count = int(np.count_nonzero(result.flags & flag.value))

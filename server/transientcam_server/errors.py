@@ -4,6 +4,7 @@
 
     ServerError
     ├── SettingsError        a setting cannot be used; says where it was given
+    ├── AddressUnavailable   the address cannot be listened on
     ├── MissingExtra         something optional is asked for that is not installed
     ├── InputError           a file given to `transientcam reconstruct` cannot be used
     └── Problem              a request cannot be answered; see `transientcam_server.problems`
@@ -43,6 +44,19 @@ class SettingsError(ServerError):
 
     def __str__(self) -> str:
         return "\n".join(str(mistake) for mistake in self.mistakes)
+
+
+class AddressUnavailable(ServerError):  # noqa: N818 - says what is wrong
+    """The address cannot be listened on."""
+
+    def __init__(self, host: str, port: int, reason: str) -> None:
+        super().__init__(host, port, reason)
+        self.host = host
+        self.port = port
+        self.reason = reason
+
+    def __str__(self) -> str:
+        return f"cannot listen on {self.host}, port {self.port}: {self.reason}"
 
 
 class MissingExtra(ServerError):  # noqa: N818 - says what is wrong

@@ -10,6 +10,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
+from starlette.routing import compile_path
 from transientcam.errors import ProtocolError
 from transientcam.wire import PROBLEM_MEDIA_TYPE
 from transientcam_driver import CameraError, CameraLost, CameraNotFound, DriverError, SequenceError
@@ -106,6 +107,9 @@ def problem_response(problem: Problem, *, instance: str | None = None) -> Respon
     )
 
 
+_REFERENCE = {"$ref": "#/components/schemas/ProblemDocument"}
+
+
 def documented(*problem_kinds: ProblemKind) -> dict[int | str, dict[str, Any]]:
     """Return what a route's OpenAPI entry says of the problems it may answer with."""
     responses: dict[int | str, dict[str, Any]] = {}
@@ -113,9 +117,8 @@ def documented(*problem_kinds: ProblemKind) -> dict[int | str, dict[str, Any]]:
         entry = responses.setdefault(
             kind.status,
             {
-                "model": ProblemDocument,
                 "description": "",
-                "content": {PROBLEM_MEDIA_TYPE: {"examples": {}}},
+                "content": {PROBLEM_MEDIA_TYPE: {"schema": _REFERENCE, "examples": {}}},
             },
         )
         entry["description"] = "; ".join(filter(None, (entry["description"], kind.title)))
@@ -126,8 +129,25 @@ def documented(*problem_kinds: ProblemKind) -> dict[int | str, dict[str, Any]]:
     return responses
 
 
+def describe(app: FastAPI) -> None:
+    """Let the OpenAPI document of ``app`` hold what `documented` refers to.
+
+    A model named in a route's responses would be documented as plain JSON beside the problem.
+    """
+    generate = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        document = generate()
+        schema = ProblemDocument.model_json_schema()
+        document.setdefault("components", {}).setdefault("schemas", {})["ProblemDocument"] = schema
+        return document
+
+    app.openapi = openapi  # type: ignore[method-assign]  # as FastAPI's documentation extends it
+
+
 def install(app: FastAPI) -> None:
-    """Let every error of ``app`` be answered as a problem."""
+    """Let every error of ``app`` be answered as a problem, and documented as one."""
+    describe(app)
 
     async def known(request: Request, error: Exception) -> Response:
         return problem_response(problem_of(error), instance=request.url.path)
@@ -144,6 +164,8 @@ def install(app: FastAPI) -> None:
         assert isinstance(error, HTTPException)  # noqa: S101 - registered for it below
         response = problem_response(_of_http(error, request), instance=request.url.path)
         response.headers.update(error.headers or {})
+        if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
+            response.headers["Allow"] = _allowed(request) or response.headers.get("Allow", "")
         return response
 
     for kind in (Problem, DriverError, ParameterError):
@@ -164,6 +186,18 @@ def _of_http(error: HTTPException, request: Request) -> Problem:
         detail = f"{_shortened(request.url.path)} does not answer {request.method}."
         return Problem(kind, detail)
     return Problem(kind, str(error.detail))
+
+
+def _allowed(request: Request) -> str:
+    """Return every method a path answers; the framework knows only those of one route of it."""
+    app: FastAPI = request.app
+    methods = {
+        method.upper()
+        for template, operations in app.openapi()["paths"].items()
+        if compile_path(template)[0].match(request.url.path)
+        for method in operations
+    }
+    return ", ".join(sorted(methods))
 
 
 def _of_validation(error: RequestValidationError) -> Problem:

@@ -12,6 +12,7 @@ import uvicorn
 from fastapi import FastAPI
 from transientcam.wire import MAX_CLIENT_MESSAGE_BYTES
 
+from transientcam_server.errors import AddressUnavailable
 from transientcam_server.service import Service
 from transientcam_server.settings import Settings
 
@@ -21,6 +22,7 @@ NOTSENT_LOWAT_BYTES: Final = 128 * 1024
 """What the kernel keeps of a message beyond what is on the wire: frames wait here, not there."""
 PING_S: Final = 10.0
 SHUTDOWN_S: Final = 3
+_BACKLOG = 1024
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -28,29 +30,36 @@ def listen(host: str, port: int) -> socket.socket:
 
     Raises
     ------
-    OSError
+    AddressUnavailable
         If the address cannot be listened on.
     """
-    family, kind, protocol, _, address = socket.getaddrinfo(
-        host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-    )[0]
-    listener = socket.socket(family, kind, protocol)
     try:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        for option, value in (
-            ("TCP_USER_TIMEOUT", USER_TIMEOUT_MS),
-            ("TCP_NOTSENT_LOWAT", NOTSENT_LOWAT_BYTES),
-        ):
-            if hasattr(socket, option):  # Linux; elsewhere the pings have to do
-                listener.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
-        listener.bind(address)
-        listener.listen(1024)
-        listener.setblocking(False)
-    except OSError:
-        listener.close()
-        raise
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        listener = socket.socket(family, kind, protocol)
+        try:
+            _prepare(listener)
+            listener.bind(address)
+            listener.listen(_BACKLOG)
+        except OSError:
+            listener.close()
+            raise
+    except OSError as error:
+        raise AddressUnavailable(host, port, error.strerror or str(error)) from error
     return listener
+
+
+def _prepare(listener: socket.socket) -> None:
+    listener.setblocking(False)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    for option, value in (
+        ("TCP_USER_TIMEOUT", USER_TIMEOUT_MS),
+        ("TCP_NOTSENT_LOWAT", NOTSENT_LOWAT_BYTES),
+    ):
+        if hasattr(socket, option):  # Linux; elsewhere the pings have to do
+            listener.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
 
 
 def address(listener: socket.socket) -> str:
@@ -122,20 +131,22 @@ class Server(uvicorn.Server):
         return tuple(self._captured_signals)
 
 
-def serve(app: FastAPI, settings: Settings, *, on_listening: Callable[[str], None]) -> None:
-    """Serve until a signal ends it; ``on_listening`` is told the URL once it answers there.
+def serve(
+    app: FastAPI,
+    settings: Settings,
+    listener: socket.socket,
+    *,
+    on_listening: Callable[[], None],
+) -> None:
+    """Serve on a listening socket until a signal ends it; ``on_listening`` once it answers.
 
     Raises
     ------
-    OSError
-        If the address cannot be listened on.
     KeyboardInterrupt
         If the signal was SIGINT.
     """
-    with listen(settings.host, settings.port) as listener:
-        url = address(listener)
-        server = Server(app, settings, on_listening=lambda: on_listening(url))
-        server.run(sockets=[listener])
+    server = Server(app, settings, on_listening=on_listening)
+    server.run(sockets=[listener])
     if signal.SIGINT in server.signals:
         raise KeyboardInterrupt
 

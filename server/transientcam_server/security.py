@@ -93,10 +93,20 @@ class SameSite:
         origin = headers.get("origin", "").lower().rstrip("/")
         if not origin or (scope["type"] == "http" and scope["method"] in _SAFE_METHODS):
             return None
-        if origin in self._origins or _authority(origin) == _authority(f"//{host}", origin):
+        if origin in self._origins or self._is_same(origin, host):
             return None
         detail = "A page of another origin may not do this."
         return Problem(kinds.ORIGIN_NOT_ALLOWED, detail, field="Origin", value=origin)
+
+    def _is_same(self, origin: str, host: str) -> bool:
+        try:
+            theirs = urlsplit(origin)
+            ours = urlsplit(f"{theirs.scheme}://{host}")
+            default = _DEFAULT_PORTS.get(theirs.scheme)
+            ports = theirs.port or default, ours.port or default
+        except ValueError:  # no URL
+            return False
+        return bool(theirs.hostname) and theirs.hostname == ours.hostname and ports[0] == ports[1]
 
     def _is_ours(self, name: str) -> bool:
         if name in self._names:
@@ -126,17 +136,23 @@ class BodyLimit:
         if announced.isdecimal() and int(announced) > self._limit:
             await self._refuse(scope, receive, send)
             return
-        received = 0
-
-        async def limited() -> Message:
-            nonlocal received
-            message = await receive()
-            received += len(message.get("body", b""))
+        if announced:
+            await self._app(scope, receive, send)  # the server holds it to what it announced
+            return
+        begin = [await receive()]
+        received = len(begin[0].get("body", b""))
+        while begin[-1].get("more_body", False):
+            begin.append(await receive())
+            received += len(begin[-1].get("body", b""))
             if received > self._limit:
-                raise self._problem()
-            return message
+                await self._refuse(scope, receive, send)
+                return
+        messages = iter(begin)
 
-        await self._app(scope, limited, send)
+        async def replayed() -> Message:
+            return next(messages, None) or await receive()
+
+        await self._app(scope, replayed, send)
 
     async def _refuse(self, scope: Scope, receive: Receive, send: Send) -> None:
         response = problem_response(self._problem(), instance=scope["path"])
@@ -158,13 +174,3 @@ def _name(host: str) -> str:
     if host.startswith("["):
         return host.partition("]")[0] + "]"
     return host.partition(":")[0]
-
-
-def _authority(url: str, like: str = "") -> tuple[str | None, int | None]:
-    """Return host and port of a URL; its default port is that of its scheme or of ``like``'s."""
-    try:
-        parts = urlsplit(url)
-        scheme = parts.scheme or urlsplit(like).scheme
-        return parts.hostname, parts.port or _DEFAULT_PORTS.get(scheme)
-    except ValueError:
-        return None, None

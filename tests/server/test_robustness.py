@@ -120,7 +120,7 @@ def test_the_frame_after_a_lost_image_says_so_in_its_meta(
         client.subscribe("flags")
         client.frame()
         fault(http, "corrupt-image")
-        lost = []
+        lost: list[int] = []
         while not any(lost):
             lost.append(client.frame().meta["lost_images"])
 

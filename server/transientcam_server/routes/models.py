@@ -184,12 +184,12 @@ class CameraDocument(Document):
     )
 
     state: Literal["starting", "streaming", "stopped", "lost"]
-    reason: str | None
+    reason: str | None = None
     """Why it is lost."""
     simulated: bool
     capabilities: dict[str, Any]
     """As the camera itself states them; units are in the names."""
-    status: dict[str, Any] | None
+    status: dict[str, Any] | None = None
     """As the camera itself states it now; null while it is lost."""
     counters: dict[str, int]
     """What was received since the service started."""
@@ -215,7 +215,7 @@ class AcquisitionDocument(Document):
 
     running: bool
     state: Literal["starting", "streaming", "stopped", "lost"]
-    rate_hz: float | None
+    rate_hz: float | None = None
     """Measured over the last frames; null before there are two."""
     frames: int
     """Captured since the service started."""
@@ -262,7 +262,7 @@ class FrameDocument(Document):
     """Arrival of the last image, Unix time."""
     capture_s: float
     """Measured by the camera's clock."""
-    reconstruct_s: float | None
+    reconstruct_s: float | None = None
     """Computing time spent on this frame so far; null until something was computed."""
     base_frequency_hz: float
     harmonics: int
@@ -274,7 +274,7 @@ class FrameDocument(Document):
     temperature_c: float
     lost_images: int
     """Images lost or corrupt between the frame before and this one."""
-    pixels: PixelCountsDocument | None
+    pixels: PixelCountsDocument | None = None
     """Null until something was computed."""
 
 
@@ -297,7 +297,7 @@ class TruthDocument(Document):
     """What the simulated scene really holds at a pixel."""
 
     kind: str
-    range_m: float | None
+    range_m: float | None = None
     direct: float
     brightness: float
     returns: list[ReturnDocument]
@@ -335,13 +335,13 @@ class PixelDocument(Document):
     meta: FrameDocument
     x: int
     y: int
-    range_m: float | None
+    range_m: float | None = None
     """Of the first return; null without one."""
     direct: float
     indirect: float
     brightness: float
     uniform: float
-    validity: float | None
+    validity: float | None = None
     """Smallest eigenvalue of the moments over the brightness; null without light."""
     flags: list[str]
     """What was wrong with the pixel; empty for nothing."""
@@ -354,7 +354,7 @@ class PixelDocument(Document):
     """The maximum entropy estimate (Theorem 1) in DN/s; null where the pixel has none."""
     cumulative: list[float | None]
     """Light up to each time of flight in DN."""
-    truth: TruthDocument | None
+    truth: TruthDocument | None = None
     """Null where the camera is a real one."""
 
 

@@ -1,0 +1,164 @@
+"""The daemon as a process: its address, its signals, its socket."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+from transientcam import wire
+from transientcam_server.errors import AddressUnavailable
+from transientcam_server.run import NOTSENT_LOWAT_BYTES, USER_TIMEOUT_MS, address, listen
+from transientcam_server.settings import ENVIRONMENT_PREFIX
+
+from tests.server.streaming import streaming
+
+
+def environment(**variables: str) -> dict[str, str]:
+    clean = {k: v for k, v in os.environ.items() if not k.startswith(ENVIRONMENT_PREFIX)}
+    # nothing is compiled here: it would go on long after the test
+    return clean | {"TRANSIENTCAM_KERNELS": "off"} | variables
+
+
+@contextmanager
+def daemon(
+    directory: Path, *arguments: str, **variables: str
+) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Run `transientcam serve` and return it with the address it prints."""
+    command = [str(Path(sys.executable).parent / "transientcam"), "serve", "--port", "0"]
+    with subprocess.Popen(
+        [*command, *arguments],
+        cwd=directory,
+        env=environment(**variables),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            assert process.stdout is not None
+            line = process.stdout.readline()
+            found = re.search(r"http://\S+:\d+", line)
+            assert found, line + process.communicate()[1]
+            yield process, found.group()
+        finally:
+            process.kill()
+
+
+def test_the_address_is_printed_once_it_is_listened_on(tmp_path: Path) -> None:
+    with daemon(tmp_path) as (process, url):
+        assert httpx.get(f"{url}/livez").status_code == 200
+        process.terminate()
+        process.communicate(timeout=10.0)
+
+        assert process.returncode == 0
+
+
+def test_sigterm_tells_the_clients_and_ends_well(tmp_path: Path) -> None:
+    with daemon(tmp_path) as (process, url):
+        with streaming(url.replace("http", "ws") + "/api/v1/stream") as client:
+            client.subscribe("flags")
+            client.frame()
+            process.send_signal(signal.SIGTERM)
+            code = client.close_code()
+        _, errors = process.communicate(timeout=10.0)
+
+    assert code == wire.CloseCode.GOING_AWAY
+    assert process.returncode == 0
+    assert errors == ""
+
+
+def test_an_interrupt_ends_it_without_a_traceback(tmp_path: Path) -> None:
+    with daemon(tmp_path) as (process, _):
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=10.0)
+
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+
+
+def test_the_environment_and_a_file_set_what_the_command_line_does_not(tmp_path: Path) -> None:
+    (tmp_path / "transientcam.toml").write_text("[stream]\nmax_clients = 0\n")
+    with daemon(tmp_path, TRANSIENTCAM_STREAM__MAX_CLIENTS="3") as (process, url):
+        assert httpx.get(f"{url}/livez").status_code == 200
+        process.terminate()
+        process.communicate(timeout=10.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--host", "0.0.0.0"], "--insecure"),
+        (["--port", "70000"], "--port"),
+        (["--camera", "sim:nowhere"], "nowhere"),
+        (["--config", "absent.toml"], "absent.toml"),
+    ],
+)
+def test_what_cannot_be_served_is_said_in_a_sentence(
+    tmp_path: Path, arguments: list[str], message: str
+) -> None:
+    result = subprocess.run(
+        [str(Path(sys.executable).parent / "transientcam"), "serve", "--port", "0", *arguments],
+        cwd=tmp_path,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=30.0,
+    )
+
+    assert result.returncode == 1
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_a_port_that_is_taken_is_said_in_a_sentence(tmp_path: Path) -> None:
+    with listen("127.0.0.1", 0) as listener:
+        port = str(listener.getsockname()[1])
+        result = subprocess.run(
+            [str(Path(sys.executable).parent / "transientcam"), "serve", "--port", port],
+            cwd=tmp_path,
+            env=environment(),
+            capture_output=True,
+            text=True,
+            timeout=30.0,
+        )
+
+    assert result.returncode == 1
+    assert port in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_connections_inherit_what_keeps_dead_and_slow_clients_short() -> None:
+    with listen("127.0.0.1", 0) as listener:
+        listener.setblocking(True)
+        with socket.create_connection(listener.getsockname()):
+            accepted, _ = listener.accept()
+            with accepted:
+                options = {
+                    name: accepted.getsockopt(socket.IPPROTO_TCP, getattr(socket, name))
+                    for name in ("TCP_USER_TIMEOUT", "TCP_NOTSENT_LOWAT")
+                }
+
+    assert options == {
+        "TCP_USER_TIMEOUT": USER_TIMEOUT_MS,
+        "TCP_NOTSENT_LOWAT": NOTSENT_LOWAT_BYTES,
+    }
+
+
+def test_an_address_is_a_url_that_can_be_opened() -> None:
+    with listen("127.0.0.1", 0) as four:
+        assert address(four) == f"http://127.0.0.1:{four.getsockname()[1]}"
+    with listen("::1", 0) as six:
+        assert address(six) == f"http://[::1]:{six.getsockname()[1]}"
+    with listen("0.0.0.0", 0) as every:
+        assert "0.0.0.0" not in address(every)
+
+
+def test_an_address_that_is_not_of_this_machine_leaves_no_socket_behind() -> None:
+    with pytest.raises(AddressUnavailable, match=r"192\.0\.2\.1"):
+        listen("192.0.2.1", 0)
