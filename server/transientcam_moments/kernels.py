@@ -17,7 +17,7 @@ from transientcam_moments._arrays import MAX_HARMONICS
 from transientcam_moments._kernels.registry import PRECISION_NAMES, REGISTRY, Key
 from transientcam_moments.errors import ParameterError
 
-LANES = ("smallest_eigenvalue", "density")
+LANES = ("pisarenko", "levinson", "density", "smallest_eigenvalue")
 
 Progress = Callable[[int, int, str], None]
 """Takes lanes done, lanes in all, and the name of the lane that is next ("" after the last)."""

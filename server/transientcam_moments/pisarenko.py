@@ -95,13 +95,12 @@ def pisarenko(b: Array, *, eigenvalue: Array | None = None) -> Returns:
     planes, trailing = moment_planes(b)
     lane = _kernels.find("pisarenko", planes)
     if lane is not None:
-        found = lane(planes)
-    elif eigenvalue is None:
-        found = by_blocks(_pisarenko, planes)
+        found = lane(planes, eigenvalue)
     else:
-        found = by_blocks(_pisarenko, planes, eigenvalue.reshape(-1))
-    if namespace(planes) is np:
-        found = _improved(planes, found)
+        known = () if eigenvalue is None else (eigenvalue.reshape(-1),)
+        found = by_blocks(_pisarenko, planes, *known)
+        if namespace(planes) is np:
+            found = _improved(planes, found)
     phase, weight, uniform, count = found
     return Returns(
         phase.reshape((phase.shape[0], *trailing)),
@@ -164,7 +163,8 @@ def _pisarenko(
             uniform = namespace(b).where(scale > 0, uniform / scale, 0 * scale)
         floor = 4 * len(planes[1:]) * (noise or float(np.finfo(scale.dtype).eps))
         phase, weight, count = _returns(planes, uniform, floor)
-        return phase, weight * scale, uniform * scale, count
+        weight = namespace(b).where(weight > 0, weight * scale, 0 * weight)
+        return phase, weight, uniform * scale, count
 
 
 def _improved(b: Array, found: tuple[Array, ...]) -> tuple[Array, ...]:

@@ -11,13 +11,13 @@ The lanes and their signatures, each that of the planar statement it stands besi
 
 ``levinson(b) -> error (...), polynomial (m+1, ...), reflection (m, ...)``
 
-``density(polynomial, error, phase_rad (T,), out (T, ...) or None, *, floor (...) or None) -> out``
-    ``floor`` is the least squared modulus.
+``density(polynomial, reflection, error, phase_rad (T,), out (T, ...) or None) -> out``
 
 ``smallest_eigenvalue(b) -> (...)``
 
-``pisarenko(b) -> phase_rad (m, ...), weight (m, ...), uniform (...), count (...)``
+``pisarenko(b, eigenvalue (...) or None) -> phase_rad, weight (m, ...), uniform, count (...)``
 
+All take ``spread=`` to do parts of the pixels on other threads (see ``spread``).
 Importing this package imports no compiler: numba is imported by the thread that compiles.
 """
 
@@ -26,11 +26,9 @@ from typing import Any
 
 import numpy as np
 
-from transientcam_moments._kernels.registry import PRECISIONS, REGISTRY, Key
+from transientcam_moments._kernels.registry import LEAST_PIXELS, PRECISIONS, REGISTRY, Key
 
 __all__ = ["find"]
-
-_LEAST_PIXELS = 64  # what the widest lane takes at a time
 
 
 def find(name: str, planes: object) -> Callable[..., Any] | None:
@@ -53,6 +51,6 @@ def find(name: str, planes: object) -> Callable[..., Any] | None:
     if not isinstance(planes, np.ndarray) or planes.ndim == 0:
         return None
     precision = PRECISIONS.get(planes.dtype.char)
-    if precision is None or planes.size < _LEAST_PIXELS * planes.shape[0]:
+    if precision is None or planes.size < LEAST_PIXELS * planes.shape[0]:
         return None
     return REGISTRY.compiled.get(Key(name, planes.shape[0] - 1, precision))

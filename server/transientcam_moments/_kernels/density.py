@@ -15,6 +15,7 @@ from transientcam_moments._kernels.entries import (
     order_type,
     real_arrays,
 )
+from transientcam_moments._kernels.spread import Spread, at_once
 
 _BANK = 480  # registers of coefficients that stay in the first cache while all phases pass
 _PAST_CACHES_BYTES = 1 << 24
@@ -43,8 +44,8 @@ def _two_phases(order: Any, q: Any, pitch: int, p: int, c0: Any, s0: Any, c1: An
 def _density(
     order: Any,
     polynomial: Any,
+    reflection: Any,
     error: Any,
-    floor: Any,
     cosine: Any,
     sine: Any,
     out: Any,
@@ -76,11 +77,14 @@ def _density(
         for i in range(0, held, step):
             p = min(i, held - step)
             simd.store_within(q, p, simd.load(one, error, left + p) * (0.5 / np.pi))
-            simd.store_within(q, pitch + p, simd.load(one, floor, left + p))
+            least = simd.eps(one)
             for j in range(m):
                 re, im = simd.load_complex(one, polynomial[j + 1], left + p)
                 simd.store_within(q, (2 * j + 2) * pitch + p, re)
                 simd.store_within(q, (2 * j + 3) * pitch + p, im)
+                re, im = simd.load_complex(one, reflection[j], left + p)
+                least = least * (1.0 - re * re - im * im)  # eps E / b_0
+            simd.store_within(q, pitch + p, least)
         for pair in range(phases):
             t = pair // distance * 2 * distance + pair % distance
             if t >= phases:
@@ -125,7 +129,7 @@ def density_lane(m: int, precision: str) -> Callable[..., Any]:
         _density,
         order_type(m),
         cplx[2],
-        real[1],
+        cplx[2],
         real[1],
         real[2],
         real[2],
@@ -137,28 +141,30 @@ def density_lane(m: int, precision: str) -> Callable[..., Any]:
 
     def lane(
         polynomial: Any,
+        reflection: Any,
         error: Any,
         phase_rad: Any,
         out: Any = None,
         *,
-        floor: Any = None,
-        threads: int = 1,
+        spread: Spread = at_once,
     ) -> Any:
         pixels = polynomial[0].size
-        planes = np.ascontiguousarray(polynomial).reshape(m + 1, pixels)
-        error = np.ascontiguousarray(error).reshape(pixels)
-        floor = (
-            np.zeros_like(error) if floor is None else np.ascontiguousarray(floor).reshape(pixels)
-        )
+        a = np.ascontiguousarray(polynomial).reshape(m + 1, pixels)
+        g = np.ascontiguousarray(reflection).reshape(m, pixels)
+        scale = np.ascontiguousarray(error).reshape(pixels)
         angles = np.multiply.outer(np.asarray(phase_rad, np.float64), np.arange(1, m + 1))
-        cosine, sine = np.cos(angles).astype(error.dtype), np.sin(angles).astype(error.dtype)
+        cosine, sine = np.cos(angles).astype(precision), np.sin(angles).astype(precision)
         if out is None:
-            out = np.empty((len(angles), *polynomial.shape[1:]), error.dtype)
+            out = np.empty((len(angles), *polynomial.shape[1:]), precision)
         flat = out.reshape(-1)
         twin = 0
         if out.nbytes > _PAST_CACHES_BYTES:
             twin = simd.REGISTER_BYTES // math.gcd(simd.REGISTER_BYTES, pixels * out.itemsize)
-        run(order, planes, error, floor, cosine, sine, flat, 0, pixels, twin)
+
+        def part(start: int, stop: int) -> None:
+            run(order, a, g, scale, cosine, sine, flat, start, stop, twin)
+
+        spread(part, pixels)
         return out
 
     return lane

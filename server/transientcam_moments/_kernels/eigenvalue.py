@@ -14,12 +14,14 @@ from transientcam_moments._kernels.entries import (
     order_type,
     real_arrays,
 )
+from transientcam_moments._kernels.spread import Spread, at_once
 
 _INTERLEAVE = 4
 
 
-@njit(nogil=True, error_model="numpy")
-def _smallest_eigenvalue(order: Any, b: Any, out: Any, start: int, stop: int) -> None:
+@njit(forceinline=True, error_model="numpy")
+def eigenvalues(order: Any, b: Any, out: Any, start: int, stop: int) -> None:
+    """Write the smallest eigenvalues of the pixels start..stop."""
     one = simd.ones(out, _INTERLEAVE)
     step = simd.width(one)
     re, im = simd.registers(one, order, 1), simd.registers(one, order, 1)
@@ -29,6 +31,11 @@ def _smallest_eigenvalue(order: Any, b: Any, out: Any, start: int, stop: int) ->
         p = min(left, stop - step)
         scale = toeplitz.load_relative(order, b, p, re, im)
         simd.store(out, p, scale * toeplitz.smallest_eigenvalue(order, re, im, h, d, e))
+
+
+@njit(nogil=True, error_model="numpy")
+def _smallest_eigenvalue(order: Any, b: Any, out: Any, start: int, stop: int) -> None:
+    eigenvalues(order, b, out, start, stop)
 
 
 def smallest_eigenvalue_lane(m: int, precision: str) -> Callable[..., Any]:
@@ -44,11 +51,11 @@ def smallest_eigenvalue_lane(m: int, precision: str) -> Callable[..., Any]:
         PIXELS,
     )
 
-    def lane(b: Any) -> Any:
+    def lane(b: Any, *, spread: Spread = at_once) -> Any:
         pixels = b[0].size
         planes = np.ascontiguousarray(b).reshape(m + 1, pixels)
         out = np.empty(pixels, precision)
-        run(order, planes, out, 0, pixels)
+        spread(lambda start, stop: run(order, planes, out, start, stop), pixels)
         return out.reshape(b.shape[1:])
 
     return lane

@@ -28,7 +28,8 @@ def complex_arrays(precision: str) -> dict[int, Any]:
 
 
 PIXELS = _types.int64
-BYTES = {axes: _types.Array(_types.uint8, axes, "C") for axes in (1, 2)}
+REAL = _types.float64
+COUNTS = _types.Array(_types.int32, 1, "C")
 
 
 def order_type(m: int) -> Any:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 PRECISIONS = {"f": "f", "F": "f", "d": "d", "D": "d"}  # of an array's type, by its character
+LEAST_PIXELS = 64  # what the widest lane takes at a time
 PRECISION_NAMES = {"float32": "f", "float64": "d"}
 
 

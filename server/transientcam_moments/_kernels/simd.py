@@ -405,31 +405,32 @@ def store_complex(typingctx: Any, array: Any, index: Any, re: Any, im: Any) -> A
     return types.void(array, types.intp, re, re), codegen
 
 
-def _llvm(name: str) -> Any:
-    """Return LLVM's vector intrinsic ``name`` of one operand."""
+def _llvm(name: str, operands: int) -> Any:
+    """Return LLVM's vector intrinsic ``name``."""
 
-    @intrinsic
-    def function(typingctx: Any, x: Any) -> Any:
-        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            vector = args[0].type
-            kind = ir.FunctionType(vector, [vector])
-            full = f"llvm.{name}.v{vector.count}f{x.element.bitwidth}"
-            callee = cgutils.get_or_insert_function(builder.module, kind, full)
-            return builder.call(callee, args)
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        vector = args[0].type
+        kind = ir.FunctionType(vector, [vector] * operands)
+        full = f"llvm.{name}.v{vector.count}f{sig.args[0].element.bitwidth}"
+        callee = cgutils.get_or_insert_function(builder.module, kind, full)
+        return builder.call(callee, args)
 
-        return x(x), codegen
-
-    return function
+    if operands == 1:
+        return intrinsic(lambda typingctx, x: (x(x), codegen))
+    return intrinsic(lambda typingctx, x, y, z: (x(x, x, x), codegen))
 
 
-sqrt = _llvm("sqrt")
-absolute = _llvm("fabs")
+sqrt = _llvm("sqrt", 1)
+absolute = _llvm("fabs", 1)
+fma = _llvm("fma", 3)  # x y + z, rounded once
 
 
 @intrinsic
 def select(typingctx: Any, mask: Any, x: Any, y: Any) -> Any:
     """Return ``x`` where the mask is true, else ``y``."""
     lanes = x if isinstance(x, Lanes) else y
+    if not isinstance(lanes, Lanes):
+        return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.select(*args)
@@ -467,14 +468,14 @@ def some(typingctx: Any, mask: Any) -> Any:
 
 
 @intrinsic
-def bits(typingctx: Any, mask: Any) -> Any:
-    """Return the truth values as the low bits of an integer, the first pixel lowest."""
+def count(typingctx: Any, mask: Any) -> Any:
+    """Return for how many pixels the mask is true."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         packed = builder.bitcast(args[0], ir.IntType(mask.count))
-        return builder.zext(packed, ir.IntType(64))
+        return builder.zext(builder.ctpop(packed), ir.IntType(64))
 
-    return types.uint64(mask), codegen
+    return types.int64(mask), codegen
 
 
 def _constant(value: Callable[[Any], float]) -> Any:
@@ -496,6 +497,27 @@ def _constant(value: Callable[[Any], float]) -> Any:
 eps = _constant(lambda limits: limits.eps)
 tiny = _constant(lambda limits: limits.tiny)
 nan = _constant(lambda limits: np.nan)
+infinity = _constant(lambda limits: np.inf)
+# A step this small leaves an error of rounding where it converges with the third power.
+nearly = _constant(lambda limits: limits.eps**0.5)
 # The powers of two between which a number and its reciprocal are far from the ends of the range.
 large = _constant(lambda limits: 2.0 ** (limits.maxexp * 3 // 4))
 small = _constant(lambda limits: 2.0 ** -(limits.maxexp * 3 // 4))
+
+
+@intrinsic
+def arctangent_ratio(typingctx: Any, square: Any) -> Any:
+    """Return arctan(t) / t of ``square`` = t^2, for 0 <= t <= tan(pi / 8), by its power series."""
+    terms = 9 if square.element.bitwidth == 32 else 21  # tan(pi / 8)^(2 terms) below rounding
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        vector = args[0].type
+        total = None
+        for k in reversed(range(terms)):
+            term = ir.Constant(vector, [(-1.0) ** k / (2 * k + 1)] * vector.count)
+            if total is not None:
+                term = builder.fadd(builder.fmul(total, args[0], flags=_FUSE), term, flags=_FUSE)
+            total = term
+        return total
+
+    return square(square), codegen

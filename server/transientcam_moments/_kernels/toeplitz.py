@@ -10,7 +10,7 @@ from numba import njit
 
 from transientcam_moments._kernels import simd
 
-_EIGENVALUE_STEPS = 30  # five are usual; a cluster of m equal eigenvalues takes thirteen
+_EIGENVALUE_STEPS = 64  # nine are usual; a cluster of equal eigenvalues halves the distance each
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -21,8 +21,8 @@ def load_relative(order: Any, b: Any, p: int, re: Any, im: Any) -> Any:
     """
     m = len(order)
     re[0], im[0] = simd.load_complex(re[0], b[0], p)
-    im[0] = re[0] * 0.0
-    scale, poison = simd.absolute(re[0]), im[0]
+    scale, poison = simd.absolute(re[0]), re[0] * 0.0 + im[0] * 0.0
+    im[0] = poison
     for j in range(1, m + 1):
         re[j], im[j] = simd.load_complex(re[0], b[j], p)
         poison = poison + re[j] * 0.0 + im[j] * 0.0
@@ -40,6 +40,85 @@ def load_relative(order: Any, b: Any, p: int, re: Any, im: Any) -> Any:
     for j in range(m + 1):
         re[j], im[j] = re[j] * inverse, im[j] * inverse + poison
     return scale
+
+
+@njit(forceinline=True, error_model="numpy")
+def physical(order: Any, re: Any, im: Any) -> None:
+    """Divide by b_0 where it isn't the largest moment, and bound moments by 2 b_0.
+
+    |b_k| <= b_0 for every density; where that is broken only the direction of b_k still counts.
+    """
+    if simd.some(~(re[0] >= 1.0)):
+        b0 = re[0]
+        inverse = simd.select(b0 > 4.0 * simd.tiny(b0), 1.0 / b0, 0.0 * b0)
+        re[0] = b0 * inverse
+        for k in range(1, len(order) + 1):
+            size = simd.sqrt(re[k] * re[k] + im[k] * im[k])
+            factor = simd.select(size > 2.0 * b0, 2.0 / size, inverse)
+            factor = simd.select(re[0] > 0.0, factor, 0.0 * b0)
+            re[k], im[k] = re[k] * factor, im[k] * factor
+
+
+@njit(forceinline=True, error_model="numpy")
+def step_up(k: int, ar: Any, ai: Any, gr: Any, gi: Any) -> None:
+    """Raise the order of a polynomial to k: a_j + g conj(a_{k-j}), a_k = g."""
+    for j in range(1, k // 2 + 1):
+        ur, ui, vr, vi = ar[j], ai[j], ar[k - j], ai[k - j]
+        ar[j], ai[j] = ur + gr * vr + gi * vi, ui + gi * vr - gr * vi
+        ar[k - j], ai[k - j] = vr + gr * ur + gi * ui, vi + gi * ur - gr * ui
+    ar[k], ai[k] = gr, gi
+
+
+@njit(forceinline=True, error_model="numpy")
+def reflect(k: int, re: Any, im: Any, ar: Any, ai: Any, error: Any) -> Any:
+    """Return g_k = -(b_k + sum_j a_j b_{k-j}) / E_{k-1} (Levinson; Theorem 1)."""
+    x, y = re[k], im[k]
+    for j in range(1, k):
+        x = x + ar[j] * re[k - j] - ai[j] * im[k - j]
+        y = y + ar[j] * im[k - j] + ai[j] * re[k - j]
+    inverse = -1.0 / error
+    return x * inverse, y * inverse
+
+
+@njit(forceinline=True, error_model="numpy")
+def below_one(x: Any, y: Any) -> Any:
+    """Return 1 - |g|^2 with an error relative to itself, also where |g| is close to 1.
+
+    What rounding takes from the squares is put back; otherwise the errors and the polynomials of
+    the recursion don't belong to each other.
+    """
+    xx, yy = x * x, y * y
+    lost = simd.fma(x, x, -xx) + simd.fma(y, y, -yy)
+    return ((1.0 - simd.maximum(xx, yy)) - simd.minimum(xx, yy)) - lost
+
+
+@njit(forceinline=True, error_model="numpy")
+def levinson(order: Any, re: Any, im: Any, ar: Any, ai: Any, gr: Any, gi: Any) -> Any:
+    """Fill a_1 .. a_m and g_1 .. g_m from moments with b_0 = 1, and return E_m.
+
+    Where E_k would fall to 4 eps or below, the border of the cone, g_k is projected into the disc
+    and all later ones are zero.
+    """
+    error = re[0]
+    floor = 4.0 * simd.eps(error)
+    alive = error > 0.0
+    for k in range(1, len(order) + 1):
+        x, y = reflect(k, re, im, ar, ai, error)
+        remaining = error * below_one(x, y)
+        inside = remaining > floor
+        if simd.some(~inside | ~alive):
+            onto = simd.sqrt(simd.maximum(1.0 - floor / error, 0.0)) / simd.sqrt(x * x + y * y)
+            onto = simd.select(inside, 1.0, onto)
+            # NaN belongs to an invalid pixel, which keeps it
+            x = simd.select(alive, x * onto, 0.0 * re[k])
+            y = simd.select(alive, y * onto, 0.0 * im[k])
+            remaining = simd.select(inside, remaining, error * below_one(x, y))
+            remaining = simd.select(alive, remaining, error)
+            alive = alive & inside
+        step_up(k, ar, ai, x, y)
+        gr[k - 1], gi[k - 1] = x, y
+        error = remaining
+    return error
 
 
 @njit(forceinline=True, error_model="numpy")

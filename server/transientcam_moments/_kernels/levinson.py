@@ -1,0 +1,65 @@
+"""Levinson's recursion for every pixel."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from transientcam_moments._kernels import simd, toeplitz
+from transientcam_moments._kernels.entries import (
+    PIXELS,
+    complex_arrays,
+    entry,
+    order_type,
+    real_arrays,
+)
+from transientcam_moments._kernels.spread import Spread, at_once
+
+_INTERLEAVE = 2
+
+
+@njit(nogil=True, error_model="numpy")
+def _levinson(
+    order: Any, b: Any, error: Any, polynomial: Any, reflection: Any, start: int, stop: int
+) -> None:
+    m = len(order)
+    one = simd.ones(error, _INTERLEAVE)
+    step = simd.width(one)
+    re, im = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    ar, ai = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    gr, gi = simd.registers(one, order, 0), simd.registers(one, order, 0)
+    for left in range(start, stop, step):
+        p = min(left, stop - step)
+        scale = toeplitz.load_relative(order, b, p, re, im)
+        brightness = re[0] * scale
+        toeplitz.physical(order, re, im)
+        simd.store(error, p, brightness * toeplitz.levinson(order, re, im, ar, ai, gr, gi))
+        simd.store_complex(polynomial[0], p, one, one * 0.0)
+        for j in range(m):
+            simd.store_complex(polynomial[j + 1], p, ar[j + 1], ai[j + 1])
+            simd.store_complex(reflection[j], p, gr[j], gi[j])
+
+
+def levinson_lane(m: int, precision: str) -> Callable[..., Any]:
+    """Compile Levinson's recursion of order m; see the table in ``_kernels``."""
+    order = (0,) * m
+    real, cplx = real_arrays(precision), complex_arrays(precision)
+    run = entry(_levinson, order_type(m), cplx[2], real[1], cplx[2], cplx[2], PIXELS, PIXELS)
+
+    def lane(b: Any, *, spread: Spread = at_once) -> tuple[Any, Any, Any]:
+        shape, pixels = b.shape[1:], b[0].size
+        planes = np.ascontiguousarray(b).reshape(m + 1, pixels)
+        error = np.empty(pixels, precision)
+        polynomial, reflection = np.empty_like(planes), np.empty_like(planes[1:])
+        spread(
+            lambda start, stop: run(order, planes, error, polynomial, reflection, start, stop),
+            pixels,
+        )
+        return (
+            error.reshape(shape),
+            polynomial.reshape((m + 1, *shape)),
+            reflection.reshape((m, *shape)),
+        )
+
+    return lane

@@ -1,0 +1,146 @@
+"""Pisarenko's returns of every pixel."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from transientcam_moments._kernels.eigenvalue import eigenvalues
+from transientcam_moments._kernels.entries import (
+    COUNTS,
+    PIXELS,
+    REAL,
+    complex_arrays,
+    entry,
+    order_type,
+    real_arrays,
+)
+from transientcam_moments._kernels.registry import LEAST_PIXELS, REGISTRY, Key
+from transientcam_moments._kernels.returns import find_returns
+from transientcam_moments._kernels.spread import Spread, at_once
+
+_BLOCK = 256  # pixels that stay in the first cache from one stage to the next
+
+
+@njit(nogil=True, error_model="numpy")
+def _pisarenko(
+    order: Any,
+    turns: Any,
+    b: Any,
+    uniform: Any,
+    known: bool,
+    phase: Any,
+    weight: Any,
+    count: Any,
+    residual: Any,
+    noise: float,
+    start: int,
+    stop: int,
+) -> int:
+    ill = 0
+    for left in range(start, stop, _BLOCK):
+        begin, end = min(left, max(start, stop - _BLOCK)), min(left + _BLOCK, stop)
+        if not known:
+            eigenvalues(order, b, uniform, begin, end)
+        ill += find_returns(
+            order, turns, b, uniform, phase, weight, count, residual, noise, begin, end
+        )
+    return ill
+
+
+def half_turns(m: int, precision: str) -> Any:
+    """Return cos and sin of pi k / m, k < m, one after the other."""
+    angle = np.pi * np.arange(m) / m
+    return np.concatenate([np.cos(angle), np.sin(angle)]).astype(precision)
+
+
+def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
+    """Compile Pisarenko's returns of order m; see the table in ``_kernels``."""
+    order = (0,) * m
+    real, cplx = real_arrays(precision), complex_arrays(precision)
+    turns = half_turns(m, precision)
+    run = entry(
+        _pisarenko,
+        order_type(m),
+        real[1],
+        cplx[2],
+        real[1],
+        PIXELS,
+        real[2],
+        real[2],
+        COUNTS,
+        real[1],
+        REAL,
+        PIXELS,
+        PIXELS,
+    )
+
+    def lane(
+        b: Any,
+        eigenvalue: Any = None,
+        *,
+        noise: float | None = None,
+        spread: Spread = at_once,
+    ) -> tuple[Any, Any, Any, Any]:
+        shape, pixels = b.shape[1:], b[0].size
+        planes = np.ascontiguousarray(b).reshape(m + 1, pixels)
+        uniform = np.empty(pixels, precision)
+        if eigenvalue is not None:
+            uniform[:] = eigenvalue.reshape(-1)
+        phase, weight = np.empty((m, pixels), precision), np.empty((m, pixels), precision)
+        count, residual = np.empty(pixels, np.int32), np.empty(pixels, precision)
+        eps = noise or float(np.finfo(precision).eps)
+        ill: list[int] = []
+
+        def part(start: int, stop: int) -> None:
+            known = int(eigenvalue is not None)
+            ill.append(
+                run(
+                    order, turns, planes, uniform, known, phase, weight, count, residual, eps,
+                    start, stop,
+                )
+            )  # fmt: skip
+
+        spread(part, pixels)
+        found = (phase, weight, uniform, count)
+        if any(ill):
+            redo(planes, found, np.flatnonzero(residual > 16 * (m + 1) * eps), eps)
+        return (
+            phase.reshape((m, *shape)),
+            weight.reshape((m, *shape)),
+            uniform.reshape(shape),
+            count.reshape(shape),
+        )
+
+    return lane
+
+
+def redo(planes: Any, found: tuple[Any, ...], ill: Any, noise: float) -> None:
+    """Redo pixels whose returns don't reproduce their moments, with more digits or more care.
+
+    Parameters
+    ----------
+    planes : array, shape (m + 1, P)
+        Moments.
+    found : tuple of array
+        Phase, weight, uniform, count; written to.
+    ill : integer array
+        The pixels.
+    noise : float
+        Precision of the data.
+    """
+    from transientcam_moments.pisarenko import _improved, _pisarenko
+
+    part = planes[:, ill]
+    wide = REGISTRY.compiled.get(Key("pisarenko", len(planes) - 1, "d"))
+    if part.dtype == np.complex64 and wide is not None and ill.size >= LEAST_PIXELS:
+        better = wide(part.astype(np.complex128), noise=noise)
+    elif part.dtype == np.complex64:
+        better = _improved(part, tuple(plane[..., ill] for plane in found))
+    else:
+        better = _pisarenko(part, noise=noise)
+        if noise == np.finfo(np.float64).eps:
+            better = _improved(part, better)
+    for plane, new in zip(found, better, strict=True):
+        plane[..., ill] = new
