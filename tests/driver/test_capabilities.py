@@ -4,7 +4,6 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
 from transientcam_driver import Sequence, SequenceError, SubPhases
 from transientcam_driver.simulation.profile import prototype
 

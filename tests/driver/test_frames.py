@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from transientcam_driver import Counters, RawFrame, Sequence
 from transientcam_driver.frames import FrameAssembler
 from transientcam_driver.framing import ImagePacket

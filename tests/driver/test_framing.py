@@ -1,7 +1,8 @@
+from itertools import pairwise
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
 from transientcam_driver.framing import ImagePacket, PacketDecoder
 from transientcam_driver.protocol import ImageFlag, ImageHeader, payload_checksum
 
@@ -33,7 +34,7 @@ def decode(data: bytes, boundaries: list[int]) -> tuple[list[ImagePacket], Packe
     decoder = PacketDecoder(payload_bytes=PAYLOAD_BYTES)
     cuts = sorted({0, len(data), *(cut % (len(data) + 1) for cut in boundaries)})
     packets = []
-    for start, end in zip(cuts[:-1], cuts[1:], strict=True):
+    for start, end in pairwise(cuts):
         packets += decoder.feed(memoryview(data)[start:end])
     return packets, decoder
 

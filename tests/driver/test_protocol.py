@@ -6,7 +6,6 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
 from transientcam_driver import FirmwareTooOld, ProtocolError, Sequence, SubPhases
 from transientcam_driver.protocol import (
     CAPS_BYTES,
@@ -156,7 +155,7 @@ def test_capabilities_read_back_are_the_same() -> None:
 def test_capabilities_with_fields_appended_by_a_later_firmware_are_read() -> None:
     longer = bytearray(pack_capabilities(CAPABILITIES)[:-4] + b"new field")
     struct.pack_into("<H", longer, 6, len(longer) + 4)
-    longer += struct.pack("<I", naive_crc(longer))
+    longer += struct.pack("<I", naive_crc(bytes(longer)))
 
     assert unpack_capabilities(bytes(longer)) == CAPABILITIES
 

@@ -16,6 +16,7 @@ from transientcam_driver.simulation.geometry import Points, blocked_by_mask
 from transientcam_driver.simulation.responses import SparseResponses
 from transientcam_driver.simulation.scene import Light, Scene, Surface, Viewpoint
 
+_BLOCK = 8192  # rays at a time, so that what is computed for them stays in the cache
 _FAR_M = 1e3  # longer than any way in a scene
 
 
@@ -42,22 +43,25 @@ class _ImageLight:
 def trace(scene: Scene, *, width: int, height: int) -> SparseResponses:
     """Impulse responses of all pixels by direct light and any chain of mirrors up to the limit."""
     assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
-    start, direction = _camera_rays(scene.camera, width=width, height=height)
-    seen = _first_diffuse(scene, start, direction)
-    delays, weights = [], []
-    for light in _image_lights(scene):
-        delay_s, weight = _light_on(scene, light, seen)
-        if np.any(weight > 0):
-            delays.append(_on_pixels(seen, delay_s, width * height))
-            weights.append(_on_pixels(seen, weight, width * height))
-    if not weights:
-        delays, weights = [np.zeros(width * height)], [np.zeros(width * height)]
-    shape = (len(weights), height, width)
-    return SparseResponses(np.reshape(delays, shape), np.reshape(weights, shape))
+    directions = _camera_rays(scene.camera, width=width, height=height)
+    lights = tuple(_image_lights(scene))
+    delay_s = np.zeros((len(lights), len(directions)))
+    weight = np.zeros_like(delay_s)
+    for first in range(0, len(directions), _BLOCK):
+        pixels = slice(first, first + _BLOCK)
+        seen = _first_diffuse(scene, scene.camera.position_m, directions[pixels])
+        for k, light in enumerate(lights):
+            delay_s[k, pixels][seen.pixel], weight[k, pixels][seen.pixel] = _light_on(
+                scene, light, seen
+            )
+    reaching = np.any(weight > 0, axis=1)
+    reaching[0] |= not reaching.any()  # a dark scene has one return, of weight 0
+    shape = (-1, height, width)
+    return SparseResponses(delay_s[reaching].reshape(shape), weight[reaching].reshape(shape))
 
 
-def _camera_rays(view: Viewpoint, *, width: int, height: int) -> tuple[Points, Points]:
-    """Rays through the pixels' centres, row by row from the top."""
+def _camera_rays(view: Viewpoint, *, width: int, height: int) -> Points:
+    """Return unit vectors through the pixels' centres, row by row from the top."""
     forward = view.look_at_m - view.position_m
     forward = forward / np.linalg.norm(forward)
     right = np.cross(forward, [0.0, 0.0, 1.0])
@@ -67,13 +71,14 @@ def _camera_rays(view: Viewpoint, *, width: int, height: int) -> tuple[Points, P
     x = half * (2 * (np.arange(width) + 0.5) / width - 1)
     y = half * (height / width) * (1 - 2 * (np.arange(height) + 0.5) / height)
     rays = forward + x[None, :, None] * right + y[:, None, None] * up
-    rays = (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).reshape(-1, 3)
-    return np.broadcast_to(view.position_m, rays.shape).copy(), rays
+    directions: Points = (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).reshape(-1, 3)
+    return directions
 
 
-def _first_diffuse(scene: Scene, start: Points, direction: Points) -> _Seen:
+def _first_diffuse(scene: Scene, eye: Points, direction: Points) -> _Seen:
     """Follow the camera's rays, over mirrors, to the diffuse surface each one ends on."""
-    count = len(start)
+    count = len(direction)
+    start = np.broadcast_to(eye, direction.shape)
     pixel = np.arange(count)
     distance_m, throughput = np.zeros(count), np.ones(count)
     ended: list[tuple[NDArray[np.intp], Points, NDArray[np.intp], Points, Points]] = []
@@ -185,9 +190,3 @@ def _hit(surface: Surface, start: Points, end: Points) -> NDArray[np.float64]:
     if surface.opaque is None:
         return at
     return np.where(blocked_by_mask(surface.rectangle, surface.opaque, start, end), at, np.inf)
-
-
-def _on_pixels(seen: _Seen, values: NDArray[np.float64], pixels: int) -> NDArray[np.float64]:
-    image = np.zeros(pixels)
-    image[seen.pixel] = values
-    return image

@@ -172,11 +172,7 @@ def _brightness(path: Path, values: NDArray[np.float32]) -> float:
 
 def _read(path: Path, bin_s: float | None) -> _Part:
     """Read one .npz; time zero is its first bin, or what its optical path lengths say."""
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            content = {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, zipfile.BadZipFile, AttributeError) as error:
-        raise SceneError(path, "the file", str(error), "a readable .npz") from error
+    content = _content(path)
     if "h" in content:
         start_s = _scalar(path, content, "start_opl_m") / SPEED_OF_LIGHT_M_S
         step_s = _scalar(path, content, "bin_opl_m") / SPEED_OF_LIGHT_M_S
@@ -188,6 +184,19 @@ def _read(path: Path, bin_s: float | None) -> _Part:
     step_s = bin_s if bin_s is not None else _scalar(path, content, "bin_s")
     dimensions = 1 if name == "counts" else 3
     return _Part(_values(path, content, name, dimensions), 0.0, _positive(path, "bin_s", step_s))
+
+
+def _content(path: Path) -> dict[str, Any]:
+    try:
+        # opened here, because np.load leaves the files open that it cannot read
+        with path.open("rb") as file:
+            archive = np.load(file, allow_pickle=False)
+            if isinstance(archive, np.ndarray):
+                raise SceneError(path, "the file", "one array without a name", "an .npz")
+            with archive:
+                return {name: archive[name] for name in archive.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise SceneError(path, "the file", str(error), "a readable .npz") from error
 
 
 def _values(path: Path, content: dict[str, Any], name: str, dimensions: int) -> NDArray[np.float32]:

@@ -71,6 +71,8 @@ class World:
 
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
         """Compute the moments of the impulse responses that the sequence measures."""
+        if self._plan is not None and self._plan.sequence == sequence:
+            return
         scale_e = self._electrons_per_s * sequence.exposure_s
         sub_phases = sequence.sub_phases
         # G_1: what the division of the exposure leaves of an ideal sinusoid (Sec. 4.1)

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-
 from transientcam_driver import Sequence, SubPhases
 from transientcam_driver.simulation.effects import EFFECTS, Call, Effect, ShotNoise
 from transientcam_driver.simulation.effects.shot_noise import FEW_E
@@ -62,7 +61,10 @@ def phasor(weights: tuple[float, ...], delays_s: tuple[float, ...], f_hz: float)
     )
 
 
-@pytest.mark.parametrize("sub_phases", [SubPhases("arccos", 8), SubPhases("none"), SubPhases("harmonic-cancellation", 3)])  # fmt: skip
+@pytest.mark.parametrize(
+    "sub_phases",
+    [SubPhases("arccos", 8), SubPhases("none"), SubPhases("harmonic-cancellation", 3)],
+)
 def test_images_follow_the_measurement_model(sub_phases: SubPhases) -> None:
     weights, delays_s = (0.5, 0.3, 0.1), (11.3e-9, 19.3e-9, 26.7e-9)
     sequence = Sequence(23e6, 3, exposure_s=EXPOSURE_S, sub_phases=sub_phases)

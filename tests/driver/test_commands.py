@@ -1,0 +1,27 @@
+import json
+
+import typer
+from transientcam_driver import list_scenes
+from transientcam_driver.commands import scenes
+from typer.testing import CliRunner
+
+
+def run(*arguments: str) -> str:
+    app = typer.Typer()
+    app.command()(scenes)
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_scenes_are_listed_by_the_name_that_opens_them() -> None:
+    output = run()
+
+    assert all(f"sim:{info.name}" in output for info in list_scenes())
+
+
+def test_scenes_are_printed_as_json() -> None:
+    listed = json.loads(run("--json"))
+
+    assert [entry["name"] for entry in listed] == ["measured", "mirrors"]
+    assert all(entry["description"] and entry["path"].endswith(".toml") for entry in listed)
