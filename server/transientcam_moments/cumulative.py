@@ -4,13 +4,19 @@ from typing import Any
 
 import numpy as np
 
-from transientcam_moments._arrays import Array, flat_planes, namespace, phases, squared
-from transientcam_moments.levinson import Coefficients
+from transientcam_moments._arrays import (
+    Array,
+    flat_planes,
+    namespace,
+    phases,
+    squared,
+    to_complex,
+)
+from transientcam_moments.levinson import Coefficients, from_reflection, moments_of
 from transientcam_moments.roots import disc_roots
 
 _BLOCK_VALUES = 1 << 16
-# sum |C_l| / b_0 is what the closed form multiplies rounding with
-_AMPLIFICATION = 1e4
+_TOLERANCE = 1e-11  # of the closed form, relative to b_0, before quadrature takes over
 _LEVELS = 60
 _NODES = 12
 
@@ -44,68 +50,99 @@ def cumulative(coefficients: Coefficients, phase_rad: Array) -> Array:
     quadrature on intervals that shrink towards the poles takes over. JAX arrays under `jit`
     always get the closed form.
     """
-    a = flat_planes(coefficients.polynomial)
-    error = coefficients.error.reshape(-1)
-    phase = phases(phase_rad, like=a)
-    xp = namespace(a)
-    if xp is not np:
-        out, _ = _cumulative(a, error, phase)
-        return out.reshape((phase.shape[0], *coefficients.error.shape))
-    wide, exact = a.astype(np.complex128), error.astype(np.float64)
-    out = np.empty((phase.shape[0], wide.shape[1]), error.dtype)
+    reflection = flat_planes(coefficients.reflection)
+    b0 = coefficients.brightness.reshape(-1)
+    phase = phases(phase_rad, like=reflection)
+    shape = (phase.shape[0], *coefficients.error.shape)
+    if namespace(reflection) is not np:
+        return _closed_form(from_reflection(b0, reflection), phase)[0].reshape(shape)
+    exact = from_reflection(b0.astype(np.float64), reflection.astype(np.complex128))
+    out = np.empty((phase.shape[0], b0.size), b0.dtype)
     pixels = max(128, _BLOCK_VALUES // max(1, phase.shape[0]))
-    for start in range(0, wide.shape[1], pixels):
+    for start in range(0, b0.size, pixels):
         part = slice(start, start + pixels)
-        out[:, part] = _with_fallback(wide[:, part], exact[part], phase)
-    return out.reshape((phase.shape[0], *coefficients.error.shape))
+        out[:, part] = _with_fallback(Coefficients(*(x[..., part] for x in exact)), phase)
+    return out.reshape(shape)
 
 
-def _with_fallback(a: Array, error: Array, phase: Array) -> Array:
-    out, amplification = _cumulative(a, error, phase)
-    ill = np.flatnonzero(~(amplification <= _AMPLIFICATION) & np.isfinite(error) & (error > 0))
+def _with_fallback(coefficients: Coefficients, phase: Array) -> Array:
+    out, error = _closed_form(coefficients, phase)
+    ill = np.flatnonzero(~(error <= _TOLERANCE) & (coefficients.error > 0))
     if ill.size:
-        out[:, ill] = _quadrature(a[:, ill], error[ill], phase)
+        out[:, ill] = _quadrature(Coefficients(*(x[..., ill] for x in coefficients)), phase)
     return out
 
 
-def _cumulative(a: Array, error: Array, phase: Array) -> tuple[Array, Array]:
-    """Planar statement of the closed form; also returns sum |C_l| / b_0."""
+def _closed_form(coefficients: Coefficients, phase: Array) -> tuple[Array, Array]:
+    """Planar statement of the closed form; also returns an estimate of its relative error."""
+    a = coefficients.polynomial
     xp = namespace(a)
     with np.errstate(all="ignore"):
+        b = moments_of(coefficients)
+        b0 = b[0].real
         poles = disc_roots(list(a[1:]))
-        shares = _shares(poles)
-        # partial fractions give C_0 .. C_{m-1} with sum C_l = b_0
-        b0 = sum(share.real for share in shares)
-        size = sum(xp.sqrt(squared(share)) for share in shares)
-        turn = phase[:, None]
-        whole = turn * xp.ones_like(error)
-        total = whole * b0
-        rotation = xp.cos(turn) - 1j * xp.sin(turn)
-        rotation = rotation.astype(a.dtype)
+        shares, error = _shares(poles, coefficients, b)
+        turn = phase[:, None].astype(b0.dtype)
+        backwards = to_complex(xp.cos(turn), -xp.sin(turn))
+        total = turn * b0
         for pole, share in zip(poles, shares, strict=True):
-            factor = (1 - pole * rotation) / (1 - pole)  # in the right half plane times its twin
-            angle = xp.arctan2((1 - pole * rotation).imag, (1 - pole * rotation).real)
-            angle = angle - xp.arctan2((1 - pole).imag, (1 - pole).real)
-            total = total + 2 * (share.real * angle + share.imag * xp.log(squared(factor)) / 2)
-        return (total * (error / (2 * np.pi))).astype(error.dtype), size / b0
+            # 2 Im(C log w): w = 1 - p exp(-i x) stays in the right half plane
+            start, w = 1 - pole, 1 - pole * backwards
+            angle = xp.arctan2(w.imag, w.real) - xp.arctan2(start.imag, start.real)
+            stretch = xp.log(squared(w) / squared(start))
+            total = total + (2 * share.real * angle + share.imag * stretch)
+        return xp.where(b0 > 0, total / (2 * np.pi), 0 * total), error
 
 
-def _shares(poles: list[Array]) -> list[Array]:
-    """Return C_l / E = p_l^{m-1} / prod_{j != l} (p_l - p_j) / prod_j (1 - conj(p_j) p_l)."""
-    shares = []
+def _shares(poles: list[Array], coefficients: Coefficients, b: Array) -> tuple[list[Array], Array]:
+    """Return the C_l of b_k = sum_l C_l p_l^k and an estimate of their error relative to b_0.
+
+    Notes
+    -----
+    There are two ways. As residues of the density, C_l = E p_l^{m-1} / (p'(p_l) prod_j (1 -
+    conj(p_j) p_l)), they know the light in a sharp peak to no more digits than the distance of its
+    pole from the circle has. As solution of the equations for k < m, C_l = sum_k q_k b_k / p'(p_l)
+    with p(z) / (z - p_l) = sum_k q_k z^k, they suffer twice where poles nearly coincide. Each
+    pixel takes the better one.
+    """
+    a = coefficients.polynomial
+    xp = namespace(a)
+    m = a.shape[0] - 1
+    size = sum(xp.sqrt(squared(plane)) for plane in a)
+    residues, solutions = [], []
+    residue_error, solution_error = 0 * coefficients.error, 0 * coefficients.error
     for index, pole in enumerate(poles):
-        below = 1 - pole.conj() * pole
-        share = pole**0
+        quotient = a[0]
+        solution = quotient * b[m - 1]
+        for k in range(1, m):
+            quotient = quotient * pole + a[k]
+            solution = solution + quotient * b[m - 1 - k]
+        slope, near = xp.ones_like(pole), 0 * size
+        mirrored = 1 - pole.conj() * pole
+        distance = mirrored.real
+        residue = coefficients.error
         for other_index, other in enumerate(poles):
             if other_index != index:
-                below = below * (1 - other.conj() * pole) * (pole - other)
-                share = share * pole
-        shares.append(share / below)
-    return shares
+                slope = slope * (pole - other)  # p'(p_l), of which close poles cancel each other
+                residue = residue * pole
+                mirrored = mirrored * (1 - other.conj() * pole)
+                near = near + 1 / xp.sqrt(squared(pole - other))
+        inverse = slope.conj() / squared(slope)
+        residues.append(residue * inverse * mirrored.conj() / squared(mirrored))
+        solutions.append(solution * inverse)
+        rounding = size * xp.sqrt(squared(inverse))
+        weight = xp.sqrt(squared(residues[-1])), xp.sqrt(squared(solutions[-1]))
+        residue_error = residue_error + weight[0] + b[0].real * rounding / distance
+        solution_error = solution_error + weight[1] * (1 + rounding * near)
+    better = residue_error <= solution_error
+    shares = [xp.where(better, *pair) for pair in zip(residues, solutions, strict=True)]
+    eps = float(np.finfo(size.dtype).eps)
+    return shares, eps * xp.where(better, residue_error, solution_error) / b[0].real
 
 
-def _quadrature(a: Array, error: Array, phase: Array) -> Array:
+def _quadrature(coefficients: Coefficients, phase: Array) -> Array:
     """Integrate by Gauss-Legendre rules on intervals that halve towards the angle of each pole."""
+    a, error = coefficients.polynomial, coefficients.error
     with np.errstate(all="ignore"):
         angles = np.angle(np.stack(disc_roots(list(a[1:])))) % (2 * np.pi)
     steps = np.pi * 0.5 ** np.arange(_LEVELS)
@@ -120,8 +157,8 @@ def _quadrature(a: Array, error: Array, phase: Array) -> Array:
     out = np.empty(wanted.shape)
     for pixel in range(a.shape[1]):  # few pixels come here
         at = np.searchsorted(knots[:, pixel], rest)
-        out[:, pixel] = running[at, pixel] + turns * running[-1, pixel]
-    return out
+        out[:, pixel] = running[at, pixel] / running[-1, pixel] + turns
+    return out * coefficients.brightness
 
 
 def _panels(a: Array, error: Array, knots: Array) -> Array:

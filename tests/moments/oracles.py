@@ -50,8 +50,8 @@ def toeplitz(b: Complex) -> Complex:
 
 def smallest_eigenvalue(b: Complex) -> Real:
     """By LAPACK, in double precision."""
-    values: Real = np.linalg.eigvalsh(toeplitz(b))[..., 0]
-    return values
+    values: Real = np.linalg.eigvalsh(toeplitz(b))
+    return values[..., 0]
 
 
 def first_column_of_inverse(b: Complex) -> Complex:
@@ -66,14 +66,16 @@ def density(b: Complex, phase_rad: Sequence[float] | Real) -> Real:
     column = first_column_of_inverse(b)
     wave = np.exp(1j * np.outer(np.asarray(phase_rad), np.arange(b.shape[0])))
     below = np.abs(np.tensordot(wave, column.conj(), axes=1)) ** 2
-    return column[0].real / (2 * np.pi * below)
+    h: Real = column[0].real / (2 * np.pi * below)
+    return h
 
 
 def moments_of_density(density: Real, phase_rad: Real, m: int) -> Complex:
     """Moments of a density given on a full turn of equidistant phases: exact for smooth ones."""
     step = 2 * np.pi / phase_rad.size
     wave = np.exp(1j * np.outer(np.arange(m + 1), phase_rad)) * step
-    return np.tensordot(wave, density, axes=1)
+    moments: Complex = np.tensordot(wave, density, axes=1)
+    return moments
 
 
 def around(difference: ArrayLike) -> Real:

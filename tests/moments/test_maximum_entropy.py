@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import transientcam_moments as tm
 from scipy.optimize import minimize
 
-import transientcam_moments as tm
 from tests.moments import oracles
 
 PHASE = np.linspace(0, 2 * np.pi, 4096, endpoint=False)
@@ -116,7 +116,7 @@ def test_peaks_of_three_measured_impulse_responses(
     data_dir: Path, m: int, expected_ns: tuple[float, ...], dtype: type
 ) -> None:
     frequency_hz = 23e6
-    b = composite(data_dir, m, frequency_hz).astype(dtype)
+    b: np.ndarray = composite(data_dir, m, frequency_hz).astype(dtype)
 
     found = tm.peaks(tm.levinson(b), threshold=0.0)
 

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 import transientcam_moments as tm
 
 
@@ -28,7 +27,7 @@ def test_arccos_sampling_leaves_even_harmonics_as_theory_says() -> None:
 def test_arccos_sampling_with_eight_steps_leaves_known_odd_harmonics() -> None:
     gains = np.abs(tm.modulation_gain(np.array([3, 5, 7]), *tm.arccos_sub_phases(8)))
 
-    assert np.round(gains, 4).tolist() == [0.0255, 0.0175, 0.0346]
+    assert np.abs(gains - [0.0255, 0.0175, 0.0346]).max() < 5e-5
 
 
 def test_effective_modulation_of_a_square_wave_is_its_series_times_the_gain() -> None:
@@ -59,7 +58,7 @@ def test_distortion_of_a_measured_correlation_falls_as_published(data_dir: Path)
     raw = distortion(np.zeros(1), np.ones(1))
     cancelled = distortion(*tm.harmonic_cancellation_sub_phases(3))
     arccos = distortion(*tm.arccos_sub_phases(8))
-    assert np.round([raw, cancelled, arccos], 3).tolist() == [0.194, 0.018, 0.007]
+    assert np.abs(np.array([raw, cancelled, arccos]) - [0.194, 0.018, 0.007]).max() < 5e-4
 
 
 def test_wrong_arguments_are_refused() -> None:
