@@ -9,8 +9,8 @@ void main() {
 /**
  * Eq. (2) at one time of flight, a fragment a pixel of the sensor.
  *
- * Layer 0 of \`coefficients\` is E, layers 2j - 1 and 2j are the real and imaginary part of a_j. With
- * \`asNumbers\` the density itself is written, which needs a framebuffer of floats.
+ * A texel of `coefficients` holds two complex numbers, a_2l and a_(2l+1) in layer l; in the place of
+ * a_0 = 1 stands E. With `asNumbers` the density itself is written, which needs a framebuffer of floats.
  */
 export const FRAGMENT_SHADER = `#version 300 es
 precision highp float;
@@ -19,7 +19,7 @@ precision highp sampler2DArray;
 uniform sampler2DArray coefficients;
 uniform sampler2D backdrop;
 uniform sampler2D colours;
-uniform int harmonics;
+uniform int layers;
 uniform vec2 z;                // exp(i phi)
 uniform float baseFrequencyHz;
 uniform float white;           // density shown brightest
@@ -28,16 +28,21 @@ uniform int tone;              // linear, root, logarithmic
 uniform bool asNumbers;
 out vec4 colour;
 
+vec2 horner(vec2 p, vec2 a) {  // (p + conj(a)) z
+  p += vec2(a.x, -a.y);
+  return vec2(p.x * z.x - p.y * z.y, p.x * z.y + p.y * z.x);
+}
+
 float density(ivec2 at) {
   vec2 p = vec2(0.0);
-  for (int j = harmonics; j >= 1; j--) {  // Horner's rule
-    p += vec2(
-      texelFetch(coefficients, ivec3(at, 2 * j - 1), 0).r,
-      -texelFetch(coefficients, ivec3(at, 2 * j), 0).r);
-    p = vec2(p.x * z.x - p.y * z.y, p.x * z.y + p.y * z.x);
+  for (int layer = layers - 1; layer >= 1; layer--) {
+    vec4 pair = texelFetch(coefficients, ivec3(at, layer), 0);
+    p = horner(horner(p, pair.zw), pair.xy);
   }
+  vec4 first = texelFetch(coefficients, ivec3(at, 0), 0);
+  p = horner(p, first.zw);
   p.x += 1.0;
-  return texelFetch(coefficients, ivec3(at, 0), 0).r * baseFrequencyHz / dot(p, p);
+  return first.x * baseFrequencyHz / dot(p, p);
 }
 
 void main() {

@@ -2,10 +2,11 @@ import type { Coefficients } from "../physics/maximumEntropy";
 import { colourTable, LEVELS, type ColourMapName } from "../ui/colourMaps";
 import type { Backdrop, DensityRenderer, Exposure } from "./renderer";
 import { FRAGMENT_SHADER, VERTEX_SHADER } from "./shader";
+import { layersOf, packTexels } from "./texels";
 import { toneIndex } from "./tone";
 
 const UNIFORMS = [
-  "coefficients", "backdrop", "colours", "harmonics", "z", "baseFrequencyHz", "white", "backdropWhite", "tone", "asNumbers",
+  "coefficients", "backdrop", "colours", "layers", "z", "baseFrequencyHz", "white", "backdropWhite", "tone", "asNumbers",
 ] as const; // prettier-ignore
 
 type Uniforms = Record<(typeof UNIFORMS)[number], WebGLUniformLocation | null>;
@@ -24,6 +25,7 @@ export class WebGl2Renderer implements DensityRenderer {
   #lost: (() => void) | null = null;
   #uploaded: Coefficients | null = null;
   #layout = "";
+  #texels = new Float32Array(0);
   #backdrop: Backdrop["values"] | null = null;
   #backdropLayout = "";
   #colours: ColourMapName | null = null;
@@ -114,7 +116,7 @@ export class WebGl2Renderer implements DensityRenderer {
 
   #shade(coefficients: Coefficients, phase_rad: number): void {
     const gl = this.#gl;
-    gl.uniform1i(this.#uniforms.harmonics, coefficients.harmonics);
+    gl.uniform1i(this.#uniforms.layers, layersOf(coefficients.harmonics));
     gl.uniform2f(this.#uniforms.z, Math.cos(phase_rad), Math.sin(phase_rad));
     gl.uniform1f(this.#uniforms.baseFrequencyHz, coefficients.baseFrequency_hz);
     gl.viewport(0, 0, coefficients.width, coefficients.height);
@@ -124,16 +126,18 @@ export class WebGl2Renderer implements DensityRenderer {
   #upload(coefficients: Coefficients): void {
     if (this.#uploaded === coefficients) return;
     const gl = this.#gl;
-    const { width, height, harmonics, planes } = coefficients;
-    const layers = 2 * harmonics + 1;
+    const { width, height } = coefficients;
+    const layers = layersOf(coefficients.harmonics);
     const layout = `${width}x${height}x${layers}`;
     if (this.#layout !== layout) {
       this.#bind(COEFFICIENTS, gl.TEXTURE_2D_ARRAY);
-      gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, gl.R32F, width, height, layers);
+      gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, gl.RGBA32F, width, height, layers);
+      this.#texels = new Float32Array(4 * width * height * layers);
       this.#layout = layout;
     }
+    packTexels(coefficients, this.#texels);
     gl.activeTexture(gl.TEXTURE0 + COEFFICIENTS);
-    gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, 0, width, height, layers, gl.RED, gl.FLOAT, planes);
+    gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, 0, width, height, layers, gl.RGBA, gl.FLOAT, this.#texels);
     this.#uploaded = coefficients;
   }
 

@@ -8,8 +8,9 @@ export type Connection =
   | { readonly kind: "open" }
   | { readonly kind: "waiting"; readonly retryAt_s: number; readonly reason: string };
 
-/** Frames whose arrival the rate is taken over, and how long they count. */
+/** Frames whose arrival the rate is taken over, and how long they count; the last few count however old. */
 const RATE_FRAMES = 64;
+const RATE_FEWEST = 3;
 const RATE_WINDOW_S = 3;
 
 /** What the page knows of connection, camera and the flow of frames. Times are of this page's clock. */
@@ -73,7 +74,8 @@ export class Status {
     const known = this.latency_s.peek();
     this.latency_s.value = known === null ? latency_s : known + 0.2 * (latency_s - known);
     this.#arrivals.push(now_s);
-    this.#arrivals = this.#arrivals.slice(-RATE_FRAMES).filter((at_s) => now_s - at_s < RATE_WINDOW_S);
+    const recent = this.#arrivals.filter((at_s) => now_s - at_s < RATE_WINDOW_S).length;
+    this.#arrivals = this.#arrivals.slice(-Math.min(RATE_FRAMES, Math.max(RATE_FEWEST, recent)));
     const span_s = now_s - this.#arrivals[0];
     this.rate_hz.value = span_s > 0 ? (this.#arrivals.length - 1) / span_s : null;
   }

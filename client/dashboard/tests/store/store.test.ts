@@ -86,6 +86,12 @@ describe("the status", () => {
     expect(status.rate_hz.value).toBeCloseTo(20, 6);
   });
 
+  test("knows the rate of a camera that takes long for a frame", () => {
+    const status = new Status();
+    for (let n = 0; n < 5; n++) status.frameDrawn(meta(n + 1), 8 * n);
+    expect(status.rate_hz.value).toBeCloseTo(1 / 8, 9);
+  });
+
   test("tells how old frames are when they are drawn", () => {
     const status = new Status();
     for (let n = 1; n < 50; n++) status.frameDrawn(meta(n, 100 + n), 100 + n + 0.08);
