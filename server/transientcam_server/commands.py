@@ -164,7 +164,7 @@ def _tell(
         f"{measurement.base_frequency_hz / 1e6:g} MHz, {result.time_s.size} times of flight",
         soft_wrap=True,
     )
-    for flag in tm.Flags:
+    for flag in filter(None, tm.Flags):
         count = int(np.count_nonzero(result.flags & flag.value))
         if count:
             console.print(f"  {count} pixels flagged {str(flag.name).lower().replace('_', ' ')}")

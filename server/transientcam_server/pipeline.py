@@ -246,14 +246,17 @@ class Frame:
         return result
 
     async def _compute_product(self, product: Product, time_s: tuple[float, ...]) -> _Array:
+        if product.over_time:
+            self._refuse_too_large(len(time_s))
         with self._failure_of(product):
             needs = await asyncio.gather(*map(self.stage, product.needs))
             if product.over_time:
-                self._refuse_too_large(len(time_s))
-                run, needs = self._pipeline.run_long, [np.asarray(time_s), *needs]
+                work = self._pipeline.run_long(
+                    product.compute, self.recipe, np.asarray(time_s), *needs
+                )
             else:
-                run = self._pipeline.run
-            array, _ = await run(product.compute, self.recipe, *needs)
+                work = self._pipeline.run(product.compute, self.recipe, *needs)
+            array, _ = await work
         return array
 
     async def _encode(

@@ -1,55 +1,59 @@
 """Everything about one pixel: what a click on the dashboard shows."""
 
 import math
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 import transientcam_moments as tm
 from transientcam_driver import Truth
 
-from transientcam_server.products import Moments, Recipe
+from transientcam_server.products import Recipe
 
 _TRUE_RETURNS: Final = 16
 
 
 def describe_pixel(
-    recipe: Recipe, moments: Moments, truth: Truth | None, x: int, y: int, bins: int
+    recipe: Recipe, image: tm.Reconstruction, truth: Truth | None, x: int, y: int, bins: int
 ) -> dict[str, Any]:
     """Return range, returns, moments and impulse response of pixel (y, x) as plain values.
 
     The impulse response is given at ``bins`` times of flight, evenly spaced over one period of the
     base frequency, its start included.
     """
-    b = moments.b[:, y, x, np.newaxis]
+    flags = tm.Flags(int(image.flags[y, x]))
+    # smoothing and biasing are done; flags are not to be judged a second time
+    found = tm.Reconstruction(
+        image.moments[:, y, x, np.newaxis], replace(image.settings, zeroth="low-frequency")
+    )
     rad_s = 2.0 * np.pi * recipe.base_frequency_hz
     phase_rad = 2.0 * np.pi * np.arange(bins) / bins
-    coefficients = tm.levinson(b)
-    returns = tm.pisarenko(b)
-    separation = tm.separate(returns, threshold=recipe.settings.return_threshold)
-    flags = tm.Flags(int(moments.flags[y, x]))
+    density = rad_s * tm.density(found.coefficients, phase_rad)[:, 0]
+    cumulative = tm.cumulative(found.coefficients, phase_rad)[:, 0]
     return {
         "x": x,
         "y": y,
-        "range_m": _number(tm.range_m(separation.phase_rad, recipe.base_frequency_hz)[0]),
-        "direct": _number(separation.direct[0]) or 0.0,
-        "indirect": _number(separation.indirect[0]) or 0.0,
-        "brightness": _number(b[0, 0].real) or 0.0,
-        "uniform": _number(returns.uniform[0]) or 0.0,
-        "validity": _number(moments.validity[y, x]),
+        "range_m": None if flags & tm.INVALID else _number(found.range_m[0]),
+        "direct": _number(found.direct[0]) or 0.0,
+        "indirect": _number(found.indirect[0]) or 0.0,
+        "brightness": _number(found.brightness[0]) or 0.0,
+        "uniform": _number(found.uniform[0]) or 0.0,
+        "validity": _number(image.validity[y, x]),
         "flags": [str(flag.name).lower() for flag in tm.Flags if flag and flag in flags],
         "moments": [
-            {"re": _number(each.real) or 0.0, "im": _number(each.imag) or 0.0} for each in b[:, 0]
+            {"re": _number(each.real) or 0.0, "im": _number(each.imag) or 0.0}
+            for each in found.moments[:, 0]
         ],
         "returns": [
             {"time_s": float(phase) / rad_s, "weight": float(weight)}
-            for phase, weight in zip(returns.phase_rad[:, 0], returns.weight[:, 0], strict=True)
+            for phase, weight in zip(
+                found.returns.phase_rad[:, 0], found.returns.weight[:, 0], strict=True
+            )
             if weight > 0.0 and math.isfinite(phase)
         ],
         "time_s": [float(phase) / rad_s for phase in phase_rad],
-        "density_per_s": [
-            _number(rad_s * each) for each in tm.density(coefficients, phase_rad)[:, 0]
-        ],
-        "cumulative": [_number(each) for each in tm.cumulative(coefficients, phase_rad)[:, 0]],
+        "density_per_s": [_number(each) for each in density],
+        "cumulative": [_number(each) for each in cumulative],
         "truth": None if truth is None else _describe_truth(truth, x, y),
     }
 

@@ -6,7 +6,7 @@ somebody asked. The functions here are pure, so any executor may run them.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -35,25 +35,6 @@ class Recipe:
     def base_frequency_hz(self) -> float:
         """The frequency whose period is the unambiguous time of flight."""
         return self.applied.sequence.base_frequency_hz
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Moments:
-    """Moments fit for reconstruction, and what was found out on the way there.
-
-    Attributes
-    ----------
-    b
-        complex64 (m+1, H, W), calibrated, smoothed, biased, in DN.
-    validity
-        float32 (H, W), smallest eigenvalue over b_0 before biasing.
-    flags
-        uint8 (H, W), `transientcam_moments.Flags`.
-    """
-
-    b: _Array
-    validity: _Array
-    flags: _Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,76 +87,58 @@ class Product:
 # -- stages ------------------------------------------------------------------------------------
 
 
-def reconstructible(
-    calibrated: _Array, *, zeroth: str, settings: ReconstructionSettings
-) -> Moments:
-    """Return calibrated moments (m+1, H, W) made fit for reconstruction (Sec. 4.3)."""
-    smooth = tm.smooth(calibrated, sigma_px=settings.smoothing_px)
-    if zeroth == "estimated":
-        smooth = tm.estimate_zeroth(smooth, epsilon=settings.bias)
-    eigenvalue = tm.smallest_eigenvalue(smooth)
-    with np.errstate(all="ignore"):  # b_0 = 0 is flagged, not an error
-        validity = eigenvalue / smooth[0].real
-    flags = tm.flags(smooth, eigenvalue=eigenvalue)
-    biased = tm.bias(smooth, epsilon=settings.bias)
-    # what was indefinite is not any more, and says so
-    flags = np.where(biased.biased, flags & ~np.uint8(tm.Flags.DEGENERATE), flags)
-    flags |= np.where(biased.biased, np.uint8(tm.Flags.BIASED), np.uint8(0))
-    return Moments(biased.moments, np.asarray(validity, dtype=np.float32), flags)
-
-
-def _moments(recipe: Recipe, raw: RawFrame) -> Moments:
+def _reconstruction(recipe: Recipe, raw: RawFrame) -> tm.Reconstruction:
     sequence = recipe.applied.sequence
-    measured = tm.measure(raw.images, takes=sequence.takes, zeroth=sequence.zeroth)
     calibration = tm.nominal_calibration(
         sequence.harmonics,
         sequence.sub_phases.phases_rad,
         sequence.sub_phases.weights,
         sequence.zeroth,
     )
-    calibrated = tm.calibrate(measured, calibration)
-    moments = reconstructible(calibrated, zeroth=sequence.zeroth, settings=recipe.settings)
-    saturated = tm.saturated(raw.images, full_scale=recipe.full_scale)
-    flags = moments.flags | np.where(saturated, np.uint8(tm.Flags.SATURATED), np.uint8(0))
-    return replace(moments, flags=flags)
+    settings = recipe.settings.for_moments(
+        base_frequency_hz=sequence.base_frequency_hz,
+        zeroth=sequence.zeroth,
+        takes=sequence.takes,
+        full_scale=recipe.full_scale,
+    )
+    reconstruction = tm.reconstruct(raw.images, settings, calibration=calibration)
+    return _computed(reconstruction, "moments", "flags", "validity")
 
 
-def _coefficients(recipe: Recipe, moments: Moments) -> tm.Coefficients:
-    return tm.levinson(moments.b)
+def _computed(reconstruction: tm.Reconstruction, *names: str) -> tm.Reconstruction:
+    """Compute properties now, so that no product has to that needs no more than reading them."""
+    for name in names:
+        getattr(reconstruction, name)
+    return reconstruction
 
 
-def _returns(recipe: Recipe, moments: Moments) -> tm.Returns:
-    return tm.pisarenko(moments.b)
+def _coefficients(recipe: Recipe, reconstruction: tm.Reconstruction) -> tm.Coefficients:
+    return reconstruction.coefficients
 
 
-def _separation(recipe: Recipe, returns: tm.Returns) -> tm.Separation:
-    return tm.separate(returns, threshold=recipe.settings.return_threshold)
+def _returns(recipe: Recipe, reconstruction: tm.Reconstruction) -> tm.Reconstruction:
+    return _computed(reconstruction, "returns", "direct", "range_m")
 
 
 STAGES: Final[dict[str, Stage]] = {
-    "moments": Stage(("raw",), _moments),
+    "moments": Stage(("raw",), _reconstruction),
     "coefficients": Stage(("moments",), _coefficients),
     "returns": Stage(("moments",), _returns),
-    "separation": Stage(("returns",), _separation),
 }
 """Intermediate results by name; ``raw`` and ``truth`` are there without computing."""
 
 
-def pixel_counts(moments: Moments) -> dict[str, int]:
+def pixel_counts(reconstruction: tm.Reconstruction) -> dict[str, int]:
     """Return how many pixels carry each flag."""
-    flags = moments.flags
+    flags = reconstruction.flags
     counts = {"total": int(flags.size), "valid": int(np.count_nonzero(flags == 0))}
     for flag in tm.Flags:
-        counts[str(flag.name).lower()] = int(np.count_nonzero(flags & flag.value))
+        if flag:
+            counts[str(flag.name).lower()] = int(np.count_nonzero(flags & flag.value))
     return counts
 
 
 # -- products ----------------------------------------------------------------------------------
-
-
-def _range(recipe: Recipe, separation: tm.Separation, moments: Moments) -> _Array:
-    range_m = tm.range_m(separation.phase_rad, recipe.base_frequency_hz)
-    return np.where(moments.flags & _WITHOUT_RANGE, np.float32(np.nan), range_m)
 
 
 def _coefficient_planes(recipe: Recipe, coefficients: tm.Coefficients) -> _Array:
@@ -210,21 +173,20 @@ def _product(
     return Product(description, needs, compute, over_time, png_scale, png_unit)
 
 
-_WITHOUT_RANGE = np.uint8(tm.INVALID)
 _PNG_STEPS = {"range": (1e3, "mm"), "truth": (1e3, "mm"), "validity": (1e4, "1e-4")}
 
 PRODUCTS: Final[dict[str, Product]] = {
     product.name: product
     for product in (
-        _product("range", ("separation", "moments"), _range),
-        _product("direct", ("separation",), lambda _, separation: separation.direct),
-        _product("indirect", ("separation",), lambda _, separation: separation.indirect),
-        _product("uniform", ("returns",), lambda _, returns: returns.uniform),
-        _product("brightness", ("moments",), lambda _, moments: moments.b[0].real),
-        _product("validity", ("moments",), lambda _, moments: moments.validity),
-        _product("flags", ("moments",), lambda _, moments: moments.flags),
+        _product("range", ("returns",), lambda _, found: found.range_m),
+        _product("direct", ("returns",), lambda _, found: found.direct),
+        _product("indirect", ("returns",), lambda _, found: found.indirect),
+        _product("uniform", ("returns",), lambda _, found: found.uniform),
+        _product("brightness", ("moments",), lambda _, found: found.brightness),
+        _product("validity", ("moments",), lambda _, found: found.validity),
+        _product("flags", ("moments",), lambda _, found: found.flags),
         _product("coefficients", ("coefficients",), _coefficient_planes),
-        _product("moments", ("moments",), lambda _, moments: moments.b),
+        _product("moments", ("moments",), lambda _, found: found.moments),
         _product("raw", ("raw",), lambda _, raw: raw.images),
         _product("transient", ("coefficients",), _transient, over_time=True),
         _product("cumulative", ("coefficients",), _cumulative, over_time=True),

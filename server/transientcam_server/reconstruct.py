@@ -17,7 +17,6 @@ from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
 from transientcam_server.errors import InputError
-from transientcam_server.products import Moments, reconstructible
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
@@ -135,39 +134,30 @@ def reconstruct(
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Reconstruction:
     """Reconstruct every pixel, in blocks of pixels; ``progress`` is told how many are done."""
-    f_hz = measurement.base_frequency_hz
-    rad_s = 2.0 * np.pi * f_hz
-    time_s = np.arange(bins) / (bins * f_hz)
+    rad_s = 2.0 * np.pi * measurement.base_frequency_hz
+    time_s = 2.0 * np.pi * np.arange(bins) / (bins * rad_s)
+    chosen = settings.for_moments(base_frequency_hz=measurement.base_frequency_hz)
     # smoothing needs neighbours, so it comes before the pixels are taken apart
-    moments = reconstructible(measurement.moments, zeroth="measured", settings=settings)
-    height, width = moments.flags.shape
-    pixels = height * width
-    flat = Moments(
-        moments.b.reshape(moments.b.shape[0], pixels),
-        moments.validity.reshape(pixels),
-        moments.flags.reshape(pixels),
-    )
-    real = np.float32 if flat.b.dtype == np.complex64 else np.float64
+    smoothed = tm.Reconstruction(measurement.moments, chosen).smoothed
+    height, width = smoothed.shape[1:]
+    flat = smoothed.reshape(smoothed.shape[0], -1)
+    pixels = flat.shape[1]
+    real = np.float32 if flat.dtype == np.complex64 else np.float64
     density, cumulative = (np.empty((bins, pixels), dtype=real) for _ in range(2))
-    images = {name: np.empty(pixels, dtype=real) for name in ("range_m", *_WEIGHTS)}
+    images = {name: np.empty(pixels, dtype=real) for name in _IMAGES}
+    images["flags"] = np.empty(pixels, dtype=np.uint8)
     for block in _blocks(pixels, bins):
-        b = flat.b[:, block]
-        coefficients = tm.levinson(b)
-        density[:, block] = rad_s * tm.density(coefficients, rad_s * time_s)
-        cumulative[:, block] = tm.cumulative(coefficients, rad_s * time_s)
-        returns = tm.pisarenko(b)
-        separation = tm.separate(returns, threshold=settings.return_threshold)
-        images["range_m"][block] = tm.range_m(separation.phase_rad, f_hz)
-        images["direct"][block] = separation.direct
-        images["indirect"][block] = separation.indirect
-        images["uniform"][block] = returns.uniform
-        progress(min(block.stop, pixels), pixels)
+        found = tm.Reconstruction(flat[:, block], chosen)
+        density[:, block] = rad_s * tm.density(found.coefficients, rad_s * time_s)
+        cumulative[:, block] = tm.cumulative(found.coefficients, rad_s * time_s)
+        for name, image in images.items():
+            image[block] = getattr(found, name)
+        progress(block.stop, pixels)
     shape = (height, width)
     return Reconstruction(
         time_s=time_s,
         density=density.reshape(bins, *shape),
         cumulative=cumulative.reshape(bins, *shape),
-        flags=moments.flags,
         **{name: image.reshape(shape) for name, image in images.items()},
     )
 
@@ -183,7 +173,7 @@ def save(path: Path, result: Reconstruction) -> None:
         part.unlink(missing_ok=True)
 
 
-_WEIGHTS = ("direct", "indirect", "uniform")
+_IMAGES = ("range_m", "direct", "indirect", "uniform")
 
 
 def _blocks(pixels: int, bins: int) -> Iterator[slice]:

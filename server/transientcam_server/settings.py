@@ -12,6 +12,7 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
+import transientcam_moments as tm
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_settings import (
     BaseSettings,
@@ -28,6 +29,7 @@ from transientcam_server.errors import SettingsError, SettingsMistake
 ENVIRONMENT_PREFIX: Final = "TRANSIENTCAM_"
 DEFAULT_FILES: Final = (Path("transientcam.toml"), Path("/etc/transientcam/transientcam.toml"))
 
+_DEFAULTS = tm.Settings()  # the paper's
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -38,12 +40,27 @@ class _Group(BaseModel):
 class ReconstructionSettings(_Group):
     """How images become moments and moments become returns."""
 
-    smoothing_px: _Finite = Field(default=0.6, ge=0.0, le=10.0)
+    smoothing_px: _Finite = Field(default=_DEFAULTS.smoothing_sigma_px, ge=0.0, le=10.0)
     """Standard deviation of the Gaussian that smooths the moments, in pixels; 0 for none."""
-    bias: _Finite = Field(default=4e-3, gt=0.0, le=1.0)
+    bias: _Finite = Field(default=_DEFAULTS.epsilon, gt=0.0, lt=1.0)
     """Smallest eigenvalue every pixel's moments are raised to, over its brightness (Sec. 4.3)."""
-    return_threshold: _Finite = Field(default=0.1, ge=0.0, lt=1.0)
+    return_threshold: _Finite = Field(default=_DEFAULTS.threshold, ge=0.0, le=1.0)
     """Weight from which a return counts as the first, over the pixel's strongest return."""
+    estimator: Literal["pisarenko", "maximum-entropy", "single-frequency"] = "pisarenko"
+    """What the range is taken from; the last one is the usual way, for comparison."""
+    minimum_brightness_dn: _Finite = Field(default=0.0, ge=0.0)
+    """Pixels with no more light than this have no range."""
+
+    def for_moments(self, **others: Any) -> tm.Settings:
+        """Return these settings as the arithmetic calls them, together with its other ones."""
+        return tm.Settings(
+            epsilon=self.bias,
+            smoothing_sigma_px=self.smoothing_px,
+            threshold=self.return_threshold,
+            estimator=self.estimator,
+            minimum_brightness=self.minimum_brightness_dn,
+            **others,
+        )
 
 
 class StreamSettings(_Group):

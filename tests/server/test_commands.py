@@ -72,7 +72,7 @@ def test_flagged_pixels_are_told(
         (["--bias", "nan"], 2, "bias"),
         (["--bins", "0"], 2, "bins"),
         (["--smoothing-px", "-1"], 2, "smoothing-px"),
-        (["--threshold", "1"], 2, "threshold"),
+        (["--threshold", "1.5"], 2, "threshold"),
     ],
 )
 def test_an_option_that_cannot_be_used_is_named_and_nothing_written(

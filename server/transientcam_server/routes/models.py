@@ -125,6 +125,8 @@ class InfoDocument(Document):
                         "smoothing_px": 0.6,
                         "bias": 0.004,
                         "return_threshold": 0.1,
+                        "estimator": "pisarenko",
+                        "minimum_brightness_dn": 0.0,
                     },
                 }
             ]
@@ -161,7 +163,7 @@ class InfoDocument(Document):
     """Streams open now."""
     kernels: dict[str, Any]
     """Which compiled kernels are ready; the others are computed with NumPy meanwhile."""
-    reconstruction: dict[str, float]
+    reconstruction: dict[str, float | str]
     """Settings of the reconstruction."""
 
 
