@@ -144,7 +144,7 @@ def reconstruct(
     pixels = flat.shape[1]
     real = np.float32 if flat.dtype == np.complex64 else np.float64
     density, cumulative = (np.empty((bins, pixels), dtype=real) for _ in range(2))
-    images = {name: np.empty(pixels, dtype=real) for name in _IMAGES}
+    images: dict[str, _Array] = {name: np.empty(pixels, dtype=real) for name in _IMAGES}
     images["flags"] = np.empty(pixels, dtype=np.uint8)
     for block in _blocks(pixels, bins):
         found = tm.Reconstruction(flat[:, block], chosen)
