@@ -32,7 +32,7 @@ _TICKS_S = os.sysconf("SC_CLK_TCK")
 
 
 def _descendants(pid: int) -> set[int]:
-    """The processes below ``pid``."""
+    """Return the processes below ``pid``."""
     parents: dict[int, int] = {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -49,7 +49,7 @@ def _descendants(pid: int) -> set[int]:
 
 
 def _processor_s(pids: set[int]) -> float:
-    """Processor time that processes have used."""
+    """Return the processor time that processes have used."""
     total = 0.0
     for pid in pids:
         try:
@@ -61,7 +61,7 @@ def _processor_s(pids: set[int]) -> float:
 
 
 def _heap_mb(page: Page) -> float:
-    """Memory of the page's scripts after collecting what nobody holds."""
+    """Return the memory of the page's scripts after collecting what nobody holds."""
     session = page.context.new_cdp_session(page)
     session.send("HeapProfiler.collectGarbage")
     used = session.send("Runtime.getHeapUsage")

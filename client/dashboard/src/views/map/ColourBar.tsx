@@ -3,7 +3,7 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 
 import { LEVELS, colourTable, type ColourMapName } from "../../ui/colourMaps";
 import { decimalsFor, fraction, niceStep, ticks, type Scale } from "../../ui/scale";
-import { significant, withUnit } from "../../ui/format";
+import { fixed, significant, withUnit } from "../../ui/format";
 
 interface ColourBarProps {
   readonly scale: Scale;
@@ -31,7 +31,7 @@ export function ColourBar({ scale, colours, unit, marked }: ColourBarProps) {
   );
   const values = ticks(scale, 6);
   const decimals = decimalsFor(niceStep(scale.high - scale.low, 6));
-  const write = (value: number): string => (scale.kind === "linear" ? value.toFixed(decimals) : significant(value, 1));
+  const write = (value: number): string => (scale.kind === "linear" ? fixed(value, decimals) : significant(value, 1));
   return (
     <div class="colour-bar" role="img" aria-label={`Colour scale from ${write(scale.low)} to ${withUnit(write(scale.high), unit)}`}>
       <canvas ref={canvas} width={LEVELS} height={1} />

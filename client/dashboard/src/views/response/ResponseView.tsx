@@ -5,7 +5,7 @@ import "uplot/dist/uPlot.min.css";
 import { rangeOfTime_m } from "../../physics/constants";
 import { impulseResponse, peaks, type Peak } from "../../physics/impulseResponse";
 import { aBoolean, remembered } from "../../store/settings";
-import { useStore } from "../../store/store";
+import { type Pixel, useStore } from "../../store/store";
 import { Toggle } from "../../ui/controls";
 import { fixed, significant } from "../../ui/format";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
@@ -15,6 +15,8 @@ import { responsePlot, type ResponsePlot } from "./plot";
 
 /** Even samples of the curve, beside those around its peaks. */
 const SAMPLES = 513;
+/** Share of the height that the axis was made for which is left after a frame without such a peak. */
+const SHRINK = 0.96;
 /** Returns listed beside the plot, and the least share of the light that makes one worth it. */
 const LISTED = 4;
 const LEAST_SHARE = 0.02;
@@ -57,6 +59,8 @@ export function ResponseView() {
 
   const logarithmic = useMemo(() => remembered(store.shelf, "response.logarithmic", false, aBoolean), [store]);
   const pointed = useSignal("");
+  const held = useRef(0);
+  const heldFor = useRef<Pixel | null>(null);
   const top = useRef<Span | null>(null);
   useEffect(() => {
     if (box.current === null) return undefined;
@@ -90,7 +94,11 @@ export function ResponseView() {
     }
     const density = response.density.map((value) => value * 1e-9);
     const highest = density.reduce((a, b) => (b > a ? b : a), 0); // NaN never counts
-    top.current = autoLimits(top.current, { low: 0, high: highest });
+    // A peak's height is its noisiest figure: the axis grows with it at once and shrinks slowly.
+    const { pixel } = shown.value ?? { pixel: null };
+    held.current = pixel === heldFor.current ? Math.max(highest, SHRINK * held.current) : highest;
+    heldFor.current = pixel;
+    top.current = autoLimits(top.current, { low: 0, high: held.current });
     plot.value.plot.setData([response.time_s.map((time_s) => time_s * 1e9), density]);
   }, [plot, shown]);
 

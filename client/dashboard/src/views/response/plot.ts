@@ -50,7 +50,7 @@ export function responsePlot(box: HTMLElement, { logarithmic, top, seek, point }
       },
       axes: [
         { ...axis, size: 20, gap: 2, label: "time of flight (ns)", labelSize: 16, labelGap: 0 },
-        { ...axis, size: 52, gap: 4, label: "DN/ns", labelSize: 16, labelGap: 0, space: 28, values: (_plot, splits) => splits.map(tickText), ...(logarithmic ? { splits: powersOfTen } : {}) },
+        { ...axis, size: 52, gap: 4, label: "DN/ns", labelSize: 16, labelGap: 0, space: 28, values: (_plot, splits) => splits.map(tickText), ...(logarithmic ? { splits: powersOfTen, filter: (_plot: uPlot, splits: number[]) => splits } : {}) },
         {
           ...axis,
           scale: "x",

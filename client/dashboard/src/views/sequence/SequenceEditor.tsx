@@ -4,7 +4,7 @@ import { useEffect, useMemo } from "preact/hooks";
 import { RequestError } from "../../store/api";
 import { useStore } from "../../store/store";
 import type { AppliedSequence, Problem, SequenceDocument, Zeroth } from "../../stream/protocol";
-import { ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
+import { fieldOf, sequenceProblem, ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
 import { DRAFT_FIELD, documentOf, draftOf, type Draft } from "./draft";
 import { Figures } from "./SequenceView";
 
@@ -62,7 +62,7 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
   };
 
   const told = verdict.value;
-  const wrong = told.kind === "refused" ? faultyField(told.problem) : null;
+  const wrong = told.kind === "refused" ? (DRAFT_FIELD[fieldOf(told.problem) ?? ""] ?? null) : null;
   const field = (name: keyof Draft, label: string, unit: string) => (
     <label class="field">
       <span>{label}</span>
@@ -132,11 +132,6 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
 }
 
 function refusal(error: unknown): Verdict {
-  if (error instanceof RequestError) return { kind: "refused", problem: error.problem, words: error.message };
+  if (error instanceof RequestError) return { kind: "refused", problem: error.problem, words: sequenceProblem(error.problem) };
   throw error;
-}
-
-/** The field of the draft that a problem names, as "harmonics" or as "body.harmonics". */
-function faultyField(problem: Problem): keyof Draft | null {
-  return DRAFT_FIELD[problem.field?.split(".").pop() ?? ""] ?? null;
 }

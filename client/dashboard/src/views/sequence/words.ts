@@ -1,4 +1,42 @@
-import type { Zeroth } from "../../stream/protocol";
+import { plainWords } from "../../store/api";
+import type { Problem, Zeroth } from "../../stream/protocol";
+import { engineering } from "../../ui/format";
+
+/** Names of the fields as the form has them. */
+const FIELD_NAMES: Readonly<Record<string, string>> = {
+  base_frequency_hz: "Base frequency",
+  harmonics: "Harmonics m",
+  zeroth: "Zeroth moment",
+  exposure_s: "Exposure",
+  takes: "Takes",
+};
+
+/** The name of the field that a problem is about, as "harmonics" or as "body.harmonics". */
+export function fieldOf(problem: Problem): string | null {
+  return problem.field?.split(".").pop() ?? null;
+}
+
+/** What is wrong with a sequence, in the words and units of the form. */
+export function sequenceProblem(problem: Problem): string {
+  const name = FIELD_NAMES[fieldOf(problem) ?? ""];
+  if (name === undefined || typeof problem.limit !== "string") return plainWords(problem);
+  return `${name} must be ${inUnits(problem.limit)}.`;
+}
+
+/** Quantities as people write them: "from 2e-05 to 0.05 s" becomes "from 20 µs to 50 ms". */
+function inUnits(limit: string): string {
+  return limit.replace(QUANTITY, (_, first: string, joined: string | undefined, second: string | undefined, unit: string) =>
+    [quantity(first, unit), ...(joined && second ? [joined, quantity(second, unit)] : [])].join(""),
+  );
+}
+
+/** One number with its unit, or two that share it. */
+const QUANTITY = /([\d.]+(?:e[+-]?\d+)?)(?:( to )([\d.]+(?:e[+-]?\d+)?))? (Hz|s)\b/g;
+
+function quantity(text: string, unit: string): string {
+  const digits = text.replace(/e.*|[.]/g, "").replace(/^0+|0+$/g, "").length;
+  return engineering(Number(text), unit, Math.max(2, digits));
+}
 
 /** How the zeroth moment is had (Sec. 4.3), in words. */
 export const ZEROTH_NAMES: Record<Zeroth, string> = {

@@ -1,0 +1,134 @@
+import { beforeEach, describe, expect, test } from "vitest";
+
+import { Api } from "../../src/store/api";
+import { Store } from "../../src/store/store";
+import { StreamClient, type WorkerPort } from "../../src/stream/client";
+import type { FrameMeta, FrameMessage, Hello } from "../../src/stream/protocol";
+import { summarised } from "../../src/stream/summary";
+import type { Command, Report } from "../../src/stream/worker";
+import { AnimationLoop } from "../../src/ui/animation";
+
+const CAMERA = { state: "streaming", reason: null, simulated: true, capabilities: { model: "A" } } as const;
+
+function frame(product: string, number: number): Report {
+  const meta = { frame: number, base_frequency_hz: 23e6, host_time_s: 0 } as FrameMeta;
+  const array = { dtype: "<f4", shape: [1, 2], data: Float32Array.from([number, 2]) } as const;
+  return summarised({ type: "frame", product, unit: "m", axes: ["y", "x"], meta, encode_s: 0, array } as FrameMessage);
+}
+
+const hello = (state: Hello["camera"]["state"]): Report => ({
+  type: "message",
+  message: { type: "hello", session: "1", server: { name: "", version: "" }, sequence: null, camera: { state } },
+});
+
+class Page {
+  readonly sent: Command[] = [];
+  readonly worker: WorkerPort = { onmessage: null, postMessage: (command) => this.sent.push(command) };
+  readonly #requested: ((now_ms: number) => void)[] = [];
+  readonly store = new Store({
+    shelf: null,
+    api: new Api(() => Promise.resolve(new Response(JSON.stringify(CAMERA)))),
+  });
+  readonly client = new StreamClient(
+    this.store,
+    this.worker,
+    new AnimationLoop((callback) => this.#requested.push(callback)),
+    () => 1000,
+  );
+
+  receives(...reports: Report[]): void {
+    for (const data of reports) this.worker.onmessage?.({ data } as MessageEvent<Report>);
+  }
+
+  refreshes(): void {
+    for (const callback of this.#requested.splice(0)) callback(0);
+  }
+
+  get acknowledged(): number[] {
+    return this.sent.filter((command) => command.type === "acknowledge").map(({ frame: number }) => number);
+  }
+}
+
+let page: Page;
+beforeEach(() => {
+  page = new Page();
+  page.store.frames.claim(["range", "brightness"]);
+  page.client.open("ws://camera/");
+});
+
+describe("between worker and store", () => {
+  test("it asks for what views want, and again when that changes", () => {
+    page.store.frames.claim(["coefficients"]);
+    expect(page.sent).toEqual([
+      { type: "open", url: "ws://camera/", products: ["brightness", "range"] },
+      { type: "want", products: ["brightness", "coefficients", "range"] },
+    ]);
+  });
+
+  test("frames reach the store at the next refresh, and are acknowledged then", () => {
+    page.receives(frame("range", 4), frame("brightness", 4));
+    expect(page.store.frames.of("range").value).toBeNull();
+    expect(page.acknowledged).toEqual([]);
+    page.refreshes();
+    expect(page.store.frames.of("range").value?.values[0]).toBe(4);
+    expect(page.store.status.newest.value?.frame).toBe(4);
+    expect(page.acknowledged).toEqual([4]);
+  });
+
+  test("of what comes faster than the display only the newest is drawn", () => {
+    page.receives(frame("range", 4), frame("range", 5));
+    page.refreshes();
+    expect(page.store.frames.of("range").value?.values[0]).toBe(5);
+    expect(page.acknowledged).toEqual([5]);
+  });
+
+  test("a held page takes no frame and acknowledges none, until it is let go", () => {
+    page.store.held.value = true;
+    page.receives(frame("range", 4));
+    page.refreshes();
+    expect(page.store.frames.of("range").value).toBeNull();
+    expect(page.acknowledged).toEqual([]);
+    page.store.held.value = false;
+    page.refreshes();
+    expect(page.acknowledged).toEqual([4]);
+  });
+
+  test("a camera that is lost and comes back is told to the status", () => {
+    page.receives({ type: "open" }, hello("streaming"));
+    expect(page.store.status.stale.value).toBe(false);
+    page.receives({ type: "message", message: { type: "notice", kind: "camera-lost", reason: "unplugged" } });
+    expect(page.store.status.cameraLoss.value).toEqual({ at_s: 1000, reason: "unplugged" });
+    page.receives({ type: "message", message: { type: "notice", kind: "camera-back" } });
+    expect(page.store.status.cameraLoss.value).toBeNull();
+    expect(page.store.status.running.value).toBe(true);
+  });
+
+  test("a session that begins without a camera says so", () => {
+    page.receives({ type: "open" }, hello("lost"));
+    expect(page.store.status.cameraLoss.value).not.toBeNull();
+  });
+
+  test("drops, lost images and what could not be read are counted and told", () => {
+    page.receives(
+      { type: "message", message: { type: "notice", kind: "dropped", channel: 1, count: 2, total: 9 } },
+      { type: "message", message: { type: "notice", kind: "lost-images", count: 3 } },
+      { type: "message", message: { type: "notice", kind: "lost-images", count: 1 } },
+      { type: "message", message: { type: "error", problem: { title: "No such product" } } },
+    );
+    expect(page.store.status.dropped.value).toBe(9);
+    expect(page.store.status.lostImages.value).toBe(4);
+    expect(page.store.status.unreadable.value).toBe("No such product");
+  });
+
+  test("a lost connection is said with the time of the next attempt", () => {
+    page.receives({ type: "waiting", retry_s: 2, reason: "The service cannot be reached." });
+    expect(page.store.status.connection.value).toEqual({
+      kind: "waiting",
+      retryAt_s: 1002,
+      reason: "The service cannot be reached.",
+    });
+    expect(page.store.status.stale.value).toBe(true);
+    page.client.retryNow();
+    expect(page.sent.at(-1)).toEqual({ type: "retry" });
+  });
+});
