@@ -12,7 +12,7 @@ of pixels after them, single or double precision, NumPy, JAX or CuPy. ::
     direct, indirect, phase_rad = tm.separate(tm.pisarenko(b))
 """
 
-from transientcam_moments import kernels
+from transientcam_moments import kernels, noise
 from transientcam_moments.biasing import (
     Biased,
     bias,
@@ -83,6 +83,7 @@ __all__ = [
     "measure",
     "modulation_gain",
     "moments_of",
+    "noise",
     "nominal_calibration",
     "peaks",
     "pisarenko",

@@ -1,0 +1,144 @@
+"""First-order noise of Pisarenko's returns, and of what is derived from them."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from transientcam_moments._arrays import Array, in_range, namespace
+from transientcam_moments.noise.cramer_rao import CramerRao, cramer_rao
+from transientcam_moments.noise.moments import MomentNoise
+from transientcam_moments.pisarenko import DIRECT_THRESHOLD, Returns
+
+CLEAR = 8.0
+"""Standard deviations that returns must keep from vanishing, from each other, from the ends of the
+turn and from the threshold for first order to hold."""
+
+
+class ReturnNoise(NamedTuple):
+    """Standard deviations of returns; shapes as of `Returns` and `Separation`.
+
+    Attributes
+    ----------
+    phase_std_rad, weight_std : array, shape (m, ...)
+        Of every return; NaN in unused slots.
+    uniform_std : array, shape (...)
+        Of the uniform part.
+    direct_phase_std_rad, direct_std, indirect_std : array, shape (...)
+        Of the direct return's phase and weight and of all other weights together; NaN where there
+        is no return.
+    holds : boolean array, shape (...)
+        Where first order holds.
+    """
+
+    phase_std_rad: Array
+    weight_std: Array
+    uniform_std: Array
+    direct_phase_std_rad: Array
+    direct_std: Array
+    indirect_std: Array
+    holds: Array
+
+
+def return_noise(
+    returns: Returns, noise: MomentNoise, *, threshold: float = DIRECT_THRESHOLD
+) -> ReturnNoise:
+    """Propagate the noise of moments to the returns that Pisarenko's estimate finds in them.
+
+    Parameters
+    ----------
+    returns : Returns
+        From `pisarenko`, of moments without noise if those are known, else of the measured ones.
+    noise : MomentNoise
+        Of shape (m + 1, ...).
+    threshold : float
+        As for `separate`, 0 to 1.
+
+    Returns
+    -------
+    ReturnNoise
+
+    Raises
+    ------
+    ParameterError
+        For a threshold outside of 0 to 1.
+
+    Notes
+    -----
+    Implicit differentiation of b_j = sum_k w_k exp(i j phi_k), j = 1 .. m. With m returns these
+    are as many real equations as unknowns: the inverse of their Jacobian is all there is, and the
+    estimate reaches the Cramer-Rao bound. b_0, however it was measured or biased, is in none of
+    them; it only moves the uniform part.
+
+    First order fails, and `holds` is false, with fewer than m returns (the rest of the estimate is
+    made of noise, splits the true returns and gives their phases heavy tails, so that what is
+    stated is no more than the bound), where a return is no more than `CLEAR` standard deviations
+    strong, where two are no further apart, and where the direct return might be another one.
+    """
+    in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
+    bound = cramer_rao(returns.phase_rad, returns.weight, noise)
+    xp = namespace(bound.weight_std)
+    used = returns.weight > 0
+    direct = used & (returns.weight >= threshold * returns.weight.max(axis=0))
+    first = direct & (xp.cumsum(direct, axis=0) == 1)
+    any_there = used.any(axis=0)
+    with np.errstate(all="ignore"):
+        total = _of_sum(bound, used)
+        indirect = _of_sum(bound, used & ~first)
+
+        def of_first(values: Array) -> Array:
+            chosen = xp.where(first, values, 0).sum(axis=0)
+            return xp.where(any_there, chosen, np.nan)
+
+        return ReturnNoise(
+            phase_std_rad=bound.phase_std_rad,
+            weight_std=bound.weight_std,
+            uniform_std=xp.sqrt(noise.variance[0] + total),
+            direct_phase_std_rad=of_first(bound.phase_std_rad),
+            direct_std=of_first(bound.weight_std),
+            indirect_std=xp.where(any_there, xp.sqrt(indirect), np.nan),
+            holds=used.all(axis=0)
+            & _strong(returns, bound)
+            & _apart(returns, bound)
+            & _decided(returns, bound, first, threshold),
+        )
+
+
+def _of_sum(bound: CramerRao, chosen: Array) -> Array:
+    """Variance of the sum of the chosen weights."""
+    xp = namespace(bound.covariance)
+    count = chosen.shape[0]
+    both = chosen[:, None] & chosen[None]
+    return xp.where(both, bound.covariance[:count, :count], 0).sum(axis=(0, 1))
+
+
+def _strong(returns: Returns, bound: CramerRao) -> Array:
+    """Whether every return is clearly there."""
+    return (returns.weight > CLEAR * bound.weight_std).all(axis=0)
+
+
+def _apart(returns: Returns, bound: CramerRao) -> Array:
+    """Whether neighbours on the turn keep their order, and none crosses its ends."""
+    xp = namespace(bound.covariance)
+    phase, weight = returns.phase_rad, returns.weight
+    count = weight.shape[0]
+    clear = (phase > CLEAR * bound.phase_std_rad) & (
+        2 * np.pi - phase > CLEAR * bound.phase_std_rad
+    )
+    clear = clear.all(axis=0)
+    for k in range(count - 1):
+        mixed = bound.covariance[count + k, count + k + 1] / (weight[k] * weight[k + 1])
+        variance = bound.phase_std_rad[k] ** 2 + bound.phase_std_rad[k + 1] ** 2 - 2 * mixed
+        clear = clear & (phase[k + 1] - phase[k] > CLEAR * xp.sqrt(xp.maximum(variance, 0)))
+    return clear
+
+
+def _decided(returns: Returns, bound: CramerRao, first: Array, threshold: float) -> Array:
+    """Whether noise cannot lift an earlier return over the threshold or the direct one under it."""
+    xp = namespace(bound.covariance)
+    strongest = returns.weight.max(axis=0)
+    is_strongest = returns.weight == strongest
+    of_strongest = xp.where(is_strongest, bound.weight_std, 0).max(axis=0)
+    spread = bound.weight_std + threshold * of_strongest
+    margin = abs(returns.weight - threshold * strongest) > CLEAR * spread
+    until = xp.cumsum(first[::-1], axis=0)[::-1] > 0  # the direct one and all before it
+    return (margin | is_strongest | ~until).all(axis=0)
