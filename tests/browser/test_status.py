@@ -104,7 +104,7 @@ def test_the_sequence_is_judged_as_it_is_typed_and_set(
     page.get_by_role("button", name="Edit").click()
     harmonics = page.get_by_label("Harmonics m")
     harmonics.fill("99")
-    expect(page.locator(".refusal")).to_contain_text("harmonics")
+    expect(page.locator(".refusal")).to_have_text("Harmonics m must be an integer from 1 to 32.")
     expect(harmonics).to_have_attribute("aria-invalid", "true")
     expect(page.get_by_role("button", name="Apply")).to_be_disabled()
     harmonics.fill("")

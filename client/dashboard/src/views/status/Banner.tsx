@@ -10,8 +10,9 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
   if (connection.kind === "waiting") {
     return (
       <div class="banner" role="alert" data-banner="connection">
-        <strong>No connection to the service.</strong> {connection.reason}{" "}
-        <Countdown until_s={connection.retryAt_s} />
+        <p>
+          <strong>No connection to the service.</strong> {connection.reason} <Countdown until_s={connection.retryAt_s} />
+        </p>
         <button type="button" onClick={onRetry}>
           Try now
         </button>
@@ -22,8 +23,11 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
   if (loss !== null && connection.kind === "open") {
     return (
       <div class="banner" role="alert" data-banner="camera">
-        <strong>Camera lost</strong> at {new Date(1000 * loss.at_s).toLocaleTimeString()}. The service looks for it and
-        goes on by itself; what you see is the last frame. <span class="quiet">{loss.reason}</span>
+        <p>
+          <strong>Camera lost</strong> at {new Date(1000 * loss.at_s).toLocaleTimeString()}. The service looks for it and
+          goes on by itself; what you see is the last frame.{" "}
+          {loss.reason !== null && <span class="quiet">({loss.reason})</span>}
+        </p>
       </div>
     );
   }
@@ -35,7 +39,7 @@ function Unreadable() {
   if (status.unreadable.value === null) return null;
   return (
     <div class="banner banner-mild" role="alert" data-banner="message">
-      {status.unreadable.value}
+      <p>{status.unreadable.value}</p>
       <button type="button" onClick={() => (status.unreadable.value = null)}>
         Dismiss
       </button>
