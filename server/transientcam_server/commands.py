@@ -5,7 +5,7 @@ What is heavy is imported when a verb runs, so that ``transientcam --help`` stay
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.console import Console
@@ -21,11 +21,13 @@ from rich.progress import (
 if TYPE_CHECKING:
     from transientcam_server.reconstruct import Measurement, Reconstruction
 
+Background = Literal["none", "median"]
+
 
 def serve(
     camera: Annotated[
         str | None,
-        typer.Option(help="usb[:SERIAL], sim:SCENE or measured:FILE  [default: sim:mirrors]"),
+        typer.Option(help="usb[:SERIAL] or sim:SCENE  [default: sim:mirrors]"),
     ] = None,
     host: Annotated[
         str | None, typer.Option(help="Address to listen on.  [default: 127.0.0.1]")
@@ -105,10 +107,9 @@ def reconstruct(
     threshold: Annotated[
         float, typer.Option(min=0.0, help="Weight of the first return, over the strongest.")
     ] = 0.1,
-    subtract_background: Annotated[
-        bool,
-        typer.Option("--subtract-background", help="Subtract the median of counts first."),
-    ] = False,
+    background: Annotated[
+        Background, typer.Option(help="What to subtract from photon counts first.")
+    ] = "none",
     plot: Annotated[Path | None, typer.Option(help="Also draw a picture into this .png.")] = None,
 ) -> None:
     """Reconstruct a measurement in a file: density, cumulative density, range, direct, indirect."""
@@ -128,7 +129,7 @@ def reconstruct(
         mistake = error.errors()[0]
         raise typer.BadParameter(f"{mistake['loc'][0]}: {mistake['msg']}") from error
     measurement = offline.load(
-        input, frequency_hz=frequency_hz, harmonics=harmonics, background=subtract_background
+        input, frequency_hz=frequency_hz, harmonics=harmonics, background=background
     )
     console = Console(stderr=True)
     with Progress(

@@ -1,15 +1,15 @@
 """Reconstruction of a measurement in a file: the daemon's arithmetic without a camera.
 
-Three kinds of ``.npz`` are understood: ``moments`` with ``base_frequency_hz``; one impulse response
-``counts`` with ``bin_s``; a transient cube ``h`` (H, W, T) with ``start_opl_m`` and ``bin_opl_m``,
-its time axis an optical path length.
+Three kinds of ``.npz`` are understood: ``moments`` with ``base_frequency_hz``; photons in
+``counts`` (n_bins,) or ``meas`` (H, W, n_bins) with ``bin_s``; a transient cube ``h`` (H, W, T)
+with ``start_opl_m`` and ``bin_opl_m``, its time axis an optical path length.
 """
 
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 import transientcam_moments as tm
@@ -75,7 +75,7 @@ def load(
     *,
     frequency_hz: float | None = None,
     harmonics: int | None = None,
-    background: bool = False,
+    background: Literal["none", "median"] = "none",
 ) -> Measurement:
     """Return the moments that a file holds or that follow from its impulse responses.
 
@@ -85,7 +85,7 @@ def load(
         For impulse responses, the modulation to measure them with (23 MHz, 4); for moments, which
         have their own, at most as many harmonics as there are.
     background
-        Subtract the median of ``counts``: photons that came at any time.
+        ``median`` subtracts each pixel's median from counts: photons that came at any time.
 
     Raises
     ------
@@ -102,15 +102,13 @@ def load(
     if harmonics is not None and not 1 <= harmonics <= MAX_HARMONICS:
         raise InputError("--harmonics", "value", f"{harmonics}", f"from 1 to {MAX_HARMONICS}")
     f_hz, m = frequency_hz or DEFAULT_FREQUENCY_HZ, harmonics or DEFAULT_HARMONICS
-    if "counts" in arrays:
+    if "counts" in arrays or "meas" in arrays:
         time_s, response = _of_counts(path, arrays, background=background)
     elif "h" in arrays:
         time_s, response = _of_cube(path, arrays)
     else:
         found = ", ".join(sorted(arrays)) or "nothing"
-        raise InputError(
-            str(path), "content", found, "moments + base_frequency_hz, counts + bin_s, or h"
-        )
+        raise InputError(str(path), "content", found, "moments, counts, meas or h")
     return Measurement(moments_of(response, time_s, frequency_hz=f_hz, harmonics=m), f_hz)
 
 
@@ -226,21 +224,23 @@ def _of_moments(
 
 
 def _of_counts(
-    path: Path, arrays: Mapping[str, _Array], *, background: bool
+    path: Path, arrays: Mapping[str, _Array], *, background: str
 ) -> tuple[_Array, _Array]:
-    counts = arrays["counts"]
-    if counts.ndim != 1 or counts.size < 2 or counts.dtype.kind not in "fiu":
-        found = f"{counts.dtype} of shape {counts.shape}"
-        raise InputError(str(path), "counts", found, "numbers of shape (n_bins,)")
+    key = "counts" if "counts" in arrays else "meas"
+    counts = arrays[key]
+    if counts.ndim not in (1, 3) or counts.shape[-1] < 2 or not counts.size:
+        raise InputError(str(path), key, f"of shape {counts.shape}", "(n_bins,) or (H, W, n_bins)")
+    if counts.dtype.kind not in "fiu":
+        raise InputError(str(path), key, f"{counts.dtype}", "numbers")
+    if counts.ndim == 1:
+        counts = counts[np.newaxis, np.newaxis]
     counts = counts.astype(np.float64)
-    if not np.isfinite(counts).all():
-        where = int(np.flatnonzero(~np.isfinite(counts))[0])
-        raise InputError(str(path), "counts", f"{counts[where]} in bin {where}", "finite")
     bin_s = _scalar(path, arrays, "bin_s")
-    if background:
+    _some_finite(path, key, counts.sum(axis=-1)[np.newaxis])
+    if background == "median":
         # fewer photons than the background are noise of it, not negative light
-        counts = np.maximum(counts - np.median(counts), 0.0)
-    return np.arange(counts.size) * bin_s, counts[np.newaxis, np.newaxis, :]
+        counts = np.maximum(counts - np.median(counts, axis=-1, keepdims=True), 0.0)
+    return np.arange(counts.shape[-1]) * bin_s, counts
 
 
 def _of_cube(path: Path, arrays: Mapping[str, _Array]) -> tuple[_Array, _Array]:

@@ -78,7 +78,7 @@ class Settings(_Group):
     """Everything that can be set."""
 
     camera: str = Field(default="sim:mirrors", min_length=1)
-    """Which camera: ``usb``, ``usb:SERIAL``, ``sim:SCENE`` or ``measured:FILE``."""
+    """Which camera: ``usb``, ``usb:SERIAL``, ``sim:SCENE`` or ``sim:measured:FILE``."""
     host: str = Field(default="127.0.0.1", min_length=1)
     """Address to listen on."""
     port: int = Field(default=8000, ge=0, le=65535)
