@@ -3,8 +3,6 @@
 Pure: time is passed in, images come from a renderer, and nothing here knows how the bytes travel.
 """
 
-from collections import deque
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -29,6 +27,7 @@ from transientcam_driver.protocol import (
     phase_word,
 )
 from transientcam_driver.sequence import ImageLabel, Sequence
+from transientcam_driver.simulation.exposures import Exposed, Exposures
 
 
 class Refusal(Exception):  # noqa: N818  (a refusal is an answer of the device, not a failure)
@@ -56,24 +55,11 @@ class Renderer(Protocol):
         ...
 
 
-@dataclass(slots=True)
-class _Run:
-    """Images exposed back to back since START, or since a COMMIT while streaming."""
-
-    start_s: float
-    period_s: float
-    first_image: int
-    first_frame: int
-    exposed: int = 0
-
-
 class Firmware:
     """A camera without its cable.
 
-    Images are produced by the clock alone: image k of a run is exposed from ``start + k T`` and
-    stands in the FIFO at ``start + (k + 1) T``, T being exposure plus streaming read-out. The
-    FIFO is bounded; an image without room in it is lost with the rest of its frame. Only images
-    that are read are rendered.
+    Images are exposed by the clock alone (see ``Exposures``), one every exposure plus streaming
+    read-out; only those that are read are rendered.
     """
 
     def __init__(
@@ -83,25 +69,17 @@ class Firmware:
         self._renderer = renderer
         self._power_on_s = power_on_s
         self._packet_bytes = IMAGE_HEADER_BYTES + capabilities.image_bytes
-        self._room = capabilities.fifo_bytes // self._packet_bytes
+        self._exposures = Exposures(capabilities.fifo_bytes // self._packet_bytes)
         self._staged: SequenceWords | None = None
         self._words: SequenceWords | None = None
         self._labels: tuple[ImageLabel, ...] = ()
         self._epoch = 0
-        self._run: _Run | None = None
-        self._fifo_run: _Run | None = None  # the run whose images stand in the FIFO
-        self._next_image = 0
-        self._next_frame = 0
-        self._fifo: deque[tuple[int, ImageFlag]] = deque()  # (k of the run, flags)
-        self._overflowed = False
-        self._high_water = 0
-        self._dropped = 0
         self._heartbeat_s = power_on_s
         self._watchdog_tripped = False
         self._interlock_closed = True
         self._faulted = False
         self._last_error = (ErrorCode.NONE, 0, "")
-        self._ready: tuple[int, bytes] | None = None  # an image rendered ahead: (number, packet)
+        self._ready: tuple[Exposed, bytes] | None = None  # an image rendered ahead
         self._to_corrupt = 0
         self._to_drop = 0
 
@@ -119,8 +97,8 @@ class Firmware:
         """Open or close the safety interlock; opening it switches the light off."""
         self._advance(now_s)
         self._interlock_closed = closed
-        if not closed and self._run is not None:
-            self._end_run()
+        if not closed and self._exposures.running:
+            self._exposures.end()
             self._faulted = True
 
     # --- requests -------------------------------------------------------------------------
@@ -155,7 +133,7 @@ class Firmware:
                 case Request.START:
                     self._start(now_s)
                 case Request.STOP | Request.SAFE_OFF:
-                    self._end_run()
+                    self._exposures.end()
                 case Request.FLUSH:
                     self._flush()
                 case Request.HEARTBEAT:
@@ -183,8 +161,8 @@ class Firmware:
         if self._staged is None and self._words is None:
             raise Refusal(ErrorCode.NOT_CONFIGURED, "no sequence staged")
         if self._staged is not None:
-            streaming = self._run is not None
-            self._end_run()
+            streaming = self._exposures.running
+            self._exposures.end()
             self._flush()
             self._words, self._staged = self._staged, None
             sequence = self._words.sequence(self.capabilities)
@@ -192,12 +170,12 @@ class Firmware:
             self._renderer.configure(sequence, self._labels)
             self._epoch = max(self._epoch, epoch_above) + 1
             if streaming:
-                self._begin_run(now_s)
+                self._begin(now_s)
         assert self._words is not None  # noqa: S101  (refused above otherwise)
         return Commitment(
             epoch=self._epoch,
             images=len(self._labels),
-            first_image=self._next_image,
+            first_image=self._exposures.next_image,
             image_period_ns=round(self._period_s() * 1e9),
             words=self._words,
         )
@@ -207,17 +185,17 @@ class Firmware:
             raise Refusal(ErrorCode.NOT_CONFIGURED, "no sequence committed")
         if not self._interlock_closed:
             raise Refusal(ErrorCode.INTERLOCK_OPEN, "the interlock is open")
-        self._end_run()
+        self._exposures.end()
         self._flush()
         self._faulted = False
         self._watchdog_tripped = False
         self._heartbeat_s = now_s
-        self._begin_run(now_s)
+        self._begin(now_s)
 
     def _status(self, now_s: float) -> Status:
         flags = StatusFlag(0)
         state = DeviceState.FAULTED if self._faulted else DeviceState.IDLE
-        if self._run is not None:
+        if self._exposures.running:
             state = DeviceState.STREAMING
             flags |= StatusFlag.LIGHT_ON
         if self._interlock_closed:
@@ -231,11 +209,11 @@ class Firmware:
             state=state,
             flags=flags,
             epoch=self._epoch,
-            next_image=self._next_image,
+            next_image=self._exposures.next_image,
             device_time_s=device_time_s,
-            dropped_images=self._dropped,
-            fifo_bytes=len(self._fifo) * self._packet_bytes,
-            fifo_high_water_bytes=self._high_water * self._packet_bytes,
+            dropped_images=self._exposures.dropped,
+            fifo_bytes=len(self._exposures) * self._packet_bytes,
+            fifo_high_water_bytes=self._exposures.high_water * self._packet_bytes,
             temperature_c=self._renderer.temperature_c(device_time_s),
         )
 
@@ -243,28 +221,23 @@ class Firmware:
 
     def due_s(self) -> float | None:
         """When there is an image to read: in the past if there is one already, None if never."""
-        if self._fifo and self._fifo_run is not None:
-            return self._due_of(self._fifo_run, self._fifo[0][0])
-        return None if self._run is None else self._due_of(self._run, self._next_stored(self._run))
+        image = self._exposures.upcoming()
+        return None if image is None else image.due_s
 
     def prepare(self) -> None:
         """Render the image that is read next, ahead of its time."""
-        run = self._fifo_run if self._fifo else self._run
-        if run is not None and not self._to_drop:
-            coming = ImageFlag.OVERFLOW if self._overflowed else ImageFlag(0)
-            k, flags = self._fifo[0] if self._fifo else (self._next_stored(run), coming)
-            self._packet(run, k, flags)
+        image = self._exposures.upcoming()
+        if image is not None and not self._to_drop:
+            self._packet(image)
 
     def read(self, *, now_s: float) -> bytes | None:
         """Take the oldest image packet out of the FIFO, if there is one."""
         self._advance(now_s)
-        while self._fifo:
-            k, flags = self._fifo.popleft()
-            assert self._fifo_run is not None  # noqa: S101  (the FIFO holds images of a run)
+        while (image := self._exposures.take()) is not None:
             if self._to_drop:
                 self._to_drop -= 1
                 continue
-            packet = self._packet(self._fifo_run, k, flags)
+            packet = self._packet(image)
             self._ready = None
             if self._to_corrupt:
                 self._to_corrupt -= 1
@@ -274,93 +247,42 @@ class Firmware:
             return packet
         return None
 
-    def _begin_run(self, now_s: float) -> None:
-        self._run = _Run(now_s, self._period_s(), self._next_image, self._next_frame)
-        self._fifo_run = self._run
-
-    def _end_run(self) -> None:
-        """Switch the light off; the images exposed so far stay in the FIFO."""
-        if self._run is not None and self._run.exposed % len(self._labels):
-            self._next_frame += 1
-        self._run = None
+    def _begin(self, now_s: float) -> None:
+        self._exposures.begin(now_s, period_s=self._period_s(), count=len(self._labels))
 
     def _flush(self) -> None:
-        self._fifo.clear()
+        self._exposures.flush()
         self._ready = None
-        self._overflowed = False
 
     def _period_s(self) -> float:
         assert self._words is not None  # noqa: S101  (callers have a sequence)
         return self._words.exposure_ns / 1e9 + self.capabilities.streaming_readout_s
 
-    @staticmethod
-    def _due_of(run: _Run, k: int) -> float:
-        return run.start_s + (k + 1) * run.period_s
-
     def _advance(self, now_s: float) -> None:
-        """Let happen what the time up to now brings: exposures, overflow, the watchdog."""
-        run = self._run
-        if run is None:
+        """Let happen what the time up to now brings: exposures, and the watchdog."""
+        if not self._exposures.running:
             return
         trip_s = self._heartbeat_s + self.capabilities.heartbeat_s
-        # half a nanosecond, so that a wait until the due time finds the image there
-        until_s = min(now_s, trip_s) + 0.5e-9
-        exposed = max(run.exposed, int((until_s - run.start_s) / run.period_s))
-        for k in range(run.exposed, exposed):
-            self._store(k)
-        self._high_water = max(self._high_water, len(self._fifo))
-        run.exposed = exposed
-        self._next_image = run.first_image + exposed
-        self._next_frame = run.first_frame + exposed // len(self._labels)
+        self._exposures.advance(min(now_s, trip_s))
         if now_s > trip_s:
             self._watchdog_tripped = True
-            self._end_run()
+            self._exposures.end()
 
-    def _store(self, k: int) -> None:
-        """Put an image into the FIFO, or drop it and the rest of its frame.
-
-        After that the FIFO takes images again with a frame for which it has room, so that a host
-        that is always too slow still gets whole frames.
-        """
-        free = self._room - len(self._fifo)
-        count = len(self._labels)
-        resumes = k % count == 0 and free >= min(count, self._room // 2)
-        if free == 0 or (self._overflowed and not resumes):
-            self._overflowed = True
-            self._dropped += 1
-            return
-        flag = ImageFlag.OVERFLOW if self._overflowed else ImageFlag(0)
-        self._overflowed = False
-        self._fifo.append((k, flag))
-
-    def _next_stored(self, run: _Run) -> int:
-        """Return the image that comes into the empty FIFO: after an overflow, a frame's first."""
-        count = len(self._labels)
-        return -(-run.exposed // count) * count if self._overflowed else run.exposed
-
-    def _packet(self, run: _Run, k: int, flags: ImageFlag) -> bytes:
-        number = run.first_image + k
-        if self._ready is not None and self._ready[0] == number:
+    def _packet(self, image: Exposed) -> bytes:
+        if self._ready is not None and self._ready[0] == image:
             return self._ready[1]
-        count = len(self._labels)
-        label = self._labels[k % count]
-        device_time_s = run.start_s + k * run.period_s - self._power_on_s
-        pixels = self._renderer.image(label, number=number, device_time_s=device_time_s)
+        label = self._labels[image.index]
+        device_time_s = image.begin_s - self._power_on_s
+        pixels = self._renderer.image(label, number=image.number, device_time_s=device_time_s)
         payload = pixels.astype("<u2", copy=False).tobytes()
-        assert self._words is not None  # noqa: S101  (a run has a sequence)
-        if label.illumination:
-            flags |= ImageFlag.ILLUMINATION
-        if label.index == 0:
-            flags |= ImageFlag.FIRST_OF_FRAME
-        if label.index == count - 1:
-            flags |= ImageFlag.LAST_OF_FRAME
+        assert self._words is not None  # noqa: S101  (what is exposed has a sequence)
         header = ImageHeader(
-            flags=flags,
+            flags=self._image_flags(image, label),
             epoch=self._epoch,
-            frame=run.first_frame + k // count,
-            number=number,
-            index=label.index,
-            count=count,
+            frame=image.frame,
+            number=image.number,
+            index=image.index,
+            count=len(self._labels),
             tuning_word=self._words.word(label.harmonic),
             phase=phase_word(label.phase_rad),
             harmonic=label.harmonic,
@@ -371,5 +293,17 @@ class Firmware:
             payload_crc=payload_checksum(payload),
         )
         packet = header.pack() + payload
-        self._ready = (number, packet)
+        self._ready = (image, packet)
         return packet
+
+    def _image_flags(self, image: Exposed, label: ImageLabel) -> ImageFlag:
+        said = {
+            ImageFlag.ILLUMINATION: label.illumination,
+            ImageFlag.FIRST_OF_FRAME: image.index == 0,
+            ImageFlag.LAST_OF_FRAME: image.index == len(self._labels) - 1,
+            ImageFlag.OVERFLOW: image.after_overflow,
+        }
+        flags = ImageFlag(0)
+        for flag, holds in said.items():
+            flags |= flag if holds else ImageFlag(0)
+        return flags

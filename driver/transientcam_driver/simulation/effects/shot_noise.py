@@ -9,9 +9,9 @@ from transientcam_driver.simulation.effects.effect import Call, Conditions, Effe
 FEW_E = 100.0
 """Below this mean a pixel is drawn from the Poisson distribution itself.
 
-Above it the normal distribution of the same mean and variance takes its place, which is more than
-ten times cheaper. At 100 electrons the skewness it leaves out is 0.1, and the read noise that
-follows hides that further.
+Above it the normal distribution of the same mean and variance takes its place: it is cheaper to
+draw, and its draw is shared with other noise. At 100 electrons the skewness it leaves out is 0.1,
+and the read noise that follows hides that further.
 """
 
 _COST_S_PER_PIXEL = 1.2e-8

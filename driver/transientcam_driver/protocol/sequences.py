@@ -1,0 +1,123 @@
+"""What the device is to capture: SET_SEQUENCE and COMMIT."""
+
+import struct
+from dataclasses import dataclass
+
+from transientcam_driver.capabilities import Capabilities
+from transientcam_driver.errors import ProtocolError
+from transientcam_driver.protocol.codes import SCHEMES, ZEROTHS
+from transientcam_driver.protocol.requests import VERSION
+from transientcam_driver.protocol.units import nanoseconds
+from transientcam_driver.sequence import Sequence, SubPhases
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceWords:
+    """A sequence in the integers of the hardware: payload of SET_SEQUENCE, part of COMMIT's answer.
+
+    Frequency j is ``j * base_word`` steps of the synthesiser, so ratios are exact.
+    """
+
+    harmonics: int
+    zeroth: int
+    scheme: int
+    sub_phases: int
+    base_word: int
+    low_word: int
+    exposure_ns: int
+    takes: int
+
+    _LAYOUT = struct.Struct("<BBBBBxHIII")
+    BYTES = _LAYOUT.size
+
+    @classmethod
+    def of(cls, sequence: Sequence, capabilities: Capabilities) -> "SequenceWords":
+        """Round a sequence to the hardware's grid."""
+        low_frequency = sequence.zeroth == "low-frequency"
+        return cls(
+            harmonics=sequence.harmonics,
+            zeroth=ZEROTHS.index(sequence.zeroth),
+            scheme=SCHEMES.index(sequence.sub_phases.scheme),
+            sub_phases=sequence.sub_phases.n,
+            base_word=capabilities.tuning_word(sequence.base_frequency_hz),
+            low_word=capabilities.tuning_word(capabilities.low_frequency_hz) * low_frequency,
+            exposure_ns=nanoseconds(sequence.exposure_s),
+            takes=sequence.takes,
+        )
+
+    def sequence(self, capabilities: Capabilities) -> Sequence:
+        """Give the integers their meaning back.
+
+        Raises
+        ------
+        ProtocolError
+            A code without a meaning.
+        SequenceError
+            A field out of every range.
+        """
+        if self.zeroth >= len(ZEROTHS) or self.scheme >= len(SCHEMES):
+            raise ProtocolError(f"unknown codes {self.zeroth} (zeroth), {self.scheme} (scheme)")
+        return Sequence(
+            base_frequency_hz=capabilities.frequency_hz(self.base_word),
+            harmonics=self.harmonics,
+            zeroth=ZEROTHS[self.zeroth],
+            exposure_s=self.exposure_ns / 1e9,
+            takes=self.takes,
+            sub_phases=SubPhases(SCHEMES[self.scheme], self.sub_phases),
+        )
+
+    def word(self, harmonic: int) -> int:
+        """Tuning word of a harmonic; 0 asks for the one of the zeroth moment."""
+        return self.base_word * harmonic if harmonic else self.low_word
+
+    def pack(self) -> bytes:
+        """Payload of SET_SEQUENCE."""
+        return self._LAYOUT.pack(
+            VERSION,
+            self.harmonics,
+            self.zeroth,
+            self.scheme,
+            self.sub_phases,
+            self.takes,
+            self.base_word,
+            self.low_word,
+            self.exposure_ns,
+        )
+
+    @classmethod
+    def unpack(cls, data: bytes) -> "SequenceWords":
+        """Read the payload of SET_SEQUENCE."""
+        if len(data) != cls.BYTES or data[0] != VERSION:
+            raise ProtocolError(f"{len(data)} bytes for a sequence of {cls.BYTES}")
+        _, harmonics, zeroth, scheme, sub_phases, takes, base, low, exposure = cls._LAYOUT.unpack(
+            data
+        )
+        return cls(harmonics, zeroth, scheme, sub_phases, base, low, exposure, takes)
+
+
+@dataclass(frozen=True, slots=True)
+class Commitment:
+    """Answer to COMMIT: the epoch, what was really set, and the number of its first image."""
+
+    epoch: int
+    images: int
+    first_image: int
+    image_period_ns: int
+    words: SequenceWords
+
+    _LAYOUT = struct.Struct("<IIQI")
+    BYTES = _LAYOUT.size + SequenceWords.BYTES
+
+    def pack(self) -> bytes:
+        """Bytes of the answer."""
+        front = self._LAYOUT.pack(self.epoch, self.images, self.first_image, self.image_period_ns)
+        return front + self.words.pack()
+
+    @classmethod
+    def unpack(cls, data: bytes) -> "Commitment":
+        """Read the answer."""
+        if len(data) != cls.BYTES:
+            raise ProtocolError(f"answer of {len(data)} bytes to COMMIT, {cls.BYTES} needed")
+        epoch, images, first_image, period_ns = cls._LAYOUT.unpack_from(data)
+        words = SequenceWords.unpack(data[cls._LAYOUT.size :])
+        return cls(epoch, images, first_image, period_ns, words)
