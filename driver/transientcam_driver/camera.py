@@ -4,7 +4,6 @@ import math
 import threading
 import warnings
 import weakref
-from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from enum import StrEnum
@@ -23,8 +22,8 @@ from transientcam_driver.errors import (
     TransferOverflow,
     TransferStalled,
 )
-from transientcam_driver.frames import Counters, FrameAssembler, RawFrame
-from transientcam_driver.framing import PacketDecoder
+from transientcam_driver.frames import Counters, RawFrame
+from transientcam_driver.incoming import Incoming
 from transientcam_driver.protocol import (
     CAPS_ROOM_BYTES,
     LAST_ERROR_BYTES,
@@ -94,14 +93,12 @@ class Camera:
         self.simulation = simulation
         self.counters = Counters()
         self._control = threading.RLock()  # requests and the state
-        self._assembly = threading.Lock()  # decoder and assembler; never held while waiting
         self._reading = threading.Lock()  # held by the reader
         self._wanted = sequence or Sequence()
         self._resume = False
         self._closed = False
         self._heartbeat_s = -math.inf
         self._stalled = False
-        self._frames: deque[RawFrame] = deque()
         self._state = CameraState.CONNECTING
         self._applied: AppliedSequence | None = None
         self._open(None)
@@ -194,10 +191,8 @@ class Camera:
             end_s = self._clock.now_s() + timeout_s
             while True:
                 self._keep_alive()
-                while self._frames:
-                    frame = self._frames.popleft()
-                    if frame.epoch == self.applied.epoch:
-                        return frame
+                if (frame := self._incoming.take()) is not None:
+                    return frame
                 left_s = end_s - self._clock.now_s()
                 if left_s <= 0:
                     raise FrameTimeout(timeout_s)
@@ -207,18 +202,23 @@ class Camera:
     def reconnect(self) -> None:
         """After CameraLost: find the same device again, restore the sequence, resume streaming.
 
+        Does nothing unless the camera is disconnected.
+
         Raises
         ------
         CameraNotFound
             It is still absent; try again later.
+        CameraError
+            It is there but cannot be had: not yet (a node without its permissions, a second
+            unplugging), or because another program was faster.
         """
         with self._reading, self._control:
             self._require_open()
             if self._state is not CameraState.DISCONNECTED:
                 return
-            resume = self._resume
+            self._let_go()
             self._open(self._capabilities.serial)
-            if resume:
+            if self._resume:
                 self._start()
 
     def close(self) -> None:
@@ -232,8 +232,7 @@ class Camera:
                 self._transport.control_out(Request.SAFE_OFF)
             self._state = CameraState.DISCONNECTED
         with self._reading:  # the device may not vanish under a reader
-            self._release.detach()
-            self._transport.close()
+            self._let_go()
 
     def __enter__(self) -> "Camera":
         return self
@@ -261,22 +260,24 @@ class Camera:
             self._capabilities = unpack_capabilities(
                 self._transport.control_in(Request.GET_CAPS, length=CAPS_ROOM_BYTES)
             )
-            image_bytes = self._capabilities.image_bytes
-            self._transport.expect_transfers(IMAGE_HEADER_BYTES + image_bytes)
-            self._decoder = PacketDecoder(payload_bytes=image_bytes)
+            self._transport.expect_transfers(IMAGE_HEADER_BYTES + self._capabilities.image_bytes)
+            self._incoming = Incoming(self._capabilities, self.counters)
             self._configure(self._wanted)
         except BaseException:
-            self._lose()
+            self._let_go()
+            self._state = CameraState.DISCONNECTED
             raise
         self._stalled = False
         self._state = CameraState.IDLE
 
     def _lose(self) -> None:
-        """Let go of a device that is gone."""
-        if self._state is not CameraState.DISCONNECTED:
-            self._state = CameraState.DISCONNECTED
-            self._release.detach()
-            self._transport.close()
+        """Take note that the device is gone; a reader may still hold its handle."""
+        self._state = CameraState.DISCONNECTED
+
+    def _let_go(self) -> None:
+        """Give the device back; nobody reads."""
+        self._release.detach()
+        self._transport.close()
 
     def _require_open(self) -> None:
         if self._closed:
@@ -311,8 +312,7 @@ class Camera:
     def _configure(self, sequence: Sequence) -> AppliedSequence:
         words = SequenceWords.of(sequence, self._capabilities)
         self._tell(Request.SET_SEQUENCE, words.pack())
-        # No image of the new epoch may be looked at before its labels are known.
-        with self._assembly:
+        with self._incoming.lock:
             above = 0 if self._applied is None else self._applied.epoch
             answer = Commitment.unpack(
                 self._ask(Request.COMMIT, value=above, length=Commitment.BYTES)
@@ -321,19 +321,14 @@ class Camera:
             if answer.images != really_set.images or answer.epoch <= above:
                 raise ProtocolError(f"COMMIT answered with {answer}")
             self._applied = self._capabilities.describe(really_set, epoch=answer.epoch)
-            self._assembler = FrameAssembler(self._applied, self._capabilities, self.counters)
-            self._assembler.restart(answer.first_image)
-            self._decoder.reset()
+            self._incoming.switch(self._applied, first_image=answer.first_image)
         return self._applied
 
     def _start(self) -> None:
         self._require_open()
-        with self._assembly:
+        with self._incoming.lock:
             self._tell(Request.STOP)
-            first_image = self.status().next_image
-            self._decoder.reset()
-            self._frames.clear()
-            self._assembler.restart(first_image)
+            self._incoming.restart(first_image=self.status().next_image)
             self._tell(Request.START)
             self._heartbeat_s = self._clock.now_s()
             self._state = CameraState.STREAMING
@@ -369,9 +364,7 @@ class Camera:
             self._clear_stall()
             return True
         except TransferOverflow:
-            with self._assembly:
-                self._decoder.reset()
-                self.counters.resyncs += 1
+            self._incoming.resynchronise()
             return True
         except CameraLost:
             with self._control:
@@ -381,13 +374,7 @@ class Camera:
         if not data:
             return False
         self._stalled = False
-        with self._assembly:
-            resyncs = self._decoder.resyncs
-            for packet in self._decoder.feed(data):
-                frame = self._assembler.push(packet, host_time_s=self._clock.unix_s())
-                if frame is not None:
-                    self._frames.append(frame)
-            self.counters.resyncs += self._decoder.resyncs - resyncs
+        self._incoming.feed(data, host_time_s=self._clock.unix_s())
         return True
 
     def _clear_stall(self) -> None:
