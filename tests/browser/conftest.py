@@ -8,9 +8,13 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_playwright
+from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, sync_playwright
 
 from tests.serving import Served, serving
+
+# A laden machine takes its time; nothing here is about how long.
+_PATIENCE_MS = 20_000
+expect.set_options(timeout=_PATIENCE_MS)
 
 _ROOT = Path(__file__).resolve().parents[2]
 _SOURCES = _ROOT / "client" / "dashboard"
@@ -86,7 +90,7 @@ def page(browser: Browser, served: Served, watch: Watch) -> Iterator[Page]:
     context = browser.new_context(
         viewport={"width": 1280, "height": 800}, reduced_motion="reduce", base_url=served.url
     )
-    context.set_default_timeout(20_000)
+    context.set_default_timeout(_PATIENCE_MS)
     context.on("console", watch.on_console)
     context.on("weberror", lambda error: watch.complaints.append(f"exception: {error.error}"))
     context.on("request", watch.on_request)
