@@ -13,7 +13,7 @@ from transientcam_server.run import Server, address, listen
 from transientcam_server.service import Service
 from transientcam_server.settings import Settings
 
-START_S = 20.0
+START_S = 60.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ def steady_daemon() -> Iterator[Served]:
 @pytest.fixture(scope="module")
 def steady(steady_daemon: Served) -> Iterator[httpx.Client]:
     """A client of the shared daemon, which has a frame already."""
-    with httpx.Client(base_url=steady_daemon.url, timeout=20.0) as client:
+    with httpx.Client(base_url=steady_daemon.url, timeout=60.0) as client:
         hold_to_contract(client, steady_daemon.app.openapi())
         client.get("/api/v1/frames/latest", params={"wait_s": 10.0})
         yield client
@@ -42,6 +42,6 @@ def steady_stream(steady_daemon: Served) -> str:
 @pytest.fixture
 def http(served: Served) -> Iterator[httpx.Client]:
     """A client whose every answer is checked against the daemon's own OpenAPI document."""
-    with httpx.Client(base_url=served.url, timeout=20.0) as client:
+    with httpx.Client(base_url=served.url, timeout=60.0) as client:
         hold_to_contract(client, served.app.openapi())
         yield client

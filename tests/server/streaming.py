@@ -8,7 +8,7 @@ from transientcam import wire
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 VIDEO = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}
 
 

@@ -30,7 +30,7 @@ from transientcam_server.acquisition import (
     SequenceChanged,
 )
 
-PATIENCE_S = 10.0
+PATIENCE_S = 60.0
 APPLIED = AppliedSequence(
     sequence=Sequence(),
     epoch=1,

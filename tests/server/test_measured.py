@@ -25,7 +25,7 @@ def test_the_daemon_finds_three_measured_responses_where_the_reference_says(
     np.savez(tmp_path / "composite.npz", counts=counts, bin_s=bin_s)
     with (
         serving(f"sim:measured:{tmp_path / 'composite.npz'}?noise=off") as daemon,
-        httpx.Client(base_url=daemon.url, timeout=20.0) as http,
+        httpx.Client(base_url=daemon.url, timeout=60.0) as http,
     ):
         wanted = {"harmonics": harmonics, "zeroth": "on-off"}
         applied = http.put("/api/v1/sequence", json=wanted).json()

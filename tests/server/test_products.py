@@ -217,7 +217,7 @@ def test_every_way_to_the_zeroth_moment_gives_the_same_range(
 def test_saturated_pixels_are_flagged() -> None:
     with (
         serving("sim:mirrors?noise=off") as daemon,
-        httpx.Client(base_url=daemon.url, timeout=20.0) as http,
+        httpx.Client(base_url=daemon.url, timeout=60.0) as http,
     ):
         http.put("/api/v1/sequence", json={"exposure_s": 0.02})
         frame = http.get(LATEST, params={"wait_s": 10.0}).json()

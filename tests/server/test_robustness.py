@@ -19,7 +19,7 @@ from tests.server.streaming import streaming
 from tests.serving import Served
 
 LATEST = "/api/v1/frames/latest"
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 def fault(http: httpx.Client, name: str) -> None:

@@ -19,6 +19,8 @@ from transientcam_server.settings import ENVIRONMENT_PREFIX
 
 from tests.server.streaming import streaming
 
+PATIENCE_S = 60.0
+
 
 def environment(**variables: str) -> dict[str, str]:
     clean = {k: v for k, v in os.environ.items() if not k.startswith(ENVIRONMENT_PREFIX)}
@@ -54,7 +56,7 @@ def test_the_address_is_printed_once_it_is_listened_on(tmp_path: Path) -> None:
     with daemon(tmp_path) as (process, url):
         assert httpx.get(f"{url}/livez").status_code == 200
         process.terminate()
-        process.communicate(timeout=10.0)
+        process.communicate(timeout=PATIENCE_S)
 
         assert process.returncode == 0
 
@@ -66,7 +68,7 @@ def test_sigterm_tells_the_clients_and_ends_well(tmp_path: Path) -> None:
             client.frame()
             process.send_signal(signal.SIGTERM)
             code = client.close_code()
-        _, errors = process.communicate(timeout=10.0)
+        _, errors = process.communicate(timeout=PATIENCE_S)
 
     assert code == wire.CloseCode.GOING_AWAY
     assert process.returncode == 0
@@ -76,7 +78,7 @@ def test_sigterm_tells_the_clients_and_ends_well(tmp_path: Path) -> None:
 def test_an_interrupt_ends_it_without_a_traceback(tmp_path: Path) -> None:
     with daemon(tmp_path) as (process, _):
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=10.0)
+        _, errors = process.communicate(timeout=PATIENCE_S)
 
     assert process.returncode == 130
     assert "Traceback" not in errors
@@ -87,7 +89,7 @@ def test_the_environment_and_a_file_set_what_the_command_line_does_not(tmp_path:
     with daemon(tmp_path, TRANSIENTCAM_STREAM__MAX_CLIENTS="3") as (process, url):
         assert httpx.get(f"{url}/livez").status_code == 200
         process.terminate()
-        process.communicate(timeout=10.0)
+        process.communicate(timeout=PATIENCE_S)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +110,7 @@ def test_what_cannot_be_served_is_said_in_a_sentence(
         env=environment(),
         capture_output=True,
         text=True,
-        timeout=30.0,
+        timeout=PATIENCE_S,
     )
 
     assert result.returncode == 1
@@ -125,7 +127,7 @@ def test_a_port_that_is_taken_is_said_in_a_sentence(tmp_path: Path) -> None:
             env=environment(),
             capture_output=True,
             text=True,
-            timeout=30.0,
+            timeout=PATIENCE_S,
         )
 
     assert result.returncode == 1
