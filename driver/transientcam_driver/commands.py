@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from transientcam_driver.simulation import list_scenes
@@ -24,5 +25,5 @@ def scenes(
         return
     table = Table("scene", "what it shows", box=None)
     for info in infos:
-        table.add_row(f"sim:{info.name}", info.description)
+        table.add_row(f"sim:{info.name}", escape(info.description))
     Console().print(table)
