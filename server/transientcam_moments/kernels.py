@@ -9,15 +9,47 @@ kept for the next process in ``NUMBA_CACHE_DIR``, else in ``transientcam/kernels
 ``XDG_CACHE_HOME`` or ``~/.cache``, else (nothing there can be written to) not at all.
 """
 
+import math
 import threading
 from collections.abc import Callable, Sequence
-from typing import TypedDict
+from typing import TYPE_CHECKING, TypedDict
 
-from transientcam_moments._arrays import MAX_HARMONICS
-from transientcam_moments._kernels.registry import PRECISION_NAMES, REGISTRY, Key
-from transientcam_moments.errors import ParameterError
+import numpy as np
 
-LANES = ("pisarenko", "levinson", "density", "smallest_eigenvalue")
+from transientcam_moments._arrays import MAX_HARMONICS, Array
+from transientcam_moments._kernels.reconstructor import Reconstructed, Reconstructor
+from transientcam_moments._kernels.registry import (
+    LEAST_PIXELS,
+    PRECISION_NAMES,
+    REGISTRY,
+    Key,
+)
+from transientcam_moments._kernels.spread import Spread, at_once, over
+from transientcam_moments.errors import ParameterError, ShapeError
+from transientcam_moments.ranging import range_m
+from transientcam_moments.smoothing import gaussian_taps
+
+if TYPE_CHECKING:
+    from transientcam_moments.reconstruction import Settings
+
+__all__ = [
+    "LANES",
+    "Progress",
+    "Reconstructed",
+    "Reconstructor",
+    "Spread",
+    "State",
+    "at_once",
+    "compile",
+    "compile_in_background",
+    "over",
+    "reconstructor",
+    "state",
+]
+
+LANES = ("reconstruct", "pisarenko", "levinson", "density", "smallest_eigenvalue")
+
+_LEAST_WIDTH = 32
 
 Progress = Callable[[int, int, str], None]
 """Takes lanes done, lanes in all, and the name of the lane that is next ("" after the last)."""
@@ -101,6 +133,55 @@ def compile_in_background(
     return thread
 
 
+def reconstructor(
+    shape: tuple[int, int],
+    harmonics: int,
+    settings: "Settings",
+    calibration: Array | None = None,
+) -> Reconstructor | None:
+    """Return a workspace that turns raw images into range, light and coefficients in one go.
+
+    The same results as `reconstruct` gives stage by stage, without allocating anything per frame.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Height and width of the images.
+    harmonics : int
+        m.
+    settings : Settings
+        How to reconstruct.
+    calibration : array, shape (m + 1,) or (m + 1, H, W), optional
+        Gains to divide by, as `calibrate` takes them.
+
+    Returns
+    -------
+    Reconstructor or None
+        None where `reconstruct` is to be used: the lane isn't compiled (yet), images are tiny, or
+        settings ask for several takes, keep="brightness" or another estimator than Pisarenko's.
+
+    Raises
+    ------
+    ShapeError
+        When the calibration doesn't fit.
+    """
+    lane = REGISTRY.compiled.get(Key("reconstruct", harmonics, "f"))
+    usual = (settings.takes, settings.keep, settings.estimator) == (1, "harmonics", "pisarenko")
+    if lane is None or not usual or shape[1] < _LEAST_WIDTH or math.prod(shape) < LEAST_PIXELS:
+        return None
+    gain = np.ones(harmonics + 1) if calibration is None else np.asarray(calibration)
+    if gain.shape not in ((harmonics + 1,), (harmonics + 1, *shape)):
+        expected = f"of shape ({harmonics + 1},) or {(harmonics + 1, *shape)}"
+        raise ShapeError("calibration", f"of shape {gain.shape}", expected)
+    with np.errstate(all="ignore"):
+        inverse = 1 / gain.astype(np.complex128)
+    metres = float(range_m(np.float64(1.0), settings.base_frequency_hz))
+    workspace: Reconstructor = lane(
+        shape, settings, inverse, gaussian_taps(settings.smoothing_sigma_px), metres
+    )
+    return workspace
+
+
 def _keys(harmonics: Sequence[int], precisions: Sequence[str]) -> list[Key]:
     for m in harmonics:
         if not 1 <= m <= MAX_HARMONICS:
@@ -113,6 +194,7 @@ def _keys(harmonics: Sequence[int], precisions: Sequence[str]) -> list[Key]:
         for precision in precisions
         for m in dict.fromkeys(harmonics)
         for name in LANES
+        if (name, precision) != ("reconstruct", "float64")
     ]
 
 

@@ -40,15 +40,22 @@ def smooth(moments: Array, sigma_px: float = SIGMA_PX) -> Array:
     if sigma_px == 0:
         return moments
     xp = namespace(moments)
-    radius = int(np.ceil(4 * sigma_px))
-    taps = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma_px) ** 2)
-    taps /= taps.sum()
+    taps = gaussian_taps(sigma_px)
     present = xp.isfinite(moments).reshape((-1, *moments.shape[-2:])).all(axis=0)
     share = _blur(present.astype(real_type(moments)), taps)
     smoothed = _blur(xp.where(present, moments, 0), taps)
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = xp.where(present, 1 / share, 1).astype(share.dtype)
     return xp.where(present, smoothed * inverse, moments).astype(moments.dtype)
+
+
+def gaussian_taps(sigma_px: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Return the weights along one axis, shape (2 R + 1,), R = ceil(4 sigma_px), of sum 1."""
+    if sigma_px == 0:
+        return np.ones(1)
+    radius = int(np.ceil(4 * sigma_px))
+    taps = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma_px) ** 2)
+    return np.asarray(taps / taps.sum())
 
 
 def _blur(images: Array, taps: np.ndarray[tuple[int], np.dtype[np.float64]]) -> Array:

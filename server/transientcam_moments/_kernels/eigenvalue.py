@@ -19,9 +19,11 @@ from transientcam_moments._kernels.spread import Spread, at_once
 _INTERLEAVE = 4
 
 
-@njit(forceinline=True, error_model="numpy")
-def eigenvalues(order: Any, b: Any, out: Any, start: int, stop: int) -> None:
-    """Write the smallest eigenvalues of the pixels start..stop."""
+@njit(nogil=True, error_model="numpy")
+def _smallest_eigenvalue(
+    order: Any, b: Any, without: bool, out: Any, start: int, stop: int
+) -> None:
+    """Write the smallest eigenvalues of the pixels start..stop, with or ``without`` b_0."""
     one = simd.ones(out, _INTERLEAVE)
     step = simd.width(one)
     re, im = simd.registers(one, order, 1), simd.registers(one, order, 1)
@@ -29,33 +31,29 @@ def eigenvalues(order: Any, b: Any, out: Any, start: int, stop: int) -> None:
     d, e = simd.registers(one, order, 1), simd.registers(one, order, 1)
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        scale = toeplitz.load_relative(order, b, p, re, im)
+        zeroth = one * 0.0
+        if not without:
+            zeroth = toeplitz.load_zeroth(one, b, p)
+        scale = toeplitz.load_relative(order, zeroth, b, p, re, im)
         simd.store(out, p, scale * toeplitz.smallest_eigenvalue(order, re, im, h, d, e))
 
 
-@njit(nogil=True, error_model="numpy")
-def _smallest_eigenvalue(order: Any, b: Any, out: Any, start: int, stop: int) -> None:
-    eigenvalues(order, b, out, start, stop)
+def eigenvalue_entry(m: int, precision: str) -> Callable[..., Any]:
+    """Compile the kernel of order m."""
+    real, cplx = real_arrays(precision), complex_arrays(precision)
+    return entry(_smallest_eigenvalue, order_type(m), cplx[2], PIXELS, real[1], PIXELS, PIXELS)
 
 
 def smallest_eigenvalue_lane(m: int, precision: str) -> Callable[..., Any]:
     """Compile the smallest eigenvalue of order m; see the table in ``_kernels``."""
     order = (0,) * m
-    real, cplx = real_arrays(precision), complex_arrays(precision)
-    run = entry(
-        _smallest_eigenvalue,
-        order_type(m),
-        cplx[2],
-        real[1],
-        PIXELS,
-        PIXELS,
-    )
+    run = eigenvalue_entry(m, precision)
 
     def lane(b: Any, *, spread: Spread = at_once) -> Any:
         pixels = b[0].size
         planes = np.ascontiguousarray(b).reshape(m + 1, pixels)
         out = np.empty(pixels, precision)
-        spread(lambda start, stop: run(order, planes, out, start, stop), pixels)
+        spread(lambda start, stop: run(order, planes, 0, out, start, stop), pixels)
         return out.reshape(b.shape[1:])
 
     return lane

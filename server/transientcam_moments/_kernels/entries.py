@@ -30,6 +30,9 @@ def complex_arrays(precision: str) -> dict[int, Any]:
 PIXELS = _types.int64
 REAL = _types.float64
 COUNTS = _types.Array(_types.int32, 1, "C")
+PLACES = _types.Array(_types.int64, 1, "C")
+BYTES = _types.Array(_types.uint8, 1, "C")
+IMAGES = _types.Array(_types.uint16, 2, "C")
 
 
 def order_type(m: int) -> Any:

@@ -21,8 +21,17 @@ _INTERLEAVE = 2
 
 @njit(nogil=True, error_model="numpy")
 def _levinson(
-    order: Any, b: Any, error: Any, polynomial: Any, reflection: Any, start: int, stop: int
+    order: Any,
+    b: Any,
+    zeroth: Any,
+    apart: bool,
+    error: Any,
+    polynomial: Any,
+    reflection: Any,
+    start: int,
+    stop: int,
 ) -> None:
+    """Write the coefficients of the pixels start..stop, b_0 from ``zeroth`` if it is ``apart``."""
     m = len(order)
     one = simd.ones(error, _INTERLEAVE)
     step = simd.width(one)
@@ -31,7 +40,8 @@ def _levinson(
     gr, gi = simd.registers(one, order, 0), simd.registers(one, order, 0)
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        scale = toeplitz.load_relative(order, b, p, re, im)
+        b0 = simd.load(one, zeroth, p) if apart else toeplitz.load_zeroth(one, b, p)
+        scale = toeplitz.load_relative(order, b0, b, p, re, im)
         brightness = re[0] * scale
         toeplitz.physical(order, re, im)
         simd.store(error, p, brightness * toeplitz.levinson(order, re, im, ar, ai, gr, gi))
@@ -41,21 +51,38 @@ def _levinson(
             simd.store_complex(reflection[j], p, gr[j], gi[j])
 
 
+def levinson_entry(m: int, precision: str) -> Callable[..., Any]:
+    """Compile the kernel of order m."""
+    real, cplx = real_arrays(precision), complex_arrays(precision)
+    return entry(
+        _levinson,
+        order_type(m),
+        cplx[2],
+        real[1],
+        PIXELS,
+        real[1],
+        cplx[2],
+        cplx[2],
+        PIXELS,
+        PIXELS,
+    )
+
+
 def levinson_lane(m: int, precision: str) -> Callable[..., Any]:
     """Compile Levinson's recursion of order m; see the table in ``_kernels``."""
     order = (0,) * m
-    real, cplx = real_arrays(precision), complex_arrays(precision)
-    run = entry(_levinson, order_type(m), cplx[2], real[1], cplx[2], cplx[2], PIXELS, PIXELS)
+    run = levinson_entry(m, precision)
 
     def lane(b: Any, *, spread: Spread = at_once) -> tuple[Any, Any, Any]:
         shape, pixels = b.shape[1:], b[0].size
         planes = np.ascontiguousarray(b).reshape(m + 1, pixels)
         error = np.empty(pixels, precision)
         polynomial, reflection = np.empty_like(planes), np.empty_like(planes[1:])
-        spread(
-            lambda start, stop: run(order, planes, error, polynomial, reflection, start, stop),
-            pixels,
-        )
+
+        def part(start: int, stop: int) -> None:
+            run(order, planes, error, 0, error, polynomial, reflection, start, stop)
+
+        spread(part, pixels)
         return (
             error.reshape(shape),
             polynomial.reshape((m + 1, *shape)),

@@ -4,9 +4,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from transientcam_moments._kernels.eigenvalue import eigenvalues
+from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.entries import (
     COUNTS,
     PIXELS,
@@ -18,35 +17,7 @@ from transientcam_moments._kernels.entries import (
 )
 from transientcam_moments._kernels.registry import LEAST_PIXELS, REGISTRY, Key
 from transientcam_moments._kernels.returns import find_returns
-from transientcam_moments._kernels.spread import Spread, at_once
-
-_BLOCK = 256  # pixels that stay in the first cache from one stage to the next
-
-
-@njit(nogil=True, error_model="numpy")
-def _pisarenko(
-    order: Any,
-    turns: Any,
-    b: Any,
-    uniform: Any,
-    known: bool,
-    phase: Any,
-    weight: Any,
-    count: Any,
-    residual: Any,
-    noise: float,
-    start: int,
-    stop: int,
-) -> int:
-    ill = 0
-    for left in range(start, stop, _BLOCK):
-        begin, end = min(left, max(start, stop - _BLOCK)), min(left + _BLOCK, stop)
-        if not known:
-            eigenvalues(order, b, uniform, begin, end)
-        ill += find_returns(
-            order, turns, b, uniform, phase, weight, count, residual, noise, begin, end
-        )
-    return ill
+from transientcam_moments._kernels.spread import Spread, at_once, blocks
 
 
 def half_turns(m: int, precision: str) -> Any:
@@ -55,18 +26,17 @@ def half_turns(m: int, precision: str) -> Any:
     return np.concatenate([np.cos(angle), np.sin(angle)]).astype(precision)
 
 
-def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
-    """Compile Pisarenko's returns of order m; see the table in ``_kernels``."""
-    order = (0,) * m
+def returns_entry(m: int, precision: str) -> Callable[..., Any]:
+    """Compile the kernel of order m."""
     real, cplx = real_arrays(precision), complex_arrays(precision)
-    turns = half_turns(m, precision)
-    run = entry(
-        _pisarenko,
+    return entry(
+        find_returns,
         order_type(m),
         real[1],
         cplx[2],
         real[1],
         PIXELS,
+        real[1],
         real[2],
         real[2],
         COUNTS,
@@ -75,6 +45,13 @@ def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
         PIXELS,
         PIXELS,
     )
+
+
+def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
+    """Compile Pisarenko's returns of order m; see the table in ``_kernels``."""
+    order = (0,) * m
+    turns = half_turns(m, precision)
+    run_eigenvalue, run_returns = eigenvalue_entry(m, precision), returns_entry(m, precision)
 
     def lane(
         b: Any,
@@ -94,13 +71,14 @@ def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
         ill: list[int] = []
 
         def part(start: int, stop: int) -> None:
-            known = int(eigenvalue is not None)
-            ill.append(
-                run(
-                    order, turns, planes, uniform, known, phase, weight, count, residual, eps,
-                    start, stop,
-                )
-            )  # fmt: skip
+            for left, right in blocks(start, stop):
+                if eigenvalue is None:
+                    run_eigenvalue(order, planes, 0, uniform, left, right)
+                worst = run_returns(
+                    order, turns, planes, uniform, 0, uniform, phase, weight, count, residual,
+                    eps, left, right,
+                )  # fmt: skip
+                ill.append(worst)
 
         spread(part, pixels)
         found = (phase, weight, uniform, count)

@@ -151,11 +151,13 @@ def weigh(order: Any, gr: Any, gi: Any, inverse: Any, x: Any, y: Any) -> Any:
     return 1.0 / total, x - y * turn, y + x * turn
 
 
-@njit(forceinline=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def find_returns(
     order: Any,
     turns: Any,
     b: Any,
+    zeroth: Any,
+    apart: bool,
     uniform: Any,
     phase: Any,
     weight: Any,
@@ -166,6 +168,8 @@ def find_returns(
     stop: int,
 ) -> int:
     """Write the returns of the pixels start..stop, whose smallest eigenvalues are known.
+
+    b_0 comes from ``zeroth`` if it is ``apart``.
 
     ``noise`` is the precision of the data. ``residual`` becomes the largest error of a moment that
     the returns leave, relative to their sum; infinite where they could not be found, 0 where there
@@ -185,7 +189,7 @@ def find_returns(
     ill = 0
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        total, _ = simd.load_complex(one, b[0], p)
+        total = simd.load(one, zeroth, p) if apart else toeplitz.load_zeroth(one, b, p)
         total = total - simd.load(one, uniform, p)
         lit = total > 0.0
         factor = 1.0 / total

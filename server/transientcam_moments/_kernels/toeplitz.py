@@ -14,17 +14,24 @@ _EIGENVALUE_STEPS = 64  # nine are usual; a cluster of equal eigenvalues halves 
 
 
 @njit(forceinline=True, error_model="numpy")
-def load_relative(order: Any, b: Any, p: int, re: Any, im: Any) -> Any:
-    """Load moments b_0 .. b_m divided by the largest of them, and return that one.
+def load_zeroth(one: Any, b: Any, p: int) -> Any:
+    """Load the real part of b_0, NaN where its imaginary part isn't finite."""
+    b0, rest = simd.load_complex(one, b[0], p)
+    return b0 + rest * 0.0
+
+
+@njit(forceinline=True, error_model="numpy")
+def load_relative(order: Any, zeroth: Any, b: Any, p: int, re: Any, im: Any) -> Any:
+    """Load moments b_1 .. b_m, divide them and b_0 by the largest of them, and return that one.
 
     A pixel of zeros stays zero. One with a NaN or an infinity becomes NaN in all of its moments.
     """
     m = len(order)
-    re[0], im[0] = simd.load_complex(re[0], b[0], p)
-    scale, poison = simd.absolute(re[0]), re[0] * 0.0 + im[0] * 0.0
+    re[0] = zeroth
+    scale, poison = simd.absolute(zeroth), zeroth * 0.0
     im[0] = poison
     for j in range(1, m + 1):
-        re[j], im[j] = simd.load_complex(re[0], b[j], p)
+        re[j], im[j] = simd.load_complex(zeroth, b[j], p)
         poison = poison + re[j] * 0.0 + im[j] * 0.0
         scale = simd.maximum(scale, simd.maximum(simd.absolute(re[j]), simd.absolute(im[j])))
     scale = scale + poison

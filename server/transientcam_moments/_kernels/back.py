@@ -1,0 +1,137 @@
+"""What a frame's pixels need besides coefficients and returns: flags, biasing, direct light."""
+
+from typing import Any
+
+from numba import njit
+
+from transientcam_moments._kernels import simd
+
+_INTERLEAVE = 2
+# transientcam_moments.Flags
+_BIASED, _NO_SIGNAL, _SATURATED, _NON_FINITE = 1.0, 2.0, 4.0, 8.0
+
+
+@njit(nogil=True, error_model="numpy")
+def judge(
+    order: Any,
+    estimated: bool,
+    b: Any,
+    saturated: Any,
+    eigenvalue: Any,
+    brightness: Any,
+    uniform: Any,
+    validity: Any,
+    flags: Any,
+    epsilon: float,
+    least: float,
+    start: int,
+    stop: int,
+) -> None:
+    """Flag and bias the pixels start..stop, whose eigenvalues are known (Sec. 4.3).
+
+    ``brightness`` and ``uniform`` become b_0 and the smallest eigenvalue after biasing.
+    """
+    one = simd.ones(eigenvalue, _INTERLEAVE)
+    step = simd.width(one)
+    for left in range(start, stop, step):
+        p = min(left, stop - step)
+        smallest = simd.load(one, eigenvalue, p)
+        b0, rest = simd.load_complex(one, b[0], p)
+        poison = b0 * 0.0 + rest * 0.0
+        for j in range(1, len(order) + 1):
+            x, y = simd.load_complex(one, b[j], p)
+            poison = poison + x * 0.0 + y * 0.0
+        finite = poison >= 0.0
+        if estimated:
+            b0 = smallest / (epsilon - 1.0)
+            smallest = epsilon * b0
+        dark = finite & ~(b0 > least)
+        biased = smallest < epsilon * b0
+        raised = simd.select(biased, (b0 - smallest) / (1.0 - epsilon), b0)
+        flag = simd.load(one, saturated, p)
+        flag = flag + simd.select(finite, one * 0.0, _NON_FINITE)
+        flag = flag + simd.select(dark, _NO_SIGNAL * one, 0.0)
+        flag = flag + simd.select(biased, _BIASED * one, 0.0)
+        simd.store(flags, p, flag)
+        simd.store(validity, p, simd.select(b0 > 0.0, smallest / b0, simd.nan(one)))
+        simd.store(brightness, p, raised)
+        simd.store(uniform, p, smallest + (raised - b0))
+
+
+@njit(nogil=True, error_model="numpy")
+def separate(
+    order: Any,
+    phase: Any,
+    weight: Any,
+    flags: Any,
+    direct: Any,
+    indirect: Any,
+    range_m: Any,
+    threshold: float,
+    metres: float,
+    start: int,
+    stop: int,
+) -> None:
+    """Tell direct from indirect light: the first return above a threshold (Sec. 5.1)."""
+    one = simd.ones(direct, _INTERLEAVE)
+    step = simd.width(one)
+    for left in range(start, stop, step):
+        p = min(left, stop - step)
+        strongest, total = one * 0.0, one * 0.0
+        for i in range(len(order)):
+            w = simd.load(one, weight[i], p)
+            strongest, total = simd.maximum(w, strongest), total + w
+        first, angle = one * 0.0, simd.nan(one)
+        for i in range(len(order) - 1, -1, -1):
+            w = simd.load(one, weight[i], p)
+            enough = (w >= threshold * strongest) & (w > 0.0)
+            first = simd.select(enough, w, first)
+            angle = simd.select(enough, simd.load(one, phase[i], p), angle)
+        flag = simd.load(one, flags, p)
+        invalid = flag >= _NON_FINITE
+        flag = simd.select(flag >= _SATURATED, flag - _SATURATED, flag)
+        invalid = invalid | (flag >= _NO_SIGNAL)
+        simd.store(direct, p, first)
+        simd.store(indirect, p, simd.maximum(total - first, 0.0))
+        simd.store(range_m, p, simd.select(invalid, simd.nan(one), angle * metres))
+
+
+@njit(nogil=True, error_model="numpy")
+def gather(
+    order: Any, b: Any, brightness: Any, residual: Any, tolerance: float, wide: Any, where: Any,
+    begin: int,
+) -> int:  # fmt: skip
+    """Collect pixels from ``begin`` on whose residual is above the tolerance, until room ends.
+
+    Fills moments ``wide`` (m + 1, n) in double precision and their places ``where`` (n), both
+    padded with the first one; returns their number.
+    """
+    room, found = where.shape[0], 0
+    for p in range(begin, residual.shape[0]):
+        if residual[p] > tolerance:
+            where[found] = p
+            found += 1
+            if found == room:
+                break
+    for i in range(room if found else 0):
+        p = where[i] if i < found else where[0]
+        where[i] = p
+        wide[0, i] = brightness[p]
+        for j in range(1, len(order) + 1):
+            wide[j, i] = b[j, p]
+    return found
+
+
+@njit(nogil=True, error_model="numpy")
+def scatter(
+    order: Any, where: Any, found: int, wide_phase: Any, wide_weight: Any, wide_count: Any,
+    wide_residual: Any, phase: Any, weight: Any, count: Any, residual: Any,
+) -> None:  # fmt: skip
+    """Put redone returns back where they came from."""
+    for i in range(found):
+        p = where[i]
+        count[p] = wide_count[i]
+        residual[p] = wide_residual[i]
+        for k in range(len(order)):
+            phase[k, p] = wide_phase[k, i]
+            weight[k, p] = wide_weight[k, i]

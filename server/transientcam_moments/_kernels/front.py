@@ -1,0 +1,95 @@
+"""From raw images to calibrated and smoothed moments (Sec. 3.1, 4.2, 4.3 and 6)."""
+
+from typing import Any
+
+from numba import njit
+
+from transientcam_moments._kernels import simd
+
+LOW_FREQUENCY, ON_OFF, ESTIMATED = 0, 1, 2
+
+
+@njit(forceinline=True, error_model="numpy")
+def _bucket(one: Any, images: Any, first: int, p: int) -> Any:
+    """Return (I_0 - I_180) + i (I_90 - I_270) and the largest of the four."""
+    i0, i90 = simd.load(one, images[first], p), simd.load(one, images[first + 1], p)
+    i180, i270 = simd.load(one, images[first + 2], p), simd.load(one, images[first + 3], p)
+    largest = simd.maximum(simd.maximum(i0, i90), simd.maximum(i180, i270))
+    return i0 - i180, i90 - i270, largest
+
+
+@njit(nogil=True, error_model="numpy")
+def measure(
+    order: Any,
+    images: Any,
+    zeroth: int,
+    inverse: Any,
+    stride: int,
+    full_scale: float,
+    moments: Any,
+    flags: Any,
+    start: int,
+    stop: int,
+) -> None:
+    """Write calibrated moments and the flag 4 of saturated pixels for the pixels start..stop.
+
+    ``inverse`` holds what to multiply with, (m + 1, n): a row of lanes for all pixels alike
+    (``stride`` 0) or one number a pixel (``stride`` 1).
+    """
+    one = simd.ones(moments, 1)
+    step = simd.width(one)
+    limit = simd.spread(one, full_scale)
+    for left in range(start, stop, step):
+        p = min(left, stop - step)
+        first = 4
+        x, largest = one * 0.0, one * 0.0
+        if zeroth == LOW_FREQUENCY:
+            x, y, largest = _bucket(one, images, 0, p)
+            x = simd.sqrt(x * x + y * y)
+        elif zeroth == ON_OFF:
+            on, off = simd.load(one, images[0], p), simd.load(one, images[1], p)
+            x, largest, first = 2.0 * (on - off), simd.maximum(on, off), 2
+        else:
+            first = 0
+        u, v = simd.load_complex(one, inverse[0], p * stride)
+        simd.store_complex(moments[0], p, x * u, x * v)
+        for j in range(1, len(order) + 1):
+            x, y, here = _bucket(one, images, first + 4 * (j - 1), p)
+            largest = simd.maximum(largest, here)
+            u, v = simd.load_complex(one, inverse[j], p * stride)
+            simd.store_complex(moments[j], p, x * u - y * v, x * v + y * u)
+        simd.store(flags, p, simd.select(largest >= limit, 4.0 * one, 0.0))
+
+
+@njit(nogil=True, error_model="numpy")
+def smooth(
+    moments: Any, taps: Any, weight: Any, rows: Any, out: Any, width: int, start: int, stop: int
+) -> None:
+    """Smooth rows start..stop of all planes (n, H * 2 W), real and imaginary parts interleaved.
+
+    ``weight`` (H * 2 W) normalises, ``rows`` (2 W + 4 R + lanes) is room for a row with 2 R zeros
+    before and behind it.
+    """
+    one = simd.ones(weight, 1)
+    step = simd.width(one)
+    radius = taps.shape[0] // 2
+    length = 2 * width
+    height = weight.shape[0] // length
+    margin = 2 * radius
+    for j in range(moments.shape[0]):
+        plane, smoothed = moments[j], out[j]
+        for y in range(start, stop):
+            low, high = max(-radius, -y), min(radius, height - 1 - y)
+            for left in range(0, length, step):
+                x = min(left, length - step)
+                total = one * 0.0
+                for k in range(low, high + 1):
+                    total = total + taps[radius + k] * simd.load(one, plane, (y + k) * length + x)
+                simd.store(rows, margin + x, total)
+            for left in range(0, length, step):
+                x = min(left, length - step)
+                total = one * 0.0
+                for k in range(2 * radius + 1):
+                    total = total + taps[k] * simd.load(one, rows, x + 2 * k)
+                p = y * length + x
+                simd.store(smoothed, p, total * simd.load(one, weight, p))
