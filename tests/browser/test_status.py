@@ -83,6 +83,16 @@ def test_the_camera_stops_and_starts_again(page: Page, served: Served) -> None:
     expect(page.locator("[data-field=state]")).to_have_text("Live")
 
 
+def test_a_camera_that_somebody_else_stops_and_starts_is_followed(
+    page: Page, served: Served
+) -> None:
+    open_page(page)
+    acquisition = f"{served.url}/api/v1/acquisition"
+    for running, state in ((False, "Stopped"), (True, "Live")):
+        httpx.put(acquisition, json={"running": running}).raise_for_status()
+        expect(page.locator("[data-field=state]")).to_have_text(state)
+
+
 def test_a_held_page_keeps_its_frame_while_the_camera_goes_on(page: Page, served: Served) -> None:
     open_page(page)
     page.keyboard.press("h")

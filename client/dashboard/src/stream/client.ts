@@ -4,7 +4,7 @@ import { effect } from "@preact/signals";
 import type { Frame } from "../store/frames";
 import type { Store } from "../store/store";
 import type { AnimationLoop } from "../ui/animation";
-import type { AppliedSequence, Hello, Notice } from "./protocol";
+import type { AppliedSequence, CameraDocument, Hello, Notice } from "./protocol";
 import { coefficientsOf, type FrameReport } from "./summary";
 import type { Command, Report } from "./worker";
 
@@ -24,6 +24,7 @@ export class StreamClient {
   readonly #now_s: Clock;
   /** Newest frame a product that is not drawn yet: what comes faster than the display replaces it. */
   readonly #pending = new Map<string, FrameReport>();
+  #asking = false;
 
   constructor(store: Store, worker: WorkerPort, loop: AnimationLoop, now_s: Clock = () => Date.now() / 1000) {
     this.#store = store;
@@ -76,8 +77,7 @@ export class StreamClient {
         status.connectionLost(report.reason, this.#now_s() + report.retry_s);
         break;
       case "camera":
-        this.#store.camera.value = report.document;
-        status.cameraIs(report.document.state, this.#now_s(), report.document.reason);
+        this.#takeCamera(report.document);
         break;
       case "unreadable":
         status.unreadable.value = report.reason;
@@ -129,11 +129,20 @@ export class StreamClient {
 
   /** What the stream does not tell: what the camera is and can do. */
   async #readCamera(): Promise<void> {
+    if (this.#asking) return;
+    this.#asking = true;
     try {
-      this.#store.camera.value = await this.#store.api.camera();
+      this.#takeCamera(await this.#store.api.camera());
     } catch {
       // Asked again when there is a connection again; the stream itself says that there is none.
+    } finally {
+      this.#asking = false;
     }
+  }
+
+  #takeCamera(document: CameraDocument): void {
+    this.#store.camera.value = document;
+    this.#store.status.cameraIs(document.state, this.#now_s(), document.reason);
   }
 
   #draw(): void {
@@ -146,6 +155,8 @@ export class StreamClient {
       this.#store.status.frameDrawn(meta, this.#now_s());
     }
     this.#pending.clear();
+    // Somebody else may have started the camera; or this frame was on its way when it stopped. It knows.
+    if (this.#store.status.cameraState.peek() !== "streaming") void this.#readCamera();
     this.#send({ type: "acknowledge", frame: newest });
   }
 }

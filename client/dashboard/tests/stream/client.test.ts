@@ -108,6 +108,15 @@ describe("between worker and store", () => {
     expect(page.store.status.cameraLoss.value).not.toBeNull();
   });
 
+  test("a camera that somebody else started is asked how it is when its first frame comes", async () => {
+    page.receives({ type: "open" }, hello("stopped"));
+    await expect.poll(() => page.store.status.running.value).toBe(true); // what the service answers on opening
+    page.store.status.cameraIs("stopped", 1000);
+    page.receives(frame("range", 9));
+    page.refreshes();
+    await expect.poll(() => page.store.status.running.value).toBe(true);
+  });
+
   test("drops, lost images and what could not be read are counted and told", () => {
     page.receives(
       { type: "message", message: { type: "notice", kind: "dropped", channel: 1, count: 2, total: 9 } },
