@@ -11,6 +11,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Coroutine, Hashable, Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
+from dataclasses import asdict
 from typing import Any, TypeVar
 
 import numpy as np
@@ -101,15 +102,15 @@ class Pipeline:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
-    def note_failure(self, product: Product, number: int) -> None:
+    def note_failure(self, name: str, number: int) -> None:
         """Log a failure with its cause, the first of a series; call it while handling that."""
-        if product.name not in self._failing:
-            self._failing.add(product.name)
-            _log.exception("frame %d: making %s failed", number, product.name)
+        if name not in self._failing:
+            self._failing.add(name)
+            _log.exception("frame %d: making %s failed", number, name)
 
-    def note_success(self, product: Product) -> None:
+    def note_success(self, name: str) -> None:
         """Note that a product works, so that its next failure is logged again."""
-        self._failing.discard(product.name)
+        self._failing.discard(name)
 
     def truth(self) -> Any:
         """Return the ground truth of the simulated scene; runs on a worker."""
@@ -211,10 +212,19 @@ class Frame:
         )
         return data
 
-    async def pixel(self, compute: Callable[..., _T], *arguments: Any) -> _T:
-        """Return what ``compute(recipe, moments, *arguments)`` gives on a worker."""
-        moments = await self.stage("moments")
-        value, _ = await self._pipeline.run(compute, self.recipe, moments, *arguments)
+    async def with_moments(self, compute: Callable[..., _T], *arguments: Any) -> _T:
+        """Return what ``compute(recipe, moments, meta, *arguments)`` gives on a worker.
+
+        Raises
+        ------
+        Problem
+            ``product-failed`` if it raised.
+        """
+        with self._failure_of("moments"):
+            moments = await self.stage("moments")
+            value, _ = await self._pipeline.run(
+                compute, self.recipe, moments, self.meta(), *arguments
+            )
         return value
 
     async def _once(
@@ -248,7 +258,7 @@ class Frame:
     async def _compute_product(self, product: Product, time_s: tuple[float, ...]) -> _Array:
         if product.over_time:
             self._refuse_too_large(len(time_s))
-        with self._failure_of(product):
+        with self._failure_of(product.name):
             needs = await asyncio.gather(*map(self.stage, product.needs))
             if product.over_time:
                 work = self._pipeline.run_long(
@@ -265,24 +275,24 @@ class Frame:
         array = await self.product(product, time_s)
         run = self._pipeline.run_long if product.over_time else self._pipeline.run
         extra = self._extra(product, time_s)
-        with self._failure_of(product):
+        with self._failure_of(product.name):
             data, _ = await run(encoding.encode, product, array, self.meta(), extra, channel)
-        self._pipeline.note_success(product)
+        self._pipeline.note_success(product.name)
         return data
 
     @contextmanager
-    def _failure_of(self, product: Product) -> Iterator[None]:
+    def _failure_of(self, name: str) -> Iterator[None]:
         """Around the making of a product: what goes wrong is that product's problem alone."""
         try:
             yield
         except Problem:
             raise
         except Exception as error:
-            self._pipeline.note_failure(product, self.number)
+            self._pipeline.note_failure(name, self.number)
             raise Problem(
                 kinds.PRODUCT_FAILED,
-                f"Computing {product.name} of frame {self.number} failed.",
-                product=product.name,
+                f"Computing {name} of frame {self.number} failed.",
+                product=name,
                 frame=self.number,
             ) from error
 
@@ -290,7 +300,7 @@ class Frame:
         if product.over_time:
             return {"time_s": list(time_s)}
         if product.name == "raw":
-            return {"labels": [_label_document(label) for label in self.raw.labels]}
+            return {"labels": [asdict(label) for label in self.raw.labels]}
         return {}
 
     def _refuse_too_large(self, times: int) -> None:
@@ -304,18 +314,6 @@ class Frame:
                 value=times,
                 limit=f"at most {limit}",
             )
-
-
-def _label_document(label: Any) -> dict[str, Any]:
-    return {
-        "index": label.index,
-        "take": label.take,
-        "harmonic": label.harmonic,
-        "frequency_hz": label.frequency_hz,
-        "phase_rad": label.phase_rad,
-        "exposure_s": label.exposure_s,
-        "illumination": label.illumination,
-    }
 
 
 def _timed(compute: Callable[..., _T], *arguments: Any) -> tuple[_T, float]:

@@ -1,6 +1,8 @@
 """Everything about one pixel: what a click on the dashboard shows."""
 
+import json
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
 
@@ -11,6 +13,20 @@ from transientcam_driver import Truth
 from transientcam_server.products import Recipe
 
 _TRUE_RETURNS: Final = 16
+
+
+def pixel_json(
+    recipe: Recipe,
+    image: tm.Reconstruction,
+    meta: Mapping[str, Any],
+    truth: Truth | None,
+    x: int,
+    y: int,
+    bins: int,
+) -> bytes:
+    """Return what `describe_pixel` says, with the frame's meta, as JSON."""
+    document = {"meta": meta} | describe_pixel(recipe, image, truth, x, y, bins)
+    return json.dumps(document, allow_nan=False, separators=(",", ":")).encode()
 
 
 def describe_pixel(

@@ -10,7 +10,7 @@ from transientcam_server import problem_kinds as kinds
 from transientcam_server.encoding import COLOUR_PNG, MSGPACK, NPY, PNG, Encoding, negotiate
 from transientcam_server.errors import Problem
 from transientcam_server.pipeline import Frame
-from transientcam_server.pixel import describe_pixel
+from transientcam_server.pixel import pixel_json
 from transientcam_server.problems import documented
 from transientcam_server.products import Product
 from transientcam_server.routes.models import FrameDocument, PixelDocument
@@ -58,6 +58,7 @@ async def read_latest(service: ServiceOf, wait_s: _Wait = 0.0, after: _After = 0
 @router.get(
     "/frames/latest/pixel",
     summary="Everything about one pixel",
+    response_model=PixelDocument,
     responses=documented(
         kinds.INVALID_REQUEST, kinds.PRODUCT_FAILED, kinds.NO_FRAME_YET, kinds.SHUTTING_DOWN
     ),
@@ -69,7 +70,7 @@ async def read_pixel(
     bins: Annotated[int, Query(ge=1, le=MAX_BINS, description="times of flight")] = 256,
     wait_s: _Wait = 0.0,
     after: _After = 0,
-) -> PixelDocument:
+) -> Response:
     """Return range, returns, moments and the whole estimated impulse response of one pixel."""
     frame = await service.hub.newest(after=after, wait_s=wait_s)
     for field, value, length in (("x", x, frame.shape[1]), ("y", y, frame.shape[0])):
@@ -77,8 +78,8 @@ async def read_pixel(
             limit = f"from 0 to {length - 1}"
             raise _invalid(field, value, limit)
     truth = await frame.stage("truth") if service.camera.simulation is not None else None
-    document = await frame.pixel(describe_pixel, truth, x, y, bins)
-    return PixelDocument.model_validate(document | {"meta": frame.meta()})
+    body = await frame.with_moments(pixel_json, truth, x, y, bins)
+    return Response(body, media_type="application/json", headers={"Cache-Control": "no-store"})
 
 
 _HEADERS = {
