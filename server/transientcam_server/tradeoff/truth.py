@@ -1,0 +1,58 @@
+"""What a simulated scene really holds, in the terms that are measured."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from transientcam_driver import Truth
+
+_Array = NDArray[Any]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sample:
+    """Some pixels with all of their light.
+
+    Attributes
+    ----------
+    y, x
+        (P) indices.
+    light
+        Of each pixel, times of flight in s and the share of its light that comes back at each.
+    """
+
+    y: _Array
+    x: _Array
+    light: tuple[tuple[_Array, _Array], ...]
+
+
+def sample_pixels(truth: Truth, *, pixels: int, seed: int) -> Sample:
+    """Choose pixels that light comes back to; every pixel with the same chance."""
+    y, x = np.nonzero(np.isfinite(truth.range_m) & (truth.brightness > 0))
+    chosen = np.random.default_rng(seed).permutation(len(y))[:pixels]
+    y, x = y[chosen], x[chosen]
+    light = []
+    for row, column in zip(y.tolist(), x.tolist(), strict=True):
+        time_s, value = truth.impulse_response(column, row)
+        # a density over equal bins, or the returns' weights: only their shares matter
+        light.append((time_s, value / value.sum()))
+    return Sample(y, x, tuple(light))
+
+
+def cumulative(sample: Sample, phase_rad: _Array, *, base_frequency_hz: float) -> _Array:
+    """Return the share of the light (T, P) that has come back until each phase, in [0, 2 pi)."""
+    result = np.empty((len(phase_rad), len(sample.light)))
+    for pixel, (time_s, share) in enumerate(sample.light):
+        phase = np.remainder(2 * np.pi * base_frequency_hz * time_s, 2 * np.pi)
+        order = np.argsort(phase)
+        summed = np.append(0.0, np.cumsum(share[order]))
+        result[:, pixel] = summed[np.searchsorted(phase[order], phase_rad, side="right")]
+    return result
+
+
+def count_returns(weight: _Array, *, threshold: float) -> _Array:
+    """Count returns (K, ...) of at least a share of each pixel's strongest one."""
+    strongest = weight.max(axis=0)
+    counted: _Array = ((weight >= threshold * strongest) & (weight > 0)).sum(axis=0)
+    return counted
