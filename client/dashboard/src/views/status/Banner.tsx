@@ -26,7 +26,7 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
         <p>
           <strong>Camera lost</strong> at {new Date(1000 * loss.at_s).toLocaleTimeString()}. The service looks for it and
           goes on by itself; what you see is the last frame.{" "}
-          {loss.reason !== null && <span class="quiet">({loss.reason})</span>}
+          {loss.reason !== null && <span class="quiet">Reason: {loss.reason}</span>}
         </p>
       </div>
     );
