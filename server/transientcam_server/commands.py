@@ -171,16 +171,30 @@ def _tell(
             console.print(f"  {count} pixels flagged {str(flag.name).lower().replace('_', ' ')}")
 
 
-def compile_kernels() -> None:
+def compile_kernels(
+    harmonics: Annotated[
+        list[int], typer.Option(min=1, max=32, help="Orders m to compile for; may be repeated.")
+    ] = [3, 4, 8],  # noqa: B006 - typer copies it
+) -> None:
     """Compile the kernels of the reconstruction now, for images and packages."""
     import transientcam_moments as tm
 
+    console = Console()
+    if not tm.kernels.state()["enabled"]:
+        console.print("Kernels are off (TRANSIENTCAM_KERNELS); everything is left to NumPy.")
+        return
     with Progress(
-        TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=Console()
+        TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=console
     ) as progress:
         task = progress.add_task("compiling", total=None)
 
         def advance(done: int, total: int, name: str) -> None:
-            progress.update(task, completed=done, total=total, description=name)
+            progress.update(task, completed=done, total=total, description=name or "compiled")
 
-        tm.kernels.compile(progress=advance)
+        tm.kernels.compile(harmonics=harmonics, progress=advance)
+    state = tm.kernels.state()
+    for failure in state["failed"]:
+        console.print(f"failed: {failure}", soft_wrap=True)
+    console.print(f"{len(state['compiled'])} kernels are ready.")
+    if state["failed"]:
+        raise typer.Exit(code=1)

@@ -92,7 +92,7 @@ class Service:
         reasons = []
         if status.state == "lost":
             reasons.append(f"the camera is lost: {status.reason}")
-        if status.state == "starting" and self.hub.latest is None:
+        if status.state in ("starting", "streaming") and not status.frames:
             reasons.append("the camera is starting")
         if status.stalled:
             reasons.append(f"no frame arrived for {status.frame_age_s:.1f} s")

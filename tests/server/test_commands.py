@@ -1,10 +1,12 @@
 """`transientcam reconstruct` and `compile`, through the command line of the client."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from transientcam.cli import run
+from transientcam_moments import kernels
 from transientcam_server.reconstruct import Reconstruction
 
 F_HZ = 23e6
@@ -112,3 +114,45 @@ def test_an_output_that_cannot_be_written_is_named_and_leaves_no_part(
     assert code == 1
     assert "nowhere" in capfd.readouterr().err.replace("\n", "")
     assert [each.name for each in tmp_path.iterdir()] == ["in.npz"]
+
+
+def test_compiling_tells_what_is_ready(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    asked: list[Any] = []
+
+    def compile_(*, harmonics: list[int], progress: Any) -> None:
+        asked.extend(harmonics)
+        progress(0, 1, "levinson m=5 float32")
+        progress(1, 1, "")
+
+    state = {"enabled": True, "compiled": ["a", "b"], "compiling": None, "failed": []}
+    monkeypatch.setattr(kernels, "compile", compile_)
+    monkeypatch.setattr(kernels, "state", lambda: state)
+
+    assert run(["compile", "--harmonics", "5", "--harmonics", "6"]) == 0
+
+    assert asked == [5, 6]
+    assert "2 kernels are ready" in capfd.readouterr().out
+
+
+def test_a_kernel_that_cannot_be_compiled_is_named_and_fails_the_command(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    state = {"enabled": True, "compiled": [], "compiling": None, "failed": ["density m=3: no disk"]}
+    monkeypatch.setattr(kernels, "compile", lambda **_: None)
+    monkeypatch.setattr(kernels, "state", lambda: state)
+
+    assert run(["compile"]) == 1
+
+    assert "density m=3: no disk" in capfd.readouterr().out
+
+
+def test_where_kernels_are_off_there_is_nothing_to_compile(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(kernels, "state", lambda: {"enabled": False})
+
+    assert run(["compile"]) == 0
+
+    assert "NumPy" in capfd.readouterr().out
