@@ -160,7 +160,8 @@ def below_one(g: Array) -> Array:
     re, re_error = _square(g.real)
     im, im_error = _square(g.imag)
     larger, smaller = namespace(g).maximum(re, im), namespace(g).minimum(re, im)
-    return ((1 - larger) - smaller) - (re_error + im_error)
+    rest = 1 - larger
+    return (rest - smaller) + (((1 - rest) - larger) - (re_error + im_error))
 
 
 def _square(x: Array) -> tuple[Array, Array]:

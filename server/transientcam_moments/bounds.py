@@ -53,7 +53,8 @@ def bounds(b: Array, phase_rad: Array, radius: float = RADIUS) -> tuple[Array, A
     in_range("radius", radius, 0.0, float(np.nextafter(1.0, 0.0)), _LIMIT)
     coefficients = levinson(b)
     centre, disc = _smoothed(coefficients, phase_rad, radius, spread=1.0)
-    return centre - disc, centre + disc
+    with np.errstate(over="ignore", invalid="ignore"):
+        return centre - disc, centre + disc
 
 
 def smoothed_density(coefficients: Coefficients, phase_rad: Array, radius: float = RADIUS) -> Array:
@@ -96,11 +97,11 @@ def _smoothed(
     phase = phases(phase_rad, like=reflection)
     b0 = coefficients.brightness.reshape(-1)
     points = radius * (xp.cos(phase) + 1j * xp.sin(phase))
-    with np.errstate(all="ignore"):
-        values = _disc(reflection, points.astype(reflection.dtype), spread)
     shape = (phase.shape[0], *coefficients.error.shape)
     scale = (b0 / (2 * np.pi)).astype(real_type(reflection))
-    centre, size = ((value * scale).reshape(shape) for value in values)
+    with np.errstate(all="ignore"):
+        values = _disc(reflection, points.astype(reflection.dtype), spread)
+        centre, size = ((value * scale).reshape(shape) for value in values)
     return centre, size
 
 

@@ -86,12 +86,20 @@ def _closed_form(coefficients: Coefficients, phase: Array) -> tuple[Array, Array
         backwards = to_complex(xp.cos(turn), -xp.sin(turn))
         total = turn * b0
         for pole, share in zip(poles, shares, strict=True):
-            # 2 Im(C log w): w = 1 - p exp(-i x) stays in the right half plane
-            start, w = 1 - pole, 1 - pole * backwards
-            angle = xp.arctan2(w.imag, w.real) - xp.arctan2(start.imag, start.real)
-            stretch = xp.log(squared(w) / squared(start))
-            total = total + (2 * share.real * angle + share.imag * stretch)
+            angle, stretch = _logarithm(pole * backwards)
+            angle_0, stretch_0 = _logarithm(pole)
+            total = total + 2 * (share.real * (angle - angle_0))
+            total = total + 2 * (share.imag * (stretch - stretch_0))
         return xp.where(b0 > 0, total / (2 * np.pi), 0 * total), error
+
+
+def _logarithm(w: Array) -> tuple[Array, Array]:
+    """Return imaginary and real part of log(1 - w), |w| < 1, precise also for tiny w."""
+    xp = namespace(w)
+    above = squared(w) - 2 * w.real  # |1 - w|^2 - 1
+    near = 1 - w  # in the right half plane
+    stretch = xp.where(above > -0.5, xp.log1p(xp.maximum(above, -0.5)), xp.log(squared(near)))
+    return xp.arctan2(near.imag, near.real), stretch / 2
 
 
 def _shares(poles: list[Array], coefficients: Coefficients, b: Array) -> tuple[list[Array], Array]:
@@ -108,15 +116,18 @@ def _shares(poles: list[Array], coefficients: Coefficients, b: Array) -> tuple[l
     a = coefficients.polynomial
     xp = namespace(a)
     m = a.shape[0] - 1
-    size = sum(xp.sqrt(squared(plane)) for plane in a)
+    sizes = [xp.sqrt(squared(plane)) for plane in a]
     residues, solutions = [], []
     residue_error, solution_error = 0 * coefficients.error, 0 * coefficients.error
     for index, pole in enumerate(poles):
         quotient = a[0]
         solution = quotient * b[m - 1]
+        reach = xp.sqrt(squared(pole))
+        size = sizes[0] * reach + sizes[1]
         for k in range(1, m):
             quotient = quotient * pole + a[k]
             solution = solution + quotient * b[m - 1 - k]
+            size = size * reach + sizes[k + 1]
         slope, near = xp.ones_like(pole), 0 * size
         mirrored = 1 - pole.conj() * pole
         distance = mirrored.real
@@ -131,12 +142,13 @@ def _shares(poles: list[Array], coefficients: Coefficients, b: Array) -> tuple[l
         residues.append(residue * inverse * mirrored.conj() / squared(mirrored))
         solutions.append(solution * inverse)
         rounding = size * xp.sqrt(squared(inverse))
-        weight = xp.sqrt(squared(residues[-1])), xp.sqrt(squared(solutions[-1]))
+        # log(1 - w) is about w: faint poles count as much as they reach
+        weight = reach * xp.sqrt(squared(residues[-1])), reach * xp.sqrt(squared(solutions[-1]))
         residue_error = residue_error + weight[0] + b[0].real * rounding / distance
         solution_error = solution_error + weight[1] * (1 + rounding * near)
     better = residue_error <= solution_error
     shares = [xp.where(better, *pair) for pair in zip(residues, solutions, strict=True)]
-    eps = float(np.finfo(size.dtype).eps)
+    eps = float(np.finfo(b[0].real.dtype).eps)
     return shares, eps * xp.where(better, residue_error, solution_error) / b[0].real
 
 

@@ -18,7 +18,7 @@ class Flags(IntFlag):
     SATURATED = 4
     """An image was at the end of its scale."""
     NON_FINITE = 8
-    """A moment is NaN or infinite."""
+    """A moment is NaN, infinite or so large that densities overflow its precision."""
     DEGENERATE = 16
     """The Toeplitz matrix is singular or indefinite, so that the density is not determined."""
 
@@ -55,12 +55,13 @@ def flags(b: Array, *, minimum_brightness: float = 0.0, eigenvalue: Array | None
     xp = namespace(planes)
     smallest: Array = smallest_eigenvalue(planes) if eigenvalue is None else eigenvalue
     b0 = planes[0].real
-    finite = xp.isfinite(planes[0])
+    limits = np.finfo(b0.dtype)
+    finite = xp.isfinite(planes[0]) & (abs(b0) < float(limits.max) * float(limits.eps))
     for plane in planes[1:]:
         finite = finite & xp.isfinite(plane)
     dark = finite & ~(b0 > minimum_brightness)
     # an eigenvalue is known to about eps times the order of the matrix
-    rounding = 4 * len(planes) * float(np.finfo(b0.dtype).eps)
+    rounding = 4 * len(planes) * float(limits.eps)
     degenerate = finite & ~dark & ~(smallest.reshape(-1) > rounding * b0)
     out = xp.where(finite, 0, int(Flags.NON_FINITE))
     out = xp.where(dark, int(Flags.NO_SIGNAL), out)

@@ -264,7 +264,8 @@ def _physical(b: list[Array]) -> list[Array]:
     planes = [b0 * inverse]
     for plane in b[1:]:
         size = xp.sqrt(squared(plane))
-        planes.append(plane * xp.where(size > 2 * b0, 2 / size, inverse) * (planes[0] > 0))
+        factor = xp.where(size > 2 * b0, 2 / size, inverse)
+        planes.append(plane * xp.where(planes[0] > 0, factor, 0 * b0))
     return planes
 
 

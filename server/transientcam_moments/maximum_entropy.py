@@ -7,12 +7,12 @@ import numpy as np
 from transientcam_moments import _kernels
 from transientcam_moments._arrays import (
     Array,
+    below_one,
     chosen,
     flat_planes,
     namespace,
     phases,
     real_type,
-    squared,
 )
 from transientcam_moments.levinson import Coefficients
 
@@ -61,16 +61,16 @@ def density(coefficients: Coefficients, phase_rad: Array, *, evaluation: str = "
             out = lane(planes, flat_planes(coefficients.reflection), error.reshape(-1), phase, None)
     if out is None:
         fill = _density if evaluation == "modulus" else _density_fourier
-        floor = _floor(coefficients).reshape(-1)
+        floor = modulus_floor(coefficients).reshape(-1)
         out = _by_blocks(fill, planes, error.reshape(-1), floor, phase)
     return out.reshape((phase.shape[0], *error.shape))
 
 
-def _floor(coefficients: Coefficients) -> Array:
+def modulus_floor(coefficients: Coefficients) -> Array:
     """Return the smallest squared modulus that is told from rounding: eps prod (1 - |g_k|^2)."""
-    product = 1 - squared(coefficients.reflection[0])
+    product = below_one(coefficients.reflection[0])
     for g in coefficients.reflection[1:]:
-        product = product * (1 - squared(g))
+        product = product * below_one(g)
     return float(np.finfo(product.dtype).eps) * product
 
 

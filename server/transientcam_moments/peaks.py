@@ -17,6 +17,7 @@ from transientcam_moments._arrays import (
 )
 from transientcam_moments._loops import repeat
 from transientcam_moments.levinson import Coefficients
+from transientcam_moments.maximum_entropy import modulus_floor
 from transientcam_moments.roots import disc_roots
 
 PEAK_THRESHOLD = 0.1
@@ -74,11 +75,12 @@ def peaks(coefficients: Coefficients, *, threshold: float = PEAK_THRESHOLD) -> P
     in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
     a, error = flat_planes(coefficients.polynomial), coefficients.error.reshape(-1)
     m = a.shape[0] - 1
+    floor = modulus_floor(coefficients).reshape(-1)
 
-    def find(part: Array, scale: Array) -> tuple[Array, ...]:
-        return _peaks(part, scale, threshold)
+    def find(part: Array, scale: Array, least: Array) -> tuple[Array, ...]:
+        return _peaks(part, scale, least, threshold)
 
-    first, strongest, phase, height = by_blocks(find, a, error)
+    first, strongest, phase, height = by_blocks(find, a, error, floor)
     trailing = coefficients.error.shape
     return Peaks(
         first.reshape(trailing),
@@ -88,8 +90,8 @@ def peaks(coefficients: Coefficients, *, threshold: float = PEAK_THRESHOLD) -> P
     )
 
 
-def _peaks(a: Array, error: Array, threshold: float) -> tuple[Array, ...]:
-    """Planar statement of `peaks`: polynomial (m + 1, P) and error (P)."""
+def _peaks(a: Array, error: Array, floor: Array, threshold: float) -> tuple[Array, ...]:
+    """Planar statement of `peaks`: polynomial (m + 1, P), error (P), floor of the modulus (P)."""
     xp = namespace(a)
     with np.errstate(all="ignore"):
         poles = disc_roots(list(a[1:]))
@@ -97,9 +99,10 @@ def _peaks(a: Array, error: Array, threshold: float) -> tuple[Array, ...]:
         for pole in poles:
             top = _climb(pole, poles)
             phases.append(in_turn(xp.arctan2(top.imag, top.real)).astype(error.dtype))
-            height = _height(top, poles) * (error / (2 * np.pi))
+            height = error / (2 * np.pi) / xp.maximum(_modulus(top, poles), floor)
             heights.append(xp.where(_is_peak(top, poles) & (height > 0), height, 0))
-    phase, height = xp.stack(phases), xp.stack(heights).astype(error.dtype)
+        height = xp.minimum(xp.stack(heights), float(np.finfo(error.dtype).max))
+    phase, height = xp.stack(phases), height.astype(error.dtype)
     order = xp.argsort(xp.where(height > 0, phase, np.inf), axis=0)
     return _select(
         xp.take_along_axis(phase, order, axis=0),
@@ -173,13 +176,12 @@ def _shape(z: Array, poles: Sequence[Array]) -> tuple[Array, Array, Array]:
     return slope, curvature, near
 
 
-def _height(z: Array, poles: Sequence[Array]) -> Array:
-    """Return 1 / prod |z - p_l|^2, limited to what rounding resolves."""
-    xp = namespace(z)
-    product = xp.ones_like(z.real)
-    for pole in poles:
+def _modulus(z: Array, poles: Sequence[Array]) -> Array:
+    """Return prod |z - p_l|^2, the denominator of Eq. (2)."""
+    product = squared(z - poles[0])
+    for pole in poles[1:]:
         product = product * squared(z - pole)
-    return 1 / xp.maximum(product, float(np.finfo(product.dtype).eps) ** 2)
+    return product
 
 
 def _is_peak(z: Array, poles: Sequence[Array]) -> Array:

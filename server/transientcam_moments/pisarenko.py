@@ -162,8 +162,7 @@ def _pisarenko(
         else:
             uniform = namespace(b).where(scale > 0, uniform / scale, 0 * scale)
         floor = 4 * len(planes[1:]) * (noise or float(np.finfo(scale.dtype).eps))
-        phase, weight, count = _returns(planes, uniform, floor)
-        weight = namespace(b).where(weight > 0, weight * scale, 0 * weight)
+        phase, weight, count = _returns(planes, uniform, scale, floor)
         return phase, weight, uniform * scale, count
 
 
@@ -196,10 +195,13 @@ def _improved(b: Array, found: tuple[Array, ...]) -> tuple[Array, ...]:
     return result
 
 
-def _returns(b: list[Array], uniform: Array, floor: float) -> tuple[Array, Array, Array]:
+def _returns(
+    b: list[Array], uniform: Array, scale: Array, floor: float
+) -> tuple[Array, Array, Array]:
     """Find the returns of planes whose largest moment is 1, with a singular B - uniform I.
 
-    Prediction errors and weights below `floor`, relative to the brightness, are rounding.
+    Prediction errors and weights below `floor`, relative to the brightness, are rounding. Weights
+    are multiplied with `scale`.
     """
     xp = namespace(b[1])
     total = b[0] - uniform
@@ -211,11 +213,12 @@ def _returns(b: list[Array], uniform: Array, floor: float) -> tuple[Array, Array
         last = xp.where(singular.order == k, g, last)
     phases, weights = [], []
     for index, u in enumerate(circle_roots(singular.polynomial, singular.order, last)):
-        weight = 1 / _christoffel(singular, u)
-        used = (singular.order > index) & (weight > floor)
+        share = 1 / _christoffel(singular, u)
+        weight = share * total * scale
+        used = (singular.order > index) & (share > floor) & (weight > 0)
         angle = xp.arctan2(-u.imag, u.real)  # z = 1 / u
         phases.append(xp.where(used, in_turn(angle), np.nan).astype(total.dtype))
-        weights.append(xp.where(used, weight * total, 0).astype(total.dtype))
+        weights.append(xp.where(used, weight, 0).astype(total.dtype))
     phase, weight = xp.stack(phases), xp.stack(weights)
     order = xp.argsort(phase, axis=0)  # NaN comes last
     return (

@@ -1,0 +1,176 @@
+"""The stages together."""
+
+import numpy as np
+import pytest
+import transientcam_moments as tm
+
+from tests.moments import oracles
+
+SHAPE = (6, 7)
+FREQUENCY_HZ = 23e6
+
+
+def scene(m: int, *, noise: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Moments, phases (2, H, W) and weights of a direct and an indirect return everywhere."""
+    rng = np.random.default_rng(0)
+    phase = np.array([1.0, 3.0])[:, None, None] + 0.01 * rng.random(SHAPE)
+    weight = np.array([500.0, 200.0])[:, None, None] * np.ones(SHAPE)
+    b = oracles.moments_of_returns(phase, weight, m)
+    b += noise * (rng.normal(size=b.shape) + 1j * rng.normal(size=b.shape))
+    b[0] = b[0].real + 10
+    return b, phase, weight
+
+
+PLAIN = tm.Settings(base_frequency_hz=FREQUENCY_HZ, smoothing_sigma_px=0.0)
+
+
+def test_direct_and_indirect_light_are_separated() -> None:
+    b, phase, weight = scene(3)
+
+    result = tm.reconstruct(b, PLAIN)
+
+    assert np.allclose(result.phase_rad, phase[0], atol=1e-3)
+    assert np.allclose(result.range_m, tm.range_m(phase[0], FREQUENCY_HZ), atol=1e-3)
+    assert np.allclose(result.direct, weight[0], rtol=0.02)
+    assert np.allclose(result.indirect, weight[1], rtol=0.03)
+    assert np.allclose(result.uniform, 10, rtol=1e-6)
+    assert np.allclose(result.validity, 10 / 710)
+    assert np.all(result.flags == 0)
+
+
+@pytest.mark.parametrize("dtype", [np.complex64, np.complex128])
+@pytest.mark.parametrize("keep", ["harmonics", "brightness"])
+@pytest.mark.parametrize("noise", [30.0, 100.0])
+def test_light_is_neither_lost_nor_made(dtype: type, keep: str, noise: float) -> None:
+    b, _, _ = scene(4, noise=noise)
+
+    result = tm.reconstruct(b.astype(dtype), tm.Settings(keep=keep))
+
+    assert result.flags.max() == tm.Flags.BIASED
+    total = result.direct + result.indirect + result.uniform
+    assert np.allclose(total, result.brightness, rtol=50 * np.finfo(dtype).eps)
+    if keep == "brightness":
+        assert np.allclose(result.brightness, result.smoothed[0].real)
+
+
+@pytest.mark.parametrize("estimator", ["pisarenko", "maximum-entropy", "single-frequency"])
+def test_every_estimator_finds_a_single_return(estimator: str) -> None:
+    phase = np.linspace(0.1, 6.1, 20)
+    b = oracles.moments_of_returns(phase[None], np.full((1, 20), 100.0), 3)
+
+    result = tm.reconstruct(b, tm.Settings(estimator=estimator))
+
+    assert oracles.around(result.phase_rad - phase).max() < 1e-6
+
+
+def test_multipath_disturbs_a_single_frequency_and_not_the_others() -> None:
+    b, phase, _ = scene(4)
+    error = {
+        estimator: np.abs(tm.reconstruct(b, tm.Settings(estimator=estimator)).phase_rad - phase[0])
+        for estimator in ("pisarenko", "maximum-entropy", "single-frequency")
+    }
+
+    assert error["single-frequency"].min() > 0.2
+    assert error["pisarenko"].max() < 0.02
+    assert error["maximum-entropy"].max() < 0.02
+
+
+def test_images_go_through_calibration_to_range() -> None:
+    b, phase, _ = scene(3)
+    sub_phases, weights = tm.arccos_sub_phases(8)
+    gain = complex(tm.modulation_gain(1, sub_phases, weights))
+    low = b[0].real * abs(gain)
+    images = [(b[0].real + (low * 1j**-k).real) / 2 for k in range(4)]
+    for plane in b[1:]:
+        images += [(b[0].real + (plane * gain * 1j**-k).real) / 2 for k in range(4)]
+    raw = np.round(np.stack(images)).astype(np.uint16)
+    raw[5, 2, 2] = 4095
+    calibration = tm.nominal_calibration(3, sub_phases, weights)
+
+    result = tm.reconstruct(raw, PLAIN, calibration=calibration)
+    listed = tm.reconstruct(list(raw), PLAIN, calibration=calibration)
+
+    others = np.ones(SHAPE, bool)
+    others[2, 2] = False
+    assert np.abs(result.phase_rad - phase[0])[others].max() < 0.1
+    assert result.flags[2, 2] & tm.Flags.SATURATED
+    assert not np.any(result.flags[others] & int(tm.Flags.SATURATED))
+    assert np.array_equal(listed.flags, result.flags)
+
+
+def test_an_unmeasured_zeroth_moment_is_estimated() -> None:
+    b, phase, _ = scene(3)
+    b[0] = 0
+
+    result = tm.reconstruct(
+        b, tm.Settings(zeroth="estimated", smoothing_sigma_px=0.0, epsilon=0.01)
+    )
+
+    assert np.allclose(result.validity, 0.01)
+    assert np.allclose(result.brightness, 700, rtol=0.02)
+    assert np.abs(result.phase_rad - phase[0]).max() < 0.01
+    assert np.all(result.flags == 0)
+
+
+def test_a_pixel_without_light_or_with_nan_has_no_range_and_hurts_nobody() -> None:
+    b, _, _ = scene(3)
+    clean = tm.reconstruct(b, PLAIN)
+    poisoned = b.copy()
+    poisoned[:, 1, 1] = 0
+    poisoned[2, 3, 3] = np.nan
+    bad = np.zeros(SHAPE, bool)
+    bad[1, 1] = bad[3, 3] = True
+
+    result = tm.reconstruct(poisoned, PLAIN)
+
+    assert np.array_equal(np.isnan(result.range_m), bad)
+    assert np.array_equal(result.has_range, ~bad)
+    assert result.flags[1, 1] == tm.Flags.NO_SIGNAL
+    assert result.flags[3, 3] == tm.Flags.NON_FINITE
+    for name in ("range_m", "direct", "indirect", "uniform", "flags", "validity"):
+        assert np.array_equal(getattr(result, name)[~bad], getattr(clean, name)[~bad]), name
+
+
+def test_density_and_cumulative_are_per_second_and_of_time() -> None:
+    b, phase, _ = scene(3)
+    result = tm.reconstruct(b, PLAIN)
+    turn_s = 1 / FREQUENCY_HZ
+    time_s = np.linspace(0, turn_s, 20_001)
+
+    g, light = result.density(time_s), result.cumulative(time_s)
+
+    step = time_s[1]
+    assert np.allclose((g[1:] + g[:-1]).sum(axis=0) * step / 2, result.brightness, rtol=1e-4)
+    assert np.allclose(light[-1], result.brightness)
+    assert np.allclose(time_s[g.argmax(axis=0)], phase[0] / (2 * np.pi) * turn_s, atol=1e-10)
+    assert np.allclose(result.density(time_s, evaluation="fourier"), g, rtol=1e-6)
+
+
+def test_stages_are_computed_once_and_only_when_asked_for() -> None:
+    result = tm.reconstruct(scene(2)[0])
+
+    assert "returns" not in vars(result)
+    first = result.returns
+    assert result.returns is first
+    assert "coefficients" not in vars(result)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("base_frequency_hz", 0.0),
+        ("zeroth", "none"),
+        ("takes", 0),
+        ("epsilon", 1.0),
+        ("keep", "both"),
+        ("smoothing_sigma_px", -1.0),
+        ("threshold", 2.0),
+        ("estimator", "best"),
+    ],
+)
+def test_settings_refuse_what_no_stage_could_work_with(field: str, value: object) -> None:
+    with pytest.raises(tm.ParameterError) as caught:
+        tm.Settings(**{field: value})  # type: ignore[arg-type]  # that is the point
+
+    assert caught.value.field == field
+    assert caught.value.value == value
