@@ -2,7 +2,9 @@
 
 from transientcam_driver.errors import CameraError
 from transientcam_driver.simulation.device import EmulatedDevice
+from transientcam_driver.simulation.faults import Fault
 from transientcam_driver.simulation.responses import Truth
+from transientcam_driver.simulation.sensor import Sensor
 from transientcam_driver.simulation.world import World
 
 
@@ -25,6 +27,11 @@ class Simulation:
         return self._world.truth()
 
     @property
+    def sensor(self) -> Sensor:
+        """Its sensor, as a data sheet would have it."""
+        return self._world.sensor
+
+    @property
     def plugged(self) -> bool:
         """Whether the cable is in."""
         return self._device.plugged
@@ -39,11 +46,11 @@ class Simulation:
 
     def corrupt_next(self, images: int = 1) -> None:
         """Damage the pixels of the next images on the wire."""
-        self._device.corrupt_next(_count(images))
+        self._device.expect(Fault.CORRUPT_PIXELS, _count(images))
 
     def drop_next(self, images: int = 1) -> None:
         """Lose the next images on the wire."""
-        self._device.drop_next(_count(images))
+        self._device.expect(Fault.DROP, _count(images))
 
     def set_interlock(self, *, closed: bool) -> None:
         """Open or close the safety interlock of the light."""

@@ -69,6 +69,11 @@ class World:
         self._brightness = responses.moments(0.0).real
         self._plan: _Plan | None = None
 
+    @property
+    def sensor(self) -> Sensor:
+        """What turns electrons into numbers."""
+        return self._sensor
+
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
         """Compute the moments of the impulse responses that the sequence measures."""
         if self._plan is not None and self._plan.sequence == sequence:
