@@ -41,7 +41,8 @@ def judge(
         for j in range(1, len(order) + 1):
             x, y = simd.load_complex(one, b[j], p)
             poison = poison + x * 0.0 + y * 0.0
-        finite = poison >= 0.0
+        # so large a density would overflow
+        finite = (poison >= 0.0) & (simd.absolute(b0) < simd.overflowing(b0))
         if estimated:
             b0 = smallest / (epsilon - 1.0)
             smallest = epsilon * b0

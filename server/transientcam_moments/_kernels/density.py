@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from transientcam_moments._kernels import simd
+from transientcam_moments._kernels import simd, toeplitz
 from transientcam_moments._kernels.entries import (
     PIXELS,
     complex_arrays,
@@ -83,7 +83,7 @@ def _density(
                 simd.store_within(q, (2 * j + 2) * pitch + p, re)
                 simd.store_within(q, (2 * j + 3) * pitch + p, im)
                 re, im = simd.load_complex(one, reflection[j], left + p)
-                least = least * (1.0 - re * re - im * im)  # eps E / b_0
+                least = least * toeplitz.below_one(re, im)  # eps E / b_0
             simd.store_within(q, pitch + p, least)
         for pair in range(phases):
             t = pair // distance * 2 * distance + pair % distance

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from transientcam_moments._kernels.careful import redo
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.entries import (
     COUNTS,
@@ -15,7 +16,6 @@ from transientcam_moments._kernels.entries import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._kernels.registry import LEAST_PIXELS, REGISTRY, Key
 from transientcam_moments._kernels.returns import find_returns
 from transientcam_moments._kernels.spread import Spread, at_once, blocks
 
@@ -92,33 +92,3 @@ def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
         )
 
     return lane
-
-
-def redo(planes: Any, found: tuple[Any, ...], ill: Any, noise: float) -> None:
-    """Redo pixels whose returns don't reproduce their moments, with more digits or more care.
-
-    Parameters
-    ----------
-    planes : array, shape (m + 1, P)
-        Moments.
-    found : tuple of array
-        Phase, weight, uniform, count; written to.
-    ill : integer array
-        The pixels.
-    noise : float
-        Precision of the data.
-    """
-    from transientcam_moments.pisarenko import _improved, _pisarenko
-
-    part = planes[:, ill]
-    wide = REGISTRY.compiled.get(Key("pisarenko", len(planes) - 1, "d"))
-    if part.dtype == np.complex64 and wide is not None and ill.size >= LEAST_PIXELS:
-        better = wide(part.astype(np.complex128), noise=noise)
-    elif part.dtype == np.complex64:
-        better = _improved(part, tuple(plane[..., ill] for plane in found))
-    else:
-        better = _pisarenko(part, noise=noise)
-        if noise == np.finfo(np.float64).eps:
-            better = _improved(part, better)
-    for plane, new in zip(found, better, strict=True):
-        plane[..., ill] = new

@@ -5,9 +5,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from transientcam_moments._kernels.careful import redo
 from transientcam_moments._kernels.spread import Spread, at_once, blocks
+from transientcam_moments.errors import ShapeError
 
 _ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}
+_IMAGES = {"low-frequency": 4, "on-off": 2, "estimated": 0}
 _ROOM = 1024  # pixels that are redone in double precision at a time
 _LANES = 64
 
@@ -155,9 +158,17 @@ class Reconstructor:
         -------
         Reconstructed
             Views of the workspace: the next call overwrites them.
+
+        Raises
+        ------
+        ShapeError
+            For another number of images or pixels.
         """
         e, flat, settings = self._entries, self._flat, self._settings
-        raw = np.ascontiguousarray(images, np.uint16).reshape(images.shape[0], -1)
+        expected = (_IMAGES[settings.zeroth] + 4 * len(e.order), *self._shape)
+        if images.shape != expected:
+            raise ShapeError("images", f"of shape {images.shape}", f"{expected}")
+        raw = np.ascontiguousarray(images, np.uint16).reshape(expected[0], -1)
         zeroth = _ZEROTH[settings.zeroth]
         estimated = int(settings.zeroth == "estimated")
 
@@ -259,10 +270,13 @@ class Reconstructor:
                 return
             stop = -(-found // _LANES) * _LANES
             e.wide_eigenvalue(e.order, moments, 0, uniform, 0, stop)
-            e.wide_returns(
+            ill = e.wide_returns(
                 e.order, e.wide_turns, moments, uniform, 0, uniform, phase, weight, count,
                 residual, self._noise, 0, stop,
             )  # fmt: skip
+            if ill:
+                where = np.flatnonzero(residual[:stop] > tolerance)
+                redo(moments, (phase, weight, uniform, count), where, self._noise)
             e.scatter(
                 e.order, self._places, found, phase, weight, count, residual, flat.phase_rad,
                 flat.weight, flat.count, self._residual,

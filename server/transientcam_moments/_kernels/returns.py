@@ -13,6 +13,7 @@ from numba import njit
 from transientcam_moments._kernels import simd, toeplitz
 
 _INTERLEAVE = 2
+_FAINT = 1024.0  # times what rounding makes of nothing
 _ROOT_STEPS = 24  # four are usual
 
 
@@ -94,6 +95,7 @@ def circle_roots(
     for k in range(m):
         wr[k], wi[k] = c * turns[k] - s * turns[m + k], c * turns[m + k] + s * turns[k]
     near = simd.nearly(middle)
+    moving = middle == middle
     for _ in range(_ROOT_STEPS):
         for i in range(m):
             move[i] = middle * 0.0
@@ -120,10 +122,13 @@ def circle_roots(
             value = middle + vr * ur - vi * ui
             below = -(sr * ui + si * ur) - value * move[i]
             size = 1.0 / simd.sqrt(below * below + value * value + simd.tiny(value))
-            c, s = below * size, -value * size
+            # a pixel that has arrived stays, however long its neighbours take
+            c = simd.select(moving, below * size, 1.0)
+            s = simd.select(moving, -value * size, 0.0)
             wr[i], wi[i] = x * c - y * s, x * s + y * c
             largest = simd.maximum(simd.absolute(s), largest)
-        if not simd.some(largest > near):
+        moving = moving & (largest > near)
+        if not simd.some(moving):
             break
 
 
@@ -198,7 +203,7 @@ def find_returns(
             re[k], im[k] = simd.load_complex(one, b[k], p)
             re[k], im[k] = re[k] * factor, im[k] * factor
         fewer = lit & singular(order, re, im, ar, ai, gr, gi, inverse, floor)
-        least = floor
+        least, doubtful = floor, fewer & ~fewer
         if simd.some(fewer):
             # a little more in the diagonal makes all smaller blocks definite: the surplus returns
             # become as faint as that, wherever they are
@@ -215,6 +220,8 @@ def find_returns(
             w, x, y = weigh(order, gr, gi, inverse, wr[i], wi[i])
             zr, zi = x * x - y * y, 2.0 * x * y
             used = lit & (w > least)
+            # a surplus return next to one of the others takes a share of that one's weight
+            doubtful = doubtful | (fewer & used & (w < _FAINT * floor))
             found = found + simd.select(used, one, 0.0)
             move[i] = simd.select(used, w, 0.0)
             wr[i] = simd.select(used, phase_of(zr, zi), simd.infinity(one))
@@ -227,7 +234,7 @@ def find_returns(
         worst = re[0] * re[0]
         for k in range(1, m + 1):
             worst = simd.maximum(re[k] * re[k] + im[k] * im[k], worst)
-        worst = simd.select(worst < 1.0, simd.sqrt(worst), simd.infinity(one))
+        worst = simd.select((worst < 1.0) & ~doubtful, simd.sqrt(worst), simd.infinity(one))
         worst = simd.select(lit, worst, 0.0)
         simd.store(residual, p, worst)
         ill += simd.count(worst > tolerance)
@@ -236,7 +243,7 @@ def find_returns(
         for i in range(m):
             unused = wr[i] > 7.0
             simd.store(phase[i], p, simd.select(unused, simd.nan(one), wr[i]))
-            simd.store(weight[i], p, move[i] * total)
+            simd.store(weight[i], p, simd.select(unused, 0.0, move[i] * total))
     return ill
 
 

@@ -143,6 +143,7 @@ _operator(operator.lt, Lanes, 2, _compare("<"), _truth)
 _operator(operator.le, Lanes, 2, _compare("<="), _truth)
 _operator(operator.gt, Lanes, 2, _compare(">"), _truth)
 _operator(operator.ge, Lanes, 2, _compare(">="), _truth)
+_operator(operator.eq, Lanes, 2, _compare("=="), _truth)
 _operator(operator.and_, Mask, 2, lambda b, x, y: b.and_(x, y), _same)
 _operator(operator.or_, Mask, 2, lambda b, x, y: b.or_(x, y), _same)
 _operator(operator.invert, Mask, 1, lambda b, x: b.not_(x), _same)
@@ -496,6 +497,7 @@ def _constant(value: Callable[[Any], float]) -> Any:
 
 eps = _constant(lambda limits: limits.eps)
 tiny = _constant(lambda limits: limits.tiny)
+overflowing = _constant(lambda limits: limits.max * limits.eps)
 nan = _constant(lambda limits: np.nan)
 infinity = _constant(lambda limits: np.inf)
 # A step this small leaves an error of rounding where it converges with the third power.

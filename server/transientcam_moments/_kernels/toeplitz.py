@@ -177,6 +177,7 @@ def smallest_eigenvalue(order: Any, re: Any, im: Any, h: Any, d: Any, e: Any) ->
         e[i] = e[i] * e[i]
     tolerance = 2.0 * simd.eps(x)
     last = x * 0.0
+    moving = x == x
     for _ in range(_EIGENVALUE_STEPS):
         # p = det(T - x I) and its first two derivatives by the recurrence over leading blocks
         p0, q0, r0 = x * 0.0 + 1.0, x * 0.0, x * 0.0
@@ -194,8 +195,10 @@ def smallest_eigenvalue(order: Any, re: Any, im: Any, h: Any, d: Any, e: Any) ->
         back = simd.maximum(-1.0 / g, -0.25 * last)
         left = (p1 > 0.0) & (q1 < 0.0)
         step = simd.select(left, climb, simd.select((p1 < 0.0) & (q1 < 0.0), back, 0.0))
-        x = x + step
+        # a pixel that has arrived stays, however long its neighbours take
+        x = simd.select(moving, x + step, x)
         last = simd.absolute(step)
-        if not simd.some(last > tolerance):
+        moving = moving & (last > tolerance)
+        if not simd.some(moving):
             break
     return x

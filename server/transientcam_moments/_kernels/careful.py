@@ -1,0 +1,39 @@
+"""What lanes cannot do safely: a few pixels, with more digits or by the planar statement."""
+
+from typing import Any
+
+import numpy as np
+
+from transientcam_moments._kernels.registry import LEAST_PIXELS, REGISTRY, Key
+
+
+def redo(planes: Any, found: tuple[Any, ...], ill: Any, noise: float) -> None:
+    """Redo pixels whose returns don't reproduce their moments, with more digits or more care.
+
+    Parameters
+    ----------
+    planes : array, shape (m + 1, P)
+        Moments.
+    found : tuple of array
+        Phase, weight, uniform, count; written to.
+    ill : integer array
+        The pixels.
+    noise : float
+        Precision of the data.
+    """
+    from transientcam_moments.pisarenko import _improved, _pisarenko
+
+    part = planes[:, ill]
+    wide = REGISTRY.compiled.get(Key("pisarenko", len(planes) - 1, "d"))
+    if part.dtype == np.complex64 and wide is not None:
+        enough = np.resize(np.arange(ill.size), max(ill.size, LEAST_PIXELS))
+        better = wide(part[:, enough].astype(np.complex128), noise=noise)
+        better = tuple(plane[..., : ill.size] for plane in better)
+    elif part.dtype == np.complex64:
+        better = _improved(part, tuple(plane[..., ill] for plane in found))
+    else:
+        better = _pisarenko(part, noise=noise)
+        if noise == np.finfo(np.float64).eps:
+            better = _improved(part, better)
+    for plane, new in zip(found, better, strict=True):
+        plane[..., ill] = new

@@ -1,0 +1,39 @@
+"""Lanes for tests: compiled once a session, and present only in the tests that ask for them."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import transientcam_moments as tm
+from transientcam_moments._kernels.registry import REGISTRY
+
+CACHE = Path(__file__).resolve().parents[2] / ".pytest_cache" / "kernels"
+
+
+@contextmanager
+def lanes(*harmonics: int, precisions: tuple[str, ...] = ("float32", "float64")) -> Iterator[None]:
+    """Have the lanes of these orders inside, as well as those that were there before."""
+    before = dict(REGISTRY.compiled)
+    set_by_user = "NUMBA_CACHE_DIR" in os.environ
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(CACHE))
+    try:
+        tm.kernels.compile(harmonics=harmonics, precisions=precisions)
+        assert not tm.kernels.state()["failed"]
+        yield
+    finally:
+        if not set_by_user:
+            del os.environ["NUMBA_CACHE_DIR"]
+        REGISTRY.compiled.clear()
+        REGISTRY.compiled.update(before)
+
+
+@contextmanager
+def without_lanes() -> Iterator[None]:
+    """Leave everything to NumPy inside."""
+    before = dict(REGISTRY.compiled)
+    REGISTRY.compiled.clear()
+    try:
+        yield
+    finally:
+        REGISTRY.compiled.update(before)

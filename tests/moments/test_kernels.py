@@ -1,0 +1,274 @@
+"""When lanes are there and when they aren't; nothing may wait for a compiler."""
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import transientcam_moments as tm
+from transientcam_moments import _kernels
+from transientcam_moments._kernels import registry
+from transientcam_moments._kernels.cache import cache_directory
+from transientcam_moments._kernels.registry import REGISTRY, Key, Registry
+
+from tests.moments.kernel_lanes import lanes, without_lanes
+
+
+@pytest.fixture(autouse=True)
+def nothing_compiled() -> Iterator[None]:
+    with without_lanes():
+        yield
+
+
+def in_fresh_process(code: str, **environ: str) -> str:
+    """Run code with the environment changed, and return what it prints; its warnings are errors."""
+    result = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        env={**os.environ, **environ},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stdout.strip()
+
+
+def test_importing_the_package_imports_no_compiler() -> None:
+    code = "import sys, transientcam_moments; print('numba' in sys.modules)"
+
+    assert in_fresh_process(code) == "False"
+
+
+def test_using_the_package_imports_no_compiler() -> None:
+    code = (
+        "import sys, numpy as np, transientcam_moments as tm\n"
+        "b = np.ones((4, 100), np.complex64); b[0] = 3\n"
+        "tm.density(tm.levinson(b), [0.0]); tm.pisarenko(b); tm.kernels.state()\n"
+        "print('numba' in sys.modules)"
+    )
+
+    assert in_fresh_process(code) == "False"
+
+
+def test_kernels_can_be_turned_off() -> None:
+    code = (
+        "import sys, transientcam_moments as tm\n"
+        "tm.kernels.compile(harmonics=[3]); tm.kernels.compile_in_background().join()\n"
+        "state = tm.kernels.state()\n"
+        "print(state['enabled'], state['compiled'], 'numba' in sys.modules)"
+    )
+
+    assert in_fresh_process(code, TRANSIENTCAM_KERNELS="off") == "False [] False"
+
+
+@pytest.mark.parametrize("setting", ["off", "OFF", " 0 ", "no", "false"])
+def test_several_words_turn_kernels_off(setting: str) -> None:
+    assert not Registry({"TRANSIENTCAM_KERNELS": setting}).enabled
+
+
+@pytest.mark.parametrize("environ", [{}, {"TRANSIENTCAM_KERNELS": "on"}])
+def test_kernels_are_on_otherwise(environ: dict[str, str]) -> None:
+    assert Registry(environ).enabled
+
+
+def test_a_lane_is_compiled_where_nothing_can_be_written() -> None:
+    code = (
+        "import transientcam_moments as tm\n"
+        "from transientcam_moments._kernels.compiler import compile_lane\n"
+        "from transientcam_moments._kernels.registry import Key\n"
+        "import numpy as np\n"
+        "lane = compile_lane(Key('smallest_eigenvalue', 1, 'f'))\n"
+        "print(lane(np.full((2, 64), 3 + 0j, np.complex64))[0])"
+    )
+    nowhere = {"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null", "NUMBA_CACHE_DIR": ""}
+
+    assert float(in_fresh_process(code, **nowhere)) == pytest.approx(0, abs=1e-5)
+
+
+def test_the_second_process_loads_what_the_first_compiled(tmp_path: Path) -> None:
+    code = (
+        "from transientcam_moments._kernels.eigenvalue import _smallest_eigenvalue as kernel\n"
+        "from transientcam_moments._kernels.compiler import compile_lane\n"
+        "from transientcam_moments._kernels.registry import Key\n"
+        "compile_lane(Key('smallest_eigenvalue', 1, 'f'))\n"
+        "print(sum(kernel.stats.cache_hits.values()), sum(kernel.stats.cache_misses.values()))"
+    )
+    environ = {"NUMBA_CACHE_DIR": str(tmp_path)}
+
+    assert in_fresh_process(code, **environ) == "0 1"
+    assert in_fresh_process(code, **environ) == "1 0"
+
+
+def test_the_users_choice_of_a_cache_comes_first(tmp_path: Path) -> None:
+    environ = {"NUMBA_CACHE_DIR": str(tmp_path / "chosen"), "XDG_CACHE_HOME": str(tmp_path / "xdg")}
+
+    assert cache_directory(environ, "d") == tmp_path / "chosen" / "d"
+    assert not (tmp_path / "xdg").exists()
+
+
+def test_the_cache_is_below_the_users_cache_directory(tmp_path: Path) -> None:
+    xdg, home = tmp_path / "xdg", tmp_path / "home"
+
+    in_xdg = cache_directory({"XDG_CACHE_HOME": str(xdg), "HOME": str(home)}, "d")
+    at_home = cache_directory({"HOME": str(home)}, "d")
+
+    assert in_xdg == xdg / "transientcam" / "kernels" / "d"
+    assert at_home == home / ".cache" / "transientcam" / "kernels" / "d"
+    assert in_xdg.is_dir()
+    assert at_home.is_dir()
+
+
+def test_a_cache_that_cannot_be_written_is_passed_over(tmp_path: Path) -> None:
+    environ = {"XDG_CACHE_HOME": "/dev/null", "HOME": str(tmp_path)}
+
+    assert cache_directory(environ, "d") == tmp_path / ".cache" / "transientcam" / "kernels" / "d"
+    assert cache_directory({"NUMBA_CACHE_DIR": "/dev/null"}, "d") is None
+    assert cache_directory({}, "d") is None
+
+
+def test_what_compiled_code_is_kept_for_changes_with_every_source_file() -> None:
+    code = (
+        "import pathlib, shutil, sys, tempfile\n"
+        "from transientcam_moments._kernels import cache\n"
+        "before = cache.digest_of_sources()\n"
+        "with tempfile.TemporaryDirectory() as copy:\n"
+        "    shutil.copytree(pathlib.Path(cache.__file__).parent, copy, dirs_exist_ok=True)\n"
+        "    cache.__file__ = copy + '/cache.py'\n"
+        "    same = cache.digest_of_sources()\n"
+        "    with open(copy + '/simd.py', 'a') as file: file.write('# changed')\n"
+        "    print(before == same, before == cache.digest_of_sources())"
+    )
+
+    assert in_fresh_process(code) == "True False"
+
+
+def test_progress_names_every_lane_and_ends_at_the_total() -> None:
+    seen: list[tuple[int, int, str]] = []
+    with lanes(3, precisions=("float32",)):
+        tm.kernels.compile(
+            harmonics=[3],
+            precisions=["float32"],
+            progress=lambda *step: seen.append(step),
+        )
+
+        names = [str(Key(name, 3, "f")) for name in tm.kernels.LANES]
+        assert seen == [(i, len(names), name) for i, name in enumerate([*names, ""])]
+        assert set(tm.kernels.state()["compiled"]) == set(names)
+
+
+def test_compiling_in_the_background_ends_with_the_lanes_in_use() -> None:
+    with lanes():  # the cache of the tests
+        thread = tm.kernels.compile_in_background(harmonics=[3], precisions=["float32"])
+        assert thread.name == "transientcam-compile"
+        thread.join()
+
+        assert _kernels.find("levinson", np.ones((4, 64), np.complex64)) is not None
+        state = tm.kernels.state()
+        assert (state["compiling"], state["failed"]) == (None, [])
+
+
+def test_a_lane_that_cannot_be_compiled_leaves_numpy_and_the_other_lanes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from transientcam_moments._kernels import compiler
+
+    def broken(m: int, precision: str) -> None:
+        raise RuntimeError("no such processor\nand a long story")
+
+    monkeypatch.setattr(REGISTRY, "failed", {})
+    with lanes():
+        monkeypatch.setitem(compiler.LANES, "levinson", broken)
+        tm.kernels.compile(harmonics=[3], precisions=["float32"])
+
+        state = tm.kernels.state()
+        assert state["failed"] == ["levinson m=3 float32: RuntimeError: no such processor"]
+        assert "pisarenko m=3 float32" in state["compiled"]
+        assert tm.levinson(np.ones((4, 64), np.complex64)).error.shape == (64,)
+
+
+def test_background_compiling_stops_when_the_program_ends() -> None:
+    code = (
+        "import transientcam_moments as tm\n"
+        "from transientcam_moments._kernels import compiler\n"
+        "import threading, time\n"
+        "for name in compiler.LANES:\n"
+        "    compiler.LANES[name] = lambda m, precision: print(m, flush=True) or time.sleep(0.2)\n"
+        "tm.kernels.compile_in_background(harmonics=range(1, 33))\n"
+    )
+
+    lines = in_fresh_process(code).splitlines()
+
+    assert len(lines) <= 2, "it went on after the main thread had ended"
+
+
+def test_several_threads_compile_each_lane_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    from transientcam_moments._kernels import compiler
+
+    made: list[tuple[str, int]] = []
+    for name in compiler.LANES:
+
+        def make(m: int, precision: str, name: str = name) -> object:
+            made.append((name, m))
+            return lambda: None
+
+        monkeypatch.setitem(compiler.LANES, name, make)
+
+    threads = [tm.kernels.compile_in_background(harmonics=[3, 5]) for _ in range(4)]
+    for thread in threads:
+        thread.join()
+
+    assert len(made) == len(set(made)) * 2 - 2  # two precisions; one lane has only one
+    assert threading.active_count() >= 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [({"harmonics": [0]}, "harmonics"), ({"harmonics": [33]}, "harmonics"),
+     ({"precisions": ["float16"]}, "precisions")],
+)  # fmt: skip
+def test_orders_and_precisions_out_of_range_are_refused(
+    arguments: dict[str, list[int]], field: str
+) -> None:
+    with pytest.raises(tm.ParameterError) as caught:
+        tm.kernels.compile(**arguments)  # type: ignore[arg-type]  # what is refused
+
+    assert caught.value.field == field
+    with pytest.raises(tm.ParameterError):
+        tm.kernels.compile_in_background(**arguments)  # type: ignore[arg-type]  # likewise
+
+
+def test_every_public_lane_has_its_compiler() -> None:
+    from transientcam_moments._kernels import compiler
+
+    assert set(compiler.LANES) == set(tm.kernels.LANES)
+
+
+def test_lanes_are_found_by_name_order_and_precision() -> None:
+    REGISTRY.compiled[Key("levinson", 3, "f")] = found = lambda b: b
+
+    assert _kernels.find("levinson", np.ones((4, 64), np.complex64)) is found
+    assert _kernels.find("levinson", np.ones((4, 8, 8), np.complex64)) is found
+    assert _kernels.find("levinson", np.ones((4, 64), np.complex128)) is None
+    assert _kernels.find("levinson", np.ones((5, 64), np.complex64)) is None
+    assert _kernels.find("density", np.ones((4, 64), np.complex64)) is None
+
+
+@pytest.mark.parametrize(
+    "planes",
+    [
+        np.ones((4, registry.LEAST_PIXELS - 1), np.complex64),
+        np.ones((4, 0), np.complex64),
+        np.ones((4, 64), np.int32),
+        np.ones((), np.complex64),
+        [[1.0] * 64] * 4,
+        None,
+    ],
+)
+def test_what_no_lane_takes_finds_none(planes: object) -> None:
+    REGISTRY.compiled[Key("levinson", 3, "f")] = lambda b: b
+
+    assert _kernels.find("levinson", planes) is None
