@@ -123,7 +123,8 @@ class Service:
             outbox.put(notice)
 
 
-def _service(request: Request) -> Service:
+# async, or FastAPI takes a thread for it
+async def _service(request: Request) -> Service:
     service: Service = request.app.state.service
     return service
 
