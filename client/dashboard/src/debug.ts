@@ -1,5 +1,6 @@
 /** What tests and measurements reach the page by; loaded only where the address asks for `?debug`. */
-import { createRenderer, type DensityRenderer } from "./gl/renderer";
+import { createRenderer } from "./gl/createRenderer";
+import type { DensityRenderer } from "./gl/renderer";
 import type { Coefficients } from "./physics/maximumEntropy";
 import { decodeMessage, type FrameMessage } from "./stream/protocol";
 import { frameOf } from "./stream/client";

@@ -1,8 +1,6 @@
 import type { Coefficients } from "../physics/maximumEntropy";
 import type { ColourMapName } from "../ui/colourMaps";
 import type { Tone } from "./tone";
-import { TypedArrayRenderer } from "./typedArray";
-import { WebGl2Renderer } from "./webgl2";
 
 /** The still scene behind the light: one brightness a pixel, `white` shown brightest. */
 export interface Backdrop {
@@ -30,9 +28,4 @@ export interface DensityRenderer {
   /** Called when the renderer can no longer draw on this canvas and another must be made. */
   onLost(listener: () => void): void;
   dispose(): void;
-}
-
-/** WebGL2 where the browser grants it and `webGl2` asks for it, typed arrays otherwise. */
-export function createRenderer(canvas: HTMLCanvasElement, webGl2: boolean): DensityRenderer {
-  return (webGl2 ? WebGl2Renderer.create(canvas) : null) ?? new TypedArrayRenderer(canvas);
 }

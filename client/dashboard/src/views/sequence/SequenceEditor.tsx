@@ -6,7 +6,7 @@ import { useStore } from "../../store/store";
 import type { AppliedSequence, Problem, SequenceDocument, Zeroth } from "../../stream/protocol";
 import { fieldOf, sequenceProblem, ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
 import { DRAFT_FIELD, documentOf, draftOf, type Draft } from "./draft";
-import { Figures } from "./SequenceView";
+import { Figures } from "./Figures";
 
 /** Pause after the last keystroke before the service is asked what the sequence would cost. */
 const TYPING_PAUSE_MS = 250;

@@ -2,8 +2,9 @@ import { useSignal } from "@preact/signals";
 
 import { useStore } from "../../store/store";
 import type { AppliedSequence } from "../../stream/protocol";
-import { engineering, fixed, grouped } from "../../ui/format";
+import { engineering, fixed } from "../../ui/format";
 import { Panel } from "../../ui/Panel";
+import { Fact, Figures } from "./Figures";
 import { SequenceEditor } from "./SequenceEditor";
 import { ZEROTH_NAMES } from "./words";
 
@@ -47,33 +48,5 @@ function Summary({ applied }: { applied: AppliedSequence }) {
       <Fact name="Takes" value={String(applied.takes)} field="takes" />
       <Figures applied={applied} />
     </dl>
-  );
-}
-
-/** The figures that follow from a sequence; shown for the one in use and for one being edited. */
-export function Figures({ applied }: { applied: AppliedSequence }) {
-  return (
-    <>
-      <Fact name="Images" value={grouped(applied.images)} field="images" />
-      <Fact name="Capture time" value={engineering(applied.capture_s, "s")} field="capture_s" strong />
-      <Fact name="Frame rate" value={fixed(applied.frame_rate_hz, applied.frame_rate_hz < 10 ? 2 : 1, "Hz")} field="frame_rate_hz" strong />
-      <Fact name="Raw data" value={engineering(applied.data_rate_bytes_s, "B/s")} field="data_rate_bytes_s" />
-    </>
-  );
-}
-
-interface FactProps {
-  readonly name: string;
-  readonly value: string;
-  readonly field: string;
-  readonly strong?: boolean;
-}
-
-function Fact({ name, value, field, strong = false }: FactProps) {
-  return (
-    <div class={strong ? "fact fact-strong" : "fact"}>
-      <dt>{name}</dt>
-      <dd data-field={field}>{value}</dd>
-    </div>
   );
 }

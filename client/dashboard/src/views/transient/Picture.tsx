@@ -1,7 +1,8 @@
 import { signal, useComputed } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 
-import { createRenderer, type DensityRenderer } from "../../gl/renderer";
+import { createRenderer } from "../../gl/createRenderer";
+import type { DensityRenderer } from "../../gl/renderer";
 import { useStore } from "../../store/store";
 import { useDrawing } from "../../ui/hooks";
 import { Stage } from "../../ui/Stage";
