@@ -45,6 +45,7 @@ from transientcam_driver.usb import Transport
 READ_S = 0.1
 """Longest single read: how long a stop or an interrupt may have to wait for a reader."""
 _BEATS_PER_TIMEOUT = 4
+_PERIOD_RTOL = 0.01  # of the time from image to image, which capabilities give to the nanosecond
 
 
 class CameraState(StrEnum):
@@ -77,7 +78,7 @@ class Camera:
     simulation
         Handle on the simulated world, when there is one behind the cable.
     sequence
-        What to configure first.
+        What to configure first; the default, as near as the camera comes to it, without one.
     """
 
     def __init__(
@@ -94,7 +95,7 @@ class Camera:
         self.counters = Counters()
         self._control = threading.RLock()  # requests and the state
         self._reading = threading.Lock()  # held by the reader
-        self._wanted = sequence or Sequence()
+        self._wanted = sequence
         self._resume = False
         self._closed = False
         self._heartbeat_s = -math.inf
@@ -180,6 +181,8 @@ class Camera:
         ------
         FrameTimeout
             None was complete in time; the camera goes on.
+        ProtocolError
+            None was complete in time, because images have another size than the camera says.
         NotStreaming
             The camera was not started, or was stopped meanwhile.
         CameraLost
@@ -195,6 +198,7 @@ class Camera:
                     return frame
                 left_s = end_s - self._clock.now_s()
                 if left_s <= 0:
+                    self._incoming.require_images_of_the_size_announced()
                     raise FrameTimeout(timeout_s)
                 if not self._read(min(left_s, READ_S)):
                     self._look_after_silence()
@@ -262,7 +266,7 @@ class Camera:
             )
             self._transport.expect_transfers(IMAGE_HEADER_BYTES + self._capabilities.image_bytes)
             self._incoming = Incoming(self._capabilities, self.counters)
-            self._configure(self._wanted)
+            self._configure(self._wanted or self._capabilities.nearest(Sequence()))
         except BaseException:
             self._let_go()
             self._state = CameraState.DISCONNECTED
@@ -286,15 +290,15 @@ class Camera:
     # --- requests (under _control) ---------------------------------------------------------
 
     def _ask(self, request: Request, *, value: int = 0, length: int) -> bytes:
-        with self._answering():
+        with self._answering(request):
             return self._transport.control_in(request, value=value, length=length)
 
     def _tell(self, request: Request, data: bytes = b"") -> None:
-        with self._answering():
+        with self._answering(request):
             self._transport.control_out(request, data)
 
     @contextmanager
-    def _answering(self) -> Iterator[None]:
+    def _answering(self, request: Request) -> Iterator[None]:
         """Around a request: a stall becomes DeviceRefused, a loss disconnects the camera."""
         self._require_open()
         if self._state is CameraState.DISCONNECTED:
@@ -303,11 +307,21 @@ class Camera:
             try:
                 yield
             except TransferStalled as stall:
-                answer = self._transport.control_in(Request.GET_LAST_ERROR, length=LAST_ERROR_BYTES)
-                raise DeviceRefused(*unpack_last_error(answer)) from stall
+                raise self._refusal(request) from stall
         except CameraLost:
             self._lose()
             raise
+
+    def _refusal(self, request: Request) -> DeviceRefused:
+        """Ask the device why it stalled a request."""
+        try:
+            answer = self._transport.control_in(Request.GET_LAST_ERROR, length=LAST_ERROR_BYTES)
+        except TransferStalled:
+            return DeviceRefused(request.name, "NONE", "it does not say why")
+        refused, code, detail = unpack_last_error(answer)
+        if refused != request.name:
+            return DeviceRefused(request.name, "NONE", "it does not say why")
+        return DeviceRefused(refused, code, detail)
 
     def _configure(self, sequence: Sequence) -> AppliedSequence:
         words = SequenceWords.of(sequence, self._capabilities)
@@ -318,7 +332,12 @@ class Camera:
                 self._ask(Request.COMMIT, value=above, length=Commitment.BYTES)
             )
             really_set = answer.words.sequence(self._capabilities)
-            if answer.images != really_set.images or answer.epoch <= above:
+            period_s = really_set.exposure_s + self._capabilities.streaming_readout_s
+            if (
+                answer.images != really_set.images
+                or answer.epoch <= above
+                or not math.isclose(answer.image_period_ns / 1e9, period_s, rel_tol=_PERIOD_RTOL)
+            ):
                 raise ProtocolError(f"COMMIT answered with {answer}")
             self._applied = self._capabilities.describe(really_set, epoch=answer.epoch)
             self._incoming.switch(self._applied, first_image=answer.first_image)
@@ -336,7 +355,10 @@ class Camera:
     def _off(self, request: Request) -> None:
         with self._control:
             self._resume = False
-            self._tell(request)
+            try:
+                self._tell(request)
+            except DeviceRefused:
+                self._tell(Request.SAFE_OFF)  # which is never refused
             self._state = CameraState.IDLE
 
     # --- images (under _reading) -----------------------------------------------------------

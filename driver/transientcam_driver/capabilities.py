@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from transientcam_driver.errors import SequenceError
-from transientcam_driver.sequence import ImageLabel, Sequence
+from transientcam_driver.sequence import ImageLabel, Scheme, Sequence, SubPhases, TakeOrder, Zeroth
 
 IMAGE_HEADER_BYTES = 64
 BYTES_PER_PIXEL = 2
@@ -71,8 +71,9 @@ class Capabilities:
     max_takes: int
     max_sub_phases: int
     max_images: int
-    schemes: tuple[str, ...]
-    zeroths: tuple[str, ...]
+    schemes: tuple[Scheme, ...]
+    zeroths: tuple[Zeroth, ...]
+    take_orders: tuple[TakeOrder, ...]
     fifo_bytes: int
     heartbeat_s: float
 
@@ -112,10 +113,34 @@ class Capabilities:
         if sequence.sub_phases.n > self.max_sub_phases:
             limit = f"at most {self.max_sub_phases} on this camera"
             raise SequenceError("sub_phases.n", sequence.sub_phases.n, limit)
+        if sequence.take_order not in self.take_orders:
+            limit = f"one of {', '.join(self.take_orders)} on this camera"
+            raise SequenceError("take_order", sequence.take_order, limit)
         most_takes = min(self.max_takes, self.max_images // sequence.images_per_take)
         if sequence.takes > most_takes:
             limit = f"at most {most_takes} with {sequence.images_per_take} images a take"
             raise SequenceError("takes", sequence.takes, limit)
+
+    def nearest(self, sequence: Sequence) -> Sequence:
+        """Return a sequence that this camera can do, as near to the one asked for as it comes."""
+        harmonics = min(sequence.harmonics, self.max_harmonics)
+        highest_hz = self.frequency_hz(self.tuning_word(self.max_frequency_hz) // harmonics)
+        sub_phases, schemes, zeroths = sequence.sub_phases, self.schemes, self.zeroths
+        scheme = sub_phases.scheme if sub_phases.scheme in schemes else schemes[0]
+        order = sequence.take_order if sequence.take_order in self.take_orders else "sequential"
+        nearest = replace(
+            sequence,
+            harmonics=harmonics,
+            base_frequency_hz=_clamped(
+                sequence.base_frequency_hz, self.min_frequency_hz, highest_hz
+            ),
+            zeroth=sequence.zeroth if sequence.zeroth in zeroths else zeroths[0],
+            exposure_s=_clamped(sequence.exposure_s, self.min_exposure_s, self.max_exposure_s),
+            sub_phases=SubPhases(scheme, min(sub_phases.n, self.max_sub_phases)),
+            take_order=order,
+        )
+        most_takes = min(self.max_takes, self.max_images // nearest.images_per_take)
+        return replace(nearest, takes=min(sequence.takes, most_takes))
 
     def apply(self, sequence: Sequence, *, epoch: int = 0) -> AppliedSequence:
         """Say what this camera makes of a sequence, without asking it."""
@@ -151,3 +176,7 @@ class Capabilities:
     def tuning_word(self, frequency_hz: float) -> int:
         """Nearest tuning word of a frequency; harmonics use multiples of the base's word."""
         return round(frequency_hz / self.tuning_step_hz)
+
+
+def _clamped(value: float, least: float, most: float) -> float:
+    return max(least, min(most, value))

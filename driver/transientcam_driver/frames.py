@@ -45,6 +45,16 @@ class RawFrame:
     temperature_c: float
     lost_images: int
 
+    @property
+    def by_take(self) -> NDArray[np.uint16]:
+        """The images as (takes, images a take, H, W), in whichever order they were captured."""
+        takes = self.labels[-1].take + 1
+        each = len(self.labels) // takes
+        shape = self.images.shape[1:]
+        if takes > 1 and self.labels[1].take == 1:  # interleaved
+            return self.images.reshape(each, takes, *shape).swapaxes(0, 1)
+        return self.images.reshape(takes, each, *shape)
+
 
 @dataclass(slots=True)
 class Counters:

@@ -22,6 +22,13 @@ class PacketDecoder:
     payload than ``payload_bytes`` is taken for noise, so that a damaged length can neither
     swallow the packets behind it nor hold them up. After pixels with a wrong checksum the search
     goes on right behind the header, because a shortened image has its successor inside.
+
+    Attributes
+    ----------
+    resyncs
+        How often bytes had to be passed over.
+    odd_payload_bytes
+        The other payload that an intact header announced last, if one did.
     """
 
     def __init__(self, *, payload_bytes: int) -> None:
@@ -29,10 +36,12 @@ class PacketDecoder:
         self._buffer = bytearray()
         self._lost_track = False
         self.resyncs = 0
+        self.odd_payload_bytes: int | None = None
 
     def reset(self) -> None:
         """Forget the bytes of a stream that was cut off."""
         self._buffer.clear()
+        self.odd_payload_bytes = None
         self._lost_track = False
 
     def feed(self, data: bytes | bytearray | memoryview) -> list[ImagePacket]:
@@ -68,9 +77,11 @@ class PacketDecoder:
             if found + IMAGE_HEADER_BYTES > len(self._buffer):
                 return found, None
             header = ImageHeader.unpack(bytes(self._buffer[found : found + IMAGE_HEADER_BYTES]))
-            if header is not None and header.payload_bytes == self._payload_bytes:
-                self._lost_track = False
-                return found, header
+            if header is not None:
+                if header.payload_bytes == self._payload_bytes:
+                    self._lost_track = False
+                    return found, header
+                self.odd_payload_bytes = header.payload_bytes
             self._skip(found, found + 1)
             start = found + 1
 

@@ -4,6 +4,7 @@ import threading
 from collections import deque
 
 from transientcam_driver.capabilities import AppliedSequence, Capabilities
+from transientcam_driver.errors import ProtocolError
 from transientcam_driver.frames import Counters, FrameAssembler, RawFrame
 from transientcam_driver.framing import PacketDecoder
 
@@ -55,6 +56,19 @@ class Incoming:
                 if frame is not None:
                     self._frames.append(frame)
             self._counters.resyncs += self._decoder.resyncs - resyncs
+
+    def require_images_of_the_size_announced(self) -> None:
+        """Hold intact headers against the capabilities.
+
+        Raises
+        ------
+        ProtocolError
+            Images of another size came in this run; they are taken for noise one by one.
+        """
+        odd_bytes = self._decoder.odd_payload_bytes
+        if odd_bytes is not None:
+            announced = self._capabilities.image_bytes
+            raise ProtocolError(f"images of {odd_bytes} bytes, its capabilities say {announced}")
 
     def take(self) -> RawFrame | None:
         """Return the oldest complete frame, if there is one."""

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from numbers import Integral, Real
 from typing import Any, Literal, get_args
 
@@ -17,6 +17,7 @@ PHASE_STEPS_RAD = (0.0, math.pi / 2, math.pi, 3 * math.pi / 2)
 
 Zeroth = Literal["low-frequency", "on-off", "estimated"]
 Scheme = Literal["arccos", "harmonic-cancellation", "none"]
+TakeOrder = Literal["sequential", "interleaved"]
 
 # What an applied sequence adds to its document; a client may send it back unchanged.
 DERIVED_FIELDS = frozenset(
@@ -113,7 +114,10 @@ class Sequence:
     exposure_s
         Of one image.
     takes
-        How often the whole set is captured, for averaging.
+        How often each image is captured, for averaging.
+    take_order
+        ``sequential`` captures the whole set, then all of it again; ``interleaved`` each image as
+        often as there are takes, then the next one.
     sub_phases
         Division of each exposure.
     """
@@ -124,6 +128,7 @@ class Sequence:
     exposure_s: float = 0.00192
     takes: int = 1
     sub_phases: SubPhases = field(default_factory=SubPhases)
+    take_order: TakeOrder = "sequential"
 
     def __post_init__(self) -> None:
         _positive("base_frequency_hz", self.base_frequency_hz, "a number of hertz above 0")
@@ -137,6 +142,7 @@ class Sequence:
         _one_of("zeroth", self.zeroth, get_args(Zeroth))
         _positive("exposure_s", self.exposure_s, "a number of seconds above 0")
         _integer("takes", self.takes, "an integer of at least 1", least=1, most=None)
+        _one_of("take_order", self.take_order, get_args(TakeOrder))
         if not isinstance(self.sub_phases, SubPhases):
             raise SequenceError("sub_phases", self.sub_phases, "an object {scheme, n}")
         object.__setattr__(self, "base_frequency_hz", float(self.base_frequency_hz))
@@ -159,7 +165,11 @@ class Sequence:
         return self.labels_at(LOW_FREQUENCY_HZ)
 
     def labels_at(self, low_frequency_hz: float) -> tuple[ImageLabel, ...]:
-        """Label the images in the order of capture: takes, then frequencies, then phases."""
+        """Label the images in the order of capture.
+
+        Within a take frequencies, the zeroth moment first, then phases; ``take_order`` says
+        whether takes follow one another as a whole or image by image.
+        """
         of_a_take: list[tuple[int, float, float, bool]] = []
         if self.zeroth == "on-off":
             of_a_take += [(0, 0.0, 0.0, True), (0, 0.0, 0.0, False)]
@@ -168,9 +178,12 @@ class Sequence:
         for j in range(1, self.harmonics + 1):
             frequency_hz = j * self.base_frequency_hz
             of_a_take += [(j, frequency_hz, phase_rad, True) for phase_rad in PHASE_STEPS_RAD]
+        order = [(take, image) for take in range(self.takes) for image in of_a_take]
+        if self.take_order == "interleaved":
+            order = [(take, image) for image in of_a_take for take in range(self.takes)]
         return tuple(
             ImageLabel(
-                index=take * len(of_a_take) + k,
+                index=index,
                 take=take,
                 harmonic=harmonic,
                 frequency_hz=frequency_hz,
@@ -178,8 +191,7 @@ class Sequence:
                 exposure_s=self.exposure_s,
                 illumination=illumination,
             )
-            for take in range(self.takes)
-            for k, (harmonic, frequency_hz, phase_rad, illumination) in enumerate(of_a_take)
+            for index, (take, (harmonic, frequency_hz, phase_rad, illumination)) in enumerate(order)
         )
 
     def capture_s(self, readout_s: float) -> float:
@@ -199,6 +211,7 @@ class Sequence:
             "zeroth": self.zeroth,
             "exposure_s": self.exposure_s,
             "takes": self.takes,
+            "take_order": self.take_order,
             "sub_phases": self.sub_phases.to_document(),
         }
 
@@ -214,12 +227,12 @@ class Sequence:
         SequenceError
             Naming the field, its value and the limit.
         """
-        known = {"base_frequency_hz", "harmonics", "zeroth", "exposure_s", "takes", "sub_phases"}
+        known = {each.name for each in fields(cls)}
         _known_keys("", document, known | DERIVED_FIELDS)
-        fields = {name: value for name, value in document.items() if name in known}
-        if "sub_phases" in fields:
-            fields["sub_phases"] = SubPhases.from_document(fields["sub_phases"])
-        return cls(**fields)
+        given = {name: value for name, value in document.items() if name in known}
+        if "sub_phases" in given:
+            given["sub_phases"] = SubPhases.from_document(given["sub_phases"])
+        return cls(**given)
 
 
 def _known_keys(prefix: str, document: object, known: set[str] | frozenset[str]) -> None:

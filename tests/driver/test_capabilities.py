@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from transientcam_driver import Sequence, SequenceError, SubPhases
+from transientcam_driver import Capabilities, Sequence, SequenceError, SubPhases
 from transientcam_driver.simulation.profile import prototype
 
 CAPABILITIES = prototype(serial="T", width=163, height=120, bits=12)
@@ -38,6 +38,7 @@ def test_what_the_camera_cannot_do_is_refused_by_name(
         ({"max_harmonics": 4}, Sequence(harmonics=5), "harmonics"),
         ({"zeroths": ("estimated",)}, Sequence(zeroth="on-off"), "zeroth"),
         ({"schemes": ("none",)}, Sequence(), "sub_phases.scheme"),
+        ({"take_orders": ("sequential",)}, Sequence(take_order="interleaved"), "take_order"),
     ],
 )
 def test_a_lesser_camera_refuses_more(
@@ -95,3 +96,41 @@ def test_an_applied_sequence_says_what_follows_from_it() -> None:
         "unambiguous_range_m": pytest.approx(6.517, abs=1e-3),
         "data_rate_bytes_s": pytest.approx(image_bytes / 4.48e-3),
     }
+
+
+lesser_cameras = st.builds(
+    replace,
+    st.just(CAPABILITIES),
+    max_harmonics=st.integers(1, 32),
+    max_frequency_hz=st.floats(35e6, 150e6),
+    min_exposure_s=st.floats(1e-6, 5e-3),
+    max_exposure_s=st.floats(5e-3, 1.0),
+    max_takes=st.integers(1, 256),
+    max_images=st.integers(132, 2048),
+    max_sub_phases=st.integers(1, 32),
+    schemes=st.sampled_from([("none",), ("arccos",), ("none", "harmonic-cancellation")]),
+    zeroths=st.sampled_from([("estimated",), ("on-off",), ("low-frequency", "estimated")]),
+    take_orders=st.sampled_from([("sequential",), ("sequential", "interleaved")]),
+)
+
+
+@given(
+    camera=lesser_cameras,
+    base_frequency_hz=st.floats(1e5, 1e9),
+    harmonics=st.integers(1, 32),
+    takes=st.integers(1, 300),
+    take_order=st.sampled_from(["sequential", "interleaved"]),
+)
+def test_the_nearest_sequence_is_one_that_the_camera_can_do(
+    camera: Capabilities, base_frequency_hz: float, harmonics: int, takes: int, take_order: Any
+) -> None:
+    asked = Sequence(base_frequency_hz, harmonics, takes=takes, take_order=take_order)
+
+    nearest = camera.nearest(asked)
+
+    camera.validate(nearest)
+    assert camera.nearest(nearest) == nearest
+
+
+def test_a_sequence_that_the_camera_can_do_is_its_own_nearest() -> None:
+    assert CAPABILITIES.nearest(Sequence(takes=3)) == Sequence(takes=3)

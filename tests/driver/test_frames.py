@@ -1,4 +1,5 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -58,6 +59,23 @@ def test_a_frame_holds_all_images_in_the_order_of_its_labels() -> None:
     assert frame.images[:, 0, 0].tolist() == list(range(COUNT))
     assert frame.labels == LABELS
     assert (frame.number, frame.epoch, frame.host_time_s, frame.lost_images) == (0, 5, 99.0, 0)
+
+
+@pytest.mark.parametrize("take_order", ["sequential", "interleaved"])
+def test_images_are_had_by_take_in_whichever_order_they_came(take_order: Any) -> None:
+    sequence = Sequence(harmonics=1, zeroth="on-off", takes=3, take_order=take_order)
+    labels = sequence.labels
+    shown = [10 * label.take + 4 * label.harmonic + round(label.phase_rad) for label in labels]
+    images = np.array(shown, np.uint16)[:, None, None] * np.ones((1, 3, 4), np.uint16)
+    frame = RawFrame(0, 5, images, labels, 0.0, 0.0, 0.0, 0.0, 0)
+
+    by_take = frame.by_take
+
+    assert by_take.shape == (3, 6, 3, 4)
+    assert by_take[:, :, 0, 0].tolist() == [
+        [10 * take + each for each in (0, 0, 4, 6, 7, 9)] for take in range(3)
+    ]
+    assert np.shares_memory(by_take, images)
 
 
 def test_times_are_the_devices_own() -> None:

@@ -130,7 +130,7 @@ def test_capabilities_have_the_fields_at_the_offsets_of_the_specification() -> N
     assert [number(packed, offset, 2) for offset in (4, 6)] == [1, 152]
     assert packed[40:72].rstrip(b"\0") == b"T-1"
     assert [number(packed, offset, 2) for offset in (88, 90)] == [163, 120]
-    assert list(packed[92:98]) == [12, 32, 32, 0b111, 0b111, 0]
+    assert list(packed[92:98]) == [12, 32, 32, 0b111, 0b111, 0b1]
     assert [number(packed, offset, 2) for offset in (98, 100, 102)] == [256, 2048, 0]
     assert [number(packed, offset, 4) for offset in range(104, 148, 4)] == [
         250_000,
@@ -207,6 +207,22 @@ def test_a_sequence_has_the_bytes_of_the_specification() -> None:
     assert packed == bytes.fromhex("01 04 01 01 08 00 1400 00cf7b05 80ee3600 004c1d00")
 
 
+def test_interleaved_takes_are_one_byte_of_a_sequence() -> None:
+    sequence = Sequence(23e6, 4, exposure_s=1.92e-3, takes=20, take_order="interleaved")
+
+    packed = SequenceWords.of(sequence, CAPABILITIES).pack()
+
+    assert packed == bytes.fromhex("01 04 01 01 08 01 1400 00cf7b05 80ee3600 004c1d00")
+
+
+def test_a_camera_that_says_nothing_of_the_order_of_takes_has_the_sequential_one() -> None:
+    silent = bytearray(pack_capabilities(CAPABILITIES)[:-4])
+    silent[97] = 0
+    packed = bytes(silent) + struct.pack("<I", naive_crc(silent))
+
+    assert unpack_capabilities(packed).take_orders == ("sequential",)
+
+
 @given(
     base_frequency_hz=st.floats(0.5e6, 4.5e6),
     harmonics=st.integers(1, 32),
@@ -215,6 +231,7 @@ def test_a_sequence_has_the_bytes_of_the_specification() -> None:
     takes=st.integers(1, 256),
     scheme=st.sampled_from(["arccos", "harmonic-cancellation", "none"]),
     n=st.integers(1, 32),
+    take_order=st.sampled_from(["sequential", "interleaved"]),
 )
 def test_a_sequence_on_the_grid_survives_the_wire(
     base_frequency_hz: float,
@@ -224,6 +241,7 @@ def test_a_sequence_on_the_grid_survives_the_wire(
     takes: int,
     scheme: str,
     n: int,
+    take_order: str,
 ) -> None:
     asked = Sequence.from_document(
         {
@@ -232,6 +250,7 @@ def test_a_sequence_on_the_grid_survives_the_wire(
             "zeroth": zeroth,
             "exposure_s": round(exposure_s * 1e9) / 1e9,
             "takes": takes,
+            "take_order": take_order,
             "sub_phases": {"scheme": scheme, "n": n},
         }
     )
@@ -244,11 +263,18 @@ def test_a_sequence_on_the_grid_survives_the_wire(
     ]
 
 
-@pytest.mark.parametrize(("zeroth", "scheme"), [(3, 0), (0, 3)])
-def test_a_code_without_meaning_is_a_protocol_error(zeroth: int, scheme: int) -> None:
-    words = replace(SequenceWords.of(Sequence(), CAPABILITIES), zeroth=zeroth, scheme=scheme)
+@pytest.mark.parametrize(
+    ("code", "name"),
+    [
+        ({"zeroth": 3}, "code 3 for the zeroth moment"),
+        ({"scheme": 3}, "code 3 for the scheme"),
+        ({"take_order": 2}, "code 2 for the order of takes"),
+    ],
+)
+def test_a_code_without_meaning_is_a_protocol_error(code: dict[str, int], name: str) -> None:
+    words = replace(SequenceWords.of(Sequence(), CAPABILITIES), **code)
 
-    with pytest.raises(ProtocolError, match="unknown codes"):
+    with pytest.raises(ProtocolError, match=name):
         words.sequence(CAPABILITIES)
 
 

@@ -1,10 +1,11 @@
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from transientcam_driver import Sequence, SequenceError, SubPhases
+from transientcam_driver import ImageLabel, Sequence, SequenceError, SubPhases
 from transientcam_driver.sequence import DERIVED_FIELDS
 
 READOUT_S = 3.73e-3
@@ -66,6 +67,24 @@ def test_labels_run_over_takes_then_frequencies_then_phases() -> None:
     assert [label.harmonic for label in labels[:12]] == [0] * 4 + [1] * 4 + [2] * 4
     assert [label.frequency_hz for label in labels[:12:4]] == [0.9e6, 10e6, 20e6]
     assert [label.phase_rad for label in labels[:4]] == [0, math.pi / 2, math.pi, 3 * math.pi / 2]
+
+
+def test_interleaved_takes_follow_image_by_image() -> None:
+    interleaved = Sequence(10e6, harmonics=2, zeroth="on-off", takes=3, take_order="interleaved")
+    sequential = replace(interleaved, take_order="sequential")
+
+    labels = interleaved.labels
+
+    assert [label.index for label in labels] == list(range(30))
+    assert [label.take for label in labels[:6]] == [0, 1, 2, 0, 1, 2]
+    assert [label.illumination for label in labels[:6]] == [True] * 3 + [False] * 3
+    assert [label.harmonic for label in labels[6::12]] == [1, 2]
+
+    def shown(label: ImageLabel) -> tuple[int, int, float, bool]:
+        return label.take, label.harmonic, label.phase_rad, label.illumination
+
+    assert sorted(map(shown, labels)) == sorted(map(shown, sequential.labels))
+    assert interleaved.capture_s(1e-3) == sequential.capture_s(1e-3)
 
 
 def test_an_on_off_pair_is_unmodulated_and_differs_by_the_light() -> None:
@@ -133,6 +152,7 @@ def test_without_sub_phases_there_is_one_part() -> None:
         ({"zeroth": ["on-off"]}, "zeroth"),
         ({"exposure_s": 0.0}, "exposure_s"),
         ({"takes": 0}, "takes"),
+        ({"take_order": "random"}, "take_order"),
         ({"takes": 10**400}, None),
         ({"sub_phases": {"scheme": "sawtooth"}}, "sub_phases.scheme"),
         ({"sub_phases": {"n": 0}}, "sub_phases.n"),
@@ -170,6 +190,7 @@ sequences = st.builds(
     sub_phases=st.builds(
         SubPhases, st.sampled_from(["arccos", "harmonic-cancellation", "none"]), st.integers(1, 9)
     ),
+    take_order=st.sampled_from(["sequential", "interleaved"]),
 )
 
 

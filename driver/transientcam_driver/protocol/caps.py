@@ -2,17 +2,19 @@
 
 import math
 import struct
+from typing import TypeVar
 
 from crc32c import crc32c
 
 from transientcam_driver.capabilities import IMAGE_HEADER_BYTES, Capabilities
 from transientcam_driver.errors import FirmwareTooOld, ProtocolError
-from transientcam_driver.protocol.codes import SCHEMES, ZEROTHS
+from transientcam_driver.protocol.codes import SCHEMES, TAKE_ORDERS, ZEROTHS
 from transientcam_driver.protocol.requests import VERSION
 from transientcam_driver.protocol.units import nanoseconds
 
+_Word = TypeVar("_Word", bound=str)
 _CAPS_MAGIC = b"TCCP"
-_CAPS = struct.Struct("<4sHH32s32s16sHHBBBBBxHHxxIIIIIIIIIII")
+_CAPS = struct.Struct("<4sHH32s32s16sHHBBBBBBHHxxIIIIIIIIIII")
 CAPS_BYTES = _CAPS.size + 4
 CAPS_ROOM_BYTES = 512
 """What a host asks for, so that later fields fit."""
@@ -35,6 +37,7 @@ def pack_capabilities(capabilities: Capabilities) -> bytes:
         c.max_sub_phases,
         _bits(c.schemes, SCHEMES),
         _bits(c.zeroths, ZEROTHS),
+        _bits(c.take_orders[1:], TAKE_ORDERS[1:]),
         c.max_takes,
         c.max_images,
         round(c.tuning_step_hz * 1e6),
@@ -84,6 +87,7 @@ def unpack_capabilities(data: bytes) -> Capabilities:
         max_sub_phases,
         schemes,
         zeroths,
+        take_orders,
         max_takes,
         max_images,
         step_uhz,
@@ -121,6 +125,7 @@ def unpack_capabilities(data: bytes) -> Capabilities:
         max_images=max_images,
         schemes=_named(schemes, SCHEMES),
         zeroths=_named(zeroths, ZEROTHS),
+        take_orders=(TAKE_ORDERS[0], *_named(take_orders, TAKE_ORDERS[1:])),
         fifo_bytes=fifo_bytes,
         heartbeat_s=heartbeat_ms / 1e3,
     )
@@ -142,6 +147,8 @@ def _check_capabilities(c: Capabilities) -> None:
         ("lowest frequency in Hz", c.min_frequency_hz, 1, c.max_frequency_hz),
         ("shortest exposure in s", c.min_exposure_s, 1e-9, c.max_exposure_s),
         ("heartbeat in s", c.heartbeat_s, 0.01, 3600),
+        ("known schemes of sub-phases", len(c.schemes), 1, len(SCHEMES)),
+        ("known ways to the zeroth moment", len(c.zeroths), 1, len(ZEROTHS)),
         ("FIFO in bytes", c.fifo_bytes, IMAGE_HEADER_BYTES + c.image_bytes, math.inf),
     )
     for name, value, least, most in ranges:
@@ -153,9 +160,9 @@ def _text(field: bytes) -> str:
     return field.rstrip(b"\0").decode("utf-8", "replace")
 
 
-def _bits(names: tuple[str, ...], known: tuple[str, ...]) -> int:
+def _bits(names: tuple[_Word, ...], known: tuple[_Word, ...]) -> int:
     return sum(1 << known.index(name) for name in names)
 
 
-def _named(bits: int, known: tuple[str, ...]) -> tuple[str, ...]:
+def _named(bits: int, known: tuple[_Word, ...]) -> tuple[_Word, ...]:
     return tuple(name for k, name in enumerate(known) if bits >> k & 1)

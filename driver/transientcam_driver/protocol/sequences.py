@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from transientcam_driver.capabilities import Capabilities
 from transientcam_driver.errors import ProtocolError
-from transientcam_driver.protocol.codes import SCHEMES, ZEROTHS
+from transientcam_driver.protocol.codes import SCHEMES, TAKE_ORDERS, ZEROTHS
 from transientcam_driver.protocol.requests import VERSION
 from transientcam_driver.protocol.units import nanoseconds
 from transientcam_driver.sequence import Sequence, SubPhases
@@ -26,8 +26,9 @@ class SequenceWords:
     low_word: int
     exposure_ns: int
     takes: int
+    take_order: int = 0
 
-    _LAYOUT = struct.Struct("<BBBBBxHIII")
+    _LAYOUT = struct.Struct("<BBBBBBHIII")
     BYTES = _LAYOUT.size
 
     @classmethod
@@ -43,6 +44,7 @@ class SequenceWords:
             low_word=capabilities.tuning_word(capabilities.low_frequency_hz) * low_frequency,
             exposure_ns=nanoseconds(sequence.exposure_s),
             takes=sequence.takes,
+            take_order=TAKE_ORDERS.index(sequence.take_order),
         )
 
     def sequence(self, capabilities: Capabilities) -> Sequence:
@@ -55,8 +57,14 @@ class SequenceWords:
         SequenceError
             A field out of every range.
         """
-        if self.zeroth >= len(ZEROTHS) or self.scheme >= len(SCHEMES):
-            raise ProtocolError(f"unknown codes {self.zeroth} (zeroth), {self.scheme} (scheme)")
+        codes = (
+            ("zeroth moment", self.zeroth, ZEROTHS),
+            ("scheme", self.scheme, SCHEMES),
+            ("order of takes", self.take_order, TAKE_ORDERS),
+        )
+        for name, code, known in codes:
+            if code >= len(known):
+                raise ProtocolError(f"unknown code {code} for the {name}")
         return Sequence(
             base_frequency_hz=capabilities.frequency_hz(self.base_word),
             harmonics=self.harmonics,
@@ -64,6 +72,7 @@ class SequenceWords:
             exposure_s=self.exposure_ns / 1e9,
             takes=self.takes,
             sub_phases=SubPhases(SCHEMES[self.scheme], self.sub_phases),
+            take_order=TAKE_ORDERS[self.take_order],
         )
 
     def word(self, harmonic: int) -> int:
@@ -78,6 +87,7 @@ class SequenceWords:
             self.zeroth,
             self.scheme,
             self.sub_phases,
+            self.take_order,
             self.takes,
             self.base_word,
             self.low_word,
@@ -89,10 +99,10 @@ class SequenceWords:
         """Read the payload of SET_SEQUENCE."""
         if len(data) != cls.BYTES or data[0] != VERSION:
             raise ProtocolError(f"{len(data)} bytes for a sequence of {cls.BYTES}")
-        _, harmonics, zeroth, scheme, sub_phases, takes, base, low, exposure = cls._LAYOUT.unpack(
-            data
+        _, harmonics, zeroth, scheme, sub_phases, order, takes, base, low, exposure = (
+            cls._LAYOUT.unpack(data)
         )
-        return cls(harmonics, zeroth, scheme, sub_phases, base, low, exposure, takes)
+        return cls(harmonics, zeroth, scheme, sub_phases, base, low, exposure, takes, order)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 What mounts it (a pyusb backend, a usbfs server) only carries requests and transfers here.
 """
 
+import math
 import struct
 import threading
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from transientcam_driver.capabilities import Capabilities
 from transientcam_driver.protocol import Request
 from transientcam_driver.simulation import descriptors
 from transientcam_driver.simulation.clock import Clock
+from transientcam_driver.simulation.faults import Fault, FaultyCable
 from transientcam_driver.simulation.firmware import Firmware, Refusal
 
 _STANDARD, _VENDOR, _TYPE_MASK, _DEVICE_TO_HOST = 0x00, 0x40, 0x60, 0x80
@@ -66,7 +68,10 @@ class EmulatedDevice:
         )
         self._power_on = power_on
         self._halted = False
+        self._cable = FaultyCable()
         self._left_over = memoryview(b"")
+        self._requests_to_stall = 0
+        self._silent_until_s = -math.inf
         self._configuration = 1
         self._firmware = power_on(clock.now_s())
 
@@ -94,6 +99,9 @@ class EmulatedDevice:
             and index == descriptors.MS_OS_20_DESCRIPTOR_INDEX
         ):
             return descriptors.MS_OS_20_DESCRIPTOR
+        if self._requests_to_stall and request != Request.SAFE_OFF:  # that one is never refused
+            self._requests_to_stall -= 1
+            raise Stall
         try:
             if request_type & _DEVICE_TO_HOST:
                 return self._firmware.control_in(request, value, index, now_s=self.clock.now_s())
@@ -102,7 +110,7 @@ class EmulatedDevice:
             raise Stall from refusal
         finally:
             if request in _CUTS_THE_STREAM:
-                self._left_over = memoryview(b"")
+                self._cut()
             self.changed.notify_all()  # a read in progress may have another image to wait for
         return b""
 
@@ -173,11 +181,18 @@ class EmulatedDevice:
             raise Unplugged
         if self._halted:
             raise Stall
+        if self.clock.now_s() < self._silent_until_s:
+            return None
         if not self._left_over:
-            packet = self._firmware.read(now_s=self.clock.now_s())
-            if packet is None:
-                return None
-            self._left_over = memoryview(packet)
+            while not self._cable:
+                packet = self._firmware.read(now_s=self.clock.now_s())
+                if packet is None:
+                    return None
+                self._cable.carry(packet)
+            transfer = self._cable.take()
+            if transfer is None:
+                raise Overflow
+            self._left_over = memoryview(transfer)
         if len(self._left_over) > most and most % descriptors.MAX_PACKET_BYTES:
             self._left_over = memoryview(b"")
             raise Overflow
@@ -186,7 +201,9 @@ class EmulatedDevice:
 
     def due_s(self) -> float | None:
         """When the next image can be read; None as long as none is being made."""
-        return self.clock.now_s() if self._left_over else self._firmware.due_s()
+        now_s = self.clock.now_s()
+        due_s = now_s if self._left_over or self._cable else self._firmware.due_s()
+        return None if due_s is None else max(due_s, self._silent_until_s)
 
     def clear_halt(self) -> None:
         """Let the bulk endpoint run again."""
@@ -223,15 +240,21 @@ class EmulatedDevice:
             self._halted = True
             self.changed.notify_all()
 
-    def corrupt_next(self, images: int) -> None:
-        """Damage the pixels of the next images on their way."""
+    def expect(self, fault: Fault, images: int = 1) -> None:
+        """Let a fault happen to the next images on their way."""
         with self.changed:
-            self._firmware.corrupt_next(images)
+            self._cable.expect(fault, images)
 
-    def drop_next(self, images: int) -> None:
-        """Lose the next images on their way."""
+    def stall_next(self, requests: int = 1) -> None:
+        """Stall the next vendor requests, whatever they are, but never SAFE_OFF."""
         with self.changed:
-            self._firmware.drop_next(images)
+            self._requests_to_stall += requests
+
+    def fall_silent(self, duration_s: float) -> None:
+        """Send no image for some time."""
+        with self.changed:
+            self._silent_until_s = self.clock.now_s() + duration_s
+            self.changed.notify_all()
 
     def set_interlock(self, *, closed: bool) -> None:
         """Open or close the safety interlock."""
@@ -239,9 +262,16 @@ class EmulatedDevice:
             self._firmware.set_interlock(self.clock.now_s(), closed=closed)
             self.changed.notify_all()
 
+    def _cut(self) -> None:
+        self._cable.cut()
+        self._left_over = memoryview(b"")
+
     def _restart(self) -> None:
         self._halted = False
-        self._left_over = memoryview(b"")
+        self._cut()
+        self._cable = FaultyCable()
+        self._requests_to_stall = 0
+        self._silent_until_s = -math.inf
         self._configuration = 1
         self._firmware = self._power_on(self.clock.now_s())
         self.changed.notify_all()

@@ -80,18 +80,6 @@ class Firmware:
         self._faulted = False
         self._last_error = (ErrorCode.NONE, 0, "")
         self._ready: tuple[Exposed, bytes] | None = None  # an image rendered ahead
-        self._to_corrupt = 0
-        self._to_drop = 0
-
-    # --- faults that a test or a demonstration asks for -----------------------------------
-
-    def corrupt_next(self, images: int) -> None:
-        """Damage the pixels of the next images on their way out."""
-        self._to_corrupt += images
-
-    def drop_next(self, images: int) -> None:
-        """Lose the next images on their way out."""
-        self._to_drop += images
 
     def set_interlock(self, now_s: float, *, closed: bool) -> None:
         """Open or close the safety interlock; opening it switches the light off."""
@@ -227,25 +215,18 @@ class Firmware:
     def prepare(self) -> None:
         """Render the image that is read next, ahead of its time."""
         image = self._exposures.upcoming()
-        if image is not None and not self._to_drop:
+        if image is not None:
             self._packet(image)
 
     def read(self, *, now_s: float) -> bytes | None:
         """Take the oldest image packet out of the FIFO, if there is one."""
         self._advance(now_s)
-        while (image := self._exposures.take()) is not None:
-            if self._to_drop:
-                self._to_drop -= 1
-                continue
-            packet = self._packet(image)
-            self._ready = None
-            if self._to_corrupt:
-                self._to_corrupt -= 1
-                damaged = bytearray(packet)
-                damaged[IMAGE_HEADER_BYTES + self.capabilities.image_bytes // 2] ^= 0x55
-                packet = bytes(damaged)
-            return packet
-        return None
+        image = self._exposures.take()
+        if image is None:
+            return None
+        packet = self._packet(image)
+        self._ready = None
+        return packet
 
     def _begin(self, now_s: float) -> None:
         self._exposures.begin(now_s, period_s=self._period_s(), count=len(self._labels))

@@ -28,6 +28,7 @@ def prototype(*, serial: str, width: int, height: int, bits: int) -> Capabilitie
         max_images=2048,
         schemes=("none", "arccos", "harmonic-cancellation"),
         zeroths=("on-off", "low-frequency", "estimated"),
+        take_orders=("sequential", "interleaved"),
         fifo_bytes=32 * (IMAGE_HEADER_BYTES + width * height * 2),
         heartbeat_s=2.0,
     )

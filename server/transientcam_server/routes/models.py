@@ -10,6 +10,7 @@ _SEQUENCE_EXAMPLE: dict[str, JsonValue] = {
     "zeroth": "low-frequency",
     "exposure_s": 0.00192,
     "takes": 1,
+    "take_order": "sequential",
     "sub_phases": {"scheme": "arccos", "n": 8},
 }
 _APPLIED_EXAMPLE: dict[str, JsonValue] = _SEQUENCE_EXAMPLE | {
@@ -76,7 +77,9 @@ class SequenceDocument(Document):
     exposure_s: float = Field(default=0.00192, gt=0)
     """Of one image."""
     takes: int = Field(default=1, ge=1)
-    """How often the whole set is captured, for averaging."""
+    """How often each image is captured, for averaging; whole images that are off are left out."""
+    take_order: Literal["sequential", "interleaved"] = "sequential"
+    """Whether takes follow one another as a whole, or image by image."""
     sub_phases: SubPhasesDocument = SubPhasesDocument()
 
 

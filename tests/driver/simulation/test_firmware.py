@@ -150,7 +150,7 @@ def test_epochs_stay_above_the_one_the_host_knows(device: Device) -> None:
         ({"takes": 0}, "takes = 0"),
         ({"exposure_ns": 10}, "exposure_s = 1e-08"),
         ({"base_word": 2**32 - 1}, "base_frequency_hz"),
-        ({"zeroth": 77}, "unknown codes"),
+        ({"zeroth": 77}, "unknown code 77"),
     ],
 )
 def test_an_impossible_sequence_is_stalled_and_explained(
@@ -370,22 +370,3 @@ def test_safe_off_is_obeyed_in_every_state(device: Device) -> None:
     assert not device.status().light_on
     device.firmware.set_interlock(device.now_s, closed=False)
     device.tell(Request.SAFE_OFF)
-
-
-def test_a_corrupted_image_keeps_its_header(device: Device) -> None:
-    device.tell(Request.START)
-    device.firmware.corrupt_next(1)
-    device.now_s += 2 * PERIOD_S + 1e-6
-
-    assert [(found.header.number, found.intact) for found in device.read()] == [
-        (0, False),
-        (1, True),
-    ]
-
-
-def test_a_dropped_image_leaves_a_gap_in_the_numbers(device: Device) -> None:
-    device.tell(Request.START)
-    device.firmware.drop_next(2)
-    device.now_s += 4 * PERIOD_S + 1e-6
-
-    assert device.numbers() == [2, 3]

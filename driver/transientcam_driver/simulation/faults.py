@@ -1,0 +1,83 @@
+"""What can happen to images and requests on their way over the cable."""
+
+from collections import deque
+from enum import StrEnum
+
+from transientcam_driver.capabilities import IMAGE_HEADER_BYTES
+
+
+class Fault(StrEnum):
+    """What happens to an image packet."""
+
+    DROP = "drop"
+    """It is lost."""
+    CORRUPT_PIXELS = "corrupt-pixels"
+    """Bits of its pixels flip; the header's checksum still holds."""
+    CORRUPT_HEADER = "corrupt-header"
+    """Bits of its header flip."""
+    SHORTEN = "shorten"
+    """The transfer ends in its middle."""
+    DUPLICATE = "duplicate"
+    """It comes twice."""
+    SWAP = "swap"
+    """The image behind it comes first."""
+    BABBLE = "babble"
+    """The device sends more than was asked for, and the transfer is lost."""
+
+
+class FaultyCable:
+    """Carries image packets as transfers, and lets happen to the next ones what was asked for.
+
+    Faults take their turns in the order in which they were asked for.
+    """
+
+    def __init__(self) -> None:
+        self._pending: deque[Fault] = deque()
+        self._held: bytes | None = None
+        self._transfers: deque[bytes | None] = deque()
+
+    def __bool__(self) -> bool:
+        """Whether a transfer waits to be read."""
+        return bool(self._transfers)
+
+    def expect(self, fault: Fault, images: int) -> None:
+        """Let a fault happen to the next images that have none yet."""
+        self._pending.extend([fault] * images)
+
+    def cut(self) -> None:
+        """Forget what is on its way; faults that have not happened yet still will."""
+        self._held = None
+        self._transfers.clear()
+
+    def take(self) -> bytes | None:
+        """Return the next transfer, or None for one that overflows the host's buffer."""
+        return self._transfers.popleft()
+
+    def carry(self, packet: bytes) -> None:
+        """Put an image packet on its way."""
+        behind, self._held = self._held, None
+        match self._pending.popleft() if self._pending else None:
+            case None:
+                self._transfers.append(packet)
+            case Fault.DROP:
+                pass
+            case Fault.CORRUPT_PIXELS:
+                self._transfers.append(_flipped(packet, (IMAGE_HEADER_BYTES + len(packet)) // 2))
+            case Fault.CORRUPT_HEADER:
+                self._transfers.append(_flipped(packet, IMAGE_HEADER_BYTES // 2))
+            case Fault.SHORTEN:
+                self._transfers.append(packet[: len(packet) // 2])
+            case Fault.DUPLICATE:
+                self._transfers.extend((packet, packet))
+            case Fault.SWAP:
+                self._held = packet
+            case Fault.BABBLE:
+                self._transfers.append(None)
+        if behind is not None:
+            self._transfers.append(behind)
+
+
+def _flipped(packet: bytes, at: int) -> bytes:
+    damaged = bytearray(packet)
+    damaged[at] ^= 0x55
+    return bytes(damaged)
