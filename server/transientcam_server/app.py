@@ -14,6 +14,7 @@ from transientcam_server.routes import (
     frames,
     health,
     info,
+    plan,
     sequence,
     simulation,
 )
@@ -22,7 +23,7 @@ from transientcam_server.service import VERSION, Service
 from transientcam_server.settings import Settings
 
 API: Final = "/api/v1"
-_RESOURCES = (info, camera, sequence, acquisition, frames, simulation)
+_RESOURCES = (info, camera, sequence, acquisition, frames, simulation, plan)
 
 
 def build_app(camera: Camera, settings: Settings) -> FastAPI:

@@ -30,14 +30,25 @@ _Array = NDArray[Any]
 MAX_ANSWER_BYTES = 512 * 1024 * 1024
 """A product over time with more than this is not computed."""
 _REMEMBERED_TIME_AXES = 2
+Judge = Callable[[Recipe, Any], dict[str, float] | None]
 
 
 class Pipeline:
-    """Makes frames of captures and computes on ``executor`` what is asked of them."""
+    """Makes frames of captures and computes on ``executor`` what is asked of them.
+
+    ``judge`` predicts the deviation of the range of each frame whose returns are computed.
+    """
 
     def __init__(
-        self, camera: Camera, settings: ReconstructionSettings, executor: Executor, *, workers: int
+        self,
+        camera: Camera,
+        settings: ReconstructionSettings,
+        executor: Executor,
+        *,
+        workers: int,
+        judge: Judge | None = None,
     ) -> None:
+        self.judge = judge
         self._settings = settings
         self._executor = executor
         self._tasks: set[asyncio.Task[Any]] = set()
@@ -143,6 +154,7 @@ class Frame:
         self._pipeline = pipeline
         self._reconstruct_s: float | None = None
         self._pixels: dict[str, int] | None = None
+        self._deviation: dict[str, float] | None = None
         self._known: dict[Hashable, asyncio.Task[Any]] = {}
         self._over_time: OrderedDict[Hashable, asyncio.Task[Any]] = OrderedDict()
 
@@ -174,6 +186,7 @@ class Frame:
             "temperature_c": self.raw.temperature_c,
             "lost_images": self.raw.lost_images,
             "pixels": self._pixels,
+            "predicted_range_std_m": self._deviation,
         }
 
     async def stage(self, name: str) -> Any:
@@ -253,7 +266,20 @@ class Frame:
         self._reconstruct_s = (self._reconstruct_s or 0.0) + elapsed_s
         if name == "moments":
             self._pixels, _ = await self._pipeline.run(pixel_counts, result)
+        if name == "returns":
+            self._deviation = await self._judged(result)
         return result
+
+    async def _judged(self, found: Any) -> dict[str, float] | None:
+        """Return the predicted deviation of the range; a failure of that spoils no range."""
+        if self._pipeline.judge is None:
+            return None
+        try:
+            deviation, _ = await self._pipeline.run(self._pipeline.judge, self.recipe, found)
+        except Exception:
+            _log.exception("frame %d: predicting the range's deviation failed", self.number)
+            return None
+        return deviation
 
     async def _compute_product(self, product: Product, time_s: tuple[float, ...]) -> _Array:
         if product.over_time:

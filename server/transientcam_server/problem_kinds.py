@@ -90,6 +90,13 @@ ANSWER_TOO_LARGE: Final = ProblemKind(
     "The product at this many times of flight would exceed the limit on one answer. Ask for "
     "fewer times, or take `coefficients` and evaluate them where they are needed.",
 )
+TARGET_UNREACHABLE: Final = ProblemKind(
+    "target-unreachable",
+    422,
+    "No sequence reaches this",
+    "No sequence of this camera reaches the target on this scene within the budget. `field` names "
+    "what is out of reach, `limit` the best that is not, and `best` the sequence that achieves it.",
+)
 INTERNAL_ERROR: Final = ProblemKind(
     "internal-error",
     500,

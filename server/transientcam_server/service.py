@@ -12,6 +12,7 @@ from fastapi import Depends, Request
 from transientcam import wire
 from transientcam_driver import AppliedSequence, Camera
 
+from transientcam_server.accuracy import Accuracy
 from transientcam_server.acquisition import (
     Acquisition,
     Back,
@@ -20,6 +21,7 @@ from transientcam_server.acquisition import (
     Lost,
     SequenceChanged,
 )
+from transientcam_server.fronts import Fronts
 from transientcam_server.hub import Channel, Hub
 from transientcam_server.pipeline import Pipeline
 from transientcam_server.settings import Settings
@@ -43,9 +45,15 @@ class Service:
         self.settings = settings
         self.hub = Hub()
         self._executor = ThreadPoolExecutor(settings.workers, thread_name_prefix="worker")
+        self.accuracy = Accuracy(camera, settings.reconstruction, settings.sensor)
         self.pipeline = Pipeline(
-            camera, settings.reconstruction, self._executor, workers=settings.workers
+            camera,
+            settings.reconstruction,
+            self._executor,
+            workers=settings.workers,
+            judge=self.accuracy.judge,
         )
+        self.fronts = Fronts(self.accuracy, self.pipeline, simulated=camera.simulation is not None)
         self._loop: asyncio.AbstractEventLoop | None = None
         self.acquisition = Acquisition(camera, report=self._from_acquisition)
         self.applied: AppliedSequence = camera.applied

@@ -63,6 +63,19 @@ class ReconstructionSettings(_Group):
         )
 
 
+class SensorSettings(_Group):
+    """The sensor of a real camera, from its data sheet; predictions of accuracy rest on it."""
+
+    gain_e_per_dn: _Finite = Field(default=9.0, gt=0.0)
+    """Electrons a digital number stands for."""
+    full_well_e: _Finite = Field(default=40_000.0, gt=0.0)
+    """Electrons that a pixel holds."""
+    read_noise_e: _Finite = Field(default=30.0, ge=0.0)
+    """Standard deviation of a read-out, in electrons."""
+    dark_dn: _Finite = Field(default=64.0, ge=0.0)
+    """What the converter gives for an empty pixel."""
+
+
 class StreamSettings(_Group):
     """How many clients may look, and how far one may fall behind."""
 
@@ -94,6 +107,7 @@ class Settings(_Group):
     workers: int = Field(default_factory=lambda: max(2, os.cpu_count() or 2), ge=2, le=256)
     """Threads that reconstruct and encode; at least 2, so that one long answer delays nobody."""
     reconstruction: ReconstructionSettings = ReconstructionSettings()
+    sensor: SensorSettings = SensorSettings()
     stream: StreamSettings = StreamSettings()
 
     @property

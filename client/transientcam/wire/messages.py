@@ -23,6 +23,16 @@ class PixelCounts(TypedDict):
     degenerate: int
 
 
+class PredictedStd(TypedDict):
+    """Standard deviation that the sensor's noise gives a frame's range, in m."""
+
+    median: float
+    p90: float
+    """90 % of the pixels are better."""
+    first_order_share: float
+    """Share of the pixels where the noise model holds; that of the others is a rough figure."""
+
+
 class FrameMeta(TypedDict):
     """What is known of a frame, whatever product of it is sent."""
 
@@ -48,6 +58,8 @@ class FrameMeta(TypedDict):
     lost_images: int
     """Images lost or corrupt between the frame before and this one."""
     pixels: PixelCounts | None
+    predicted_range_std_m: PredictedStd | None
+    """None until the range of this frame was computed."""
 
 
 @dataclass(frozen=True, slots=True)

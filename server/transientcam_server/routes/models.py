@@ -47,6 +47,7 @@ _META_EXAMPLE: dict[str, JsonValue] = {
         "non_finite": 0,
         "degenerate": 0,
     },
+    "predicted_range_std_m": {"median": 0.0105, "p90": 0.0291, "first_order_share": 0.61},
 }
 
 
@@ -252,6 +253,16 @@ class PixelCountsDocument(Document):
     degenerate: int
 
 
+class PredictedStdDocument(Document):
+    """Standard deviation that the noise of the sensor gives a frame's range, in m."""
+
+    median: float
+    p90: float
+    """90 % of the pixels are better."""
+    first_order_share: float
+    """Share of the pixels where the noise model holds; that of the others is a rough figure."""
+
+
 class FrameDocument(Document):
     """What is known of a frame, whatever product of it is fetched."""
 
@@ -281,6 +292,8 @@ class FrameDocument(Document):
     """Images lost or corrupt between the frame before and this one."""
     pixels: PixelCountsDocument | None = None
     """Null until something was computed."""
+    predicted_range_std_m: PredictedStdDocument | None = None
+    """Null until the range was computed."""
 
 
 class ComplexDocument(Document):

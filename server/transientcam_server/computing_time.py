@@ -1,0 +1,88 @@
+"""How long this machine reconstructs a frame, measured when it is first asked."""
+
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+import transientcam_moments as tm
+from numpy.typing import NDArray
+from transientcam_driver import Capabilities, Sequence
+
+from transientcam_server.settings import ReconstructionSettings
+
+_REPEATED: Final = 3
+_DEPTH: Final = 1000.0
+"""Brightness of the images that are reconstructed, in DN."""
+
+
+class ComputingTime:
+    """Seconds from images to range, by number of harmonics and takes.
+
+    Parameters
+    ----------
+    capabilities
+        Of the camera, whose images have the size that matters.
+    settings
+        How images become range.
+    clock
+        Of the machine.
+    """
+
+    def __init__(
+        self,
+        capabilities: Capabilities,
+        settings: ReconstructionSettings,
+        *,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self._shape = (capabilities.height, capabilities.width)
+        self._full_scale = 2.0**capabilities.bits - 1.0
+        self._settings = settings
+        self._clock = clock
+        self._known: dict[tuple[int, int, str], float] = {}
+
+    def __call__(self, sequence: Sequence) -> float:
+        """Return the time of one frame of a sequence; averaging grows with the number of takes."""
+        once = self._measured(sequence.harmonics, 1)
+        if sequence.takes == 1:
+            return once
+        # 2 takes are averaged plainly, more are searched for outliers
+        few = 2 if sequence.takes == 2 else 3
+        averaging = max(0.0, self._measured(1, few) - self._measured(1, 1)) / (4 * few)
+        return once + averaging * 4 * sequence.harmonics * sequence.takes
+
+    def _measured(self, harmonics: int, takes: int) -> float:
+        # kernels that were compiled meanwhile make another machine of it
+        key = (harmonics, takes, str(sorted(map(str, tm.kernels.state().items()))))
+        if key not in self._known:
+            images = _images(harmonics, takes, self._shape)
+            settings = self._settings.for_moments(
+                base_frequency_hz=23e6,
+                zeroth="estimated",
+                takes=takes,
+                full_scale=self._full_scale,
+            )
+            self._known[key] = min(self._once(images, settings) for _ in range(_REPEATED))
+        return self._known[key]
+
+    def _once(self, images: NDArray[Any], settings: tm.Settings) -> float:
+        begin_s = self._clock()
+        found = tm.reconstruct(images, settings)
+        _ = found.range_m, found.direct, found.flags
+        return self._clock() - begin_s
+
+
+def _images(harmonics: int, takes: int, shape: tuple[int, int]) -> NDArray[Any]:
+    """Make images of two returns a pixel with noise, as a scene might have them."""
+    random = np.random.default_rng(harmonics)
+    phase = random.uniform(0.0, 2 * np.pi, (2, *shape))
+    weight = _DEPTH * random.uniform(0.3, 0.7, (2, *shape))
+    images = []
+    for j in range(1, harmonics + 1):
+        moment = (weight * np.exp(1j * j * phase)).sum(axis=0)
+        for step in range(4):
+            images.append(0.5 * (weight.sum(axis=0) + (moment * (-1j) ** step).real))
+    stack = np.stack(images * takes)
+    noisy = stack + random.normal(0.0, 8.0, stack.shape)
+    return np.maximum(noisy, 0.0).astype(np.uint16)
