@@ -262,7 +262,7 @@ class Camera:
         try:
             self._transport.control_out(Request.SAFE_OFF)  # whatever its last owner left
             self._capabilities = unpack_capabilities(
-                self._transport.control_in(Request.GET_CAPS, length=CAPS_ROOM_BYTES)
+                self._ask(Request.GET_CAPS, length=CAPS_ROOM_BYTES)
             )
             self._transport.expect_transfers(IMAGE_HEADER_BYTES + self._capabilities.image_bytes)
             self._incoming = Incoming(self._capabilities, self.counters)

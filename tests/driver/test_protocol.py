@@ -218,7 +218,7 @@ def test_interleaved_takes_are_one_byte_of_a_sequence() -> None:
 def test_a_camera_that_says_nothing_of_the_order_of_takes_has_the_sequential_one() -> None:
     silent = bytearray(pack_capabilities(CAPABILITIES)[:-4])
     silent[97] = 0
-    packed = bytes(silent) + struct.pack("<I", naive_crc(silent))
+    packed = bytes(silent) + struct.pack("<I", naive_crc(bytes(silent)))
 
     assert unpack_capabilities(packed).take_orders == ("sequential",)
 

@@ -162,7 +162,7 @@ class EmulatedDevice:
                 if end_s is not None and now_s >= end_s:
                     return 0
                 self._firmware.prepare()
-                due_s = self._firmware.due_s()
+                due_s = self.due_s()
                 times_s = [time_s for time_s in (due_s, end_s) if time_s is not None]
                 wait_s = min(times_s) - self.clock.now_s() if times_s else _FOREVER_S
                 self.clock.wait(self.changed, max(0.0, wait_s))
