@@ -114,7 +114,7 @@ class Choice:
     @property
     def resolves(self) -> bool:
         """Whether noise is what limits the range, and not returns that are taken for one."""
-        return self.range_bias_m <= max(self.range_std.median_m, RESOLVED_M)
+        return self.range_bias_m <= max(0.1 * self.range_std.median_m, RESOLVED_M)
 
     @property
     def computing_share(self) -> float:

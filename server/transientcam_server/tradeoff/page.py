@@ -147,9 +147,10 @@ def _what(record: Record) -> str:
     of_exposure = sub_phases["scheme"]
     if of_exposure != "none":
         of_exposure += f" {sub_phases['n']}"
+    takes = "1 take" if point["takes"] == 1 else f"{point['takes']} takes"
     return (
         f"m = {point['harmonics']}, {point['base_frequency_hz'] / 1e6:g} MHz, "
-        f"{point['exposure_s'] * 1e3:g} ms, {point['takes']} takes, {point['zeroth']}, "
+        f"{point['exposure_s'] * 1e3:g} ms, {takes}, {point['zeroth']}, "
         f"{of_exposure}"
     )
 
@@ -164,7 +165,7 @@ def _table(records: list[Record], quantities: Mapping[str, str]) -> str:
     shown = [name for name in quantities if any(record.values.get(name) for record in records)]
     copyable = records[0].kind == "capture"
     head = "".join(f"<th title='{html.escape(quantities[name])}'>{name}" for name in shown)
-    rows = [f"<div class=table><table><tr><th>{head}{'<th>' if copyable else ''}"]
+    rows = [f"<div class=table><table><tr><th>{'<th>' if copyable else ''}{head}"]
     for record in records:
         cells = "".join(
             f"<td>{_number(record.values.get(name), record.spread.get(name))}" for name in shown
