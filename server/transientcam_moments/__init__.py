@@ -13,6 +13,7 @@ of pixels after them, single or double precision, NumPy, JAX or CuPy. ::
 """
 
 from transientcam_moments import kernels, noise
+from transientcam_moments.bad_pixels import fill_bad_pixels, find_bad_pixels
 from transientcam_moments.biasing import (
     Biased,
     bias,
@@ -73,6 +74,8 @@ __all__ = [
     "effective_modulation",
     "estimate_zeroth",
     "extend",
+    "fill_bad_pixels",
+    "find_bad_pixels",
     "flags",
     "four_bucket",
     "from_reflection",

@@ -21,6 +21,8 @@ class Flags(IntFlag):
     """A moment is NaN, infinite or so large that densities overflow its precision."""
     DEGENERATE = 16
     """The Toeplitz matrix is singular or indefinite, so that the density is not determined."""
+    REPLACED = 32
+    """A bad pixel, which shows the mean of its neighbours."""
 
 
 INVALID = Flags.NO_SIGNAL | Flags.NON_FINITE

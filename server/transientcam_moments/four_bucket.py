@@ -92,7 +92,7 @@ def measure(
     An image without illumination is the dark level alone, one with it is higher by b_0 / 2.
     """
     chosen("zeroth", zeroth, tuple(ZEROTH_IMAGES))
-    stack = _takes_first(images, takes)
+    stack = takes_first(images, takes)
     m, rest = divmod(stack.shape[1] - ZEROTH_IMAGES[zeroth], 4)
     if rest or not 1 <= m <= MAX_HARMONICS:
         expected = f"{ZEROTH_IMAGES[zeroth]} + 4 m of them a take, m in 1..32, for {zeroth!r}"
@@ -129,7 +129,7 @@ def saturated(images: Array, *, full_scale: float = 4095) -> Array:
     return (images >= full_scale).any(axis=0)
 
 
-def _takes_first(images: Array | Sequence[Array], takes: int) -> Array:
+def takes_first(images: Array | Sequence[Array], takes: int) -> Array:
     """Bring all accepted layouts to (takes, images a take, ...)."""
     if takes < 1:
         raise ParameterError("takes", takes, ">= 1")

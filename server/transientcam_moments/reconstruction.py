@@ -7,12 +7,13 @@ from functools import cached_property
 import numpy as np
 
 from transientcam_moments._arrays import Array, as_array, chosen, in_range, in_turn, namespace
+from transientcam_moments.bad_pixels import fill_bad_pixels
 from transientcam_moments.biasing import EPSILON, bias, estimate_zeroth, smallest_eigenvalue
 from transientcam_moments.calibration import calibrate
 from transientcam_moments.cumulative import cumulative
 from transientcam_moments.errors import ParameterError
 from transientcam_moments.flags import INVALID, Flags, flags
-from transientcam_moments.four_bucket import ZEROTH_IMAGES, measure, saturated
+from transientcam_moments.four_bucket import ZEROTH_IMAGES, measure, saturated, takes_first
 from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.maximum_entropy import density
 from transientcam_moments.peaks import Peaks, peaks
@@ -25,6 +26,7 @@ from transientcam_moments.pisarenko import (
 )
 from transientcam_moments.ranging import range_m
 from transientcam_moments.smoothing import SIGMA_PX, smooth
+from transientcam_moments.takes import average_takes
 
 ESTIMATORS = ("pisarenko", "maximum-entropy", "single-frequency")
 
@@ -89,6 +91,7 @@ def reconstruct(
     *,
     calibration: Array | None = None,
     saturated_pixels: Array | None = None,
+    bad_pixels: Array | None = None,
 ) -> "Reconstruction":
     """Prepare the reconstruction of raw images or of moments; nothing is computed yet but moments.
 
@@ -103,6 +106,8 @@ def reconstruct(
         Gains to divide by, as `calibrate` takes them.
     saturated_pixels : boolean array, shape (...), optional
         Pixels to be flagged; found in images by themselves.
+    bad_pixels : boolean array, shape (H, W), optional
+        Pixels that show the mean of their neighbours instead, and are flagged.
 
     Returns
     -------
@@ -115,16 +120,23 @@ def reconstruct(
     """
     settings = Settings() if settings is None else settings
     data = data if isinstance(data, Sequence) else as_array(data)
-    moments: Array = data
+    kept: Array | None = None
     if isinstance(data, Sequence) or np.dtype(data.dtype).kind != "c":
-        moments = measure(data, zeroth=settings.zeroth, takes=settings.takes)
+        takes = takes_first(data, settings.takes)
+        average, kept = average_takes(takes)
+        if bad_pixels is not None:
+            average = fill_bad_pixels(average, bad_pixels)
+        moments = measure(average, zeroth=settings.zeroth)
         if saturated_pixels is None:
-            stack = np.stack(data) if isinstance(data, Sequence) else data
-            stack = stack.reshape((-1, *moments.shape[1:]))
+            stack = takes.reshape((-1, *moments.shape[1:]))
             saturated_pixels = saturated(stack, full_scale=settings.full_scale)
+            if bad_pixels is not None:  # whatever they show is not shown
+                saturated_pixels = saturated_pixels & ~bad_pixels
+    else:
+        moments = data if bad_pixels is None else fill_bad_pixels(data, bad_pixels)
     if calibration is not None:
         moments = calibrate(moments, calibration)
-    return Reconstruction(moments, settings, saturated_pixels)
+    return Reconstruction(moments, settings, saturated_pixels, bad_pixels=bad_pixels, kept=kept)
 
 
 class Reconstruction:
@@ -142,14 +154,31 @@ class Reconstruction:
         How to go on.
     saturated_pixels : boolean array, shape (...), optional
         Pixels to be flagged.
+    bad_pixels : boolean array, shape (...), optional
+        Pixels to be flagged as replaced.
+    kept : boolean array, shape (takes, N), optional
+        Which images went into the moments; all, when left out.
     """
 
     def __init__(
-        self, moments: Array, settings: Settings, saturated_pixels: Array | None = None
+        self,
+        moments: Array,
+        settings: Settings,
+        saturated_pixels: Array | None = None,
+        *,
+        bad_pixels: Array | None = None,
+        kept: Array | None = None,
     ) -> None:
         self.settings = settings
         self.measured = moments
         self._saturated = saturated_pixels
+        self._bad = bad_pixels
+        self._kept = kept
+
+    @property
+    def rejected_images(self) -> int:
+        """How many images were left out of the average over takes, as outliers."""
+        return 0 if self._kept is None else int((~self._kept).sum())
 
     @cached_property
     def smoothed(self) -> Array:
@@ -206,6 +235,8 @@ class Reconstruction:
         judged = judged | xp.where(self._biased[1], int(Flags.BIASED), 0)
         if self._saturated is not None:
             judged = judged | xp.where(xp.asarray(self._saturated), int(Flags.SATURATED), 0)
+        if self._bad is not None:
+            judged = judged | xp.where(xp.asarray(self._bad), int(Flags.REPLACED), 0)
         return judged.astype(xp.uint8)
 
     @property
