@@ -23,5 +23,6 @@ def test_scenes_are_listed_by_the_name_that_opens_them() -> None:
 def test_scenes_are_printed_as_json() -> None:
     listed = json.loads(run("--json"))
 
-    assert [entry["name"] for entry in listed] == ["measured", "mirrors"]
+    assert [entry["name"] for entry in listed] == [info.name for info in list_scenes()]
+    assert {"corner", "mirrors", "visitor"} <= {entry["name"] for entry in listed}
     assert all(entry["description"] and entry["path"].endswith(".toml") for entry in listed)

@@ -6,6 +6,6 @@ a real one.
 
 from transientcam_driver.simulation.handle import Simulation
 from transientcam_driver.simulation.responses import Truth
-from transientcam_driver.simulation.scene import SceneInfo, list_scenes
+from transientcam_driver.simulation.scene_file import SceneInfo, list_scenes
 
 __all__ = ["SceneInfo", "Simulation", "Truth", "list_scenes"]

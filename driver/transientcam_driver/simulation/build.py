@@ -3,24 +3,20 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from transientcam_driver.errors import SceneError
 from transientcam_driver.simulation.clock import Clock
 from transientcam_driver.simulation.device import EmulatedDevice
-from transientcam_driver.simulation.effects import EFFECTS
+from transientcam_driver.simulation.effects import NOISE
 from transientcam_driver.simulation.firmware import Firmware
 from transientcam_driver.simulation.handle import Simulation
-from transientcam_driver.simulation.light import trace
 from transientcam_driver.simulation.measured import load_responses
 from transientcam_driver.simulation.profile import prototype
-from transientcam_driver.simulation.responses import Responses
-from transientcam_driver.simulation.scene import (
-    BUILT_IN,
-    Background,
-    Scene,
-    TimeZero,
-    list_scenes,
-    load_scene,
-)
+from transientcam_driver.simulation.responses import SparseResponses
+from transientcam_driver.simulation.scene import Background, Diffusor, Scene, TimeZero
+from transientcam_driver.simulation.scene_file import BUILT_IN, list_scenes, load_scene
+from transientcam_driver.simulation.scenery import GivenScenery, Scenery, SurfaceScenery
 from transientcam_driver.simulation.world import World
 
 MEASURED = "measured"
@@ -58,30 +54,53 @@ def measured_scene(path: Path, *, background: Background, time_zero: TimeZero) -
 
 def without_noise(scene: Scene) -> Scene:
     """Return the same scene before a sensor whose only error is the rounding to 16 bits."""
-    effects = {effect.name: "off" for effect in EFFECTS if effect.optional}
-    return replace(scene, sensor=scene.sensor.ideal(), effects=effects)
+    quiet = {effect.name: "off" for effect in NOISE}
+    return replace(scene, sensor=scene.sensor.ideal(), effects=scene.effects | quiet)
 
 
-def responses_of(scene: Scene, *, width: int, height: int) -> Responses:
-    """Compute or read the impulse responses of a scene."""
+def scenery_of(scene: Scene, *, width: int, height: int) -> Scenery:
+    """Prepare to compute the light of a scene, or read its impulse responses."""
     if scene.responses:
-        return load_responses(scene, width=width, height=height)
-    return trace(scene, width=width, height=height)
+        return GivenScenery(load_responses(scene, width=width, height=height))
+    if scene.diffusor is not None:
+        return GivenScenery(through_diffusor(scene.diffusor, width=width, height=height))
+    return SurfaceScenery(scene, width=width, height=height)
+
+
+def through_diffusor(diffusor: Diffusor, *, width: int, height: int) -> SparseResponses:
+    """Return the same return for all pixels, but for the fall-off towards the corners."""
+    x = (2 * np.arange(width) + 1) / width - 1
+    y = (2 * np.arange(height) + 1) / height - 1
+    off_centre = (x[None, :] ** 2 + y[:, None] ** 2) / 2
+    weight = diffusor.brightness * (1 - diffusor.fall_off * off_centre)
+    return SparseResponses(np.full_like(weight, diffusor.delay_s)[None], weight[None])
+
+
+def world_of(
+    scene: Scene, *, width: int, height: int, seed: int | None = None, readout_s: float
+) -> World:
+    """Put a sensor in front of a scene."""
+    return World(
+        scenery_of(scene, width=width, height=height),
+        scene.sensor,
+        electrons_per_s=scene.light.electrons_per_s,
+        effects=scene.effects,
+        seed=scene.seed if seed is None else seed,
+        device=scene.device,
+        ambient_electrons_per_s=scene.ambient_electrons_per_s,
+        readout_s=readout_s,
+    )
 
 
 def build(
     scene: Scene, *, width: int, height: int, seed: int | None, clock: Clock
 ) -> tuple[EmulatedDevice, Simulation]:
     """Put a camera in front of a scene."""
-    world = World(
-        responses_of(scene, width=width, height=height),
-        scene.sensor,
-        electrons_per_s=scene.light.electrons_per_s,
-        effects=scene.effects,
-        seed=scene.seed if seed is None else seed,
-    )
     capabilities = prototype(
         serial=f"SIM-{scene.name}"[:32], width=width, height=height, bits=scene.sensor.bits
+    )
+    world = world_of(
+        scene, width=width, height=height, seed=seed, readout_s=capabilities.streaming_readout_s
     )
 
     def power_on(now_s: float) -> Firmware:

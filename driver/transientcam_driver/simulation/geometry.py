@@ -1,15 +1,32 @@
-"""Rectangles in space: what rays hit, what mirrors reflect, what casts shadows.
+"""Shapes in space: what rays hit, what mirrors reflect, what casts shadows.
 
 Lengths in m; x points right, y away from the camera, z up.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 Points = NDArray[np.float64]  # (..., 3)
+Bilinear = tuple[NDArray[np.intp], NDArray[np.float64]]  # (P, 4) cells, (P, 4) their weights
 _CLEAR = 1e-9  # fraction of a segment that counts as its end
+_CLEAR_OF_CURVED = 1e-6  # the same where a root of a quadratic says where the segment starts
+
+
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """A shape cut into a grid of flat patches, row by row.
+
+    ``corners`` (N, 4, 3) run counter-clockwise as seen from the front.
+    """
+
+    rows: int
+    columns: int
+    centre: Points
+    normal: Points
+    area: NDArray[np.float64]
+    corners: Points
 
 
 @dataclass(frozen=True)
@@ -49,6 +66,55 @@ class Rectangle:
         reflected: Points = direction - 2 * (direction @ self.normal)[..., None] * self.normal
         return reflected
 
+    def moved(self, by: Points) -> "Rectangle":
+        """Return it elsewhere."""
+        return replace(self, centre=self.centre + by)
+
+    def normals(self, points: Points) -> Points:
+        """Return unit normals at points on it."""
+        return np.broadcast_to(self.normal, points.shape)
+
+    def extent(self) -> Points:
+        """Return points (N, 3) whose convex hull holds it."""
+        across, along = self.right * self.width / 2, self.up * self.height / 2
+        signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        return self.centre + signs[:, :1] * across + signs[:, 1:] * along
+
+    def cells(self, edge_m: float) -> Cells:
+        """Cut it into equal cells of about the edge given."""
+        rows, columns = _counts(self.height, edge_m), _counts(self.width, edge_m)
+        y, x = np.meshgrid(_middles(rows), _middles(columns), indexing="ij")
+        across, along = self.right * self.width / 2, self.up * self.height / 2
+        centre = self.centre + x.reshape(-1, 1) * across + y.reshape(-1, 1) * along
+        signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        corners = signs[:, :1] * across / columns + signs[:, 1:] * along / rows
+        count = rows * columns
+        return Cells(
+            rows,
+            columns,
+            centre,
+            np.broadcast_to(self.normal, (count, 3)),
+            np.full(count, self.width * self.height / count),
+            centre[:, None, :] + corners,
+        )
+
+    def between_cells(self, points: Points, rows: int, columns: int) -> Bilinear:
+        """Interpolate between the cells' centres; beyond the outermost, go on in a straight line."""
+        offset = points - self.centre
+        x = offset @ self.right / (self.width / 2)
+        y = offset @ self.up / (self.height / 2)
+        row, below = _place(y, rows)
+        column, left = _place(x, columns)
+        return _bilinear(
+            row,
+            below,
+            np.minimum(row + 1, rows - 1),
+            column,
+            left,
+            np.minimum(column + 1, columns - 1),
+            columns,
+        )
+
     def in_front(self, points: Points) -> NDArray[np.bool_]:
         """Which points lie on the side the rectangle faces."""
         front: NDArray[np.bool_] = (points - self.centre) @ self.normal > 0
@@ -78,6 +144,131 @@ class Rectangle:
         fraction, x, y = self.crossing(start, end)
         inside = (np.abs(x) <= 1) & (np.abs(y) <= 1) & (fraction > _CLEAR)
         return np.where(inside, fraction, np.inf)
+
+
+@dataclass(frozen=True)
+class Ellipsoid:
+    """An ellipsoid whose axes are those of space, seen from outside."""
+
+    centre: Points
+    radii: Points
+
+    def moved(self, by: Points) -> "Ellipsoid":
+        """Return it elsewhere."""
+        return replace(self, centre=self.centre + by)
+
+    def normals(self, points: Points) -> Points:
+        """Return unit normals at points on it."""
+        gradient = (points - self.centre) / self.radii**2
+        normals: Points = gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
+        return normals
+
+    def extent(self) -> Points:
+        """Return points (N, 3) whose convex hull holds it: the corners of its box."""
+        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+        return self.centre + signs * self.radii
+
+    def in_front(self, points: Points) -> NDArray[np.bool_]:
+        """Which points lie outside."""
+        outside: NDArray[np.bool_] = (((points - self.centre) / self.radii) ** 2).sum(-1) > 1
+        return outside
+
+    def hit(self, start: Points, end: Points) -> NDArray[np.float64]:
+        """Fraction of the way at which segments enter or leave it; infinity where they miss."""
+        origin = (start - self.centre) / self.radii
+        way = (end - start) / self.radii
+        # |origin + fraction way| = 1
+        a = np.einsum("...c,...c->...", way, way)
+        b = np.einsum("...c,...c->...", origin, way)
+        c = np.einsum("...c,...c->...", origin, origin) - 1
+        discriminant = b * b - a * c
+        with np.errstate(divide="ignore", invalid="ignore"):
+            root = np.sqrt(discriminant)  # NaN where the line misses
+            first, second = (-b - root) / a, (-b + root) / a
+            at = np.where(first > _CLEAR_OF_CURVED, first, second)
+            return np.where(at > _CLEAR_OF_CURVED, at, np.inf)
+
+    def cells(self, edge_m: float) -> Cells:
+        """Cut it along equal steps of height and of longitude."""
+        rows = max(2, _counts(np.pi * self.radii[2], edge_m))
+        columns = max(4, _counts(2 * np.pi * float(self.radii[:2].max()), edge_m))
+        z, angle = np.meshgrid(_middles(rows), np.pi * _middles(columns), indexing="ij")
+        on_unit = _on_unit_sphere(z.ravel(), angle.ravel())
+        centre = self.centre + on_unit * self.radii
+        steps = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        corners = _on_unit_sphere(
+            np.clip(z.reshape(-1, 1) + steps[:, 1] / rows, -1, 1),
+            angle.reshape(-1, 1) + np.pi * steps[:, 0] / columns,
+        )
+        # the unit sphere's cells have equal areas; a linear map stretches each by this factor
+        stretch = np.prod(self.radii) * np.linalg.norm(on_unit / self.radii, axis=-1)
+        area = 4 * np.pi / (rows * columns) * stretch
+        return Cells(
+            rows, columns, centre, self.normals(centre), area, self.centre + corners * self.radii
+        )
+
+    def between_cells(self, points: Points, rows: int, columns: int) -> Bilinear:
+        """Interpolate between the cells' centres, around and up to the poles."""
+        on_unit = (points - self.centre) / self.radii
+        row, below = _place(np.clip(on_unit[..., 2], -1, 1), rows)
+        below = np.clip(below, 0, 1)
+        turn = (np.arctan2(on_unit[..., 1], on_unit[..., 0]) / (2 * np.pi) + 0.5) * columns - 0.5
+        column = np.floor(turn).astype(np.intp)
+        return _bilinear(
+            row,
+            below,
+            np.minimum(row + 1, rows - 1),
+            column % columns,
+            turn - column,
+            (column + 1) % columns,
+            columns,
+        )
+
+
+Shape = Rectangle | Ellipsoid
+
+
+def _on_unit_sphere(z: NDArray[np.float64], angle: NDArray[np.float64]) -> Points:
+    """Points by height and longitude, which starts at -x."""
+    across = np.sqrt(np.maximum(0.0, 1 - z * z))
+    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=-1)
+
+
+def _counts(length_m: float, edge_m: float) -> int:
+    return max(1, round(length_m / edge_m))
+
+
+def _middles(count: int) -> NDArray[np.float64]:
+    """Middles of equal cells over -1 to 1."""
+    return (2 * np.arange(count) + 1) / count - 1
+
+
+def _place(
+    coordinate: NDArray[np.float64], count: int
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """The cell below a coordinate from -1 to 1, and how far on the way to the next."""
+    place = (coordinate + 1) / 2 * count - 0.5
+    cell = np.clip(np.floor(place), 0, max(0, count - 2)).astype(np.intp)
+    return cell, place - cell if count > 1 else np.zeros_like(place)
+
+
+def _bilinear(
+    row: NDArray[np.intp],
+    up: NDArray[np.float64],
+    next_row: NDArray[np.intp],
+    column: NDArray[np.intp],
+    right: NDArray[np.float64],
+    next_column: NDArray[np.intp],
+    columns: int,
+) -> Bilinear:
+    cells = [
+        row * columns + column,
+        row * columns + next_column,
+        next_row * columns + column,
+        next_row * columns + next_column,
+    ]
+    weights = [(1 - up) * (1 - right), (1 - up) * right, up * (1 - right), up * right]
+    return np.stack(cells, axis=-1), np.stack(weights, axis=-1)
 
 
 def blocked_by_mask(

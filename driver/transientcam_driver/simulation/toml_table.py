@@ -88,6 +88,25 @@ class Table:
         value = self._numbers(key, default, 3)
         return np.array(value, dtype=np.float64)
 
+    def vectors(self, key: str, *, least: int) -> NDArray[np.float64]:
+        """Read a list of at least so many vectors."""
+        value = self._take(key, None)
+        allowed = f"a list of at least {least} lists of 3 numbers"
+        if not isinstance(value, list) or len(value) < least:
+            raise self.error(key, value, allowed)
+        for item in value:
+            if not _are_numbers(item, 3):
+                raise self.error(key, item, allowed)
+        return np.array(value, dtype=np.float64)
+
+    def words(self, key: str) -> list[str]:
+        """Read a word or a list of words."""
+        value = self._take(key, None)
+        words = value if isinstance(value, list) else [value]
+        if not words or not all(isinstance(word, str) for word in words):
+            raise self.error(key, value, "a text or a list of texts")
+        return words
+
     def size(self, key: str) -> tuple[float, float]:
         """Read two positive numbers, width and height."""
         width, height = self._numbers(key, None, 2)
@@ -97,11 +116,7 @@ class Table:
 
     def _numbers(self, key: str, default: tuple[float, ...] | None, count: int) -> list[float]:
         value = self._take(key, default)
-        fits = isinstance(value, list | tuple) and len(value) == count
-        if not fits or not all(
-            isinstance(item, int | float) and not isinstance(item, bool) and math.isfinite(item)
-            for item in value
-        ):
+        if not _are_numbers(value, count):
             raise self.error(key, value, f"a list of {count} numbers")
         return [float(item) for item in value]
 
@@ -126,6 +141,17 @@ class Table:
 
     def _path(self, key: str) -> str:
         return f"{self._prefix}.{key}" if self._prefix else key
+
+
+def _are_numbers(value: object, count: int) -> bool:
+    return (
+        isinstance(value, list | tuple)
+        and len(value) == count
+        and all(
+            isinstance(item, int | float) and not isinstance(item, bool) and math.isfinite(item)
+            for item in value
+        )
+    )
 
 
 def _limits(least: float, most: float, above: float) -> str:

@@ -1,38 +1,76 @@
 """A scene in front of the simulated sensor: from impulse responses to images."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.sequence import ImageLabel, Sequence
+from transientcam_driver.simulation.device_profile import IDEAL, DeviceProfile
 from transientcam_driver.simulation.effects import (
     EFFECTS,
     Call,
     Conditions,
     Effect,
     Exposure,
+    ImageEffect,
+    LightEffect,
+    LightPlanes,
+    ModulationHarmonics,
+    MotionDuringSequence,
     NormalDraw,
+    PlaneEffect,
+    Shot,
+    ShotEffect,
     Stage,
+    ThermalDrift,
 )
-from transientcam_driver.simulation.responses import Responses, Truth
+from transientcam_driver.simulation.responses import Truth
+from transientcam_driver.simulation.scenery import Scenery, Seen, View
 from transientcam_driver.simulation.sensor import Sensor
 
 _AMBIENT_C = 25.0
 
 
 @dataclass(frozen=True, slots=True)
+class _Quadratures:
+    """Electrons of an image at phase theta: ``offset + sum_k re_k cos(k theta) + im_k sin(...)``."""
+
+    constant: NDArray[np.float32] | np.float32
+    offset: NDArray[np.float32]
+    terms: tuple[tuple[int, NDArray[np.float32], NDArray[np.float32]], ...]
+
+    @classmethod
+    def of(cls, planes: LightPlanes) -> "_Quadratures":
+        """Take planes apart into contiguous ones."""
+        terms = tuple(
+            (k, np.ascontiguousarray(term.real), np.ascontiguousarray(term.imag))
+            for k, term in planes.terms.items()
+        )
+        return cls(planes.constant, planes.mean + planes.constant, terms)
+
+
+@dataclass(slots=True)
 class _Plan:
     """What does not change between the images of a sequence.
 
-    Electrons of an image at phase theta are ``half + re cos(theta) + im sin(theta)``.
+    ``looked_at`` is what was seen last, ``mean`` its brightness, and ``quadratures`` what it gives at
+    each harmonic.
     """
 
     sequence: Sequence
-    half_e: NDArray[np.float32]
-    quadratures_e: dict[int, tuple[NDArray[np.float32], NDArray[np.float32]]]
+    frequencies_hz: dict[int, float]
+    conditions: Conditions
+    view: View
+    per_image: bool
+    waveform: ModulationHarmonics | None
+    on_light: tuple[PlaneEffect, ...]
+    on_shot: tuple[ShotEffect, ...]
     stages: tuple[Stage, ...]
+    looked_at: tuple[float, Seen] | None = None
+    mean: NDArray[np.float64] | None = None
+    quadratures: dict[int, _Quadratures] = field(default_factory=dict)
 
 
 class World:
@@ -40,8 +78,8 @@ class World:
 
     Parameters
     ----------
-    responses
-        Impulse responses of all pixels.
+    scenery
+        What is in front of the camera.
     sensor
         What turns electrons into numbers.
     electrons_per_s
@@ -50,119 +88,203 @@ class World:
         "auto", "on" or "off" by the effect's name.
     seed
         Of all randomness: an image's noise depends on the seed and its sequence number only.
+    device
+        What is imperfect about the camera.
+    ambient_electrons_per_s
+        Electrons a second that other light gives a pixel that sees a white surface.
+    readout_s
+        Time between two exposures.
     """
 
     def __init__(
         self,
-        responses: Responses,
+        scenery: Scenery,
         sensor: Sensor,
         *,
         electrons_per_s: float,
         effects: Mapping[str, str],
         seed: int,
+        device: DeviceProfile = IDEAL,
+        ambient_electrons_per_s: float = 0.0,
+        readout_s: float = 0.0,
     ) -> None:
-        self._responses = responses
+        self._scenery = scenery
         self._sensor = sensor
         self._electrons_per_s = electrons_per_s
         self._effects = dict(effects)
         self._seed = seed
-        self._brightness = responses.moments(0.0).real
+        self._device = device
+        self._ambient_electrons_per_s = ambient_electrons_per_s
+        self._readout_s = readout_s
+        self._brightness = scenery.glimpse.responses.moments(0.0).real
         self._plan: _Plan | None = None
 
     @property
     def sensor(self) -> Sensor:
-        """What turns electrons into numbers."""
+        """Its sensor."""
         return self._sensor
 
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
-        """Compute the moments of the impulse responses that the sequence measures."""
+        """Decide what the sequence calls for, and build that."""
         if self._plan is not None and self._plan.sequence == sequence:
             return
-        scale_e = self._electrons_per_s * sequence.exposure_s
-        sub_phases = sequence.sub_phases
-        # G_1: what the division of the exposure leaves of an ideal sinusoid (Sec. 4.1)
-        gain = np.sum(sub_phases.weights * np.exp(-1j * np.array(sub_phases.phases_rad)))
-        frequencies = {label.harmonic: label.frequency_hz for label in labels}
-        quadratures_e = {}
-        for harmonic, frequency_hz in frequencies.items():
-            if frequency_hz:
-                moment = 0.5 * scale_e * gain * self._responses.moments(frequency_hz)
-                quadratures_e[harmonic] = (
-                    moment.real.astype(np.float32),
-                    moment.imag.astype(np.float32),
-                )
+        conditions = self.conditions(sequence)
+        built = [effect for effect in EFFECTS if self._wanted(effect, conditions)]
+        of_light = frozenset(each.name for each in built if issubclass(each, LightEffect))
+        made = [effect(self._forced(effect, conditions)) for effect in built]
         self._plan = _Plan(
             sequence,
-            (0.5 * scale_e * self._brightness).astype(np.float32),
-            quadratures_e,
-            self._build(self.conditions(sequence)),
+            {label.harmonic: label.frequency_hz for label in labels},
+            conditions,
+            self._scenery.view(of_light),
+            MotionDuringSequence.name in of_light,
+            next((each for each in made if isinstance(each, ModulationHarmonics)), None),
+            tuple(each for each in made if isinstance(each, PlaneEffect)),
+            tuple(each for each in made if isinstance(each, ShotEffect)),
+            _stages([each for each in made if isinstance(each, ImageEffect)]),
         )
+        if not self._scenery.moves:  # all at once, rather than during the first exposures
+            for harmonic in self._plan.frequencies_hz:
+                self._quadratures(self._plan, harmonic, 0.0)
 
     def image(self, label: ImageLabel, *, number: int, device_time_s: float) -> NDArray[np.uint16]:
         """Expose and read one image: 1/2 (b_0 + Re(b_j G_1 exp(-i theta))), then the effects."""
+        plan = self._configured()
+        shot = Shot(number, device_time_s, self._seed)
+        for effect in plan.on_shot:
+            effect.on_shot(shot)
         random = np.random.Generator(np.random.SFC64(np.random.SeedSequence((self._seed, number))))
-        exposure = Exposure(self._mean_e(label), random)
-        np.minimum(exposure.signal, np.float32(self._sensor.full_well_e), out=exposure.signal)
-        for stage in self._configured().stages:
+        exposure = Exposure(self._mean_e(plan, label, shot), random)
+        for stage in plan.stages:
             stage.apply(exposure)
         return exposure.signal.astype(np.uint16)
 
     def temperature_c(self, device_time_s: float) -> float:
-        """Return that of a sensor that neither warms up nor drifts."""
-        return _AMBIENT_C
+        """Return that of the sensor, which warms up if it drifts."""
+        effects = self._plan.on_shot if self._plan is not None else ()
+        rises_c = [each.rise_c(device_time_s) for each in effects if isinstance(each, ThermalDrift)]
+        return _AMBIENT_C + sum(rises_c)
 
     def conditions(self, sequence: Sequence) -> Conditions:
         """Return what effects are judged by."""
+        scale_e = self._electrons_per_s * sequence.exposure_s
         lit = self._brightness[self._brightness > 0]
-        mean = float(lit.mean()) if lit.size else 0.0
+        white_e = self._ambient_electrons_per_s * sequence.exposure_s
         return Conditions(
             sensor=self._sensor,
             sequence=sequence,
-            brightness_e=mean * self._electrons_per_s * sequence.exposure_s,
+            brightness_e=float(lit.mean()) * scale_e if lit.size else 0.0,
             pixels=self._brightness.size,
+            brightest_e=float(self._brightness.max(initial=0.0)) * scale_e,
+            ambient_white_e=white_e,
+            ambient_e=white_e * float(np.mean(self._scenery.glimpse.reflectance)),
+            image_period_s=sequence.exposure_s + self._readout_s,
+            device=self._device,
+            facts=self._scenery.facts,
+            shape=(self._brightness.shape[0], self._brightness.shape[1]),
         )
 
     def calls(self, sequence: Sequence) -> dict[str, Call]:
         """Ask each effect what it says of this scene and a sequence."""
         conditions = self.conditions(sequence)
-        return {effect.name: effect.called_for(conditions) for effect in EFFECTS}
+        return {
+            effect.name: effect.called_for(self._forced(effect, conditions)) for effect in EFFECTS
+        }
 
-    def truth(self) -> Truth:
-        """Ground truth, in DN at the exposure set."""
-        exposure_s = self._configured().sequence.exposure_s
-        scale_dn = self._electrons_per_s * exposure_s / self._sensor.gain_e_per_dn
-        delay_s, weight = self._responses.returns()
-        return Truth(delay_s, weight * scale_dn, self._responses.kind, self._responses, scale_dn)
+    def choice(self, effect: type[Effect]) -> str:
+        """Return "auto", "on" or "off"."""
+        return self._effects.get(effect.name, "auto") if effect.optional else "auto"
 
-    def _mean_e(self, label: ImageLabel) -> NDArray[np.float32]:
+    def truth(self, *, device_time_s: float | None = None) -> Truth:
+        """Ground truth, in DN at the exposure set; of the image that was made last."""
         plan = self._configured()
+        if device_time_s is not None or plan.looked_at is None:
+            seen = plan.view(device_time_s or 0.0)
+        else:
+            seen = plan.looked_at[1]
+        responses = seen.responses
+        scale_dn = self._electrons_per_s * plan.sequence.exposure_s / self._sensor.gain_e_per_dn
+        delay_s, weight = responses.returns()
+        return Truth(delay_s, weight * scale_dn, responses.kind, responses, scale_dn)
+
+    def _mean_e(self, plan: _Plan, label: ImageLabel, shot: Shot) -> NDArray[np.float32]:
+        time_s = shot.device_time_s
+        if not plan.per_image:
+            time_s -= label.index * plan.conditions.image_period_s
+        light = self._quadratures(plan, label.harmonic, time_s)
         if not label.illumination:
-            return np.zeros_like(plan.half_e)
-        if not label.frequency_hz:
-            return plan.half_e.copy()
-        in_phase, quadrature = plan.quadratures_e[label.harmonic]
-        electrons = in_phase * np.float32(np.cos(label.phase_rad))
-        electrons += quadrature * np.float32(np.sin(label.phase_rad))
-        electrons += plan.half_e
+            return np.zeros_like(light.offset) + light.constant
+        electrons = light.offset.copy()
+        turn_rad = label.phase_rad - 2 * np.pi * label.frequency_hz * shot.delay_s
+        for k, in_phase, quadrature in light.terms:
+            # the phasor of theta, by which light that is late or out of step turns with the harmonic
+            phasor = np.exp(1j * k * turn_rad)
+            if shot.factor != 1.0:
+                phasor *= np.conj(shot.factor)
+            electrons += in_phase * np.float32(phasor.real)
+            electrons += quadrature * np.float32(phasor.imag)
         # |b_j| <= b_0 holds but for rounding
         np.maximum(electrons, np.float32(0), out=electrons)
         return electrons
 
-    def _build(self, conditions: Conditions) -> tuple[Stage, ...]:
-        """Build what is called for, and nothing else."""
+    def _quadratures(self, plan: _Plan, harmonic: int, time_s: float) -> _Quadratures:
+        """What images of a harmonic are made of; computed anew only where the scene moves."""
+        if not self._scenery.moves:
+            time_s = 0.0
+        if plan.looked_at is None or abs(plan.looked_at[0] - time_s) > 1e-6:
+            plan.looked_at = (time_s, plan.view(time_s))
+            plan.mean = plan.looked_at[1].responses.moments(0.0).real
+            plan.quadratures.clear()
+        assert plan.mean is not None  # noqa: S101  (set with looked_at)
+        if harmonic not in plan.quadratures:
+            frequency_hz = plan.frequencies_hz[harmonic]
+            plan.quadratures[harmonic] = _Quadratures.of(
+                self._planes(plan, frequency_hz, plan.looked_at[1], plan.mean)
+            )
+        return plan.quadratures[harmonic]
 
-        def wanted(effect: type[Effect]) -> bool:
-            choice = self._effects.get(effect.name, "auto") if effect.optional else "auto"
-            return choice == "on" or (choice == "auto" and effect.called_for(conditions).called)
+    def _planes(
+        self, plan: _Plan, frequency_hz: float, seen: Seen, mean: NDArray[np.float64]
+    ) -> LightPlanes:
+        scale_e = 0.5 * self._electrons_per_s * plan.sequence.exposure_s
+        planes = LightPlanes(
+            frequency_hz,
+            np.float32(0),
+            seen.reflectance,
+            (scale_e * mean).astype(np.float32),
+        )
+        if frequency_hz:
+            contents = plan.waveform.harmonics(frequency_hz) if plan.waveform else {1: 1.0}
+            for k, content in contents.items():
+                factor = scale_e * content * plan.conditions.sub_phase_gain(k)
+                moments = seen.responses.moments(k * frequency_hz)
+                planes.terms[k] = (factor * moments).astype(np.complex64)
+        for effect in plan.on_light:
+            effect.on_light(planes)
+        return planes
 
-        stages: list[Stage] = []
-        for effect in EFFECTS:
-            if wanted(effect):
-                if stages and stages[-1].adds_variance and not effect.adds_variance:
-                    stages.append(NormalDraw())
-                stages.append(effect(conditions))
-        return tuple(stages)
+    def _wanted(self, effect: type[Effect], conditions: Conditions) -> bool:
+        choice = self.choice(effect)
+        if choice == "auto":
+            return effect.called_for(conditions).called
+        return choice == "on"
+
+    def _forced(self, effect: type[Effect], conditions: Conditions) -> Conditions:
+        """What an effect that is forced on judges by: a device that has it."""
+        if self.choice(effect) != "on":
+            return conditions
+        return replace(conditions, device=effect.of_device(conditions.device))
 
     def _configured(self) -> _Plan:
         assert self._plan is not None, "no sequence committed"  # noqa: S101  (the firmware's order)
         return self._plan
+
+
+def _stages(effects: list[ImageEffect]) -> tuple[Stage, ...]:
+    """Put one draw behind all that add to its variance."""
+    stages: list[Stage] = []
+    for effect in effects:
+        if stages and stages[-1].adds_variance and not effect.adds_variance:
+            stages.append(NormalDraw())
+        stages.append(effect)
+    return tuple(stages)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from transientcam_driver.simulation.build import find_scene
 from transientcam_driver.simulation.geometry import Rectangle
 from transientcam_driver.simulation.light import trace
-from transientcam_driver.simulation.scene import Light, Scene, Surface, Viewpoint
+from transientcam_driver.simulation.scene import Light, Scene, Surface, Transport, Viewpoint
 from transientcam_driver.simulation.sensor import Sensor
 
 C = 299_792_458.0
@@ -49,7 +49,7 @@ def scene(
         sensor=Sensor(),
         camera=Viewpoint(v(0, 0, 0), v(0, 1, 0) if look_at is None else look_at, 40.0),
         surfaces=surfaces,
-        mirror_bounces=bounces,
+        transport=Transport(mirror_bounces=bounces),
     )
 
 

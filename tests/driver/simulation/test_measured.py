@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from transientcam_driver import SceneError, Sequence, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
 from transientcam_driver.simulation.measured import area_weights, load_responses
-from transientcam_driver.simulation.scene import BUILT_IN, Light, ResponseFile, Scene, load_scene
+from transientcam_driver.simulation.scene import Light, ResponseFile, Scene
+from transientcam_driver.simulation.scene_file import BUILT_IN, load_scene
 
 C = 299_792_458.0
 WIDTH, HEIGHT = 8, 6

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from transientcam_driver import SceneError, list_scenes
 from transientcam_driver.simulation.build import find_scene
-from transientcam_driver.simulation.scene import load_scene
+from transientcam_driver.simulation.scene_file import load_scene
 
 SCENE = """
 [light]
@@ -60,7 +60,7 @@ ERRORS = [
     ("albedo = 0.5", "", "surface[0].albedo", None, "present"),
     ("albedo = 0.5", "albedo = true", "surface[0].albedo", True, "a number"),
     ("albedo = 0.5", "albedo = 0.5\nshiny = 1", "surface[0].shiny", 1, "known here are"),
-    ('"diffuse"', '"glass"', "surface[0].kind", "glass", "diffuse, mirror, stencil"),
+    ('"diffuse"', '"glass"', "surface[0].kind", "glass", "diffuse, translucent, mirror, stencil"),
     ("[0, -1, 0]", "[0, 0, 0]", "surface[0].normal", [0, 0, 0], "other than zero"),
     ("[0, -1, 0]", "[0, -1]", "surface[0].normal", [0, -1], "a list of 3 numbers"),
     ("[0, -1, 0]", "[0, nan, 0]", "surface[0].normal", None, "a list of 3 numbers"),
@@ -80,7 +80,7 @@ ERRORS = [
     ("[light]", "mood = 'dark'\n[light]", "mood", "dark", "absent"),
     ("[[surface]]", "[surface]", "surface", None, "written [[surface]]"),
     ("[light]", "[light", "the file", None, "valid TOML"),
-    ("[light]", "[[response]]\nfile = 'x.npz'\n[light]", "surface", 1, "not both"),
+    ("[light]", "[[response]]\nfile = 'x.npz'\n[light]", "surface", 1, "only one of them"),
 ]  # fmt: skip
 
 
@@ -124,7 +124,16 @@ def test_a_missing_file_is_told(tmp_path: Path) -> None:
 def test_the_built_in_scenes_are_listed_with_a_sentence_each() -> None:
     infos = list_scenes()
 
-    assert [info.name for info in infos] == ["measured", "mirrors"]
+    assert [info.name for info in infos] == [
+        "calibration",
+        "corner",
+        "corner-left",
+        "measured",
+        "mirrors",
+        "translucent",
+        "visitor",
+        "wall",
+    ]
     assert all(info.description and info.path.is_file() for info in infos)
 
 
@@ -134,12 +143,12 @@ def test_a_scene_is_found_by_name_or_by_path(tmp_path: Path) -> None:
 
 
 def test_an_unknown_scene_names_the_known_ones() -> None:
-    with pytest.raises(SceneError, match=r"mirrors, measured:PATH.npz"):
+    with pytest.raises(SceneError, match=r"translucent, visitor, wall, measured:PATH.npz"):
         find_scene("mirror")
 
 
 def test_the_directions_of_a_rectangle_are_those_of_a_viewer_in_front() -> None:
-    wall = find_scene("mirrors").surfaces[0].rectangle
+    wall = find_scene("mirrors").surfaces[0].mirror
 
     assert np.allclose(wall.right, [1, 0, 0])
     assert np.allclose(wall.up, [0, 0, 1])

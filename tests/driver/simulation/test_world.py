@@ -11,6 +11,7 @@ from transientcam_driver import Sequence, SubPhases
 from transientcam_driver.simulation.effects import EFFECTS, Call, Effect, ShotNoise
 from transientcam_driver.simulation.effects.shot_noise import FEW_E
 from transientcam_driver.simulation.responses import SparseResponses
+from transientcam_driver.simulation.scenery import GivenScenery
 from transientcam_driver.simulation.sensor import Sensor
 from transientcam_driver.simulation.world import World
 
@@ -32,9 +33,11 @@ def world(
     """The same few returns on all pixels; a weight of 1 is ``electrons`` an exposure."""
     ones = np.ones(SHAPE)
     return World(
-        SparseResponses(
-            np.array([delay_s * ones for delay_s in delays_s]),
-            np.array([weight * ones for weight in weights]),
+        GivenScenery(
+            SparseResponses(
+                np.array([delay_s * ones for delay_s in delays_s]),
+                np.array([weight * ones for weight in weights]),
+            )
         ),
         sensor,
         electrons_per_s=electrons / EXPOSURE_S,
@@ -208,11 +211,12 @@ def test_effects_say_whether_why_and_how_large() -> None:
     calls = world().calls(Sequence(exposure_s=EXPOSURE_S))
 
     assert calls["shot-noise"].called
-    assert calls["shot-noise"].size_dn == pytest.approx(math.sqrt(10_000) / 9)
+    # a moment is made of four images and has twice their noise
+    assert calls["shot-noise"].size_dn == pytest.approx(2 * math.sqrt(10_000) / 9)
     assert "10000 electrons" in calls["shot-noise"].reason
-    assert calls["read-noise"].size_dn == pytest.approx(30 / 9)
-    assert calls["quantisation"].size_dn == pytest.approx(1 / math.sqrt(12))
-    assert all(call.cost_s > 0 for call in calls.values())
+    assert calls["read-noise"].size_dn == pytest.approx(2 * 30 / 9)
+    assert calls["quantisation"].size_dn == pytest.approx(2 / math.sqrt(12))
+    assert all(call.cost_s > 0 for call in calls.values() if call.called)
 
 
 def test_what_is_not_there_is_not_called_for() -> None:

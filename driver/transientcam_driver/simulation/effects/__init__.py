@@ -5,30 +5,97 @@ what it costs. One that is not called for is not built: it is never called and d
 number.
 """
 
+from transientcam_driver.simulation.effects.ambient_light import AmbientLight
 from transientcam_driver.simulation.effects.effect import (
+    CALLED_ABOVE,
     Call,
     Conditions,
     Effect,
     Exposure,
+    Facts,
+    ImageEffect,
+    LightEffect,
+    LightPlanes,
     NormalDraw,
+    PlaneEffect,
+    Shot,
+    ShotEffect,
     Stage,
 )
+from transientcam_driver.simulation.effects.interreflection import DiffuseInterreflection
+from transientcam_driver.simulation.effects.lens_scatter import LensScatter
+from transientcam_driver.simulation.effects.mirror_paths import MirrorPaths
+from transientcam_driver.simulation.effects.mixed_pixels import MixedPixels
+from transientcam_driver.simulation.effects.modulation_harmonics import ModulationHarmonics
+from transientcam_driver.simulation.effects.motion import MotionDuringSequence
+from transientcam_driver.simulation.effects.pixel_pattern import PixelPattern
 from transientcam_driver.simulation.effects.quantisation import Quantisation
 from transientcam_driver.simulation.effects.read_noise import ReadNoise
+from transientcam_driver.simulation.effects.roll_off import AmplitudeRollOff
+from transientcam_driver.simulation.effects.saturation import Saturation
+from transientcam_driver.simulation.effects.scattering import Scattering
 from transientcam_driver.simulation.effects.shot_noise import ShotNoise
+from transientcam_driver.simulation.effects.synchronisation_outliers import (
+    SynchronisationOutliers,
+)
+from transientcam_driver.simulation.effects.thermal_drift import ThermalDrift
 
-EFFECTS: tuple[type[Effect], ...] = (ShotNoise, ReadNoise, Quantisation)
+CHOICES = ("auto", "on", "off")
+
+NOISE = (ShotNoise, ReadNoise)
+"""What ``noise=off`` switches off."""
+
+EFFECTS: tuple[type[Effect], ...] = (
+    MirrorPaths,
+    DiffuseInterreflection,
+    Scattering,
+    MixedPixels,
+    MotionDuringSequence,
+    ModulationHarmonics,
+    AmbientLight,
+    AmplitudeRollOff,
+    LensScatter,
+    PixelPattern,
+    ThermalDrift,
+    SynchronisationOutliers,
+    Saturation,
+    *NOISE,
+    Quantisation,
+)
 """In the order in which they happen."""
 
 __all__ = [
+    "CALLED_ABOVE",
+    "CHOICES",
     "EFFECTS",
+    "NOISE",
+    "AmbientLight",
+    "AmplitudeRollOff",
     "Call",
     "Conditions",
+    "DiffuseInterreflection",
     "Effect",
     "Exposure",
+    "Facts",
+    "ImageEffect",
+    "LensScatter",
+    "LightEffect",
+    "LightPlanes",
+    "MirrorPaths",
+    "MixedPixels",
+    "ModulationHarmonics",
+    "MotionDuringSequence",
     "NormalDraw",
+    "PixelPattern",
+    "PlaneEffect",
     "Quantisation",
     "ReadNoise",
+    "Saturation",
+    "Scattering",
+    "Shot",
+    "ShotEffect",
     "ShotNoise",
     "Stage",
+    "SynchronisationOutliers",
+    "ThermalDrift",
 ]

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, Effect, Exposure
+from transientcam_driver.simulation.effects.effect import Call, Conditions, Exposure, ImageEffect
 
 _COST_S_PER_PIXEL = 3e-9
 
 
-class Quantisation(Effect):
+class Quantisation(ImageEffect):
     """Round to the nearest code. Always there: an image holds integers."""
 
     name = "quantisation"
@@ -23,9 +23,10 @@ class Quantisation(Effect):
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
-        """Say always; its error is that of rounding, 1 / sqrt(12)."""
+        """Say always; its error is that of rounding four images, 1 / sqrt(12) each."""
         reason = f"{conditions.sensor.bits} bits of {conditions.sensor.gain_e_per_dn:g} electrons"
-        return Call(True, reason, 1 / math.sqrt(12), conditions.pixels * _COST_S_PER_PIXEL)
+        size_dn = 2 / math.sqrt(12 * conditions.sequence.takes)
+        return Call(True, reason, size_dn, conditions.pixels * _COST_S_PER_PIXEL)
 
     def apply(self, exposure: Exposure) -> None:
         """Turn electrons into codes."""

@@ -1,13 +1,15 @@
 """Read noise: the amplifier adds the same to every pixel of every image."""
 
+import math
+
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, Effect, Exposure
+from transientcam_driver.simulation.effects.effect import Call, Conditions, Exposure, ImageEffect
 
 _COST_S_PER_PIXEL = 8e-9
 
 
-class ReadNoise(Effect):
+class ReadNoise(ImageEffect):
     """Normal, the same for every pixel, independent of the light."""
 
     name = "read-noise"
@@ -24,7 +26,9 @@ class ReadNoise(Effect):
         cost_s = conditions.pixels * _COST_S_PER_PIXEL
         if noise_e == 0:
             return Call(False, "the sensor reads without noise", 0.0, cost_s)
-        size_dn = noise_e / conditions.sensor.gain_e_per_dn
+        # a moment is made of four images and has twice their noise
+        size_dn = 2 * noise_e / math.sqrt(conditions.sequence.takes)
+        size_dn /= conditions.sensor.gain_e_per_dn
         return Call(True, f"{noise_e:g} electrons at each read-out", size_dn, cost_s)
 
     def apply(self, exposure: Exposure) -> None:

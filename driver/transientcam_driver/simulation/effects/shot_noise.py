@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, Effect, Exposure
+from transientcam_driver.simulation.effects.effect import Call, Conditions, Exposure, ImageEffect
 
 FEW_E = 100.0
 """Below this mean a pixel is drawn from the Poisson distribution itself.
@@ -17,7 +17,7 @@ and the read noise that follows hides that further.
 _COST_S_PER_PIXEL = 1.2e-8
 
 
-class ShotNoise(Effect):
+class ShotNoise(ImageEffect):
     """Variance equal to the mean."""
 
     name = "shot-noise"
@@ -26,8 +26,10 @@ class ShotNoise(Effect):
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
         """Wherever there is light."""
-        mean_e = conditions.brightness_e / 2
-        size_dn = math.sqrt(mean_e) / conditions.sensor.gain_e_per_dn
+        mean_e = conditions.mean_e
+        # a moment is made of four images and has twice their noise
+        size_dn = 2 * math.sqrt(mean_e / conditions.sequence.takes)
+        size_dn /= conditions.sensor.gain_e_per_dn
         cost_s = conditions.pixels * _COST_S_PER_PIXEL
         if mean_e == 0:
             return Call(False, "no light reaches the sensor", 0.0, cost_s)

@@ -1,0 +1,117 @@
+"""What is imperfect about a make of camera, and about one specimen of it.
+
+The figures of ``PROTOTYPE`` are those of the CamBoard nano family, on which the paper's camera is
+built, as far as they are known; the rest is chosen and says so.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class RollOff:
+    """Amplitude of the modulation relative to that of an ideal one, over frequency.
+
+    Between the frequencies given it is interpolated, beyond them it stays what it is.
+    """
+
+    frequency_hz: tuple[float, ...]
+    amplitude: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Waveform:
+    """Harmonics of the correlation of light and reference, relative to the fundamental.
+
+    Either from a measured correlation function, a (rows, samples) .npy over one period, or by
+    the third harmonic's amplitude over the fundamental frequency.
+    """
+
+    file: Path | None = None
+    frequency_hz: tuple[float, ...] = ()
+    third_harmonic: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """What each pixel does in its own way: a delay of its clock, and a gain.
+
+    ``file`` holds phase offsets of a real board at ``file_frequency_hz``; without one the delays
+    are drawn from the device's seed. ``delay_s`` and ``gain`` are standard deviations.
+    """
+
+    delay_s: float = 0.0
+    gain: float = 0.0
+    file: Path | None = None
+    file_frequency_hz: float = 23e6
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """The device warms up after it is switched on, by ``rise_c`` in the end.
+
+    The light comes later by ``delay_s_per_c`` for each degree above the start.
+    """
+
+    rise_c: float
+    time_constant_s: float
+    delay_s_per_c: float
+
+
+@dataclass(frozen=True, slots=True)
+class Outliers:
+    """Images whose modulation loses its synchronisation: ``share`` of all (Sec. 6)."""
+
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class LensScatter:
+    """A share of the light goes astray in the lens, over a Gaussian of this width.
+
+    ``width`` is a standard deviation, as a share of the image's width.
+    """
+
+    share: float
+    width: float
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceProfile:
+    """One specimen of a make; None where it is perfect.
+
+    ``seed`` is that of the specimen: its pattern stays when the scene changes.
+    """
+
+    name: str
+    waveform: Waveform | None = None
+    roll_off: RollOff | None = None
+    pattern: Pattern | None = None
+    drift: Drift | None = None
+    outliers: Outliers | None = None
+    lens_scatter: LensScatter | None = None
+    seed: int = 0
+
+
+IDEAL = DeviceProfile("ideal")
+
+PROTOTYPE = DeviceProfile(
+    "prototype",
+    # measured third harmonics and amplitudes; the latter relative to that at 11.5 MHz
+    waveform=Waveform(
+        frequency_hz=(11.5e6, 23e6, 46e6, 69e6, 92e6),
+        third_harmonic=(0.092, 0.111, 0.032, 0.029, 0.006),
+    ),
+    roll_off=RollOff(
+        frequency_hz=(11.5e6, 23e6, 34.5e6, 46e6, 57.5e6, 69e6, 80.5e6, 92e6, 103.5e6, 115e6),
+        amplitude=(1.0, 0.959, 0.911, 0.951, 0.927, 0.715, 0.512, 0.553, 0.553, 0.057),
+    ),
+    # 10 degrees at 23 MHz, as on a real board of the same kind; the gain is chosen
+    pattern=Pattern(delay_s=1.2e-9, gain=0.01),
+    # chosen: what a small camera without a fan does
+    drift=Drift(rise_c=12.0, time_constant_s=300.0, delay_s_per_c=4e-12),
+    outliers=Outliers(share=0.07),  # "5-10 % of all captured images" (Sec. 6)
+    lens_scatter=LensScatter(share=0.02, width=0.15),  # chosen
+)
+
+PROFILES = {profile.name: profile for profile in (IDEAL, PROTOTYPE)}

@@ -1,0 +1,38 @@
+"""Ambient light: unmodulated, in every image, also without the camera's own."""
+
+import numpy as np
+
+from transientcam_driver.simulation.effects.effect import (
+    Call,
+    Conditions,
+    LightPlanes,
+    PlaneEffect,
+    weigh,
+)
+
+
+class AmbientLight(PlaneEffect):
+    """Adds electrons, and with them shot noise, and takes of the full well.
+
+    It falls evenly on all surfaces: a pixel gets its share by the reflectance of what it sees.
+    """
+
+    name = "ambient"
+
+    def __init__(self, conditions: Conditions) -> None:
+        super().__init__(conditions)
+        self._electrons = np.float32(conditions.ambient_white_e)
+
+    @classmethod
+    def called_for(cls, conditions: Conditions) -> Call:
+        """Where there is any whose shot noise counts."""
+        if not conditions.ambient_e:
+            return Call(False, "no light but the camera's", 0.0, 0.0)
+        noise_e = 2 * np.sqrt(conditions.ambient_e / conditions.sequence.takes)
+        size_dn = float(noise_e / conditions.sensor.gain_e_per_dn)
+        reason = f"{conditions.ambient_e:.0f} electrons in a typical pixel of each image"
+        return weigh(conditions, size_dn, reason, 0.0)
+
+    def on_light(self, planes: LightPlanes) -> None:
+        """Add it to what is there without the camera's light."""
+        planes.constant = planes.constant + self._electrons * planes.reflectance

@@ -1,0 +1,389 @@
+"""What is in front of the camera, as light: still or moving, computed as far as it is called for."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver.simulation.effects import (
+    DiffuseInterreflection,
+    Facts,
+    MirrorPaths,
+    MixedPixels,
+    Scattering,
+)
+from transientcam_driver.simulation.geometry import Rectangle
+from transientcam_driver.simulation.interreflection import Interreflection
+from transientcam_driver.simulation.light import Lit, camera_rays, light_rays, sparse
+from transientcam_driver.simulation.responses import BIN_S, Responses, Scatter, SparseResponses
+from transientcam_driver.simulation.scene import Scene
+
+_ROUGH_PATCHES = 6  # a side, to judge how much light interreflection is about
+_JUMP = 0.03  # of the range, from one pixel to the next: an edge
+_RAYS = 3  # a side, in a pixel at an edge
+_GLANCES = 5  # moments in time at which a moving scene is looked at to judge it
+
+View = Callable[[float], "Seen"]
+"""What there is to see at a time of the device."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What the camera sees: impulse responses, and how white the pixels' surfaces are."""
+
+    responses: Responses
+    reflectance: NDArray[np.float32] | np.float32
+
+
+class Scenery(Protocol):
+    """Something in front of the camera."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether it changes with time."""
+        ...
+
+    @property
+    def glimpse(self) -> "Seen":
+        """What there is to see at the start, without effects that take long."""
+        ...
+
+    @property
+    def facts(self) -> Facts | None:
+        """What effects judge it by; None if there is no geometry to judge."""
+        ...
+
+    def view(self, effects: frozenset[str]) -> View:
+        """Prepare to look at it with these effects of light."""
+        ...
+
+
+class GivenScenery:
+    """Impulse responses that are given, and stay."""
+
+    moves = False
+    facts = None
+
+    def __init__(self, responses: Responses) -> None:
+        self.glimpse = Seen(responses, np.float32(1))
+
+    def view(self, effects: frozenset[str]) -> View:
+        """Return what is given; no effect changes it."""
+        return lambda _time_s: self.glimpse
+
+
+class SurfaceScenery:
+    """Surfaces, lit and seen."""
+
+    def __init__(self, scene: Scene, *, width: int, height: int) -> None:
+        assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
+        self._scene = scene
+        self._width, self._height = width, height
+        self._rays = camera_rays(scene.camera, width=width, height=height)
+        self._start: Lit | None = None
+
+    @property
+    def moves(self) -> bool:
+        """Whether anything moves."""
+        return self._scene.moves
+
+    @cached_property
+    def glimpse(self) -> Seen:
+        """Direct light and mirrors."""
+        return self._see(self._scene.at(0.0), frozenset())
+
+    @cached_property
+    def facts(self) -> Facts:
+        """Look at the scene, at several times if it moves."""
+        if not self.moves:
+            return _Glance(self._scene, self._lit(self._scene), self._width, self._height)
+        period_s = max(motion.period_s for each in self._scene.surfaces for motion in each.motions)
+        times_s = (np.arange(_GLANCES) + 0.5) / _GLANCES * period_s
+        width, height = max(2, self._width // 3), max(2, self._height // 3)
+        assert self._scene.camera is not None  # noqa: S101  (it was there above)
+        rays = camera_rays(self._scene.camera, width=width, height=height)
+        scenes = [self._scene.at(float(time_s)) for time_s in times_s]
+        glances = [_Glance(s, light_rays(s, rays), width, height) for s in scenes]
+        return _Glances(self._scene, glances)
+
+    def view(self, effects: frozenset[str]) -> View:
+        """Trace a still scene once, and a moving one whenever it is looked at."""
+        scene = self._with(effects)
+        if not self.moves:
+            seen = self._see(scene, effects)
+            return lambda _time_s: seen
+        return lambda time_s: self._see(scene.at(time_s), effects)
+
+    def _with(self, effects: frozenset[str]) -> Scene:
+        scene = self._scene
+        mirrors = any(each.kind == "mirror" for each in scene.surfaces)
+        if mirrors and MirrorPaths.name not in effects:
+            transport = replace(scene.transport, mirror_bounces=0)
+            scene = replace(scene, transport=transport)
+        if Scattering.name not in effects and any(each.scatter for each in scene.surfaces):
+            surfaces = tuple(replace(each, scatter=None) for each in scene.surfaces)
+            scene = replace(scene, surfaces=surfaces)
+        return scene
+
+    def _lit(self, scene: Scene) -> Lit:
+        """Trace; the scene as it is in its file only once."""
+        if scene is not self._scene:
+            return light_rays(scene, self._rays)
+        if self._start is None:
+            self._start = light_rays(scene, self._rays)
+        return self._start
+
+    def _see(self, scene: Scene, effects: frozenset[str]) -> Seen:
+        lit = self._lit(scene)
+        width, height = self._width, self._height
+        responses: Responses = sparse(scene, lit, width=width, height=height)
+        if MixedPixels.name in effects:
+            responses = with_mixed_pixels(scene, lit, responses, width=width, height=height)
+        if DiffuseInterreflection.name in effects:
+            further = Interreflection(scene, lit, width=width, height=height)
+            responses = WithInterreflection(responses, further)
+        reflectance = lit.reflectance.astype(np.float32).reshape(height, width)
+        return Seen(responses, reflectance)
+
+
+class WithInterreflection:
+    """Returns by direct light and mirrors, and what surfaces give each other."""
+
+    kind: Literal["sparse", "dense"] = "dense"
+
+    def __init__(self, direct: Responses, further: Interreflection) -> None:
+        self._direct = direct
+        self._further = further
+
+    def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
+        """Sum of both."""
+        return self._direct.moments(frequency_hz) + self._further.moments(frequency_hz)
+
+    def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The direct returns, and one for all the rest at its mean delay."""
+        delay_s, weight = self._direct.returns()
+        mean_s, rest = self._further.returns()
+        mean_s = np.where(rest > 0, mean_s, np.nan)
+        delay_s, weight = (
+            np.concatenate([delay_s, mean_s[None]]),
+            np.concatenate([weight, rest[None]]),
+        )
+        order = np.argsort(delay_s, axis=0)  # NaN goes last
+        return np.take_along_axis(delay_s, order, 0), np.take_along_axis(weight, order, 0)
+
+    def of_pixel(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Density per s over equal bins; a sharp return fills one bin."""
+        _, rest = self._further.returns()
+        start_s, mass = self._further.of_pixel(x, y, weight=float(rest[y, x]))
+        time_s, value = self._direct.of_pixel(x, y)
+        if self._direct.kind == "dense":
+            value = value * BIN_S
+        if not time_s.size and not mass.any():
+            return start_s + BIN_S * np.array([0.5]), np.zeros(1)
+        first_s = min([start_s] if mass.any() else [], default=np.inf)
+        first_s = min(first_s, float(time_s.min()) - BIN_S / 2 if time_s.size else np.inf)
+        into = np.rint((time_s - first_s) / BIN_S - 0.5).astype(int)
+        shift = round((start_s - first_s) / BIN_S) if mass.any() else 0
+        bins = np.zeros(max(int(into.max(initial=0)) + 1, shift + len(mass)))
+        bins[shift : shift + len(mass)] += mass
+        np.add.at(bins, into, value)
+        return first_s + BIN_S * (np.arange(len(bins)) + 0.5), bins / BIN_S
+
+
+class WithMixedPixels:
+    """Responses some of whose pixels are replaced by the mean over several rays."""
+
+    def __init__(
+        self, base: Responses, at: tuple[NDArray[np.intp], NDArray[np.intp]], mixed: SparseResponses
+    ) -> None:
+        self.kind: Literal["sparse", "dense"] = base.kind
+        self._base = base
+        self._at = at
+        self._mixed = mixed
+
+    def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
+        """Those of the base, but for the pixels replaced."""
+        moments = self._base.moments(frequency_hz)
+        moments[self._at] = self._mixed.moments(frequency_hz)[0]
+        return moments
+
+    def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """All returns; as many planes as the pixel with the most returns needs."""
+        delay_s, weight = self._base.returns()
+        more_s, more = self._mixed.returns()
+        there = max(len(delay_s), int(np.sum(more > 0, axis=0).max(initial=0)))
+        shape = (there, *delay_s.shape[1:])
+        all_s, all_weight = np.full(shape, np.nan), np.zeros(shape)
+        all_s[: len(delay_s)], all_weight[: len(weight)] = delay_s, weight
+        rows, columns = self._at
+        all_s[:, rows, columns], all_weight[:, rows, columns] = np.nan, 0.0
+        several = min(there, len(more_s))
+        all_s[:several, rows, columns] = more_s[:several, 0]
+        all_weight[:several, rows, columns] = more[:several, 0]
+        return all_s, all_weight
+
+    def of_pixel(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """That of the base, or of the rays in a pixel that is replaced."""
+        mine = np.flatnonzero((self._at[0] == y) & (self._at[1] == x))
+        return self._mixed.of_pixel(int(mine[0]), 0) if mine.size else self._base.of_pixel(x, y)
+
+
+def with_mixed_pixels(
+    scene: Scene, lit: Lit, responses: Responses, *, width: int, height: int
+) -> Responses:
+    """Replace pixels at edges by the mean over a grid of rays in them."""
+    at = np.nonzero(edges(lit.distance_m.reshape(height, width))[0])
+    if not at[0].size:
+        return responses
+    assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
+    shifts = (2 * np.arange(_RAYS) + 1) / (2 * _RAYS) - 0.5
+    chosen = at[0] * width + at[1]
+    rays = np.concatenate(
+        [
+            camera_rays(scene.camera, width=width, height=height, shift=(right, down))[chosen]
+            for right in shifts
+            for down in shifts
+        ]
+    )
+    fine = light_rays(scene, rays)
+    count, several = len(chosen), _RAYS**2
+    spread = fine.scatter(scene)
+    by_ray = (-1, 1, count)
+    delay_s = fine.delay_s.reshape(len(fine.delay_s), several, count)
+    weight = fine.weight.reshape(delay_s.shape) / several
+    if spread is not None:  # one plane a ray and path; all of one pixel's rays differ
+        repeated = (len(fine.delay_s), 1)
+        spread = Scatter(
+            np.tile(spread.width_s.reshape(several, count), repeated).reshape(by_ray),
+            np.tile(spread.decay_s.reshape(several, count), repeated).reshape(by_ray),
+        )
+    mixed = SparseResponses(delay_s.reshape(by_ray), weight.reshape(by_ray), spread)
+    return WithMixedPixels(responses, at, mixed)
+
+
+def edges(distance_m: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Pixels (H, W) at a jump of range, and the steps in m; 0 m means that a pixel sees nothing."""
+    edge = np.zeros(distance_m.shape, dtype=bool)
+    steps: list[NDArray[np.float64]] = []
+    for axis in (0, 1):
+        near = np.take(distance_m, range(distance_m.shape[axis] - 1), axis)
+        far = np.take(distance_m, range(1, distance_m.shape[axis]), axis)
+        step = np.abs(near - far)
+        jump = (step > _JUMP * np.minimum(near, far)) & (near > 0) & (far > 0)
+        steps.append(step[jump])
+        first = [slice(None)] * 2
+        second = [slice(None)] * 2
+        first[axis], second[axis] = slice(None, -1), slice(1, None)
+        edge[tuple(first)] |= jump
+        edge[tuple(second)] |= jump
+    return edge, np.concatenate(steps)
+
+
+class _Glance:
+    """What a scene that stands still is like."""
+
+    speed_m_s = 0.0
+    moving_share = 0.0
+
+    def __init__(self, scene: Scene, lit: Lit, width: int, height: int) -> None:
+        self._scene = scene
+        self._lit = lit
+        self._width, self._height = width, height
+
+    @cached_property
+    def brightness(self) -> float:
+        """All light but that of interreflection."""
+        return float(self._lit.weight.sum())
+
+    @property
+    def mirror_share(self) -> float:
+        if not self.brightness:
+            return 0.0
+        return float(self._lit.weight[1:].sum() / self.brightness)
+
+    @cached_property
+    def indirect_share(self) -> float:
+        transport = self._scene.transport
+        scattering = [each for each in self._scene.surfaces if each.scatters]
+        flat = len(scattering) == 1 and isinstance(scattering[0].shape, Rectangle)
+        if flat or not scattering or not transport.diffuse_bounces or not self.brightness:
+            return 0.0
+        rough = replace(transport, patches=min(_ROUGH_PATCHES, transport.patches))
+        scene = replace(self._scene, transport=rough)
+        further = Interreflection(scene, self._lit, width=self._width, height=self._height)
+        indirect = float(further.moments(0.0).real.sum())
+        return indirect / (indirect + self.brightness)
+
+    @property
+    def _depths(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        scatter = self._lit.scatter(self._scene)
+        none = np.zeros(len(self._lit.surface))
+        return (none, none) if scatter is None else (scatter.width_s, scatter.decay_s)
+
+    @property
+    def scatter(self) -> Scatter | None:
+        width_s, decay_s = self._depths
+        slowest = int(decay_s.argmax())
+        return Scatter(width_s[slowest], decay_s[slowest]) if decay_s[slowest] else None
+
+    @property
+    def scatter_share(self) -> float:
+        return float(np.mean(self._depths[1] > 0))
+
+    @cached_property
+    def edges(self) -> tuple[float, float]:
+        edge, steps = edges(self._lit.distance_m.reshape(self._height, self._width))
+        return float(edge.mean()), float(np.sqrt(np.mean(steps**2))) if steps.size else 0.0
+
+    @property
+    def surface(self) -> NDArray[np.intp]:
+        """What the rays see."""
+        return self._lit.surface
+
+
+class _Glances:
+    """What a scene is like over time."""
+
+    def __init__(self, scene: Scene, glances: list[_Glance]) -> None:
+        self._scene = scene
+        self._glances = glances
+
+    def _mean(self, values: list[float]) -> float:
+        return float(np.mean(values))
+
+    @property
+    def mirror_share(self) -> float:
+        return self._mean([glance.mirror_share for glance in self._glances])
+
+    @cached_property
+    def indirect_share(self) -> float:
+        return self._mean([glance.indirect_share for glance in self._glances])
+
+    @property
+    def scatter(self) -> Scatter | None:
+        found = [glance.scatter for glance in self._glances if glance.scatter is not None]
+        return max(found, key=lambda scatter: float(scatter.decay_s), default=None)
+
+    @property
+    def scatter_share(self) -> float:
+        return self._mean([glance.scatter_share for glance in self._glances])
+
+    @property
+    def edges(self) -> tuple[float, float]:
+        shares, steps = zip(*(glance.edges for glance in self._glances), strict=True)
+        # glanced at with a third of the pixels a side: an edge is three times as many then
+        return float(np.mean(shares)) / 3, float(max(steps))
+
+    @property
+    def speed_m_s(self) -> float:
+        return max(
+            sum(motion.speed_m_s for motion in each.motions) for each in self._scene.surfaces
+        )
+
+    @property
+    def moving_share(self) -> float:
+        moving = [index for index, each in enumerate(self._scene.surfaces) if each.motions]
+        return self._mean([float(np.isin(g.surface, moving).mean()) for g in self._glances])
