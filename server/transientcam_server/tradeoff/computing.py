@@ -223,7 +223,12 @@ def _density_with_digits(mpmath: Any, b: _Array, phase: _Array) -> list[float]:
 def _cumulative_with_digits(mpmath: Any, b: _Array, phase: _Array) -> list[float]:
     """Integrate the density's Fourier series over its poles p_l, b_k = sum_l C_l p_l^k."""
     q, m = _solved(mpmath, b), len(b) - 1
-    poles = mpmath.polyroots([q[j] / q[0] for j in range(m + 1)], maxsteps=500, extraprec=400)
+    companion = mpmath.matrix(m, m)
+    for j in range(m):
+        companion[0, j] = -q[j + 1] / q[0]
+        if j:
+            companion[j, j - 1] = 1
+    poles = mpmath.eig(companion, left=False, right=False)
     powers = mpmath.matrix(m, m)
     for k in range(m):
         for each in range(m):
