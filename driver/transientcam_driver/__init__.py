@@ -9,9 +9,13 @@
 (12, 120, 163)
 """
 
+from transientcam_driver.calibration import CalibrationCapture, capture_calibration
 from transientcam_driver.camera import Camera, CameraState
 from transientcam_driver.capabilities import AppliedSequence, Capabilities
 from transientcam_driver.errors import (
+    CalibrationError,
+    CalibrationFileError,
+    CalibrationMismatch,
     CameraBusy,
     CameraClosed,
     CameraError,
@@ -38,6 +42,10 @@ from transientcam_driver.simulation import SceneInfo, Simulation, Truth, list_sc
 
 __all__ = [
     "AppliedSequence",
+    "CalibrationCapture",
+    "CalibrationError",
+    "CalibrationFileError",
+    "CalibrationMismatch",
     "Camera",
     "CameraBusy",
     "CameraClosed",
@@ -67,6 +75,7 @@ __all__ = [
     "Status",
     "SubPhases",
     "Truth",
+    "capture_calibration",
     "list_scenes",
     "open_camera",
 ]

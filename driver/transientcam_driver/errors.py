@@ -6,6 +6,9 @@
     ├── SequenceError          a field of a sequence is out of range
     ├── SceneError             a scene file says something that cannot be
     ├── SpecError              open_camera() was given a name it cannot read
+    ├── CalibrationError
+    │   ├── CalibrationMismatch   a calibration belongs to something else
+    │   └── CalibrationFileError  a file holds no calibration
     └── CameraError
         ├── CameraNotFound     no such camera is plugged in
         ├── PermissionDenied   it is there, and this user may not open it
@@ -73,6 +76,37 @@ class SpecError(DriverError):
             f"camera {self.spec!r}: {self.reason} "
             "(usb, usb:SERIAL, sim:SCENE or sim:SCENE?width=320&height=240&noise=off&seed=3)"
         )
+
+
+class CalibrationError(DriverError):
+    """Something about a calibration measurement."""
+
+
+class CalibrationMismatch(CalibrationError):  # noqa: N818 - says what is wrong
+    """A calibration is good for one camera, sequence and exposure, and ``field`` differs."""
+
+    def __init__(self, field: str, value: object, needed: object) -> None:
+        super().__init__(field, value, needed)
+        self.field = field
+        self.value = value
+        self.needed = needed
+
+    def __str__(self) -> str:
+        return f"the calibration is for {self.field} = {self.needed!r}, not {self.value!r}"
+
+
+class CalibrationFileError(CalibrationError):
+    """A file holds no calibration: ``key`` is ``found``, not ``expected``."""
+
+    def __init__(self, file: str | Path, key: str, found: object, expected: object) -> None:
+        super().__init__(file, key, found, expected)
+        self.file = str(file)
+        self.key = key
+        self.found = found
+        self.expected = expected
+
+    def __str__(self) -> str:
+        return f"{self.file}: {self.key} is {self.found}, but must be {self.expected}"
 
 
 class CameraError(DriverError):

@@ -1,0 +1,259 @@
+"""A calibration measurement: what it holds, what it is good for, and how it is kept."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from transientcam_driver import (
+    CalibrationCapture,
+    CalibrationFileError,
+    CalibrationMismatch,
+    Camera,
+    CameraLost,
+    Sequence,
+    SequenceError,
+    SubPhases,
+    capture_calibration,
+)
+
+from .bench import CAPABILITIES, Bench, number_of, numbered_pixels
+
+SEQUENCE = Sequence(harmonics=2, zeroth="low-frequency", exposure_s=0.5e-3, takes=3)
+COUNT = 12
+TAKES = 4
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+@pytest.fixture
+def camera(bench: Bench) -> Iterator[Camera]:
+    with bench.open(SEQUENCE) as opened:
+        yield opened
+
+
+@pytest.fixture
+def capture(camera: Camera) -> CalibrationCapture:
+    return capture_calibration(camera, takes=TAKES)
+
+
+def test_each_image_is_the_mean_of_its_takes(bench: Bench, capture: CalibrationCapture) -> None:
+    lit = [number for number, label in bench.images.labels.items() if label.harmonic == 2]
+    first = lit[0] - 8  # the first image of the first lit frame
+
+    assert capture.images.shape == (COUNT, CAPABILITIES.height, CAPABILITIES.width)
+    for k in range(COUNT):
+        takes = [numbered_pixels(first + COUNT * take + k) for take in range(TAKES)]
+        np.testing.assert_allclose(capture.images[k], np.mean(takes, axis=0), rtol=1e-6)
+    assert capture.kept.shape == (TAKES, COUNT)
+    assert capture.rejected_images == 0
+
+
+def test_dark_images_are_those_without_light(bench: Bench, capture: CalibrationCapture) -> None:
+    dark = [number for number, label in bench.images.labels.items() if not label.illumination]
+    images = np.array([numbered_pixels(number) for number in dark[:TAKES]], dtype=float)
+
+    assert capture.dark is not None
+    assert capture.dark_deviation is not None
+    np.testing.assert_allclose(capture.dark, images.mean(axis=0), rtol=1e-5)
+    np.testing.assert_allclose(capture.dark_deviation, images.std(axis=0, ddof=1), rtol=1e-4)
+
+
+def test_it_says_with_what_and_when_it_was_measured(
+    bench: Bench, capture: CalibrationCapture
+) -> None:
+    assert (capture.serial, capture.model) == ("BENCH-1", CAPABILITIES.model)
+    assert capture.sequence == replace(SEQUENCE, takes=1)
+    assert capture.low_frequency_hz == 0.9e6
+    assert capture.temperature_c == 30.0
+    assert capture.captured_unix_s == pytest.approx(bench.clock.unix_s(), abs=1.0)
+    assert capture.id.startswith("BENCH-1-")
+
+
+def test_the_sequence_is_restored_and_the_light_is_off(bench: Bench, camera: Camera) -> None:
+    capture_calibration(camera, takes=TAKES)
+
+    assert camera.applied.sequence == SEQUENCE
+    assert camera.state == "idle"
+    assert not bench.lit
+
+
+def test_the_light_is_off_also_when_it_is_broken_off(bench: Bench, camera: Camera) -> None:
+    class Enough(Exception):  # noqa: N818 - nothing has failed
+        pass
+
+    def stop(done: int, total: int) -> None:
+        if done == TAKES + 1:
+            raise Enough
+
+    with pytest.raises(Enough):
+        capture_calibration(camera, takes=TAKES, progress=stop)
+    assert not bench.lit
+
+
+def test_a_lost_camera_is_told(bench: Bench, camera: Camera) -> None:
+    with pytest.raises(CameraLost):
+        capture_calibration(camera, takes=TAKES, progress=lambda *_: bench.device.unplug())
+
+
+def test_progress_counts_every_frame(camera: Camera) -> None:
+    told: list[tuple[int, int]] = []
+
+    capture_calibration(camera, takes=TAKES, progress=lambda *each: told.append(each))
+
+    assert told == [(done, 2 * TAKES) for done in range(1, 2 * TAKES + 1)]
+
+
+def test_outliers_are_left_to_whoever_averages(camera: Camera) -> None:
+    def without_the_first(takes: Any) -> Any:
+        kept = np.ones(takes.shape[:2], dtype=bool)
+        kept[0] = number_of(takes[0, 0]) % 2
+        return takes[1:].mean(axis=0), kept
+
+    capture = capture_calibration(camera, takes=TAKES, average=without_the_first)
+
+    assert capture.rejected_images == COUNT // 2
+
+
+def test_one_take_is_none(camera: Camera) -> None:
+    with pytest.raises(SequenceError, match="takes = 1"):
+        capture_calibration(camera, takes=1)
+
+
+def test_a_camera_that_cannot_take_dark_images_is_calibrated_without() -> None:
+    with Bench(replace(CAPABILITIES, zeroths=("low-frequency",))).open(SEQUENCE) as camera:
+        capture = capture_calibration(camera, takes=2)
+
+    assert capture.dark is None
+    assert capture.dark_deviation is None
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"base_frequency_hz": 20e6}, "base_frequency_hz"),
+        ({"harmonics": 3}, "harmonics"),
+        ({"zeroth": "on-off"}, "zeroth"),
+        ({"exposure_s": 0.6e-3}, "exposure_s"),
+        ({"sub_phases": SubPhases("none")}, "sub_phases.scheme"),
+        ({"sub_phases": SubPhases("arccos", 4)}, "sub_phases.n"),
+    ],
+)
+def test_another_sequence_is_refused_by_name(
+    camera: Camera, capture: CalibrationCapture, change: dict[str, Any], field: str
+) -> None:
+    applied = camera.validate(replace(SEQUENCE, **change))
+
+    with pytest.raises(CalibrationMismatch, match=f"the calibration is for {field} = ") as caught:
+        capture.require_fit(applied, camera.capabilities)
+
+    assert caught.value.field == field
+
+
+def test_another_camera_is_refused_by_name(camera: Camera, capture: CalibrationCapture) -> None:
+    others: dict[str, Any] = {"serial": "X-2", "width": 640, "height": 480}
+    for field, value in others.items():
+        other = replace(camera.capabilities, **{field: value})
+
+        with pytest.raises(CalibrationMismatch) as caught:
+            capture.require_fit(camera.applied, other)
+
+        assert (caught.value.field, caught.value.value) == (field, value)
+
+
+def test_number_and_order_of_takes_do_not_matter(
+    camera: Camera, capture: CalibrationCapture
+) -> None:
+    other = camera.validate(replace(SEQUENCE, takes=7, take_order="interleaved"))
+
+    capture.require_fit(other, camera.capabilities)
+
+
+def test_a_file_read_back_is_the_same(capture: CalibrationCapture, tmp_path: Path) -> None:
+    path = tmp_path / "calibration"  # no suffix is added
+    capture.save(path)
+
+    loaded = CalibrationCapture.load(path)
+
+    assert loaded.id == capture.id
+    assert loaded.sequence == capture.sequence
+    for name in ("images", "kept", "dark", "dark_deviation"):
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(capture, name))
+
+
+def test_a_file_without_dark_images_is_read_too(
+    capture: CalibrationCapture, tmp_path: Path
+) -> None:
+    replace(capture, dark=None, dark_deviation=None).save(tmp_path / "c.npz")
+
+    assert CalibrationCapture.load(tmp_path / "c.npz").dark is None
+
+
+def test_every_measurement_has_a_name_of_its_own(capture: CalibrationCapture) -> None:
+    names = {
+        capture.id,
+        replace(capture, images=capture.images + np.float32(1)).id,
+        replace(capture, captured_unix_s=0.0).id,
+        replace(capture, dark=None).id,
+        replace(capture, sequence=replace(SEQUENCE, harmonics=1)).id,
+    }
+    assert len(names) == 5
+
+
+def rewrite(path: Path, **changes: Any) -> None:
+    """Change entries of a file; None removes one."""
+    with np.load(path) as file:
+        content = {name: file[name] for name in file.files}
+    content |= changes
+    np.savez(path, **{name: value for name, value in content.items() if value is not None})
+
+
+def document(path: Path, **changes: Any) -> str:
+    with np.load(path) as file:
+        return json.dumps(json.loads(str(file["document"])) | changes)
+
+
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [
+        (lambda _: {"images": None}, "images"),
+        (lambda _: {"images": np.zeros((3, 2, 2), np.float32)}, "images"),
+        (lambda _: {"images": np.zeros((COUNT, 5, 12))}, "images"),
+        (lambda _: {"kept": np.ones((0, COUNT), dtype=bool)}, "kept"),
+        (lambda _: {"dark_deviation": None}, "dark_deviation"),
+        (lambda _: {"document": None}, "document"),
+        (lambda _: {"document": "{"}, "document"),
+        (lambda path: {"document": document(path, format=2)}, "format"),
+        (lambda path: {"document": document(path, sequence={"harmonics": 99})}, "document"),
+        (lambda path: {"document": document(path, temperature_c="warm")}, "document"),
+        (lambda _: {"document": '{"format": 1}'}, "document"),
+    ],
+)
+def test_a_file_that_is_no_calibration_says_what_is_wrong(
+    capture: CalibrationCapture, tmp_path: Path, change: Any, key: str
+) -> None:
+    path = tmp_path / "c.npz"
+    capture.save(path)
+    rewrite(path, **change(path))
+
+    with pytest.raises(CalibrationFileError) as caught:
+        CalibrationCapture.load(path)
+
+    assert caught.value.key == key
+    assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [None, b"", b"no archive", b"PK\x03\x04 cut off", b"\x93NUMPY"])
+def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / "c.npz"
+    if content is not None:
+        path.write_bytes(content)
+
+    with pytest.raises(CalibrationFileError, match=r"c\.npz: the file is"):
+        CalibrationCapture.load(path)
