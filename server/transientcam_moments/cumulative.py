@@ -82,15 +82,18 @@ def _closed_form(coefficients: Coefficients, phase: Array) -> tuple[Array, Array
         b0 = b[0].real
         poles = disc_roots(list(a[1:]))
         shares, error = _shares(poles, coefficients, b)
-        turn = phase[:, None].astype(b0.dtype)
-        backwards = to_complex(xp.cos(turn), -xp.sin(turn))
-        total = turn * b0
+        # whole turns are told apart first: close to a sharp peak 2 pi + x isn't quite x
+        turns = xp.floor(phase / (2 * np.pi))
+        rest = (phase - 2 * np.pi * turns)[:, None].astype(b0.dtype)
+        backwards = to_complex(xp.cos(rest), -xp.sin(rest))
+        total = rest * b0
         for pole, share in zip(poles, shares, strict=True):
             angle, stretch = _logarithm(pole * backwards)
             angle_0, stretch_0 = _logarithm(pole)
             total = total + 2 * (share.real * (angle - angle_0))
             total = total + 2 * (share.imag * (stretch - stretch_0))
-        return xp.where(b0 > 0, total / (2 * np.pi), 0 * total), error
+        whole = turns[:, None].astype(b0.dtype) * b0
+        return xp.where(b0 > 0, total / (2 * np.pi) + whole, 0 * total), error
 
 
 def _logarithm(w: Array) -> tuple[Array, Array]:
@@ -154,7 +157,7 @@ def _shares(poles: list[Array], coefficients: Coefficients, b: Array) -> tuple[l
 
 def _quadrature(coefficients: Coefficients, phase: Array) -> Array:
     """Integrate by Gauss-Legendre rules on intervals that halve towards the angle of each pole."""
-    a, error = coefficients.polynomial, coefficients.error
+    a = coefficients.polynomial
     with np.errstate(all="ignore"):
         angles = np.angle(np.stack(disc_roots(list(a[1:])))) % (2 * np.pi)
     steps = np.pi * 0.5 ** np.arange(_LEVELS)
@@ -165,16 +168,16 @@ def _quadrature(coefficients: Coefficients, phase: Array) -> Array:
     wanted = np.broadcast_to(rest[:, None], (rest.size, a.shape[1]))
     ends = np.zeros((1, a.shape[1]))
     knots = np.sort(np.concatenate([ends, marks, wanted, ends + 2 * np.pi]), axis=0)
-    running = np.concatenate([ends, np.cumsum(_panels(a, error, knots), axis=0)])
+    running = np.concatenate([ends, np.cumsum(_panels(a, knots), axis=0)])
     out = np.empty(wanted.shape)
     for pixel in range(a.shape[1]):  # few pixels come here
         at = np.searchsorted(knots[:, pixel], rest)
         out[:, pixel] = running[at, pixel] / running[-1, pixel] + turns
-    return out * coefficients.brightness
+    return out * coefficients.brightness  # which the integral over the turn is known to be
 
 
-def _panels(a: Array, error: Array, knots: Array) -> Array:
-    """Integrate the density between neighbouring knots (K, P) to (K - 1, P)."""
+def _panels(a: Array, knots: Array) -> Array:
+    """Integrate 1 / |sum conj(a_j) e^{ij phi}|^2 between neighbouring knots (K, P), (K - 1, P)."""
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     centre, half = (knots[1:] + knots[:-1]) / 2, (knots[1:] - knots[:-1]) / 2
     total: Any = 0.0
@@ -184,4 +187,4 @@ def _panels(a: Array, error: Array, knots: Array) -> Array:
         for plane in a[-2::-1]:
             value = value * z + plane
         total = total + weight / squared(value)
-    return total * half * error / (2 * np.pi)
+    return total * half

@@ -58,9 +58,11 @@ def flags(b: Array, *, minimum_brightness: float = 0.0, eigenvalue: Array | None
     smallest: Array = smallest_eigenvalue(planes) if eigenvalue is None else eigenvalue
     b0 = planes[0].real
     limits = np.finfo(b0.dtype)
-    finite = xp.isfinite(planes[0]) & (abs(b0) < float(limits.max) * float(limits.eps))
-    for plane in planes[1:]:
-        finite = finite & xp.isfinite(plane)
+    # biasing makes b_0 at most 2 m + 1 times the largest moment, a peak it 1 / (2 pi eps) times b_0
+    largest = float(limits.max) * (6 * float(limits.eps) / (2 * len(planes) - 1))
+    finite = xp.isfinite(planes[0].imag)
+    for part in (b0, *(plane.real for plane in planes[1:]), *(plane.imag for plane in planes[1:])):
+        finite = finite & (abs(part) < largest)
     dark = finite & ~(b0 > minimum_brightness)
     # an eigenvalue is known to about eps times the order of the matrix
     rounding = 4 * len(planes) * float(limits.eps)

@@ -174,25 +174,42 @@ def _improved(b: Array, found: tuple[Array, ...]) -> tuple[Array, ...]:
     """
     eps = float(np.finfo(found[1].dtype).eps)
     tolerance = 16 * b.shape[0] * eps
-    (error,) = by_blocks(lambda b, *found: (size(residual(b, *found), b),), b, *found[:3])
+    with np.errstate(all="ignore"):
+        (error,) = by_blocks(lambda b, *found: (size(residual(b, *found), b),), b, *found[:3])
     ill = np.flatnonzero(error > tolerance)  # NaN stays
     if not ill.size:
         return found
     with np.errstate(all="ignore"):
         wide = b[:, ill].astype(np.complex128)
+        better = tuple(part[..., ill].astype(np.float64) for part in found[:3])
         if b.dtype == np.complex64:
-            better = by_blocks(lambda part: _pisarenko(part, noise=eps), wide)
-        else:
-            better = tuple(part[..., ill] for part in found)
-            better = (*polish(wide, *better[:3]), better[3])
+            _take_if_better(wide, better, eps, tolerance)
+        better = polish(wide, *better, tolerance=tolerance)
+        for coarser in (1e2, 1e4, 1e6):
+            _take_if_better(wide, better, coarser * eps, tolerance)
+        better = polish(wide, *better, tolerance=tolerance)
         order = np.argsort(better[0], axis=0)
         phase = np.take_along_axis(better[0], order, axis=0).astype(found[0].dtype)
         phase = in_turn(phase)
-        weight = np.take_along_axis(better[1], order, axis=0)
+        weight = np.take_along_axis(better[1], order, axis=0).astype(found[1].dtype)
+        phase = np.where(weight > 0, phase, np.nan)  # rounding may take the faintest away
+    count = np.count_nonzero(weight, axis=0)
     result = tuple(np.array(part) for part in found)
-    for part, new in zip(result, (phase, weight, *better[2:]), strict=True):
+    for part, new in zip(result, (phase, weight, better[2], count), strict=True):
         part[..., ill] = new
     return result
+
+
+def _take_if_better(b: Array, found: tuple[Array, ...], noise: float, tolerance: float) -> None:
+    """Solve again, taking returns for one that are one to the precision `noise`; keep what fits."""
+    error = size(residual(b, *found), b)
+    at = np.flatnonzero(error > tolerance)
+    if not at.size:
+        return
+    tried = by_blocks(lambda part: _pisarenko(part, noise=noise)[:3], b[:, at])
+    fits = size(residual(b[:, at], *tried), b[:, at]) < error[at]
+    for part, new in zip(found, tried, strict=True):
+        part[..., at[fits]] = new[..., fits]
 
 
 def _returns(

@@ -9,7 +9,8 @@ import numpy as np
 
 from transientcam_moments._arrays import Array, to_complex
 
-_STEPS = 8
+_STEPS = 6
+_LEAST_SHARE = 0.1  # of Newton's step; where less is needed, the linear system says nothing
 
 
 def residual(b: Array, phase: Array, weight: Array, uniform: Array) -> Array:
@@ -32,30 +33,49 @@ def size(left: Array, b: Array) -> Array:
         return np.where(scale > 0, np.abs(left).max(axis=0) / scale, 0)
 
 
-def polish(b: Array, phase: Array, weight: Array, uniform: Array) -> tuple[Array, Array, Array]:
+def polish(
+    b: Array, phase: Array, weight: Array, uniform: Array, *, tolerance: float
+) -> tuple[Array, ...]:
     """Improve returns (m, P) and uniform part (P) until they reproduce b (m + 1, P).
+
+    `tolerance` is the relative residual that is good enough.
 
     Returns
     -------
     phase, weight, uniform : array
         A step is kept where it reduces the residual and leaves all weights positive.
     """
+    phase, weight, uniform = phase.copy(), weight.copy(), uniform.copy()
     left = residual(b, phase, weight, uniform)
     error = size(left, b)
     share = np.ones_like(uniform)
     for _ in range(_STEPS):
-        turn, gain, lift = (share * part for part in _step(left, phase, weight))
-        used = weight > 0
-        tried = np.where(used, weight + gain, 0), uniform + lift
-        moved = np.where(used, phase + turn, np.nan) % (2 * np.pi)
-        left_now = residual(b, moved, *tried)
-        error_now = size(left_now, b)
-        better = (error_now < error) & ((tried[0] > 0) | ~used).all(axis=0)
-        share = np.where(better, np.minimum(4 * share, 1), share / 4)
-        phase, weight = np.where(better, moved, phase), np.where(better, tried[0], weight)
-        uniform = np.where(better, tried[1], uniform)
-        left, error = np.where(better, left_now, left), np.where(better, error_now, error)
+        at = np.flatnonzero((error > tolerance) & (share > _LEAST_SHARE))
+        if not at.size:
+            break
+        tried = _tried(left[:, at], phase[:, at], weight[:, at], uniform[at], share[at])
+        left_now = residual(b[:, at], *tried)
+        error_now = size(left_now, b[:, at])
+        used = weight[:, at] > 0
+        better = (error_now < error[at]) & ((tried[1] > 0) | ~used).all(axis=0)
+        share[at] = np.where(better, np.minimum(4 * share[at], 1), share[at] / 4)
+        to = at[better]
+        phase[:, to], weight[:, to], uniform[to] = (part[..., better] for part in tried)
+        left[:, to], error[to] = left_now[:, better], error_now[better]
     return phase, weight, uniform
+
+
+def _tried(
+    left: Array, phase: Array, weight: Array, uniform: Array, share: Array
+) -> tuple[Array, Array, Array]:
+    """Go a share of Newton's step."""
+    turn, gain, lift = (share * part for part in _step(left, phase, weight))
+    used = weight > 0
+    return (
+        np.where(used, phase + turn, np.nan) % (2 * np.pi),
+        np.where(used, weight + gain, 0),
+        uniform + lift,
+    )
 
 
 def _step(left: Array, phase: Array, weight: Array) -> tuple[Array, Array, Array]:

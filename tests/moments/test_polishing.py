@@ -27,7 +27,7 @@ def test_polishing_converges_from_rough_returns() -> None:
     b[0] += 0.1
 
     rough = phase + rng.normal(size=phase.shape) * 1e-4
-    found = polish(b, rough, weight * 1.001, np.zeros(50))
+    found = polish(b, rough, weight * 1.001, np.zeros(50), tolerance=1e-15)
 
     assert oracles.around(found[0] - phase).max() < 1e-10
     assert np.abs(found[1] / weight - 1).max() < 1e-9
@@ -38,7 +38,7 @@ def test_unused_slots_stay_unused() -> None:
     phase, weight = np.array([[1.0], [np.nan]]), np.array([[2.0], [0.0]])
     b = oracles.moments_of_returns(np.nan_to_num(phase) + 1e-5, weight, 2)
 
-    found = polish(b, phase, weight, np.zeros(1))
+    found = polish(b, phase, weight, np.zeros(1), tolerance=1e-15)
 
     assert abs(found[0][0, 0] - 1.00001) < 1e-12
     assert np.isnan(found[0][1, 0])
@@ -51,7 +51,7 @@ def test_a_step_that_does_not_help_is_not_taken() -> None:
     b = oracles.moments_of_returns(np.array([[1.0], [2.0]]), weight, 2)
     before = size(residual(b, phase, weight, np.zeros(1)), b)
 
-    found = polish(b, phase, weight, np.zeros(1))
+    found = polish(b, phase, weight, np.zeros(1), tolerance=1e-15)
 
     assert size(residual(b, *found), b) <= before
     assert np.isfinite(found[0]).all()
