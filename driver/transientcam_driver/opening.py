@@ -1,6 +1,6 @@
 """Open a camera by its name: ``usb``, ``usb:SERIAL``, ``sim:SCENE?width=320&height=240``."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, get_args
@@ -20,13 +20,14 @@ from transientcam_driver.simulation.build import (
     without_noise,
 )
 from transientcam_driver.simulation.clock import Clock, RealClock
+from transientcam_driver.simulation.device_profile import PROFILES
 from transientcam_driver.simulation.scene import Background, Scene, TimeZero
 from transientcam_driver.usb import open_transport
 
 DEFAULT_SPEC = "sim:mirrors"
 _OF_FILE = f"{MEASURED}:"
 _OPTIONS_OF_FILE = ("background", "time_zero")
-_OPTIONS = ("width", "height", "noise", "seed", *_OPTIONS_OF_FILE)
+_OPTIONS = ("width", "height", "noise", "seed", "device", *_OPTIONS_OF_FILE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +43,7 @@ class CameraSpec:
     height: int = DEFAULT_HEIGHT
     noise: bool = True
     seed: int | None = None
+    device: str | None = None
     background: Background = "none"
     time_zero: TimeZero = "start"
 
@@ -54,8 +56,9 @@ def open_camera(spec: str = DEFAULT_SPEC, *, clock: Clock | None = None) -> Came
     spec
         ``usb``, ``usb:SERIAL``, or ``sim:SCENE`` with the name of a built-in scene, a path to a
         scene's .toml, or ``measured:PATH.npz``. A simulated camera takes ``?width=640&height=480``
-        (163 x 120, 320 x 240 or 640 x 480), ``noise=off`` and ``seed=3``; a measured one also
-        ``background=median`` and ``time_zero=peak``.
+        (163 x 120, 320 x 240 or 640 x 480), ``noise=off``, ``seed=3`` and ``device=prototype`` (or
+        ``ideal``) in place of the scene's; a measured one also ``background=median`` and
+        ``time_zero=peak``.
     clock
         The time a simulated camera lives in; the world's by default.
 
@@ -73,6 +76,8 @@ def open_camera(spec: str = DEFAULT_SPEC, *, clock: Clock | None = None) -> Came
         return Camera(lambda serial: open_transport(serial or wanted.serial), clock=clock)
     clock = clock or RealClock()
     scene = _scene(wanted)
+    if wanted.device is not None:
+        scene = replace(scene, device=PROFILES[wanted.device])
     device, simulation = build(
         scene if wanted.noise else without_noise(scene),
         width=wanted.width,
@@ -111,6 +116,7 @@ def parse_spec(spec: str) -> CameraSpec:
         height=height,
         noise=_choice(spec, options, "noise", ("on", "off")) == "on",
         seed=_integer(spec, options, "seed") if "seed" in options else None,
+        device=_choice(spec, options, "device", tuple(PROFILES)) if "device" in options else None,
         background=_choice(spec, options, "background", get_args(Background)),
         time_zero=_choice(spec, options, "time_zero", get_args(TimeZero)),
     )

@@ -308,7 +308,7 @@ def test_unplugging_raises_camera_lost_and_reconnect_resumes(
         camera.read_frame()
     assert state_of(camera) is CameraState.DISCONNECTED
     for _ in range(3):
-        with pytest.raises(CameraNotFound, match="SIM-mirrors"):
+        with pytest.raises(CameraNotFound, match="SIM-ideal-0"):
             camera.reconnect()
         assert state_of(camera) is CameraState.DISCONNECTED
     with pytest.raises(CameraLost, match="disconnected"):

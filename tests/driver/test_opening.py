@@ -20,6 +20,7 @@ from .conftest import OpenCamera
             "sim:mirrors?width=320&height=240&noise=off&seed=3",
             CameraSpec(scene="mirrors", width=320, height=240, noise=False, seed=3),
         ),
+        ("sim:wall?device=prototype", CameraSpec(scene="wall", device="prototype")),
         ("sim:a/b.toml?noise=on", CameraSpec(scene="a/b.toml")),
         (
             "sim:measured:x.npz?background=median&time_zero=peak",
@@ -46,6 +47,7 @@ def test_a_name_is_taken_apart(spec: str, expected: CameraSpec) -> None:
         ("sim:mirrors?width=x&height=240", "width = 'x'"),
         ("sim:mirrors?noise=no", "noise = 'no': must be one of on, off"),
         ("sim:mirrors?seed=-1", "seed = '-1'"),
+        ("sim:mirrors?device=mine", "device = 'mine': must be one of ideal, prototype"),
         ("sim:mirrors?background=median", "belong to sim:measured:PATH.npz"),
         ("sim:measured:x.npz?background=mean", "one of none, median"),
     ],
@@ -132,6 +134,17 @@ albedo = 0.5
 
     assert camera.simulation is not None
     assert camera.simulation.truth().range_m[60, 81] == pytest.approx(2.0, abs=1e-4)
+
+
+def test_a_simulated_specimen_keeps_its_serial_number_before_every_scene(
+    open_virtual: OpenCamera,
+) -> None:
+    serials = [
+        open_virtual(f"sim:{scene}?device={device}").capabilities.serial
+        for device in ("prototype", "ideal")
+        for scene in ("mirrors", "calibration")
+    ]
+    assert serials == ["SIM-prototype-0"] * 2 + ["SIM-ideal-0"] * 2
 
 
 def test_measured_files_may_be_given_by_name(open_virtual: OpenCamera, tmp_path: Path) -> None:

@@ -38,9 +38,9 @@ def bus(device: EmulatedDevice) -> SimulatedBus:
 
 
 def test_a_camera_is_found_by_its_serial_number(bus: SimulatedBus) -> None:
-    transport = open_transport("SIM-mirrors", backend=bus)
+    transport = open_transport("SIM-ideal-0", backend=bus)
 
-    assert transport.serial == "SIM-mirrors"
+    assert transport.serial == "SIM-ideal-0"
     transport.close()
 
 

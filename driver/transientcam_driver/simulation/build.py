@@ -97,7 +97,11 @@ def build(
 ) -> tuple[EmulatedDevice, Simulation]:
     """Put a camera in front of a scene."""
     capabilities = prototype(
-        serial=f"SIM-{scene.name}"[:32], width=width, height=height, bits=scene.sensor.bits
+        # a specimen is the same one in front of every scene
+        serial=f"SIM-{scene.device.name}-{scene.device.seed}"[:32],
+        width=width,
+        height=height,
+        bits=scene.sensor.bits,
     )
     world = world_of(
         scene, width=width, height=height, seed=seed, readout_s=capabilities.streaming_readout_s

@@ -44,7 +44,7 @@ def found(bus: SimulatedBus) -> Iterator[Any]:
 
 
 def test_it_is_found_and_named(found: Any) -> None:
-    assert (found.product, found.serial_number) == ("AMCW lidar (simulated)", "SIM-mirrors")
+    assert (found.product, found.serial_number) == ("AMCW lidar (simulated)", "SIM-ideal-0")
     assert found.manufacturer == "transientcam"
     interface = found.get_active_configuration()[(0, 0)]
     assert interface.bInterfaceClass == 0xFF

@@ -120,7 +120,7 @@ def test_frames_stream_through_the_real_libusb_and_survive_a_replug(
 ) -> None:
     client = start_client()
     opened = client.ask("open")
-    assert opened == {"value": {"serial": "SIM-mirrors", "state": "idle"}}
+    assert opened == {"value": {"serial": "SIM-ideal-0", "state": "idle"}}
     assert server.ask("light") is False
     assert client.ask("start") == {"value": {"images": 12, "epoch": 2}}
     frames = [client.ask("read")["value"] for _ in range(4)]
