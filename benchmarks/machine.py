@@ -11,7 +11,9 @@ def machine() -> str:
     cores = len(os.sched_getaffinity(0))
     versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "numba"))
     system = f"{platform.system()} {platform.release().split('-')[0]}"
-    return f"{_processor()}, {cores} cores, {system}, Python {platform.python_version()}, {versions}"
+    return (
+        f"{_processor()}, {cores} cores, {system}, Python {platform.python_version()}, {versions}"
+    )
 
 
 def _processor() -> str:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "LANES",
+    "MOST_ROOTS",
     "Progress",
     "Reconstructed",
     "Reconstructor",
@@ -47,9 +48,11 @@ __all__ = [
     "state",
 ]
 
-LANES = ("reconstruct", "pisarenko", "levinson", "density", "smallest_eigenvalue")
+LANES = ("pisarenko", "levinson", "density", "smallest_eigenvalue", "reconstruct")
 
 _LEAST_WIDTH = 32
+MOST_ROOTS = 8
+"""The largest m with lanes for eigenvalues and returns."""
 
 Progress = Callable[[int, int, str], None]
 """Takes lanes done, lanes in all, and the name of the lane that is next ("" after the last)."""
@@ -94,7 +97,8 @@ def compile(  # noqa: A001  # tm.kernels.compile says it best, and the builtin i
     Parameters
     ----------
     harmonics : sequence of int
-        Orders m, each 1 to 32, the most urgent first.
+        Orders m, each 1 to 32, the most urgent first. Above 8 there are lanes for coefficients and
+        densities only.
     precisions : sequence of {"float32", "float64"}
         Most urgent first; all orders of one before the next.
     progress : callable, optional
@@ -194,8 +198,16 @@ def _keys(harmonics: Sequence[int], precisions: Sequence[str]) -> list[Key]:
         for precision in precisions
         for m in dict.fromkeys(harmonics)
         for name in LANES
-        if (name, precision) != ("reconstruct", "float64")
+        if _is_offered(name, m, precision)
     ]
+
+
+def _is_offered(name: str, m: int, precision: str) -> bool:
+    """Say whether there is such a lane; the planar statement does all orders."""
+    if name == "reconstruct" and precision != "float32":
+        return False
+    # a characteristic polynomial with more roots underflows where they cluster
+    return m <= MOST_ROOTS or name in ("levinson", "density")
 
 
 def _compile(keys: list[Key], progress: Progress | None, go_on: Callable[[], bool]) -> None:

@@ -36,4 +36,5 @@ def without_lanes() -> Iterator[None]:
     try:
         yield
     finally:
+        REGISTRY.compiled.clear()
         REGISTRY.compiled.update(before)

@@ -10,13 +10,12 @@ from transientcam_moments._kernels.pisarenko import pisarenko_lane
 from transientcam_moments._kernels.reconstruct import reconstruct_lane
 from transientcam_moments._kernels.registry import Key
 
-# From the one that gains most to the one that gains least.
 LANES: dict[str, Callable[[int, str], Callable[..., Any]]] = {
-    "reconstruct": reconstruct_lane,
     "pisarenko": pisarenko_lane,
     "smallest_eigenvalue": smallest_eigenvalue_lane,
     "levinson": levinson_lane,
     "density": density_lane,
+    "reconstruct": reconstruct_lane,
 }
 
 

@@ -17,7 +17,7 @@ from transientcam_moments._kernels.entries import (
 )
 from transientcam_moments._kernels.spread import Spread, at_once
 
-_BANK = 480  # registers of coefficients that stay in the first cache while all phases pass
+_BANK = 240  # pairs of registers of coefficients, which stay in the first cache for all phases
 _PAST_CACHES_BYTES = 1 << 24
 
 
@@ -59,7 +59,7 @@ def _density(
     begins at its own first line, and rows ``twin`` apart begin alike.
     """
     m = len(order)
-    one = simd.ones(error, 1)
+    one = simd.ones(error, 2)
     step = simd.width(one)
     pitch = _BANK // (2 * m + 2) * step
     block = pitch - step  # rows that begin at a line of memory reach into the next block

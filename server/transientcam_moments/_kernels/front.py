@@ -70,7 +70,7 @@ def smooth(
     ``weight`` (H * 2 W) normalises, ``rows`` (2 W + 4 R + lanes) is room for a row with 2 R zeros
     before and behind it.
     """
-    one = simd.ones(weight, 1)
+    one = simd.ones(weight, 4)  # a tap is spread once for four registers
     step = simd.width(one)
     radius = taps.shape[0] // 2
     length = 2 * width

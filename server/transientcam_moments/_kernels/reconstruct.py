@@ -24,11 +24,17 @@ from transientcam_moments._kernels.reconstructor import Entries, Reconstructor
 
 def reconstruct_lane(m: int, precision: str) -> Callable[..., Any]:
     """Compile all stages of order m; the lane makes a `Reconstructor`."""
+    entries = reconstruct_entries(m, precision)
+    return lambda *arguments: Reconstructor(entries, *arguments)
+
+
+def reconstruct_entries(m: int, precision: str) -> Entries:
+    """Compile all stages of order m."""
     order = order_type(m)
     real, cplx = real_arrays(precision), complex_arrays(precision)
     wide = real_arrays("d")
     plane, planes = real[1], real[2]
-    entries = Entries(
+    return Entries(
         order=(0,) * m,
         precision=precision,
         turns=half_turns(m, precision),
@@ -64,4 +70,3 @@ def reconstruct_lane(m: int, precision: str) -> Callable[..., Any]:
         wide_eigenvalue=eigenvalue_entry(m, "d"),
         wide_returns=returns_entry(m, "d"),
     )  # fmt: skip
-    return lambda *arguments: Reconstructor(entries, *arguments)

@@ -194,9 +194,9 @@ def find_returns(
     ill = 0
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        total = simd.load(one, zeroth, p) if apart else toeplitz.load_zeroth(one, b, p)
-        total = total - simd.load(one, uniform, p)
-        lit = total > 0.0
+        b0 = simd.load(one, zeroth, p) if apart else toeplitz.load_zeroth(one, b, p)
+        total = b0 - simd.load(one, uniform, p)
+        lit = total > 4.0 * simd.eps(one) * simd.absolute(b0)  # less is rounding
         factor = 1.0 / total
         re[0], im[0] = one, one * 0.0
         for k in range(1, m + 1):

@@ -1,0 +1,62 @@
+"""The data everything is measured on, and the lanes it is measured with."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import transientcam_moments as tm
+from numpy.typing import NDArray
+from transientcam_moments._kernels.registry import REGISTRY
+
+Array = NDArray[Any]
+CORES = len(os.sched_getaffinity(0))
+PAPER = (120, 163)
+VGA = (480, 640)
+
+
+def images(m: int, shape: tuple[int, int]) -> Array:
+    """Raw images of a capture, uint16 (4 (m + 1), H, W).
+
+    Direct light, two bounces that vary over the image, shot noise, and read noise of 2 DN.
+    """
+    rng = np.random.default_rng(m)
+    y, x = np.mgrid[: shape[0], : shape[1]] / max(shape)
+    phase_rad = np.stack([1 + 1.5 * x + 0.5 * y, 2.5 + x * y, 4 + x])
+    weight = np.stack([800 + 600 * np.sin(6 * x), 300 + 300 * y, 150 + 0 * x])
+    step = np.exp(-0.5j * np.pi * np.arange(4))[:, None, None]
+    raw = np.empty((4 * (m + 1), *shape), np.uint16)
+    for j in range(m + 1):
+        moment = (weight * np.exp(1j * j * phase_rad)).sum(axis=0)
+        clean = 50 + (weight.sum(axis=0) + np.real(moment * step)) / 2
+        noisy = rng.poisson(clean) + rng.normal(0, 2, clean.shape)
+        raw[4 * j : 4 * j + 4] = np.clip(np.round(noisy), 0, 4095)
+    return raw
+
+
+def moments(m: int, shape: tuple[int, int], dtype: type = np.complex64) -> Array:
+    """Biased moments (m + 1, H, W) of the same images."""
+    reconstruction = tm.reconstruct(images(m, shape), tm.Settings())
+    return np.asarray(reconstruction.moments, dtype)
+
+
+@contextmanager
+def numpy_alone() -> Iterator[None]:
+    """Leave everything to NumPy inside."""
+    lanes = dict(REGISTRY.compiled)
+    REGISTRY.compiled.clear()
+    try:
+        yield
+    finally:
+        REGISTRY.compiled.update(lanes)
+
+
+def lane(name: str, planes: Array) -> Any:
+    """Return a compiled lane, which has to be there."""
+    from transientcam_moments._kernels import find
+
+    found = find(name, planes)
+    if found is None:
+        raise RuntimeError(f"{name} isn't compiled: {tm.kernels.state()}")
+    return found

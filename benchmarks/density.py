@@ -1,0 +1,94 @@
+"""Density evaluation against NumPy, this machine's ceiling and the paper's graphics card."""
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+import transientcam_moments as tm
+
+from benchmarks.ceiling import Ceiling, measured
+from benchmarks.data import CORES, PAPER, lane, moments, numpy_alone
+from benchmarks.tables import Table, verdict
+from benchmarks.timing import measure
+
+ORDERS = (3, 4, 8)
+# Sec. 6.3: density frames a second of 163 x 120 pixels on a GTX 780
+PAPER_FRAMES_S = {3: 2.9e5, 4: 2.2e5, 8: 1.1e5}
+_CACHED, _STREAMED = 64, 1024  # frames: 5 MB and 80 MB
+
+
+def tables() -> Iterator[Table]:
+    """Measure frames a second of 163 x 120 pixels in float32."""
+    ceilings = {cores: measured(cores) for cores in sorted({1, CORES})}
+    yield _ceiling_table(ceilings)
+    table = Table(
+        "Density, 163 x 120, float32, modulus: frames a second",
+        ("m, cores, frames", "lane", "NumPy", "gain", "roofline", "share", "paper"),
+        notes=[
+            "NumPy: two matrix products (BLAS, all cores) and a reciprocal. Paper: a GTX 780.",
+            "A value is 4 m + 2 fused multiply-adds and 4 bytes written (the division and the "
+            "floor of the denominator aren't counted); the roofline is the smaller of both rates.",
+            f"{_CACHED} frames (5 MB) stay in the last cache, {_STREAMED} (80 MB) don't.",
+        ],
+    )
+    for m in ORDERS:
+        rows, notes = _rows(m, ceilings)
+        table.rows.extend(rows)
+        table.notes.extend(notes)
+    yield table
+
+
+def _rows(m: int, ceilings: dict[int, Ceiling]) -> tuple[list[Sequence[str]], list[str]]:
+    c = tm.levinson(moments(m, PAPER))
+    rows: list[Sequence[str]] = []
+    notes: list[str] = []
+    numpy_s = _numpy_frames_s(c)
+    for cores, ceiling in ceilings.items():
+        for kind, frames in (("cached", _CACHED), ("streamed", _STREAMED)):
+            rate = _frames_s(c, frames, cores)
+            writes = ceiling.cached_bytes_s if kind == "cached" else ceiling.stream_bytes_s
+            roof = min(ceiling.fused_s / (4 * m + 2), writes / 4) / c.error.size
+            label = f"m = {m}, {kind}, {cores} cores"
+            notes.append(verdict(rate / roof, 0.6, f"{label}, share of the roofline"))
+            against_numpy = ("", "")
+            if cores == CORES:
+                against_numpy = (f"{numpy_s:.3g}", f"{rate / numpy_s:.1f}")
+                notes.append(verdict(rate / numpy_s, 12, f"{label}, times NumPy"))
+                notes.append(verdict(rate, PAPER_FRAMES_S[m], f"{label}, paper's GPU"))
+            shares = (f"{roof:.3g}", f"{100 * rate / roof:.0f} %", f"{PAPER_FRAMES_S[m]:.3g}")
+            rows.append((f"{m}, {cores}, {kind}", f"{rate:.3g}", *against_numpy, *shares))
+    return rows, notes
+
+
+def _frames_s(c: tm.Coefficients, frames: int, cores: int) -> float:
+    phase_rad = np.linspace(0, 2 * np.pi, frames, endpoint=False)
+    out = np.empty((frames, *PAPER), np.float32)
+    evaluate = lane("density", c.polynomial)
+    with ThreadPoolExecutor(max(1, cores - 1)) as executor:
+        spread = tm.kernels.over(executor, cores)
+        run = partial(evaluate, c.polynomial, c.reflection, c.error, phase_rad, out, spread=spread)
+        return frames / measure(run).median_s
+
+
+def _numpy_frames_s(c: tm.Coefficients) -> float:
+    phase_rad = np.linspace(0, 2 * np.pi, _CACHED, endpoint=False)
+    with numpy_alone():
+        return _CACHED / measure(lambda: tm.density(c, phase_rad)).median_s
+
+
+def _ceiling_table(ceilings: dict[int, Ceiling]) -> Table:
+    table = Table(
+        "This machine's ceiling, float32",
+        ("cores", "fused multiply-adds / s", "writes in cache", "writes past the caches"),
+    )
+    for cores, ceiling in ceilings.items():
+        table.rows.append(
+            (
+                str(cores),
+                f"{ceiling.fused_s / 1e9:.0f} e9",
+                f"{ceiling.cached_bytes_s / 1e9:.1f} GB/s",
+                f"{ceiling.stream_bytes_s / 1e9:.1f} GB/s",
+            )
+        )
+    return table
