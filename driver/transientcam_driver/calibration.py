@@ -33,6 +33,8 @@ from transientcam_driver.sequence import Sequence
 
 DEFAULT_TAKES = 40
 """Of the paper's calibration measurements."""
+DEVICE_FIELDS = ("serial", "width", "height")
+"""Fields of a mismatch that no other sequence makes good."""
 FORMAT = 1
 _FRAME_PATIENCE = 5.0  # times as long as a frame takes, and at least:
 _LEAST_PATIENCE_S = 10.0

@@ -16,9 +16,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from transientcam_driver import AppliedSequence, Camera, RawFrame
+from transientcam_driver import AppliedSequence, CalibrationMismatch, Camera, RawFrame
 
 from transientcam_server import problem_kinds as kinds
+from transientcam_server.calibration import Calibration, calibration_id
 from transientcam_server.encoding import Encoding
 from transientcam_server.errors import Problem
 from transientcam_server.products import PRODUCTS, STAGES, Product, Recipe, pixel_counts
@@ -47,8 +48,11 @@ class Pipeline:
         *,
         workers: int,
         judge: Judge | None = None,
+        calibration: Calibration | None = None,
     ) -> None:
         self.judge = judge
+        self._calibration = calibration
+        self._capabilities = camera.capabilities
         self._settings = settings
         self._executor = executor
         self._tasks: set[asyncio.Task[Any]] = set()
@@ -67,8 +71,19 @@ class Pipeline:
     def frame(self, raw: RawFrame, applied: AppliedSequence) -> "Frame":
         """Return the next frame, counted from 1."""
         self._frames += 1
-        recipe = Recipe(applied, self._settings, self._full_scale)
+        calibration = self.calibration_for(applied)
+        recipe = Recipe(applied, self._settings, self._full_scale, calibration)
         return Frame(self, self._frames, raw, recipe)
+
+    def calibration_for(self, applied: AppliedSequence) -> Calibration | None:
+        """Return the calibration given, if it is good for this sequence."""
+        return self._calibration if self.misfit(applied) is None else None
+
+    def misfit(self, applied: AppliedSequence) -> CalibrationMismatch | None:
+        """Say why the calibration given is not good for a sequence; None if it is, or is none."""
+        if self._calibration is None:
+            return None
+        return self._calibration.capture.misfit(applied, self._capabilities)
 
     def product(self, name: str) -> Product:
         """Return a product this camera has.
@@ -154,6 +169,7 @@ class Frame:
         self._pipeline = pipeline
         self._reconstruct_s: float | None = None
         self._pixels: dict[str, int] | None = None
+        self._rejected_images: int | None = None
         self._deviation: dict[str, float] | None = None
         self._known: dict[Hashable, asyncio.Task[Any]] = {}
         self._over_time: OrderedDict[Hashable, asyncio.Task[Any]] = OrderedDict()
@@ -171,7 +187,7 @@ class Frame:
         return {
             "frame": self.number,
             "sequence_id": self.raw.epoch,
-            "calibration_id": "nominal",
+            "calibration_id": calibration_id(self.recipe.calibration),
             "device_time_s": self.raw.device_time_s,
             "host_time_s": self.raw.host_time_s,
             "capture_s": self.raw.capture_s,
@@ -185,6 +201,7 @@ class Frame:
             "height": height,
             "temperature_c": self.raw.temperature_c,
             "lost_images": self.raw.lost_images,
+            "rejected_images": self._rejected_images,
             "pixels": self._pixels,
             "predicted_range_std_m": self._deviation,
         }
@@ -266,6 +283,7 @@ class Frame:
         self._reconstruct_s = (self._reconstruct_s or 0.0) + elapsed_s
         if name == "moments":
             self._pixels, _ = await self._pipeline.run(pixel_counts, result)
+            self._rejected_images = result.rejected_images
         if name == "returns":
             self._deviation = await self._judged(result)
         return result

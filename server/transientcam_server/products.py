@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from transientcam import wire
 from transientcam_driver import AppliedSequence, RawFrame
 
+from transientcam_server.calibration import Calibration, nominal_gains
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
@@ -24,12 +25,14 @@ _Array = NDArray[Any]
 class Recipe:
     """What a computation may know beside the results it needs.
 
-    ``full_scale`` is the largest value that the sensor gives, in DN.
+    ``full_scale`` is the largest value that the sensor gives, in DN. Without a ``calibration``,
+    gains are the nominal ones.
     """
 
     applied: AppliedSequence
     settings: ReconstructionSettings
     full_scale: float
+    calibration: Calibration | None = None
 
     @property
     def base_frequency_hz(self) -> float:
@@ -89,19 +92,19 @@ class Product:
 
 def _reconstruction(recipe: Recipe, raw: RawFrame) -> tm.Reconstruction:
     sequence = recipe.applied.sequence
-    calibration = tm.nominal_calibration(
-        sequence.harmonics,
-        sequence.sub_phases.phases_rad,
-        sequence.sub_phases.weights,
-        sequence.zeroth,
-    )
+    calibration = recipe.calibration
     settings = recipe.settings.for_moments(
         base_frequency_hz=sequence.base_frequency_hz,
         zeroth=sequence.zeroth,
         takes=sequence.takes,
         full_scale=recipe.full_scale,
     )
-    reconstruction = tm.reconstruct(raw.images, settings, calibration=calibration)
+    reconstruction = tm.reconstruct(
+        raw.by_take.reshape(raw.images.shape),
+        settings,
+        calibration=nominal_gains(sequence) if calibration is None else calibration.gains,
+        bad_pixels=None if calibration is None else calibration.bad,
+    )
     return _computed(reconstruction, "moments", "flags", "validity")
 
 

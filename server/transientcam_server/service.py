@@ -6,11 +6,12 @@ import logging
 from collections.abc import AsyncIterator, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 from fastapi import Depends, Request
 from transientcam import wire
 from transientcam_driver import AppliedSequence, Camera
+from transientcam_driver.calibration import DEVICE_FIELDS
 
 from transientcam_server.accuracy import Accuracy
 from transientcam_server.acquisition import (
@@ -21,6 +22,7 @@ from transientcam_server.acquisition import (
     Lost,
     SequenceChanged,
 )
+from transientcam_server.calibration import Calibration, calibration_id, load_calibration
 from transientcam_server.fronts import Fronts
 from transientcam_server.hub import Channel, Hub
 from transientcam_server.pipeline import Pipeline
@@ -46,12 +48,14 @@ class Service:
         self.hub = Hub()
         self._executor = ThreadPoolExecutor(settings.workers, thread_name_prefix="worker")
         self.accuracy = Accuracy(camera, settings.reconstruction, settings.sensor)
+        self.calibration = _calibration(camera, settings)
         self.pipeline = Pipeline(
             camera,
             settings.reconstruction,
             self._executor,
             workers=settings.workers,
             judge=self.accuracy.judge,
+            calibration=self.calibration,
         )
         self.fronts = Fronts(self.accuracy, self.pipeline, simulated=camera.simulation is not None)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -120,8 +124,9 @@ class Service:
             case Back():
                 self.hub.tell("camera-back", {})
             case SequenceChanged(applied):
-                self.applied = applied
+                before, self.applied = self.applied, applied
                 self._tell_sequence_changed()
+                self._tell_calibration(before)
 
     def _tell_sequence_changed(self) -> None:
         sequence = self.applied.to_document()
@@ -129,6 +134,36 @@ class Service:
             channels = [each.to_document() for each in self.channel_table(outbox.channels)]
             notice = wire.Notice("sequence-changed", {"sequence": sequence, "channels": channels})
             outbox.put(notice)
+
+    def calibration_notice(self) -> dict[str, Any]:
+        """Return which gains are used with the present sequence, and why not those given."""
+        misfit = self.pipeline.misfit(self.applied)
+        return {
+            "calibration_id": calibration_id(self.pipeline.calibration_for(self.applied)),
+            "reason": None if misfit is None else str(misfit),
+        }
+
+    def _tell_calibration(self, before: AppliedSequence) -> None:
+        """Tell when frames from now on are calibrated in another way."""
+        fitted, fits = (self.pipeline.misfit(each) is None for each in (before, self.applied))
+        if fitted != fits:
+            notice = self.calibration_notice()
+            if not fits:
+                _log.warning("%s; using nominal gains", notice["reason"])
+            self.hub.tell("calibration-changed", notice)
+
+
+def _calibration(camera: Camera, settings: Settings) -> Calibration | None:
+    """Load the calibration that is given, and refuse one of another camera."""
+    if settings.calibration is None:
+        return None
+    loaded = load_calibration(settings.calibration)
+    misfit = loaded.capture.misfit(camera.applied, camera.capabilities)
+    if misfit is not None and misfit.field in DEVICE_FIELDS:
+        raise misfit
+    if misfit is not None:
+        _log.warning("%s; using nominal gains", misfit)
+    return loaded
 
 
 # async, or FastAPI takes a thread for it

@@ -104,6 +104,8 @@ class Settings(_Group):
     """Origins of foreign pages that may control the camera, as in ``https://lab.example``."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     """The least important messages to log."""
+    calibration: Path | None = None
+    """A file written by `transientcam calibrate`; nominal gains are used without one."""
     workers: int = Field(default_factory=lambda: max(2, os.cpu_count() or 2), ge=2, le=256)
     """Threads that reconstruct and encode; at least 2, so that one long answer delays nobody."""
     reconstruction: ReconstructionSettings = ReconstructionSettings()

@@ -21,6 +21,7 @@ class PixelCounts(TypedDict):
     saturated: int
     non_finite: int
     degenerate: int
+    replaced: int
 
 
 class PredictedStd(TypedDict):
@@ -57,6 +58,8 @@ class FrameMeta(TypedDict):
     temperature_c: float
     lost_images: int
     """Images lost or corrupt between the frame before and this one."""
+    rejected_images: int | None
+    """Images left out of the average over takes as outliers; None until it was computed."""
     pixels: PixelCounts | None
     predicted_range_std_m: PredictedStd | None
     """None until the range of this frame was computed."""
@@ -163,7 +166,7 @@ class Notice:
     """Something a client should know: ``kind``, and what more there is to it in ``details``.
 
     Known kinds: ``dropped``, ``lost-images``, ``camera-lost``, ``camera-back``,
-    ``sequence-changed``. A client passes over kinds it does not know.
+    ``sequence-changed``, ``calibration-changed``. A client passes over kinds it does not know.
     """
 
     kind: str

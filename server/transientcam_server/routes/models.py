@@ -38,6 +38,7 @@ _META_EXAMPLE: dict[str, JsonValue] = {
     "height": 120,
     "temperature_c": 31.5,
     "lost_images": 0,
+    "rejected_images": 0,
     "pixels": {
         "total": 19560,
         "valid": 19498,
@@ -46,6 +47,7 @@ _META_EXAMPLE: dict[str, JsonValue] = {
         "saturated": 0,
         "non_finite": 0,
         "degenerate": 0,
+        "replaced": 0,
     },
     "predicted_range_std_m": {"median": 0.0105, "p90": 0.0291, "first_order_share": 0.61},
 }
@@ -251,6 +253,7 @@ class PixelCountsDocument(Document):
     saturated: int
     non_finite: int
     degenerate: int
+    replaced: int
 
 
 class PredictedStdDocument(Document):
@@ -290,6 +293,8 @@ class FrameDocument(Document):
     temperature_c: float
     lost_images: int
     """Images lost or corrupt between the frame before and this one."""
+    rejected_images: int | None = None
+    """Images left out of the average over takes as outliers; null until it was computed."""
     pixels: PixelCountsDocument | None = None
     """Null until something was computed."""
     predicted_range_std_m: PredictedStdDocument | None = None

@@ -1,0 +1,88 @@
+"""What a calibration measurement says of each pixel: its gains, and whether it is any good."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import transientcam_moments as tm
+from numpy.typing import NDArray
+from transientcam_driver import CalibrationCapture, Sequence
+
+_Array = NDArray[Any]
+NOMINAL_ID = "nominal"
+"""Of the gains that sub-phases alone give an ideal modulation."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """A measurement, evaluated.
+
+    Attributes
+    ----------
+    id
+        Name of the measurement.
+    capture
+        The measurement.
+    gains : array, shape (m + 1, H, W), complex64
+        What to divide moments by.
+    bad : boolean array, shape (H, W)
+        Pixels that are hot, stuck, noisy or dead, and show their neighbours' mean instead.
+    """
+
+    id: str
+    capture: CalibrationCapture
+    gains: _Array
+    bad: _Array
+
+
+def load_calibration(path: Path) -> Calibration:
+    """Read and evaluate a measurement.
+
+    Raises
+    ------
+    CalibrationFileError
+        The file holds none.
+    """
+    return evaluate(CalibrationCapture.load(path))
+
+
+def evaluate(capture: CalibrationCapture) -> Calibration:
+    """Compute gains and bad pixels from the images of a measurement (Sec. 4.2)."""
+    zeroth = capture.sequence.zeroth
+    nominal = nominal_gains(capture.sequence)
+    bad = tm.find_bad_pixels(
+        dark=capture.dark,
+        dark_deviation=capture.dark_deviation,
+        brightness=_brightness(tm.measure(capture.images, zeroth=zeroth), nominal),
+    )
+    measured = tm.measure(tm.fill_bad_pixels(capture.images, bad), zeroth=zeroth)
+    measured[0] = _brightness(measured, nominal)
+    # a brightness stays in digital numbers, as with nominal gains
+    gains = tm.calibration_of(measured) * np.complex64(nominal[0])
+    return Calibration(capture.id, capture, gains, bad)
+
+
+def calibration_id(calibration: Calibration | None) -> str:
+    """Return what a frame's metadata call the gains it was computed with."""
+    return NOMINAL_ID if calibration is None else calibration.id
+
+
+def nominal_gains(sequence: Sequence) -> _Array:
+    """Return the gains (m + 1,) that sub-phases alone give an ideal modulation."""
+    gains: _Array = tm.nominal_calibration(
+        sequence.harmonics,
+        sequence.sub_phases.phases_rad,
+        sequence.sub_phases.weights,
+        sequence.zeroth,
+    )
+    return gains
+
+
+def _brightness(measured: _Array, nominal: _Array) -> _Array:
+    """Return b_0 as it was measured, or else as the first harmonic would have it."""
+    if measured[0].any():
+        brightness: _Array = measured[0].real
+        return brightness
+    # estimated: the first harmonic of light at phase zero is as large as b_0, but for its gain
+    return np.asarray(np.abs(measured[1]) / abs(nominal[1]), dtype=np.float32)
