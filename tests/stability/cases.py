@@ -47,7 +47,7 @@ def sparse_signals(m: int) -> Iterator[Signal]:
     yield Signal("one return at phase 0", (mp.mpf(0),), one)
     yield Signal("one return at 2 pi - 1e-6", (2 * mp.pi - mp.mpf("1e-6"),), one)
     yield Signal("one return, uniform 0.5", (mp.mpf("1.25"),), one, mp.mpf("0.5"))
-    yield Signal(f"{m} returns", _spread(m), _uneven(m))
+    yield Signal("m returns", _spread(m), _uneven(m))
     if m >= 2:
         for exponent in (1, 2, 3, 4):
             apart = mp.mpf(10) ** -exponent
@@ -59,8 +59,8 @@ def sparse_signals(m: int) -> Iterator[Signal]:
 def dense_signals(m: int) -> Iterator[Signal]:
     """More returns than m, or a uniform part: the matrix is positive definite."""
     yield Signal("uniform", (), (), mp.mpf(1))
-    yield Signal(f"{m + 1} returns", _spread(m + 1), _uneven(m + 1))
+    yield Signal("m + 1 returns", _spread(m + 1), _uneven(m + 1))
     for share in ("0.3", "4.2e-3", "1.1e-6"):
-        yield Signal(f"{m} returns, uniform {share}", _spread(m), _uneven(m), m * mp.mpf(share))
+        yield Signal(f"m returns, uniform {share}", _spread(m), _uneven(m), m * mp.mpf(share))
     close = (mp.mpf(2), mp.mpf("2.05"))
     yield Signal("two close returns, uniform 0.01", close, (mp.mpf(1),) * 2, mp.mpf("0.02"))

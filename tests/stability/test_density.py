@@ -43,7 +43,7 @@ def has_margin(m: int, precision: str, signal: Signal) -> bool:
 
 def is_definite(m: int, precision: str, signal: Signal) -> bool:
     """Whether there is more than rounding of a uniform part."""
-    return share(m, precision, signal) >= 100 * np.finfo(PRECISIONS[precision]).eps
+    return share(m, precision, signal) >= 100 * float(np.finfo(PRECISIONS[precision]).eps)
 
 
 def has_oracle(m: int, precision: str, signal: Signal) -> bool:
@@ -173,7 +173,7 @@ def test_contradicting_moments_have_the_eigenvalue_of_the_closed_form(
 def test_a_wrong_zeroth_moment_shifts_the_uniform_part_only(
     m: int, precision: str, factor: float
 ) -> None:
-    signal = next(s for s in sparse_signals(m) if s.name == f"{m} returns")
+    signal = next(s for s in sparse_signals(m) if s.name == "m returns")
     b = exact.rounded(signal.moments(m), PRECISIONS[precision])
     wrong: np.ndarray = b.copy()
     wrong[0] *= factor
@@ -195,7 +195,7 @@ def test_a_wrong_zeroth_moment_shifts_the_uniform_part_only(
 @pytest.mark.parametrize("exponent", [-45, -40, -37, -30, 30])
 def test_scale_changes_nothing_but_scale(m: int, precision: str, exponent: int) -> None:
     dtype = PRECISIONS[precision]
-    signal = next(s for s in dense_signals(m) if s.name == f"{m} returns, uniform 0.3")
+    signal = next(s for s in dense_signals(m) if s.name == "m returns, uniform 0.3")
     plain = signal.moments(m)
     if precision == "float64":
         exponent *= 7  # 1e-315 is subnormal, 1e210 far up
