@@ -148,6 +148,10 @@ class Acquisition:
         """Start or stop capturing."""
         return self.submit(lambda: self._set_running(running))
 
+    def safe_off(self) -> "Future[None]":
+        """Stop capturing and switch the light off, by what the camera always honours."""
+        return self.submit(self._safe_off)
+
     def device_status(self) -> "Future[Status]":
         """Ask the device how it is."""
         return self.submit(self._camera.status)
@@ -259,6 +263,14 @@ class Acquisition:
             if not running and self._started:
                 self._started = False
                 self._camera.stop()
+
+    def _safe_off(self) -> None:
+        # whatever the camera answers, nothing here starts it again
+        self._running = False
+        self._started = False
+        self._arrivals_s.clear()
+        self._moved_s = self._clock()
+        self._camera.safe_off()
 
     def _camera_lost(self, reason: str) -> None:
         self._connected = False

@@ -4,16 +4,17 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Final
 
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, Depends, FastAPI
 from transientcam_driver import Camera
 
-from transientcam_server import pages, problems, stream
+from transientcam_server import access, pages, problems, stream
 from transientcam_server.routes import (
     acquisition,
     camera,
     frames,
     health,
     info,
+    lease,
     plan,
     sequence,
     simulation,
@@ -23,7 +24,7 @@ from transientcam_server.service import VERSION, Service
 from transientcam_server.settings import Settings
 
 API: Final = "/api/v1"
-_RESOURCES = (info, camera, sequence, acquisition, frames, simulation, plan)
+_RESOURCES = (info, camera, lease, sequence, acquisition, frames, simulation, plan)
 
 
 def build_app(camera: Camera, settings: Settings) -> FastAPI:
@@ -52,13 +53,14 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     app.state.service = service
     api = APIRouter(prefix=API)
     for resource in _RESOURCES:
-        api.include_router(resource.router)
+        api.include_router(resource.router, dependencies=[Depends(access.admit)])
     api.include_router(stream.router)
     app.include_router(api)
     for router in (info.versions, health.router, pages.router):
         app.include_router(router)
     pages.add_dashboard(app)
     problems.install(app)
+    access.describe(app, [resource.router for resource in _RESOURCES], prefix=API)
     # the last one added is the first to see a request
     app.add_middleware(BodyLimit)
     app.add_middleware(SameSite, settings=settings)

@@ -66,6 +66,21 @@ NOT_ACCEPTABLE: Final = ProblemKind(
     "Neither the suffix nor the Accept header names a format this product has; `supported` lists "
     "them. Only products with one value a pixel can be a PNG.",
 )
+LEASE_HELD: Final = ProblemKind(
+    "lease-held",
+    409,
+    "Somebody else controls the camera",
+    "While somebody holds the lease, only requests that name it in the header Transientcam-Lease "
+    "change anything. `holder` says who it is and `expires_in_s` how long the lease lasts unless "
+    "it is renewed. Watching needs no lease.",
+)
+LEASE_LOST: Final = ProblemKind(
+    "lease-lost",
+    409,
+    "This lease is over",
+    "The lease that the header Transientcam-Lease names was given back, taken over or not renewed "
+    "in time. `holder` says who has one now. Nothing was changed.",
+)
 TOO_LARGE: Final = ProblemKind(
     "too-large", 413, "The request is too large", "The body is longer than `limit` bytes."
 )

@@ -2,6 +2,7 @@
 
 import logging
 import math
+from collections.abc import Callable, Iterable
 from http import HTTPStatus
 from typing import Any
 
@@ -113,9 +114,24 @@ _REFERENCE = {"$ref": "#/components/schemas/ProblemDocument"}
 def documented(*problem_kinds: ProblemKind) -> dict[int | str, dict[str, Any]]:
     """Return what a route's OpenAPI entry says of the problems it may answer with."""
     responses: dict[int | str, dict[str, Any]] = {}
+    _add_to(responses, problem_kinds, key=int)
+    return responses
+
+
+def document_problems(operation: dict[str, Any], *problem_kinds: ProblemKind) -> None:
+    """Add problems to an operation of an OpenAPI document that exists already."""
+    _add_to(operation["responses"], problem_kinds, key=str)
+
+
+def _add_to(
+    responses: dict[Any, dict[str, Any]],
+    problem_kinds: Iterable[ProblemKind],
+    *,
+    key: Callable[[int], int | str],
+) -> None:
     for kind in problem_kinds:
         entry = responses.setdefault(
-            kind.status,
+            key(kind.status),
             {
                 "description": "",
                 "content": {PROBLEM_MEDIA_TYPE: {"schema": _REFERENCE, "examples": {}}},
@@ -126,7 +142,6 @@ def documented(*problem_kinds: ProblemKind) -> dict[int | str, dict[str, Any]]:
             "summary": kind.title,
             "value": problem_document(Problem(kind, kind.meaning)),
         }
-    return responses
 
 
 def describe(app: FastAPI) -> None:

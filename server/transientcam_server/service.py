@@ -3,8 +3,8 @@
 import asyncio
 import contextlib
 import logging
-from collections.abc import AsyncIterator, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import AsyncIterator, Callable, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
 from importlib.metadata import version
 from typing import Annotated, Any, Final
 
@@ -25,6 +25,7 @@ from transientcam_server.acquisition import (
 from transientcam_server.calibration import Calibration, calibration_id, load_calibration
 from transientcam_server.fronts import Fronts
 from transientcam_server.hub import Channel, Hub
+from transientcam_server.lease import Alarm, Change, Lease, LeaseDesk
 from transientcam_server.pipeline import Pipeline
 from transientcam_server.settings import Settings
 
@@ -61,6 +62,7 @@ class Service:
         self._loop: asyncio.AbstractEventLoop | None = None
         self.acquisition = Acquisition(camera, report=self._from_acquisition)
         self.applied: AppliedSequence = camera.applied
+        self.lease = LeaseDesk(report=self._lease_changed, alarm=self._alarm)
         self.identity = {"name": "transientcam", "version": VERSION}
 
     @contextlib.asynccontextmanager
@@ -71,6 +73,7 @@ class Service:
         try:
             yield
         finally:
+            self.lease.close()
             self.hub.close()
             await self._loop.run_in_executor(self._executor, self.acquisition.stop)
             await self.pipeline.close()
@@ -128,6 +131,21 @@ class Service:
                 self._tell_sequence_changed()
                 self._tell_calibration(before)
 
+    def _alarm(self, delay_s: float, ring: Callable[[], None]) -> Alarm:
+        return asyncio.get_running_loop().call_later(delay_s, ring)
+
+    def _lease_changed(self, change: Change, lease: Lease, former: Lease | None) -> None:
+        if former is not None:
+            _log.warning("%r took the lease over from %r", lease.holder, former.holder)
+        elif change == "lapsed":
+            _log.warning("the lease of %r lapsed; on lapse: %s", lease.holder, lease.on_lapse)
+        else:
+            _log.info("the lease of %r was %s", lease.holder, change)
+        details = {"change": change, "holder": lease.holder}
+        self.hub.tell("lease-changed", details | ({"from": former.holder} if former else {}))
+        if change == "lapsed" and lease.on_lapse == "stop":
+            self.acquisition.set_running(False).add_done_callback(_log_failure)
+
     def _tell_sequence_changed(self) -> None:
         sequence = self.applied.to_document()
         for outbox in self.hub.subscribers:
@@ -151,6 +169,12 @@ class Service:
             if not fits:
                 _log.warning("%s; using nominal gains", notice["reason"])
             self.hub.tell("calibration-changed", notice)
+
+
+def _log_failure(stopped: Future[None]) -> None:
+    if stopped.exception() is not None:
+        # it is unplugged, or its heartbeat ends and it turns its light off by itself
+        _log.error("the capture could not be stopped: %s", stopped.exception())
 
 
 def _calibration(camera: Camera, settings: Settings) -> Calibration | None:

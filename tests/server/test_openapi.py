@@ -39,6 +39,13 @@ def test_every_resource_of_the_interface_is_described(document: dict[str, Any]) 
         "GET /api/v1/frames/latest/{product}",
         "GET /api/v1/simulation",
         "POST /api/v1/simulation/faults",
+        "GET /api/v1/lease",
+        "POST /api/v1/lease",
+        "PUT /api/v1/lease",
+        "DELETE /api/v1/lease",
+        "POST /api/v1/acquisition/safe-off",
+        "POST /api/v1/plan",
+        "GET /api/v1/tradeoff",
         "GET /livez",
         "GET /readyz",
     }

@@ -5,6 +5,7 @@ import asyncio
 from fastapi import APIRouter
 
 from transientcam_server import problem_kinds as kinds
+from transientcam_server.access import Role, needs
 from transientcam_server.problems import documented
 from transientcam_server.routes.models import AcquisitionDocument, AcquisitionRequest
 from transientcam_server.service import Service, ServiceOf
@@ -28,6 +29,22 @@ async def read_acquisition(service: ServiceOf) -> AcquisitionDocument:
 async def change_acquisition(service: ServiceOf, wanted: AcquisitionRequest) -> AcquisitionDocument:
     """Start or stop capturing; the camera's light is off while it does not."""
     await asyncio.wrap_future(service.acquisition.set_running(wanted.running))
+    return _document(service)
+
+
+@router.post(
+    "/acquisition/safe-off",
+    summary="Switch the light off, now",
+    responses=documented(kinds.CAMERA_FAILED, kinds.CAMERA_LOST),
+)
+@needs(Role.VIEWER, lease=False)
+async def switch_off(service: ServiceOf) -> AcquisitionDocument:
+    """Stop capturing and switch the light off, whoever holds the lease.
+
+    Where the camera cannot be reached it is not started again when it is back; its own watchdog
+    switches the light off as soon as it hears nothing from here.
+    """
+    await asyncio.wrap_future(service.acquisition.safe_off())
     return _document(service)
 
 

@@ -1,6 +1,7 @@
 """The camera: what it can do, and how it is."""
 
 import asyncio
+import contextlib
 from dataclasses import asdict
 from typing import Any
 
@@ -17,13 +18,11 @@ router = APIRouter(tags=["camera"])
 async def read_camera(service: ServiceOf) -> CameraDocument:
     """Say what the camera can do and how it is; asks the camera itself for its status."""
     camera = service.camera
-    acquisition = service.acquisition.status()
     status = None
-    if acquisition.state != "lost":
-        try:
+    if service.acquisition.status().state != "lost":
+        with contextlib.suppress(CameraError):  # which is what `state` and `reason` then say
             status = _document(await asyncio.wrap_future(service.acquisition.device_status()))
-        except CameraError:
-            acquisition = service.acquisition.status()
+    acquisition = service.acquisition.status()
     return CameraDocument(
         state=acquisition.state,
         reason=acquisition.reason,

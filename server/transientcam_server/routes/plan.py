@@ -6,6 +6,7 @@ from fastapi import APIRouter, Query
 from transientcam_driver import Sequence
 
 from transientcam_server import problem_kinds as kinds
+from transientcam_server.access import Role, needs
 from transientcam_server.planner import Goal
 from transientcam_server.problems import documented
 from transientcam_server.routes.plan_models import PlanDocument, PlanRequest, TradeoffDocument
@@ -28,6 +29,7 @@ _FRAME_WITHIN_S = 10.0
         kinds.SHUTTING_DOWN,
     ),
 )
+@needs(Role.VIEWER, lease=False)
 async def make_plan(service: ServiceOf, request: PlanRequest) -> PlanDocument:
     """Recommend a sequence with its predicted accuracy and its neighbours on the Pareto front.
 

@@ -8,6 +8,7 @@ from pydantic import WithJsonSchema
 from transientcam_driver import Sequence
 
 from transientcam_server import problem_kinds as kinds
+from transientcam_server.access import Role, needs
 from transientcam_server.problems import documented
 from transientcam_server.routes.models import AppliedDocument, SequenceDocument
 from transientcam_server.service import ServiceOf
@@ -75,6 +76,7 @@ async def change_sequence(service: ServiceOf, sequence: _Sequence) -> AppliedDoc
     summary="Check a sequence",
     responses=documented(kinds.BAD_REQUEST, kinds.INVALID_REQUEST, kinds.INVALID_SEQUENCE),
 )
+@needs(Role.VIEWER, lease=False)
 async def validate_sequence(service: ServiceOf, sequence: _Sequence) -> AppliedDocument:
     """Say what the camera would make of a sequence, without touching it."""
     applied = service.camera.validate(Sequence.from_document(sequence))
