@@ -31,6 +31,8 @@ recovers from both, or raises one of the others.
 
 from pathlib import Path
 
+UDEV_RULES_FILE = "/etc/udev/rules.d/60-transientcam.rules"
+
 
 class DriverError(Exception):
     """Everything this package raises on purpose."""
@@ -136,8 +138,8 @@ class PermissionDenied(CameraError):  # noqa: N818 - the same
 
     def __str__(self) -> str:
         return (
-            f"no permission to open {self.node}. Put this line into "
-            f"/etc/udev/rules.d/60-transientcam.rules:\n  {self.rule}\n"
+            f"no permission to open {self.node}. Put this line into {UDEV_RULES_FILE}:\n"
+            f"  {self.rule}\n"
             "then run `udevadm control --reload && udevadm trigger`, "
             "join the group plugdev, and plug the camera in again"
         )

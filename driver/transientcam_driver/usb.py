@@ -7,6 +7,7 @@ import array
 import errno
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import usb.core
@@ -177,6 +178,49 @@ def open_transport(serial: str | None = None, *, backend: Any = None) -> UsbTran
             trouble = error
         usb.util.dispose_resources(device)
     raise trouble
+
+
+@dataclass(frozen=True, slots=True)
+class UsbCamera:
+    """A camera that is plugged in.
+
+    ``serial`` and ``product`` are None, and ``problem`` says why, where it cannot be asked.
+    """
+
+    node: str
+    serial: str | None = None
+    product: str | None = None
+    problem: str | None = None
+
+    @property
+    def spec(self) -> str:
+        """The name that opens it."""
+        return "usb" if self.serial is None else f"usb:{self.serial}"
+
+
+def list_cameras(*, backend: Any = None) -> tuple[UsbCamera, ...]:
+    """Say which cameras are plugged in; none is claimed, so that none is disturbed.
+
+    Raises
+    ------
+    LibusbMissing
+    """
+    return tuple(map(_described, _cameras(backend)))
+
+
+def _described(device: Any) -> UsbCamera:
+    node = _node(device)
+    try:
+        with _translated("reading its strings", node):
+            serial, product = (
+                usb.util.get_string(device, index, _US_ENGLISH)
+                for index in (device.iSerialNumber, device.iProduct)
+            )
+            return UsbCamera(node, serial, product)
+    except CameraError as error:
+        return UsbCamera(node, problem=str(error))
+    finally:
+        usb.util.dispose_resources(device)
 
 
 def _cameras(backend: Any) -> list[Any]:

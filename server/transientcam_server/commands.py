@@ -35,6 +35,10 @@ def serve(
     port: Annotated[
         int | None, typer.Option(help="TCP port; 0 takes any free one.  [default: 8000]")
     ] = None,
+    calibration: Annotated[
+        Path | None,
+        typer.Option(help="A file of `transientcam calibrate`.  [default: nominal gains]"),
+    ] = None,
     config: Annotated[
         Path | None, typer.Option(help="Settings in TOML.  [default: ./transientcam.toml]")
     ] = None,
@@ -49,6 +53,7 @@ def serve(
 
     command_line = {
         "camera": camera,
+        "calibration": calibration,
         "host": host,
         "port": port,
         "insecure": insecure or None,

@@ -1,6 +1,7 @@
 """Every error of pyusb becomes one of ours."""
 
 import errno
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,13 +14,13 @@ from transientcam_driver import (
     LibusbMissing,
     PermissionDenied,
 )
-from transientcam_driver.errors import TransferOverflow, TransferStalled
+from transientcam_driver.errors import UDEV_RULES_FILE, TransferOverflow, TransferStalled
 from transientcam_driver.protocol import Request
 from transientcam_driver.simulation.backend import SimulatedBus
 from transientcam_driver.simulation.build import build, find_scene
 from transientcam_driver.simulation.clock import VirtualClock
 from transientcam_driver.simulation.device import EmulatedDevice
-from transientcam_driver.usb import UDEV_RULE, open_transport
+from transientcam_driver.usb import UDEV_RULE, UsbCamera, list_cameras, open_transport
 
 
 def plug(scene: str = "mirrors") -> EmulatedDevice:
@@ -192,8 +193,6 @@ def test_closing_a_camera_that_is_gone_is_no_error(
 
 
 def test_usb_is_imported_in_two_places_only() -> None:
-    from pathlib import Path
-
     import transientcam_driver
 
     package = Path(transientcam_driver.__file__).parent
@@ -204,3 +203,38 @@ def test_usb_is_imported_in_two_places_only() -> None:
         if line.startswith(("import usb", "from usb"))
     }
     assert importing == {"usb.py", "simulation/backend.py"}
+
+
+def test_cameras_are_listed_without_being_claimed(bus: SimulatedBus) -> None:
+    owned = open_transport(backend=bus)
+
+    (found,) = list_cameras(backend=bus)
+
+    assert found == UsbCamera(
+        "/dev/bus/usb/001/001", "SIM-ideal-0", "AMCW lidar (simulated)", problem=None
+    )
+    assert found.spec == "usb:SIM-ideal-0"
+    owned.close()
+
+
+def test_a_camera_that_may_not_be_opened_is_listed_with_its_problem(
+    bus: SimulatedBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fail(monkeypatch, "open_device", usb.core.USBError("Access denied", -3, errno.EACCES))
+
+    (found,) = list_cameras(backend=bus)
+
+    assert (found.serial, found.spec) == (None, "usb")
+    assert UDEV_RULE in str(found.problem)
+
+
+def test_an_empty_bus_lists_no_camera() -> None:
+    assert list_cameras(backend=SimulatedBus([])) == ()
+
+
+def test_the_file_for_udev_holds_the_rule_that_the_error_tells() -> None:
+    file = Path(__file__).parents[2] / "docker" / Path(UDEV_RULES_FILE).name
+    rules = [line for line in file.read_text().splitlines() if not line.startswith("#")]
+
+    assert rules == [UDEV_RULE]
+    assert UDEV_RULES_FILE in str(PermissionDenied("/dev/bus/usb/001/002", UDEV_RULE))
