@@ -5,6 +5,7 @@ contiguous one-dimensional view per moment, and works on NumPy, JAX and CuPy arr
 gets the pixels in blocks that stay in cache, which is several times faster than whole images.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
@@ -57,13 +58,8 @@ def moment_planes(b: Array, *, name: str = "b") -> tuple[Array, tuple[int, ...]]
 
 def flat_planes(array: Array) -> Array:
     """Return the array with all axes after the first made one, each plane contiguous."""
-    xp = namespace(array)
-    flat = (
-        array.reshape((array.shape[0], -1))
-        if array.size
-        else array.reshape((array.shape[0], int(np.prod(array.shape[1:]))))
-    )
-    return np.ascontiguousarray(flat) if xp is np else flat
+    flat = array.reshape((array.shape[0], math.prod(array.shape[1:])))
+    return np.ascontiguousarray(flat) if namespace(array) is np else flat
 
 
 def _as_complex(b: Array, name: str) -> Array:

@@ -5,6 +5,7 @@ from enum import IntFlag
 import numpy as np
 
 from transientcam_moments._arrays import Array, moment_planes, namespace
+from transientcam_moments.biasing import smallest_eigenvalue
 
 
 class Flags(IntFlag):
@@ -51,8 +52,6 @@ def flags(b: Array, *, minimum_brightness: float = 0.0, eigenvalue: Array | None
     ShapeError
         When `b` is not 2 to 33 planes of numbers.
     """
-    from transientcam_moments.biasing import smallest_eigenvalue
-
     planes, trailing = moment_planes(b)
     xp = namespace(planes)
     smallest: Array = smallest_eigenvalue(planes) if eigenvalue is None else eigenvalue
