@@ -15,6 +15,7 @@ from transientcam.errors import (
     TransientcamError,
 )
 from transientcam.frame import Frame
+from transientcam.lease import AsyncLease, Lease
 from transientcam.stream import Stream
 from transientcam.subscription import Reconnect
 from transientcam.wire import Notice, Subscription
@@ -23,10 +24,12 @@ __version__ = version("transientcam")
 
 __all__ = [
     "AsyncCamera",
+    "AsyncLease",
     "AsyncStream",
     "Camera",
     "Frame",
     "FrameTimeout",
+    "Lease",
     "Notice",
     "ParameterError",
     "ProblemError",

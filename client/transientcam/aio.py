@@ -16,6 +16,7 @@ from transientcam.connection import answer, http_options, request_options, strea
 from transientcam.deadline import Deadline
 from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamError
 from transientcam.frame import Frame
+from transientcam.lease import AsyncLease, OnLapse
 from transientcam.subscription import (
     DEFAULT_CREDITS,
     NoticeHandler,
@@ -25,7 +26,7 @@ from transientcam.subscription import (
     subscribe_message,
 )
 from transientcam.translation import translated
-from transientcam.wire import Channel, CloseCode, Hello, Notice, Subscription
+from transientcam.wire import LEASE_HEADER, Channel, CloseCode, Hello, Notice, Subscription
 
 _T = TypeVar("_T")
 
@@ -98,6 +99,47 @@ class AsyncCamera:
     async def stop(self) -> dict[str, Any]:
         """Let the camera rest."""
         return await self._ask(rest.acquire(running=False))
+
+    def lease(
+        self,
+        holder: str,
+        *,
+        duration_s: float = 30.0,
+        on_lapse: OnLapse = "stop",
+        takeover: bool = False,
+    ) -> AsyncLease:
+        """Return a block in which nobody else changes anything.
+
+        ::
+
+            async with camera.lease("alignment on bench 2"):
+                await camera.configure(harmonics=4)
+
+        It is renewed meanwhile. What this object changes is changed under the lease, also after
+        it was lost: a `ProblemError` of type ``/problems/lease-lost`` says so then.
+
+        Parameters
+        ----------
+        holder
+            What to tell others who controls the camera.
+        duration_s
+            How long the lease lasts if this process dies.
+        on_lapse
+            Whether the capture, and with it the light, stops then.
+        takeover
+            Take it from whoever has it.
+        """
+        terms = {
+            "holder": holder,
+            "duration_s": duration_s,
+            "on_lapse": on_lapse,
+            "takeover": takeover,
+        }
+        return AsyncLease(self._ask, self._show_lease, terms)
+
+    async def safe_off(self) -> dict[str, Any]:
+        """Switch the light off, whoever holds the lease."""
+        return await self._ask(rest.document("acquisition/safe-off", method="POST"))
 
     async def latest(
         self, *, wait_s: float | None = None, after: int | None = None
@@ -186,6 +228,12 @@ class AsyncCamera:
 
     def __repr__(self) -> str:
         return f"<AsyncCamera {self.url}>"
+
+    def _show_lease(self, lease_id: str | None) -> None:
+        if lease_id is None:
+            self._http.headers.pop(LEASE_HEADER, None)
+        else:
+            self._http.headers[LEASE_HEADER] = lease_id
 
     async def _ask(self, request: rest.Request[_T]) -> _T:
         with translated(self.url):

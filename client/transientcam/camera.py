@@ -10,6 +10,7 @@ from transientcam import rest
 from transientcam.address import parse_address
 from transientcam.connection import answer, http_options, request_options
 from transientcam.frame import Frame
+from transientcam.lease import Lease, OnLapse
 from transientcam.stream import Stream
 from transientcam.subscription import (
     DEFAULT_CREDITS,
@@ -20,7 +21,7 @@ from transientcam.subscription import (
     subscribe_message,
 )
 from transientcam.translation import translated
-from transientcam.wire import Subscription
+from transientcam.wire import LEASE_HEADER, Subscription
 
 _T = TypeVar("_T")
 
@@ -114,6 +115,47 @@ class Camera:
     def stop(self) -> dict[str, Any]:
         """Let the camera rest."""
         return self._ask(rest.acquire(running=False))
+
+    def lease(
+        self,
+        holder: str,
+        *,
+        duration_s: float = 30.0,
+        on_lapse: OnLapse = "stop",
+        takeover: bool = False,
+    ) -> Lease:
+        """Return a block in which nobody else changes anything.
+
+        ::
+
+            with camera.lease("alignment on bench 2"):
+                camera.configure(harmonics=4)
+
+        It is renewed meanwhile. What this object changes is changed under the lease, also after
+        it was lost: a `ProblemError` of type ``/problems/lease-lost`` says so then.
+
+        Parameters
+        ----------
+        holder
+            What to tell others who controls the camera.
+        duration_s
+            How long the lease lasts if this process dies.
+        on_lapse
+            Whether the capture, and with it the light, stops then.
+        takeover
+            Take it from whoever has it.
+        """
+        terms = {
+            "holder": holder,
+            "duration_s": duration_s,
+            "on_lapse": on_lapse,
+            "takeover": takeover,
+        }
+        return Lease(self._ask, self._show_lease, terms)
+
+    def safe_off(self) -> dict[str, Any]:
+        """Switch the light off, whoever holds the lease."""
+        return self._ask(rest.document("acquisition/safe-off", method="POST"))
 
     def latest(self, *, wait_s: float | None = None, after: int | None = None) -> dict[str, Any]:
         """Return what is known of the newest frame; ``wait_s`` and ``after`` as for `frame`."""
@@ -235,6 +277,12 @@ class Camera:
 
     def __repr__(self) -> str:
         return f"<Camera {self.url}>"
+
+    def _show_lease(self, lease_id: str | None) -> None:
+        if lease_id is None:
+            self._http.headers.pop(LEASE_HEADER, None)
+        else:
+            self._http.headers[LEASE_HEADER] = lease_id
 
     def _ask(self, request: rest.Request[_T]) -> _T:
         with translated(self.url):

@@ -113,6 +113,29 @@ def fault(name: str) -> Request[dict[str, Any]]:
     return document("simulation/faults", method="POST", body={"fault": name})
 
 
+def take_lease(terms: Mapping[str, Any]) -> Request[dict[str, Any]]:
+    """Build the request for the lease."""
+    return document("lease", method="POST", body=terms)
+
+
+def renew_lease() -> Request[dict[str, Any]]:
+    """Build the request that lets the lease last from now on."""
+    return document("lease", method="PUT", body={})
+
+
+def give_lease_back() -> Request[dict[str, Any]]:
+    """Build the request that gives the lease back."""
+    return document("lease", method="DELETE")
+
+
+def lease_id(granted: Mapping[str, Any]) -> str:
+    """Return what is to be shown with every change."""
+    value = granted.get("lease_id")
+    if not isinstance(value, str):
+        raise ProtocolError("lease_id", value, "a string")
+    return value
+
+
 @dataclass(frozen=True, slots=True)
 class Newest:
     """Which frame is new enough: one after frame ``after``, waited for as long as ``wait_s``."""

@@ -11,9 +11,9 @@ from typing import Any, Final, TypeVar
 
 from fastapi import APIRouter, FastAPI, Request
 from fastapi.routing import APIRoute
+from transientcam.wire import LEASE_HEADER
 
 from transientcam_server import problem_kinds as kinds
-from transientcam_server.lease import HEADER
 from transientcam_server.problems import document_problems
 from transientcam_server.service import ServiceOf
 
@@ -67,7 +67,7 @@ async def admit(request: Request, service: ServiceOf) -> None:
     """Let a request of the interface in, or say what it lacks."""
     wanted = needed(request.scope["endpoint"], request.method)
     if wanted.lease:
-        service.lease.check(request.headers.get(HEADER))
+        service.lease.check(request.headers.get(LEASE_HEADER))
 
 
 def describe(app: FastAPI, routers: Iterable[APIRouter], *, prefix: str) -> None:
@@ -101,7 +101,7 @@ def _describe(operation: dict[str, Any], wanted: Needs) -> None:
 
 
 _LEASE_PARAMETER: Final[dict[str, Any]] = {
-    "name": HEADER,
+    "name": LEASE_HEADER,
     "in": "header",
     "required": False,
     "description": "`lease_id` of the lease this change is made under",

@@ -12,8 +12,6 @@ from typing import Final, Literal, Protocol
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import Problem
 
-HEADER: Final = "Transientcam-Lease"
-"""Names the lease that a request is made under."""
 DEFAULT_DURATION_S: Final = 30.0
 MIN_DURATION_S: Final = 1.0
 MAX_DURATION_S: Final = 3600.0

@@ -11,10 +11,12 @@ from transientcam import wire
 def test_the_public_names_are_these() -> None:
     assert transientcam.__all__ == [
         "AsyncCamera",
+        "AsyncLease",
         "AsyncStream",
         "Camera",
         "Frame",
         "FrameTimeout",
+        "Lease",
         "Notice",
         "ParameterError",
         "ProblemError",

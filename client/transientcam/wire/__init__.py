@@ -5,6 +5,7 @@ from transientcam.wire.arrays import DTYPES, array_document, parse_array
 from transientcam.wire.codec import ALIGNMENT, pack, unpack
 from transientcam.wire.contract import (
     FIRST_MESSAGE_WITHIN_S,
+    LEASE_HEADER,
     MAX_CLIENT_MESSAGE_BYTES,
     MAX_CREDITS,
     MAX_SERVER_MESSAGE_BYTES,
@@ -45,6 +46,7 @@ __all__ = [
     "ALIGNMENT",
     "DTYPES",
     "FIRST_MESSAGE_WITHIN_S",
+    "LEASE_HEADER",
     "MAX_CLIENT_MESSAGE_BYTES",
     "MAX_CREDITS",
     "MAX_SERVER_MESSAGE_BYTES",

@@ -10,6 +10,9 @@ MEDIA_TYPE: Final = "application/vnd.msgpack"
 MEDIA_TYPE_ALIASES: Final = ("application/msgpack", "application/x-msgpack")
 PROBLEM_MEDIA_TYPE: Final = "application/problem+json"
 
+LEASE_HEADER: Final = "Transientcam-Lease"
+"""Names the lease that a request is made under."""
+
 MAX_CLIENT_MESSAGE_BYTES: Final = 64 * 1024
 """The server reads no message longer than this."""
 MAX_SERVER_MESSAGE_BYTES: Final = 512 * 1024 * 1024

@@ -3,6 +3,7 @@
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Header, Response
+from transientcam.wire import LEASE_HEADER
 
 from transientcam_server import lease as leases
 from transientcam_server import problem_kinds as kinds
@@ -21,7 +22,7 @@ _THE_SAME: Final = LeaseRenewal()
 
 _LeaseId = Annotated[
     str | None,
-    Header(alias=leases.HEADER, description="`lease_id` of the lease"),
+    Header(alias=LEASE_HEADER, description="`lease_id` of the lease"),
 ]
 
 

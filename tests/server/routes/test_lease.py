@@ -2,7 +2,7 @@ from typing import Any
 
 import httpx
 import pytest
-from transientcam_server.lease import HEADER
+from transientcam.wire import LEASE_HEADER
 
 from tests.server.streaming import streaming
 from tests.serving import Served
@@ -16,7 +16,7 @@ def take(http: httpx.Client, **others: Any) -> dict[str, str]:
     response = http.post(PATH, json=ANNA | others)
     assert response.status_code == 201
     assert response.headers["cache-control"] == "no-store"
-    return {HEADER: response.json()["lease_id"]}
+    return {LEASE_HEADER: response.json()["lease_id"]}
 
 
 def test_without_a_lease_anybody_changes_things(http: httpx.Client) -> None:
@@ -51,7 +51,7 @@ def test_the_lease_is_given_back_by_its_holder_alone(http: httpx.Client) -> None
     mine = take(http)
 
     assert http.delete(PATH).status_code == 409
-    assert http.delete(PATH, headers={HEADER: "guessed"}).status_code == 409
+    assert http.delete(PATH, headers={LEASE_HEADER: "guessed"}).status_code == 409
     assert http.delete(PATH, headers=mine).json()["held"] is False
     assert http.put("/api/v1/acquisition", json={"running": True}).status_code == 200
     late = http.put("/api/v1/acquisition", json={"running": True}, headers=mine)
@@ -65,7 +65,7 @@ def test_renewing_keeps_the_id(http: httpx.Client) -> None:
     changed = http.put(PATH, headers=mine, json={"duration_s": 60.0, "on_lapse": "keep"})
 
     assert plain.json()["duration_s"] == 300.0
-    assert changed.json()["lease_id"] == mine[HEADER]
+    assert changed.json()["lease_id"] == mine[LEASE_HEADER]
     assert (changed.json()["duration_s"], changed.json()["on_lapse"]) == (60.0, "keep")
     assert http.put(PATH).json()["type"] == "/problems/lease-lost"
 
