@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, TypedDict
 import numpy as np
 
 from transientcam_moments._arrays import MAX_HARMONICS, Array
+from transientcam_moments._kernels.margins import LEAST_WIDTH
 from transientcam_moments._kernels.reconstructor import Reconstructed, Reconstructor
 from transientcam_moments._kernels.registry import (
     LEAST_PIXELS,
@@ -48,9 +49,18 @@ __all__ = [
     "state",
 ]
 
-LANES = ("pisarenko", "levinson", "density", "smallest_eigenvalue", "reconstruct")
+LANES = (
+    "pisarenko",
+    "smallest_eigenvalue",
+    "smooth",
+    "measure",
+    "separate",
+    "levinson",
+    "density",
+    "reconstruct",
+)
+_SINGLE_ONLY = ("smooth", "measure", "separate", "reconstruct")
 
-_LEAST_WIDTH = 32
 MOST_ROOTS = 8
 """The largest m with lanes for eigenvalues and returns."""
 
@@ -100,7 +110,8 @@ def compile(  # noqa: A001  # tm.kernels.compile says it best, and the builtin i
         Orders m, each 1 to 32, the most urgent first. Above 8 there are lanes for coefficients and
         densities only.
     precisions : sequence of {"float32", "float64"}
-        Most urgent first; all orders of one before the next.
+        Most urgent first; all of one order before the next. Single precision uses the lanes for
+        double where it isn't enough.
     progress : callable, optional
         Called as ``progress(done, total, name)`` before each lane and after the last.
 
@@ -171,7 +182,7 @@ def reconstructor(
     """
     lane = REGISTRY.compiled.get(Key("reconstruct", harmonics, "f"))
     usual = (settings.takes, settings.keep, settings.estimator) == (1, "harmonics", "pisarenko")
-    if lane is None or not usual or shape[1] < _LEAST_WIDTH or math.prod(shape) < LEAST_PIXELS:
+    if lane is None or not usual or shape[1] < LEAST_WIDTH or math.prod(shape) < LEAST_PIXELS:
         return None
     gain = np.ones(harmonics + 1) if calibration is None else np.asarray(calibration)
     if gain.shape not in ((harmonics + 1,), (harmonics + 1, *shape)):
@@ -193,21 +204,23 @@ def _keys(harmonics: Sequence[int], precisions: Sequence[str]) -> list[Key]:
     for precision in precisions:
         if precision not in PRECISION_NAMES:
             raise ParameterError("precisions", precision, "float32 or float64")
-    return [
+    keys = [
         Key(name, m, PRECISION_NAMES[precision])
-        for precision in precisions
         for m in dict.fromkeys(harmonics)
+        for precision in precisions
         for name in LANES
         if _is_offered(name, m, precision)
     ]
+    # whoever wants a workspace waits for it; all others gain from the lanes
+    return sorted(keys, key=lambda key: key.name == "reconstruct")
 
 
 def _is_offered(name: str, m: int, precision: str) -> bool:
     """Say whether there is such a lane; the planar statement does all orders."""
-    if name == "reconstruct" and precision != "float32":
+    if name in _SINGLE_ONLY and precision != "float32":
         return False
     # a characteristic polynomial with more roots underflows where they cluster
-    return m <= MOST_ROOTS or name in ("levinson", "density")
+    return m <= MOST_ROOTS or name not in ("pisarenko", "smallest_eigenvalue", "reconstruct")
 
 
 def _compile(keys: list[Key], progress: Progress | None, go_on: Callable[[], bool]) -> None:

@@ -137,6 +137,10 @@ def separate(returns: Returns, threshold: float = DIRECT_THRESHOLD) -> Separatio
     in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
     xp = namespace(returns.weight)
     weights = returns.weight
+    if isinstance(weights, np.ndarray) and weights.dtype == np.float32:
+        lane = _kernels.lookup("separate", weights.shape[0], weights[0].size)
+        if lane is not None:
+            return Separation(*lane(returns.phase_rad, weights, threshold))
     enough = threshold * weights.max(axis=0)
     direct = xp.zeros_like(weights[0])
     phase = xp.full(weights[0].shape, np.nan, dtype=weights.dtype)

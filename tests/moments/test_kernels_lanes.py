@@ -391,3 +391,80 @@ def test_blocks_cover_every_pixel_once_and_none_is_tiny(stop: int) -> None:
     assert cuts[-1][1] == stop
     assert all(end == begin for (_, end), (begin, _) in itertools.pairwise(cuts))
     assert min(end - begin for begin, end in cuts) >= min(stop, 64)
+
+
+@pytest.mark.parametrize("zeroth", ["low-frequency", "on-off", "estimated"])
+@pytest.mark.parametrize("m", ORDERS)
+def test_raw_images_are_measured_as_by_the_planar_statement(m: int, zeroth: str) -> None:
+    images = 4 * m + {"low-frequency": 4, "on-off": 2, "estimated": 0}[zeroth]
+    raw = np.random.default_rng(m).integers(0, 65536, (images, 23, 37)).astype(np.uint16)
+
+    found = tm.measure(raw, zeroth=zeroth)
+
+    with without_lanes():
+        planar = tm.measure(raw, zeroth=zeroth)
+    assert found.dtype == planar.dtype
+    assert np.allclose(found, planar, rtol=1e-6)
+
+
+def test_takes_are_averaged_by_the_planar_statement() -> None:
+    raw = np.random.default_rng(0).integers(0, 4096, (3, 16, 9, 40)).astype(np.uint16)
+
+    found = tm.measure(raw.reshape(48, 9, 40), takes=3)
+
+    with without_lanes():
+        assert np.array_equal(found, tm.measure(raw.reshape(48, 9, 40), takes=3))
+
+
+@pytest.mark.parametrize("sigma_px", [0.3, 0.6, 2.5])
+@pytest.mark.parametrize("shape", [(1, 64), (3, 32), (23, 37), (60, 81)])
+def test_images_are_smoothed_as_by_the_planar_statement(
+    shape: tuple[int, int], sigma_px: float
+) -> None:
+    b = varied_moments(3, np.complex64, pixels=5000)[:, : shape[0] * shape[1]]
+    b = b.reshape(4, *shape)
+
+    found = tm.smooth(b, sigma_px)
+
+    with without_lanes():
+        planar = tm.smooth(b, sigma_px)
+    assert found.dtype == planar.dtype
+    assert np.abs(found - planar).max() < 1e-6 * np.abs(b).max()
+
+
+def test_a_pixel_that_is_not_finite_counts_as_nothing_for_its_neighbours() -> None:
+    b = varied_moments(3, np.complex64, pixels=1000).reshape(4, 25, 40)
+    b[2, 7, 9], b[0, 0, 39] = np.nan, np.inf
+
+    found = tm.smooth(b)
+
+    with without_lanes():
+        assert np.array_equal(found, tm.smooth(b), equal_nan=True)
+    assert np.isfinite(found).all(axis=0).sum() == 998
+
+
+@pytest.mark.parametrize("shape", [(4, 40, 20), (4, 300), (2, 4, 25, 40)])
+def test_images_no_lane_takes_are_smoothed_all_the_same(shape: tuple[int, ...]) -> None:
+    if len(shape) < 3:
+        shape = (*shape[:1], 10, shape[1] // 10)
+    b = np.random.default_rng(0).normal(size=shape).astype(np.complex64)
+
+    found = tm.smooth(b)
+
+    with without_lanes():
+        assert np.array_equal(found, tm.smooth(b))
+
+
+@pytest.mark.parametrize("threshold", [0.0, 0.1, 0.7, 1.0])
+@pytest.mark.parametrize("m", ORDERS)
+def test_light_is_separated_as_by_the_planar_statement(m: int, threshold: float) -> None:
+    b, _ = special_moments(m, np.complex64)
+    returns = tm.pisarenko(b)
+
+    found = tm.separate(returns, threshold)
+
+    with without_lanes():
+        planar = tm.separate(returns, threshold)
+    for one, other in zip(found, planar, strict=True):
+        assert one.dtype == other.dtype
+        assert np.allclose(one, other, rtol=1e-5, atol=1e-37, equal_nan=True)

@@ -17,6 +17,14 @@ The lanes and their signatures, each that of the planar statement it stands besi
 
 ``pisarenko(b, eigenvalue (...) or None) -> phase_rad, weight (m, ...), uniform, count (...)``
 
+For whole frames in single precision, found by `lookup`:
+
+``measure(images (N, ...) uint16, zeroth) -> moments (m+1, ...)``
+
+``smooth(moments (m+1, H, W), taps) -> (m+1, H, W)``, or None where a moment isn't finite
+
+``separate(phase (m, ...), weight (m, ...), threshold) -> direct, indirect, phase (...)``
+
 All take ``spread=`` to do parts of the pixels on other threads (see ``spread``).
 Importing this package imports no compiler: numba is imported by the thread that compiles.
 """
@@ -28,7 +36,7 @@ import numpy as np
 
 from transientcam_moments._kernels.registry import LEAST_PIXELS, PRECISIONS, REGISTRY, Key
 
-__all__ = ["find"]
+__all__ = ["find", "lookup"]
 
 
 def find(name: str, planes: object) -> Callable[..., Any] | None:
@@ -54,3 +62,8 @@ def find(name: str, planes: object) -> Callable[..., Any] | None:
     if precision is None or planes.size < LEAST_PIXELS * planes.shape[0]:
         return None
     return REGISTRY.compiled.get(Key(name, planes.shape[0] - 1, precision))
+
+
+def lookup(name: str, m: int, pixels: int) -> Callable[..., Any] | None:
+    """Return a lane of order m for so many pixels in single precision, or None, as `find` does."""
+    return None if pixels < LEAST_PIXELS else REGISTRY.compiled.get(Key(name, m, "f"))

@@ -5,6 +5,7 @@ from typing import Any
 
 from transientcam_moments._kernels.density import density_lane
 from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue_lane
+from transientcam_moments._kernels.frames import measure_lane, separate_lane, smooth_lane
 from transientcam_moments._kernels.levinson import levinson_lane
 from transientcam_moments._kernels.pisarenko import pisarenko_lane
 from transientcam_moments._kernels.reconstruct import reconstruct_lane
@@ -15,6 +16,9 @@ LANES: dict[str, Callable[[int, str], Callable[..., Any]]] = {
     "smallest_eigenvalue": smallest_eigenvalue_lane,
     "levinson": levinson_lane,
     "density": density_lane,
+    "measure": measure_lane,
+    "smooth": smooth_lane,
+    "separate": separate_lane,
     "reconstruct": reconstruct_lane,
 }
 

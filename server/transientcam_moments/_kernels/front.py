@@ -64,11 +64,12 @@ def measure(
 @njit(nogil=True, error_model="numpy")
 def smooth(
     moments: Any, taps: Any, weight: Any, rows: Any, out: Any, width: int, start: int, stop: int
-) -> None:
+) -> bool:
     """Smooth rows start..stop of all planes (n, H * 2 W), real and imaginary parts interleaved.
 
     ``weight`` (H * 2 W) normalises, ``rows`` (2 W + 4 R + lanes) is room for a row with 2 R zeros
-    before and behind it.
+    before and behind it. Returns whether every moment is finite; where one isn't, neither is what
+    is near it.
     """
     one = simd.ones(weight, 4)  # a tap is spread once for four registers
     step = simd.width(one)
@@ -76,6 +77,7 @@ def smooth(
     length = 2 * width
     height = weight.shape[0] // length
     margin = 2 * radius
+    poison = one * 0.0
     for j in range(moments.shape[0]):
         plane, smoothed = moments[j], out[j]
         for y in range(start, stop):
@@ -86,6 +88,7 @@ def smooth(
                 for k in range(low, high + 1):
                     total = total + taps[radius + k] * simd.load(one, plane, (y + k) * length + x)
                 simd.store(rows, margin + x, total)
+                poison = poison + simd.load(one, plane, y * length + x) * 0.0
             for left in range(0, length, step):
                 x = min(left, length - step)
                 total = one * 0.0
@@ -93,3 +96,4 @@ def smooth(
                     total = total + taps[k] * simd.load(one, rows, x + 2 * k)
                 p = y * length + x
                 simd.store(smoothed, p, total * simd.load(one, weight, p))
+    return not simd.some(~(poison >= 0.0))

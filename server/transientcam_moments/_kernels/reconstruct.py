@@ -3,12 +3,11 @@
 from collections.abc import Callable
 from typing import Any
 
-from transientcam_moments._kernels import back, front
+from transientcam_moments._kernels import back
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.entries import (
     BYTES,
     COUNTS,
-    IMAGES,
     PIXELS,
     PLACES,
     REAL,
@@ -17,6 +16,7 @@ from transientcam_moments._kernels.entries import (
     order_type,
     real_arrays,
 )
+from transientcam_moments._kernels.frames import measure_entry, separate_entry, smooth_entry
 from transientcam_moments._kernels.levinson import levinson_entry
 from transientcam_moments._kernels.pisarenko import half_turns, returns_entry
 from transientcam_moments._kernels.reconstructor import Entries, Reconstructor
@@ -39,13 +39,8 @@ def reconstruct_entries(m: int, precision: str) -> Entries:
         precision=precision,
         turns=half_turns(m, precision),
         wide_turns=half_turns(m, "d"),
-        measure=entry(
-            front.measure,
-            order, IMAGES, PIXELS, cplx[2], PIXELS, REAL, cplx[2], BYTES, PIXELS, PIXELS,
-        ),
-        smooth=entry(
-            front.smooth, planes, plane, plane, plane, planes, PIXELS, PIXELS, PIXELS
-        ),
+        measure=measure_entry(m),
+        smooth=smooth_entry(),
         eigenvalue=eigenvalue_entry(m, precision),
         judge=entry(
             back.judge,
@@ -54,10 +49,7 @@ def reconstruct_entries(m: int, precision: str) -> Entries:
         ),
         levinson=levinson_entry(m, precision),
         returns=returns_entry(m, precision),
-        separate=entry(
-            back.separate,
-            order, planes, planes, BYTES, plane, plane, plane, REAL, REAL, PIXELS, PIXELS,
-        ),
+        separate=separate_entry(m),
         gather=entry(
             back.gather,
             order, cplx[2], plane, plane, REAL, complex_arrays("d")[2], PLACES, PIXELS,

@@ -6,13 +6,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from transientcam_moments._kernels.careful import redo
+from transientcam_moments._kernels.margins import normalisation, row_length
+from transientcam_moments._kernels.registry import LEAST_PIXELS
 from transientcam_moments._kernels.spread import Spread, at_once, blocks
 from transientcam_moments.errors import ShapeError
 
 _ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}
 _IMAGES = {"low-frequency": 4, "on-off": 2, "estimated": 0}
 _ROOM = 1024  # pixels that are redone in double precision at a time
-_LANES = 64
 
 
 class Entries(NamedTuple):
@@ -112,7 +113,7 @@ class Reconstructor:
         m, pixels = len(entries.order), shape[0] * shape[1]
         real = np.dtype(entries.precision)
         cplx = np.result_type(real, np.complex64)
-        self._prepare_smoothing(taps.astype(real), np.asarray(inverse), cplx)
+        self._prepare_smoothing(taps, np.asarray(inverse), cplx)
         self._calibrated = np.empty((m + 1, pixels), cplx)
         self._saturated = np.empty(pixels, np.uint8)
         self._eigenvalue = np.empty(pixels, real)
@@ -230,30 +231,25 @@ class Reconstructor:
         """Room for a row between two zero margins; each part of the image has its own."""
         row = self._rows.get(start)
         if row is None:
-            length = 2 * self._shape[1] + 2 * (self._taps.size - 1) + _LANES
-            row = self._rows[start] = np.zeros(length, self._taps.dtype)
+            length = row_length(self._shape[1], self._taps.size)
+            row = self._rows[start] = np.zeros(length, np.float32)
         return row
 
     def _prepare_smoothing(self, taps: Any, inverse: Any, cplx: Any) -> None:
         """Absent pixels count as nothing for their neighbours, and stay NaN themselves."""
         height, width = self._shape
-        self._taps, self._rows = taps, dict[int, Any]()
+        self._taps, self._rows = taps.astype(np.float32), dict[int, Any]()
         planes = np.broadcast_to(
             inverse.reshape((len(inverse), -1)).astype(cplx), (len(inverse), height * width)
         )
         self._stride = 0 if inverse.ndim == 1 else 1
-        self._inverse = np.array(planes if self._stride else planes[:, :_LANES], order="C")
+        self._inverse = np.array(planes if self._stride else planes[:, :LEAST_PIXELS], order="C")
         present = np.isfinite(planes).all(axis=0).reshape(self._shape)
         if taps.size == 1:
             return
         if self._stride:
             self._inverse[:, ~present.reshape(-1)] = 0
-        share = present.astype(float)
-        for axis in (0, 1):
-            share = np.apply_along_axis(_blurred, axis, share, taps.astype(float))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            weight = np.where(present, 1 / share, np.nan)
-        self._weight = np.repeat(weight.reshape(-1), 2).astype(taps.dtype)
+        self._weight = normalisation(present, taps)
 
     def _redo(self) -> None:
         """Redo in double precision what doesn't reproduce its moments."""
@@ -268,7 +264,7 @@ class Reconstructor:
             )  # fmt: skip
             if not found:
                 return
-            stop = -(-found // _LANES) * _LANES
+            stop = -(-found // LEAST_PIXELS) * LEAST_PIXELS
             e.wide_eigenvalue(e.order, moments, 0, uniform, 0, stop)
             ill = e.wide_returns(
                 e.order, e.wide_turns, moments, uniform, 0, uniform, phase, weight, count,
@@ -283,8 +279,3 @@ class Reconstructor:
             )  # fmt: skip
             self.redone += found
             begin = int(self._places[found - 1]) + 1
-
-
-def _blurred(row: Any, taps: Any) -> Any:
-    radius = taps.size // 2
-    return np.convolve(row, taps)[radius : radius + row.size]

@@ -1,0 +1,29 @@
+"""What smoothing needs at the borders of an image."""
+
+from typing import Any
+
+import numpy as np
+
+from transientcam_moments._kernels.registry import LEAST_PIXELS
+
+LEAST_WIDTH = LEAST_PIXELS // 2  # of an image: its rows hold real and imaginary parts
+
+
+def row_length(width: int, taps: int) -> int:
+    """Return the room that smoothing needs for a row: margins for the taps, and for a register."""
+    return 2 * width + 2 * (taps - 1) + LEAST_PIXELS
+
+
+def normalisation(present: Any, taps: Any) -> Any:
+    """Return one over the weights that pixels which are there have, NaN for those that aren't."""
+    share = present.astype(float)
+    for axis in (0, 1):
+        share = np.apply_along_axis(_blurred, axis, share, taps)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        weight = np.where(present, 1 / share, np.nan)
+    return np.repeat(weight.reshape(-1), 2).astype(np.float32)
+
+
+def _blurred(row: Any, taps: Any) -> Any:
+    radius = taps.size // 2
+    return np.convolve(row, taps)[radius : radius + row.size]
