@@ -1,6 +1,6 @@
 """Open a camera by its name: ``usb``, ``usb:SERIAL``, ``sim:SCENE?width=320&height=240``."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, get_args
@@ -21,6 +21,7 @@ from transientcam_driver.simulation.build import (
 )
 from transientcam_driver.simulation.clock import Clock, RealClock
 from transientcam_driver.simulation.device_profile import PROFILES
+from transientcam_driver.simulation.effects import CHOICES, EFFECTS
 from transientcam_driver.simulation.scene import Background, Scene, TimeZero
 from transientcam_driver.usb import open_transport
 
@@ -28,6 +29,7 @@ DEFAULT_SPEC = "sim:mirrors"
 _OF_FILE = f"{MEASURED}:"
 _OPTIONS_OF_FILE = ("background", "time_zero")
 _OPTIONS = ("width", "height", "noise", "seed", "device", *_OPTIONS_OF_FILE)
+_EFFECTS = tuple(effect.name for effect in EFFECTS if effect.optional)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,7 @@ class CameraSpec:
     noise: bool = True
     seed: int | None = None
     device: str | None = None
+    effects: dict[str, str] = field(default_factory=dict)
     background: Background = "none"
     time_zero: TimeZero = "start"
 
@@ -57,7 +60,8 @@ def open_camera(spec: str = DEFAULT_SPEC, *, clock: Clock | None = None) -> Came
         ``usb``, ``usb:SERIAL``, or ``sim:SCENE`` with the name of a built-in scene, a path to a
         scene's .toml, or ``measured:PATH.npz``. A simulated camera takes ``?width=640&height=480``
         (163 x 120, 320 x 240 or 640 x 480), ``noise=off``, ``seed=3`` and ``device=prototype`` (or
-        ``ideal``) in place of the scene's; a measured one also ``background=median`` and
+        ``ideal``) in place of the scene's, and any effect's name, as in ``ambient=on`` or
+        ``mixed-pixels=off``; a measured one also ``background=median`` and
         ``time_zero=peak``.
     clock
         The time a simulated camera lives in; the world's by default.
@@ -75,11 +79,8 @@ def open_camera(spec: str = DEFAULT_SPEC, *, clock: Clock | None = None) -> Came
     if wanted.scene is None:
         return Camera(lambda serial: open_transport(serial or wanted.serial), clock=clock)
     clock = clock or RealClock()
-    scene = _scene(wanted)
-    if wanted.device is not None:
-        scene = replace(scene, device=PROFILES[wanted.device])
     device, simulation = build(
-        scene if wanted.noise else without_noise(scene),
+        scene_of(wanted),
         width=wanted.width,
         height=wanted.height,
         seed=wanted.seed,
@@ -105,8 +106,9 @@ def parse_spec(spec: str) -> CameraSpec:
     scene, _, query = rest.partition("?")
     options = dict(parse_qsl(query, keep_blank_values=True))
     for name in options:
-        if name not in _OPTIONS:
-            raise SpecError(spec, f"unknown option {name!r}; known are {', '.join(_OPTIONS)}")
+        if name not in _OPTIONS and name not in _EFFECTS:
+            known = ", ".join((*_OPTIONS, *_EFFECTS))
+            raise SpecError(spec, f"unknown option {name!r}; known are {known}")
     width, height = _resolution(spec, options)
     if not scene.startswith(_OF_FILE) and not options.keys().isdisjoint(_OPTIONS_OF_FILE):
         raise SpecError(spec, f"{', '.join(_OPTIONS_OF_FILE)} belong to sim:measured:PATH.npz")
@@ -117,9 +119,28 @@ def parse_spec(spec: str) -> CameraSpec:
         noise=_choice(spec, options, "noise", ("on", "off")) == "on",
         seed=_integer(spec, options, "seed") if "seed" in options else None,
         device=_choice(spec, options, "device", tuple(PROFILES)) if "device" in options else None,
+        effects={
+            name: _choice(spec, options, name, CHOICES) for name in _EFFECTS if name in options
+        },
         background=_choice(spec, options, "background", get_args(Background)),
         time_zero=_choice(spec, options, "time_zero", get_args(TimeZero)),
     )
+
+
+def scene_of(wanted: CameraSpec) -> Scene:
+    """Load the scene of a simulated camera, changed as its name asks for.
+
+    Raises
+    ------
+    SceneError
+        The scene says something that cannot be.
+    """
+    scene = _scene(wanted)
+    if wanted.device is not None:
+        scene = replace(scene, device=PROFILES[wanted.device])
+    if not wanted.noise:
+        scene = without_noise(scene)
+    return replace(scene, effects=scene.effects | wanted.effects)
 
 
 def _scene(wanted: CameraSpec) -> Scene:

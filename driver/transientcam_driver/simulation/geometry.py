@@ -4,6 +4,7 @@ Lengths in m; x points right, y away from the camera, z up.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +67,12 @@ class Rectangle:
         reflected: Points = direction - 2 * (direction @ self.normal)[..., None] * self.normal
         return reflected
 
+    @cached_property
+    def box(self) -> tuple[Points, Points]:
+        """Lowest and highest coordinates."""
+        corners = self.extent()
+        return corners.min(axis=0), corners.max(axis=0)
+
     def moved(self, by: Points) -> "Rectangle":
         """Return it elsewhere."""
         return replace(self, centre=self.centre + by)
@@ -99,7 +106,7 @@ class Rectangle:
         )
 
     def between_cells(self, points: Points, rows: int, columns: int) -> Bilinear:
-        """Interpolate between the cells' centres; beyond the outermost, go on in a straight line."""
+        """Interpolate between the cells' centres, and go on in a straight line beyond them."""
         offset = points - self.centre
         x = offset @ self.right / (self.width / 2)
         y = offset @ self.up / (self.height / 2)
@@ -141,9 +148,15 @@ class Rectangle:
 
     def hit(self, start: Points, end: Points) -> NDArray[np.float64]:
         """Fraction of the way at which segments hit the rectangle; infinity where they miss."""
-        fraction, x, y = self.crossing(start, end)
-        inside = (np.abs(x) <= 1) & (np.abs(y) <= 1) & (fraction > _CLEAR)
-        return np.where(inside, fraction, np.inf)
+        before = (start - self.centre) @ self.normal
+        after = (end - self.centre) @ self.normal
+        at = np.full(before.shape, np.inf)
+        crosses = before * after <= 0  # of all segments, few pass the plane
+        if crosses.any():
+            fraction, x, y = self.crossing(start[crosses], end[crosses])
+            inside = (np.abs(x) <= 1) & (np.abs(y) <= 1) & (fraction > _CLEAR)
+            at[crosses] = np.where(inside, fraction, np.inf)
+        return at
 
 
 @dataclass(frozen=True)
@@ -152,6 +165,11 @@ class Ellipsoid:
 
     centre: Points
     radii: Points
+
+    @cached_property
+    def box(self) -> tuple[Points, Points]:
+        """Lowest and highest coordinates."""
+        return self.centre - self.radii, self.centre + self.radii
 
     def moved(self, by: Points) -> "Ellipsoid":
         """Return it elsewhere."""
@@ -175,18 +193,23 @@ class Ellipsoid:
 
     def hit(self, start: Points, end: Points) -> NDArray[np.float64]:
         """Fraction of the way at which segments enter or leave it; infinity where they miss."""
-        origin = (start - self.centre) / self.radii
-        way = (end - start) / self.radii
-        # |origin + fraction way| = 1
-        a = np.einsum("...c,...c->...", way, way)
-        b = np.einsum("...c,...c->...", origin, way)
-        c = np.einsum("...c,...c->...", origin, origin) - 1
+        # |origin + fraction way| = 1, one coordinate after the other
+        a, b, c = (np.zeros(np.broadcast_shapes(start.shape, end.shape)[:-1]) for _ in range(3))
+        for axis in range(3):
+            radius = self.radii[axis]
+            origin = (start[..., axis] - self.centre[axis]) / radius
+            way = (end[..., axis] - start[..., axis]) / radius
+            a, b, c = a + way * way, b + origin * way, c + origin * origin
+        c = c - 1
         discriminant = b * b - a * c
-        with np.errstate(divide="ignore", invalid="ignore"):
-            root = np.sqrt(discriminant)  # NaN where the line misses
+        at = np.full(discriminant.shape, np.inf)
+        met = discriminant > 0
+        if met.any():
+            a, b, root = a[met], b[met], np.sqrt(discriminant[met])
             first, second = (-b - root) / a, (-b + root) / a
-            at = np.where(first > _CLEAR_OF_CURVED, first, second)
-            return np.where(at > _CLEAR_OF_CURVED, at, np.inf)
+            ahead = np.where(first > _CLEAR_OF_CURVED, first, second)
+            at[met] = np.where(ahead > _CLEAR_OF_CURVED, ahead, np.inf)
+        return at
 
     def cells(self, edge_m: float) -> Cells:
         """Cut it along equal steps of height and of longitude."""
@@ -246,7 +269,7 @@ def _middles(count: int) -> NDArray[np.float64]:
 def _place(
     coordinate: NDArray[np.float64], count: int
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """The cell below a coordinate from -1 to 1, and how far on the way to the next."""
+    """Find the cell below a coordinate from -1 to 1, and how far on the way to the next."""
     place = (coordinate + 1) / 2 * count - 0.5
     cell = np.clip(np.floor(place), 0, max(0, count - 2)).astype(np.intp)
     return cell, place - cell if count > 1 else np.zeros_like(place)

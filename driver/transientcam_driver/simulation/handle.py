@@ -1,7 +1,9 @@
 """The simulated world as a program sees it: its truth, and its faults."""
 
 from transientcam_driver.errors import CameraError
+from transientcam_driver.sequence import Sequence
 from transientcam_driver.simulation.device import EmulatedDevice
+from transientcam_driver.simulation.explain import Explanation
 from transientcam_driver.simulation.faults import Fault
 from transientcam_driver.simulation.responses import Truth
 from transientcam_driver.simulation.sensor import Sensor
@@ -25,6 +27,10 @@ class Simulation:
     def truth(self) -> Truth:
         """Ground truth of the scene, at the exposure set."""
         return self._world.truth()
+
+    def explain(self, sequence: Sequence | None = None) -> Explanation:
+        """Say what each effect makes of the scene and a sequence, by default the one set."""
+        return self._world.explain(self.scene, sequence)
 
     @property
     def sensor(self) -> Sensor:

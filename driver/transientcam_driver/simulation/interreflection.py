@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_driver.simulation.geometry import Points
-from transientcam_driver.simulation.light import Lit, image_lights, light_on, scatter_of
+from transientcam_driver.simulation.light import Lit, image_lights, light_on, normals_at, scatter_of
 from transientcam_driver.simulation.patches import Patches, form_factors
 from transientcam_driver.simulation.responses import BIN_S
 from transientcam_driver.simulation.scene import Scene
@@ -146,11 +146,12 @@ def _direct(scene: Scene, patches: Patches) -> tuple[NDArray[np.float64], NDArra
     ).reshape(-1, 3)
     surface = np.repeat(patches.surface, _SAMPLES**2)
     points = _onto(scene, points, surface)
+    normal = normals_at(scene, points, surface)
     lights = tuple(image_lights(scene))
     shape = (len(lights), len(patches), _SAMPLES**2)
     delay_s, radiosity = np.zeros(shape), np.zeros(shape)
     for k, light in enumerate(lights):
-        length_m, irradiance = light_on(scene, light, points, surface)
+        length_m, irradiance = light_on(scene, light, points, normal)
         delay_s[k] = length_m.reshape(shape[1:]) / SPEED_OF_LIGHT_M_S
         radiosity[k] = irradiance.reshape(shape[1:]) * patches.albedo[:, None] / _SAMPLES**2
     return delay_s, radiosity
@@ -240,7 +241,7 @@ class Interreflection:
         return result
 
     def _between(self, patches: Patches) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """The patches around what each pixel sees, and the weights to interpolate with."""
+        """Find the patches around what each pixel sees, and the weights to interpolate with."""
         count = len(self._lit.surface)
         index, weights = np.zeros((count, 4), dtype=np.intp), np.zeros((count, 4))
         for surface, cells in patches.cells.items():

@@ -7,6 +7,7 @@ within its rectangle and nothing stands in between.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,51 +104,80 @@ def sparse(scene: Scene, lit: Lit, *, width: int, height: int) -> SparseResponse
     )
 
 
-def camera_rays(
-    view: Viewpoint, *, width: int, height: int, shift: tuple[float, float] = (0.0, 0.0)
-) -> Points:
-    """Return unit vectors through the pixels' centres, row by row from the top.
+def camera_rays(view: Viewpoint, *, width: int, height: int) -> Points:
+    """Return unit vectors through the pixels' centres, row by row from the top."""
+    columns, rows = np.meshgrid(np.arange(width), np.arange(height))
+    return rays_through(view, columns.ravel(), rows.ravel(), width=width, height=height)
 
-    ``shift`` moves them within their pixels, by a share of a pixel right and down.
-    """
+
+def rays_through(
+    view: Viewpoint,
+    column: NDArray[Any],
+    row: NDArray[Any],
+    *,
+    width: int,
+    height: int,
+) -> Points:
+    """Return unit vectors through places on the sensor; whole numbers are pixels' centres."""
     forward = view.look_at_m - view.position_m
     forward = forward / np.linalg.norm(forward)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     up = np.cross(right, forward)
     half = np.tan(np.radians(view.field_of_view_deg) / 2)
-    x = half * (2 * (np.arange(width) + 0.5 + shift[0]) / width - 1)
-    y = half * (height / width) * (1 - 2 * (np.arange(height) + 0.5 + shift[1]) / height)
-    rays = forward + x[None, :, None] * right + y[:, None, None] * up
-    directions: Points = (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).reshape(-1, 3)
+    x = half * (2 * (column + 0.5) / width - 1)
+    y = half * (height / width) * (1 - 2 * (row + 0.5) / height)
+    rays = forward + x[:, None] * right + y[:, None] * up
+    directions: Points = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
     return directions
 
 
 def light_rays(scene: Scene, directions: Points) -> Lit:
     """Follow rays from the camera to what they see, and light to there."""
     lights = tuple(image_lights(scene))
-    count = len(directions)
+    parts = []
+    for first in range(0, max(1, len(directions)), _BLOCK):
+        rays = directions[first : first + _BLOCK]
+        seen = first_scattering(scene, _camera(scene).position_m, rays)
+        parts.append(light_seen(scene, lights, seen, rays=len(rays)))
+    if len(parts) == 1:
+        return parts[0]
+    return joined(parts)
+
+
+def joined(parts: list[Lit]) -> Lit:
+    """Put rays behind others."""
+    return Lit(
+        np.concatenate([part.surface for part in parts]),
+        np.concatenate([part.point for part in parts]),
+        np.concatenate([part.distance_m for part in parts]),
+        np.concatenate([part.reflectance for part in parts]),
+        np.concatenate([part.delay_s for part in parts], axis=1),
+        np.concatenate([part.weight for part in parts], axis=1),
+    )
+
+
+def light_seen(scene: Scene, lights: tuple[ImageLight, ...], seen: Seen, *, rays: int) -> Lit:
+    """Follow light to what rays end on."""
     lit = Lit(
-        np.full(count, -1),
-        np.zeros((count, 3)),
-        np.zeros(count),
-        np.zeros(count),
-        np.zeros((len(lights), count)),
-        np.zeros((len(lights), count)),
+        np.full(rays, -1),
+        np.zeros((rays, 3)),
+        np.zeros(rays),
+        np.zeros(rays),
+        np.zeros((len(lights), rays)),
+        np.zeros((len(lights), rays)),
     )
     albedos = np.array([surface.reflectivity for surface in scene.surfaces])
-    for first in range(0, count, _BLOCK):
-        rays = slice(first, first + _BLOCK)
-        seen = first_scattering(scene, _camera(scene).position_m, directions[rays])
-        lit.surface[rays][seen.ray] = seen.surface
-        lit.point[rays][seen.ray] = seen.point
-        lit.distance_m[rays][seen.ray] = seen.distance_m
-        lit.reflectance[rays][seen.ray] = seen.throughput * albedos[seen.surface]
-        for k, light in enumerate(lights):
-            length_m, irradiance = light_on(scene, light, seen.point, seen.surface)
-            way_m = length_m + seen.distance_m
-            lit.delay_s[k, rays][seen.ray] = way_m / SPEED_OF_LIGHT_M_S
-            lit.weight[k, rays][seen.ray] = irradiance * lit.reflectance[rays][seen.ray]
+    reflectance = seen.throughput * albedos[seen.surface]
+    normal = normals_at(scene, seen.point, seen.surface)
+    lit.surface[seen.ray] = seen.surface
+    lit.point[seen.ray] = seen.point
+    lit.distance_m[seen.ray] = seen.distance_m
+    lit.reflectance[seen.ray] = reflectance
+    for k, light in enumerate(lights):
+        length_m, irradiance = light_on(scene, light, seen.point, normal)
+        lit.delay_s[k, seen.ray] = (length_m + seen.distance_m) / SPEED_OF_LIGHT_M_S
+        lit.weight[k, seen.ray] = irradiance * reflectance
     return lit
 
 
@@ -163,37 +193,32 @@ def first_scattering(scene: Scene, eye: Points, direction: Points) -> Seen:
     ray = np.arange(count)
     distance_m, throughput = np.zeros(count), np.ones(count)
     ended: list[tuple[NDArray[np.intp], Points, NDArray[np.intp], Points, Points]] = []
-    kinds = np.array([surface.kind for surface in scene.surfaces] + ["nothing"])
+    scatters = np.array([surface.scatters for surface in scene.surfaces] + [False])
+    reflects = np.array([surface.kind == "mirror" for surface in scene.surfaces] + [False])
     for _bounce in range(scene.mirror_bounces + 1):
         nearest = np.full(len(ray), np.inf)
         which = np.full(len(ray), -1)
         for index, surface in enumerate(scene.surfaces):
             at = _hit(surface, start, start + _FAR_M * direction)
             closer = at < nearest
-            nearest, which = np.where(closer, at, nearest), np.where(closer, index, which)
-        point = start + np.where(np.isfinite(nearest), nearest, 0.0)[:, None] * _FAR_M * direction
-        distance_m = distance_m + np.linalg.norm(point - start, axis=-1)
-        facing = _facing(scene, which, start)
-        end = np.isin(kinds[which], ("diffuse", "translucent")) & facing
+            nearest[closer], which[closer] = at[closer], index
+        length_m = np.where(which < 0, 0.0, nearest) * _FAR_M
+        point = start + length_m[:, None] * direction
+        distance_m = distance_m + length_m
+        normal = normals_at(scene, point, which)
+        facing = np.einsum("pc,pc->p", normal, direction) < 0
+        end = scatters[which] & facing
         ended.append((ray[end], point[end], which[end], distance_m[end], throughput[end]))
-        on = (kinds[which] == "mirror") & facing
+        on = reflects[which] & facing
+        if not on.any():
+            break
         ray, which, direction = ray[on], which[on], direction[on]
-        point, distance_m, throughput = point[on], distance_m[on], throughput[on]
-        for index, surface in enumerate(scene.surfaces):
-            mine = which == index
-            if mine.any():
-                direction[mine] = surface.mirror.mirrored_direction(direction[mine])
-                throughput[mine] *= surface.reflectivity
-        start = point
+        start, distance_m, throughput = point[on], distance_m[on], throughput[on]
+        for index in np.unique(which):
+            mine, surface = which == index, scene.surfaces[index]
+            direction[mine] = surface.mirror.mirrored_direction(direction[mine])
+            throughput[mine] *= surface.reflectivity
     return Seen(*(np.concatenate(parts) for parts in zip(*ended, strict=True)))
-
-
-def _facing(scene: Scene, which: NDArray[np.intp], start: Points) -> NDArray[np.bool_]:
-    """Whether rays arrive at the front of what they hit."""
-    facing = np.zeros(len(which), dtype=bool)
-    for index, surface in enumerate(scene.surfaces):
-        facing |= (which == index) & surface.shape.in_front(start)
-    return facing
 
 
 def image_lights(scene: Scene) -> Iterator[ImageLight]:
@@ -218,27 +243,31 @@ def image_lights(scene: Scene) -> Iterator[ImageLight]:
 
 
 def light_on(
-    scene: Scene, light: ImageLight, point: Points, surface: NDArray[np.intp]
+    scene: Scene, light: ImageLight, point: Points, normal: Points
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Length of the way in m, and irradiance, by one chain of mirrors at points on surfaces."""
     way = light.positions_m[0] - point
-    length_m = np.linalg.norm(way, axis=-1)
+    length_m = np.sqrt(np.einsum("pc,pc->p", way, way))
     towards = way / length_m[:, None]
-    cosine = np.einsum("pc,pc->p", towards, normals_at(scene, point, surface))
+    cosine = np.einsum("pc,pc->p", towards, normal)
     irradiance = np.maximum(cosine, 0) / length_m**2
     irradiance *= _beam(scene.light, -towards @ light.axis)
     for mirror in light.mirrors:
         irradiance *= mirror.reflectivity
-    irradiance[~_unobstructed(scene, light, point)] = 0
-    return length_m, irradiance
+    shone_at = np.flatnonzero(irradiance)
+    reached = shone_at[_unobstructed(scene, light, point[shone_at])]
+    result = np.zeros_like(irradiance)
+    result[reached] = irradiance[reached]
+    return length_m, result
 
 
 def normals_at(scene: Scene, point: Points, surface: NDArray[np.intp]) -> Points:
-    """Return the normals of the surfaces that points lie on."""
+    """Return the normals of the surfaces that points lie on; none of points on none (-1)."""
     normals = np.zeros_like(point)
-    for index in np.unique(surface):
+    for index, each in enumerate(scene.surfaces):
         mine = surface == index
-        normals[mine] = scene.surfaces[index].shape.normals(point[mine])
+        if mine.any():
+            normals[mine] = each.shape.normals(point[mine])
     return normals
 
 
@@ -250,30 +279,46 @@ def _beam(light: Light, cosine: NDArray[np.float64]) -> NDArray[np.float64]:
     return intensity
 
 
-def _unobstructed(scene: Scene, light: ImageLight, point: Points) -> NDArray[np.bool_]:
-    """Walk back from the wall over the chain of mirrors to the light."""
-    clear = np.ones(len(point), dtype=bool)
+def _unobstructed(scene: Scene, light: ImageLight, point: Points) -> NDArray[np.intp]:
+    """Walk back from points over the chain of mirrors to the light; tell which ones arrive."""
+    left = np.arange(len(point))
     start = point
     for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
         fraction = mirror.shape.hit(start, np.broadcast_to(image_m, start.shape))
-        clear &= (fraction < 1) & mirror.shape.in_front(start)
-        way = np.where(np.isfinite(fraction), fraction, 0.0)[:, None] * (image_m - start)
-        clear &= ~blocked(scene, start, start + way)
-        start = start + way
-    clear &= ~blocked(scene, start, np.broadcast_to(light.positions_m[-1], start.shape))
-    return clear
+        on = (fraction < 1) & mirror.shape.in_front(start)
+        left, start = left[on], start[on]
+        end = start + fraction[on][:, None] * (image_m - start)
+        clear = ~blocked(scene, start, end)
+        left, start = left[clear], end[clear]
+    clear = ~blocked(scene, start, np.broadcast_to(light.positions_m[-1], start.shape))
+    return left[clear]
 
 
 def blocked(scene: Scene, start: Points, end: Points) -> NDArray[np.bool_]:
     """Whether anything stands between two points; what they lie on themselves does not count."""
     blocked = np.zeros(len(start), dtype=bool)
+    if not len(start):
+        return blocked
+    low, high = _box(start, end)
     for surface in scene.surfaces:
+        least, most = surface.shape.box
+        if (most < low).any() or (least > high).any():
+            continue  # nowhere near any of the segments
         if surface.opaque is None:
             blocked |= surface.shape.hit(start, end) < 1 - 1e-9
         else:
             assert isinstance(surface.shape, Rectangle)  # noqa: S101  (stencils are)
             blocked |= blocked_by_mask(surface.shape, surface.opaque, start, end)
     return blocked
+
+
+def _box(start: Points, end: Points) -> tuple[Points, Points]:
+    """Lowest and highest coordinates of segments, all of which may end at one point."""
+    ends = end[:1] if end.strides[0] == 0 else end
+    axes = range(3)
+    low = [min(start[:, axis].min(), ends[:, axis].min()) for axis in axes]
+    high = [max(start[:, axis].max(), ends[:, axis].max()) for axis in axes]
+    return np.array(low), np.array(high)
 
 
 def _hit(surface: Surface, start: Points, end: Points) -> NDArray[np.float64]:

@@ -109,4 +109,5 @@ def _contour(corners: Points, normal: Points) -> NDArray[np.float64]:
         edge = np.where(sine > 0, angle / sine, 0.0)
     # counter-clockwise from the patch's front is clockwise around the normal of who looks at it
     total = -np.einsum("pk,pkc,pc->p", edge, cross, normal) / (2 * np.pi)
-    return np.clip(total, 0.0, 1.0)
+    clipped: NDArray[np.float64] = np.clip(total, 0.0, 1.0)
+    return clipped

@@ -1,4 +1,4 @@
-"""What is in front of the camera, as light: still or moving, computed as far as it is called for."""
+"""What is in front of the camera, as light: still or moving, as far as it is called for."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,17 +17,19 @@ from transientcam_driver.simulation.effects import (
 )
 from transientcam_driver.simulation.geometry import Rectangle
 from transientcam_driver.simulation.interreflection import Interreflection
-from transientcam_driver.simulation.light import Lit, camera_rays, light_rays, sparse
+from transientcam_driver.simulation.light import Lit, camera_rays, light_rays, rays_through, sparse
+from transientcam_driver.simulation.moving import MovingLight, MovingResponses
 from transientcam_driver.simulation.responses import BIN_S, Responses, Scatter, SparseResponses
 from transientcam_driver.simulation.scene import Scene
 
 _ROUGH_PATCHES = 6  # a side, to judge how much light interreflection is about
 _JUMP = 0.03  # of the range, from one pixel to the next: an edge
 _RAYS = 3  # a side, in a pixel at an edge
+_RAYS_MOVING = 2  # the same where it is computed for every image
 _GLANCES = 5  # moments in time at which a moving scene is looked at to judge it
 
 View = Callable[[float], "Seen"]
-"""What there is to see at a time of the device."""
+"""What there is to see at a time of the device; the same object as long as nothing changes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +117,26 @@ class SurfaceScenery:
         if not self.moves:
             seen = self._see(scene, effects)
             return lambda _time_s: seen
-        return lambda time_s: self._see(scene.at(time_s), effects)
+        moving = MovingLight(scene, self._rays, width=self._width, height=self._height)
+        last: list[tuple[float, Seen]] = []
+
+        def view(time_s: float) -> Seen:
+            tick_s = moving.tick_s(time_s)
+            if not last or last[0][0] != tick_s:
+                last[:] = [(tick_s, self._see_moving(moving.at(tick_s), effects))]
+            return last[0][1]
+
+        return view
+
+    def _see_moving(self, now: MovingResponses, effects: frozenset[str]) -> Seen:
+        size = {"width": self._width, "height": self._height}
+        responses: Responses = now
+        if MixedPixels.name in effects:
+            responses = with_mixed_pixels(now.scene, now.distance_m, now, rays=_RAYS_MOVING)
+        if DiffuseInterreflection.name in effects:
+            further = Interreflection(now.scene, now.lit, **size)
+            responses = WithInterreflection(responses, further)
+        return Seen(responses, now.reflectance.astype(np.float32))
 
     def _with(self, effects: frozenset[str]) -> Scene:
         scene = self._scene
@@ -126,6 +147,9 @@ class SurfaceScenery:
         if Scattering.name not in effects and any(each.scatter for each in scene.surfaces):
             surfaces = tuple(replace(each, scatter=None) for each in scene.surfaces)
             scene = replace(scene, surfaces=surfaces)
+        forced = DiffuseInterreflection.name in effects and not scene.transport.diffuse_bounces
+        if forced:  # on, though the scene asks for none
+            scene = replace(scene, transport=replace(scene.transport, diffuse_bounces=1))
         return scene
 
     def _lit(self, scene: Scene) -> Lit:
@@ -141,7 +165,8 @@ class SurfaceScenery:
         width, height = self._width, self._height
         responses: Responses = sparse(scene, lit, width=width, height=height)
         if MixedPixels.name in effects:
-            responses = with_mixed_pixels(scene, lit, responses, width=width, height=height)
+            distance_m = lit.distance_m.reshape(height, width)
+            responses = with_mixed_pixels(scene, distance_m, responses, rays=_RAYS)
         if DiffuseInterreflection.name in effects:
             further = Interreflection(scene, lit, width=width, height=height)
             responses = WithInterreflection(responses, further)
@@ -163,7 +188,7 @@ class WithInterreflection:
         return self._direct.moments(frequency_hz) + self._further.moments(frequency_hz)
 
     def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The direct returns, and one for all the rest at its mean delay."""
+        """Return the direct returns, and one for all the rest at its mean delay."""
         delay_s, weight = self._direct.returns()
         mean_s, rest = self._further.returns()
         mean_s = np.where(rest > 0, mean_s, np.nan)
@@ -190,25 +215,63 @@ class WithInterreflection:
         bins = np.zeros(max(int(into.max(initial=0)) + 1, shift + len(mass)))
         bins[shift : shift + len(mass)] += mass
         np.add.at(bins, into, value)
-        return first_s + BIN_S * (np.arange(len(bins)) + 0.5), bins / BIN_S
+        return np.asarray(first_s + BIN_S * (np.arange(len(bins)) + 0.5)), bins / BIN_S
 
 
 class WithMixedPixels:
-    """Responses some of whose pixels are replaced by the mean over several rays."""
+    """Responses some of whose pixels are replaced by the mean over several rays.
+
+    Parameters
+    ----------
+    base
+        The responses of all pixels.
+    at
+        Rows and columns of those to replace.
+    lit, scatter
+        What the rays see: for each place in a pixel, all of these pixels.
+    """
 
     def __init__(
-        self, base: Responses, at: tuple[NDArray[np.intp], NDArray[np.intp]], mixed: SparseResponses
+        self,
+        base: Responses,
+        at: tuple[NDArray[np.intp], NDArray[np.intp]],
+        lit: Lit,
+        scatter: Scatter | None,
     ) -> None:
-        self.kind: Literal["sparse", "dense"] = base.kind
         self._base = base
         self._at = at
-        self._mixed = mixed
+        self._lit = lit
+        self._scatter = scatter
+
+    @property
+    def kind(self) -> Literal["sparse", "dense"]:
+        """As that of the base."""
+        return self._base.kind
 
     def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
         """Those of the base, but for the pixels replaced."""
+        phasors = self._lit.weight * np.exp(2j * np.pi * frequency_hz * self._lit.delay_s)
+        if self._scatter is not None:
+            phasors *= self._scatter.transfer(frequency_hz)
         moments = self._base.moments(frequency_hz)
-        moments[self._at] = self._mixed.moments(frequency_hz)[0]
+        of_rays = phasors.sum(axis=0).reshape(-1, len(self._at[0]))
+        moments[self._at] = of_rays.mean(axis=0)
         return moments
+
+    @cached_property
+    def _mixed(self) -> SparseResponses:
+        """The pixels replaced, as an image of one row: a plane for each ray and path."""
+        count = len(self._at[0])
+        paths, rays = len(self._lit.weight), self._lit.weight.shape[1] // count
+        scatter = self._scatter
+        if scatter is not None:
+            scatter = Scatter(
+                np.tile(scatter.width_s.reshape(rays, count), (paths, 1))[:, None],
+                np.tile(scatter.decay_s.reshape(rays, count), (paths, 1))[:, None],
+            )
+        planes = (-1, 1, count)
+        delay_s, weight = self._lit.delay_s.reshape(planes), self._lit.weight.reshape(planes)
+        return SparseResponses(delay_s, weight / rays, scatter)
 
     def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """All returns; as many planes as the pixel with the most returns needs."""
@@ -226,42 +289,28 @@ class WithMixedPixels:
         return all_s, all_weight
 
     def of_pixel(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """That of the base, or of the rays in a pixel that is replaced."""
+        """Return that of the base, or of the rays in a pixel that is replaced."""
         mine = np.flatnonzero((self._at[0] == y) & (self._at[1] == x))
         return self._mixed.of_pixel(int(mine[0]), 0) if mine.size else self._base.of_pixel(x, y)
 
 
 def with_mixed_pixels(
-    scene: Scene, lit: Lit, responses: Responses, *, width: int, height: int
+    scene: Scene, distance_m: NDArray[np.float64], responses: Responses, *, rays: int
 ) -> Responses:
-    """Replace pixels at edges by the mean over a grid of rays in them."""
-    at = np.nonzero(edges(lit.distance_m.reshape(height, width))[0])
-    if not at[0].size:
+    """Replace pixels at edges by the mean over a grid of rays in them, so many a side."""
+    height, width = distance_m.shape
+    rows, columns = np.nonzero(edges(distance_m)[0])
+    if not rows.size:
         return responses
     assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
-    shifts = (2 * np.arange(_RAYS) + 1) / (2 * _RAYS) - 0.5
-    chosen = at[0] * width + at[1]
-    rays = np.concatenate(
-        [
-            camera_rays(scene.camera, width=width, height=height, shift=(right, down))[chosen]
-            for right in shifts
-            for down in shifts
-        ]
+    # ray by ray over the places in a pixel, then pixel by pixel
+    within = (2 * np.arange(rays) + 1) / (2 * rays) - 0.5
+    right, down = (grid.reshape(-1, 1) for grid in np.meshgrid(within, within))
+    through = rays_through(
+        scene.camera, (columns + right).ravel(), (rows + down).ravel(), width=width, height=height
     )
-    fine = light_rays(scene, rays)
-    count, several = len(chosen), _RAYS**2
-    spread = fine.scatter(scene)
-    by_ray = (-1, 1, count)
-    delay_s = fine.delay_s.reshape(len(fine.delay_s), several, count)
-    weight = fine.weight.reshape(delay_s.shape) / several
-    if spread is not None:  # one plane a ray and path; all of one pixel's rays differ
-        repeated = (len(fine.delay_s), 1)
-        spread = Scatter(
-            np.tile(spread.width_s.reshape(several, count), repeated).reshape(by_ray),
-            np.tile(spread.decay_s.reshape(several, count), repeated).reshape(by_ray),
-        )
-    mixed = SparseResponses(delay_s.reshape(by_ray), weight.reshape(by_ray), spread)
-    return WithMixedPixels(responses, at, mixed)
+    fine = light_rays(scene, through)
+    return WithMixedPixels(responses, (rows, columns), fine, fine.scatter(scene))
 
 
 def edges(distance_m: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:

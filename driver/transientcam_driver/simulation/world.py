@@ -1,7 +1,7 @@
 """A scene in front of the simulated sensor: from impulse responses to images."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from transientcam_driver.simulation.effects import (
     Stage,
     ThermalDrift,
 )
+from transientcam_driver.simulation.explain import ExplainedEffect, Explanation
 from transientcam_driver.simulation.responses import Truth
 from transientcam_driver.simulation.scenery import Scenery, Seen, View
 from transientcam_driver.simulation.sensor import Sensor
@@ -35,7 +36,7 @@ _AMBIENT_C = 25.0
 
 @dataclass(frozen=True, slots=True)
 class _Quadratures:
-    """Electrons of an image at phase theta: ``offset + sum_k re_k cos(k theta) + im_k sin(...)``."""
+    """Electrons at phase theta: ``offset + sum_k re_k cos(k theta) + im_k sin(k theta)``."""
 
     constant: NDArray[np.float32] | np.float32
     offset: NDArray[np.float32]
@@ -55,8 +56,8 @@ class _Quadratures:
 class _Plan:
     """What does not change between the images of a sequence.
 
-    ``looked_at`` is what was seen last, ``mean`` its brightness, and ``quadratures`` what it gives at
-    each harmonic.
+    ``looked_at`` is what was seen last, ``mean`` its brightness, and ``quadratures`` what it gives
+    at each harmonic.
     """
 
     sequence: Sequence
@@ -68,7 +69,7 @@ class _Plan:
     on_light: tuple[PlaneEffect, ...]
     on_shot: tuple[ShotEffect, ...]
     stages: tuple[Stage, ...]
-    looked_at: tuple[float, Seen] | None = None
+    looked_at: Seen | None = None
     mean: NDArray[np.float64] | None = None
     quadratures: dict[int, _Quadratures] = field(default_factory=dict)
 
@@ -191,6 +192,27 @@ class World:
             effect.name: effect.called_for(self._forced(effect, conditions)) for effect in EFFECTS
         }
 
+    def explain(self, scene: str, sequence: Sequence | None = None) -> Explanation:
+        """Say what a sequence calls for, by default the one that is set."""
+        if sequence is None:
+            sequence = self._configured().sequence
+        floor_dn = self.conditions(sequence).floor_dn
+        effects = []
+        for effect, call in zip(EFFECTS, self.calls(sequence).values(), strict=True):
+            choice = self.choice(effect)
+            explained = ExplainedEffect(
+                effect=effect.name,
+                choice=choice if effect.optional else "always",
+                called_for=bool(call.called),
+                built=choice == "on" or (choice == "auto" and bool(call.called)),
+                reason=call.reason,
+                size_dn=float(call.size_dn),
+                relative=float(call.size_dn) / floor_dn,
+                cost_s=call.cost_s * sequence.images,
+            )
+            effects.append(explained)
+        return Explanation(scene, self._device.name, sequence, floor_dn, tuple(effects))
+
     def choice(self, effect: type[Effect]) -> str:
         """Return "auto", "on" or "off"."""
         return self._effects.get(effect.name, "auto") if effect.optional else "auto"
@@ -201,7 +223,7 @@ class World:
         if device_time_s is not None or plan.looked_at is None:
             seen = plan.view(device_time_s or 0.0)
         else:
-            seen = plan.looked_at[1]
+            seen = plan.looked_at
         responses = seen.responses
         scale_dn = self._electrons_per_s * plan.sequence.exposure_s / self._sensor.gain_e_per_dn
         delay_s, weight = responses.returns()
@@ -217,7 +239,7 @@ class World:
         electrons = light.offset.copy()
         turn_rad = label.phase_rad - 2 * np.pi * label.frequency_hz * shot.delay_s
         for k, in_phase, quadrature in light.terms:
-            # the phasor of theta, by which light that is late or out of step turns with the harmonic
+            # the phasor of theta, turned back by light that is late or out of step
             phasor = np.exp(1j * k * turn_rad)
             if shot.factor != 1.0:
                 phasor *= np.conj(shot.factor)
@@ -228,18 +250,17 @@ class World:
         return electrons
 
     def _quadratures(self, plan: _Plan, harmonic: int, time_s: float) -> _Quadratures:
-        """What images of a harmonic are made of; computed anew only where the scene moves."""
-        if not self._scenery.moves:
-            time_s = 0.0
-        if plan.looked_at is None or abs(plan.looked_at[0] - time_s) > 1e-6:
-            plan.looked_at = (time_s, plan.view(time_s))
-            plan.mean = plan.looked_at[1].responses.moments(0.0).real
+        """Compute what images of a harmonic are made of; anew only where the scene moves."""
+        seen = plan.view(time_s)
+        if plan.looked_at is not seen:
+            plan.looked_at = seen
+            plan.mean = seen.responses.moments(0.0).real
             plan.quadratures.clear()
         assert plan.mean is not None  # noqa: S101  (set with looked_at)
         if harmonic not in plan.quadratures:
             frequency_hz = plan.frequencies_hz[harmonic]
             plan.quadratures[harmonic] = _Quadratures.of(
-                self._planes(plan, frequency_hz, plan.looked_at[1], plan.mean)
+                self._planes(plan, frequency_hz, seen, plan.mean)
             )
         return plan.quadratures[harmonic]
 
@@ -270,10 +291,10 @@ class World:
         return choice == "on"
 
     def _forced(self, effect: type[Effect], conditions: Conditions) -> Conditions:
-        """What an effect that is forced on judges by: a device that has it."""
+        """Give an effect that is forced on a device that has it."""
         if self.choice(effect) != "on":
             return conditions
-        return replace(conditions, device=effect.of_device(conditions.device))
+        return effect.forced_on(conditions)
 
     def _configured(self) -> _Plan:
         assert self._plan is not None, "no sequence committed"  # noqa: S101  (the firmware's order)

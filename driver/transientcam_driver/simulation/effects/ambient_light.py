@@ -1,5 +1,7 @@
 """Ambient light: unmodulated, in every image, also without the camera's own."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from transientcam_driver.simulation.effects.effect import (
@@ -32,6 +34,14 @@ class AmbientLight(PlaneEffect):
         size_dn = float(noise_e / conditions.sensor.gain_e_per_dn)
         reason = f"{conditions.ambient_e:.0f} electrons in a typical pixel of each image"
         return weigh(conditions, size_dn, reason, 0.0)
+
+    @classmethod
+    def forced_on(cls, conditions: Conditions) -> Conditions:
+        """Return conditions with ambient light: a tenth of a full well, where there is none."""
+        if conditions.ambient_white_e:
+            return conditions
+        ambient_e = 0.1 * conditions.sensor.full_well_e
+        return replace(conditions, ambient_white_e=ambient_e, ambient_e=ambient_e)
 
     def on_light(self, planes: LightPlanes) -> None:
         """Add it to what is there without the camera's light."""

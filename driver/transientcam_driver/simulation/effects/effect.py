@@ -9,8 +9,8 @@ Effects come in four kinds, by where they happen:
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -241,12 +241,13 @@ class Effect(ABC):
         """Say whether these conditions call for the effect."""
 
     @classmethod
-    def of_device(cls, device: DeviceProfile) -> DeviceProfile:
-        """Return a profile that has what this effect is about."""
+    def forced_on(cls, conditions: Conditions) -> Conditions:
+        """Return conditions that have what this effect is about."""
+        device = conditions.device
         if not cls.figures or getattr(device, cls.figures) is not None:
-            return device
-        fields = {name: getattr(device, name) for name in device.__slots__}
-        return DeviceProfile(**(fields | {cls.figures: getattr(PROTOTYPE, cls.figures)}))
+            return conditions
+        figures: dict[str, Any] = {cls.figures: getattr(PROTOTYPE, cls.figures)}
+        return replace(conditions, device=replace(device, **figures))
 
 
 class LightEffect(Effect):

@@ -13,6 +13,8 @@ class DiffuseInterreflection(LightEffect):
         """Where surfaces that scatter see each other, and enough light goes that way."""
         share = conditions.facts.indirect_share if conditions.facts else 0.0
         if not share:
-            return Call(False, "no scattering surfaces that light each other", 0.0, 0.0)
+            return Call(
+                False, "no surfaces light each other, or the scene follows no such light", 0.0, 0.0
+            )
         reason = f"about {share:.1%} of the light comes over several surfaces"
         return weigh(conditions, share * conditions.brightness_dn, reason, 0.0)

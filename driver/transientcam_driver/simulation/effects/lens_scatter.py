@@ -31,7 +31,7 @@ class LensScatter(PlaneEffect):
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
-        """Where the lens scatters more than a trace of light, brightest pixels into typical ones."""
+        """Where the lens scatters more than a trace of light."""
         scatter = conditions.device.lens_scatter
         if scatter is None or not scatter.share:
             return Call(False, "the lens of the device is clear", 0.0, 0.0)
@@ -59,7 +59,8 @@ def _spread(count: int, sigma: float) -> NDArray[np.float32]:
     reach = np.arange(-4 * count, 5 * count)
     density = np.exp(-0.5 * ((pixels[:, None] - pixels[None, :]) / sigma) ** 2)
     # normalised over all places, not only those on the sensor
-    return (density / np.exp(-0.5 * (reach / sigma) ** 2).sum()).astype(np.float32)
+    spread = density / np.exp(-0.5 * (reach / sigma) ** 2).sum()
+    return np.asarray(spread, dtype=np.float32)
 
 
 def _moves(conditions: Conditions) -> bool:

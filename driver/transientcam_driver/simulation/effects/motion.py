@@ -31,4 +31,4 @@ class MotionDuringSequence(LightEffect):
         phase_rad = 4 * np.pi * conditions.highest_hz * way_m / SPEED_OF_LIGHT_M_S
         size_dn = phase_rad * np.sqrt(facts.moving_share) * conditions.brightness_dn
         reason = f"up to {way_m * 1e3:.1f} mm during the images of one moment"
-        return weigh(conditions, size_dn, reason, cost_s)
+        return weigh(conditions, float(size_dn), reason, cost_s)

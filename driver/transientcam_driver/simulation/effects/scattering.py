@@ -1,6 +1,6 @@
 """Scattering: light enters a translucent surface and comes back later."""
 
-import numpy as np
+import math
 
 from transientcam_driver.simulation.effects.effect import Call, Conditions, LightEffect, weigh
 
@@ -22,4 +22,5 @@ class Scattering(LightEffect):
             f"{share:.0%} of the pixels see a material whose light comes back "
             f"{facts.scatter.decay_s * 1e9:.2g} ns late"
         )
-        return weigh(conditions, lost * np.sqrt(share) * conditions.brightness_dn, reason, 0.0)
+        size_dn = lost * math.sqrt(share) * conditions.brightness_dn
+        return weigh(conditions, size_dn, reason, 0.0)
