@@ -7,6 +7,12 @@
     ├── AddressUnavailable   the address cannot be listened on
     ├── MissingExtra         something optional is asked for that is not installed
     ├── InputError           a file given to `transientcam reconstruct` cannot be used
+    ├── RecordingError       something about a recording
+    │   ├── NotARecording    a file cannot be read as one
+    │   ├── DamagedFrame     a frame's bytes are not the ones that were written
+    │   └── NotConvertible   the format asked for is none that recordings are converted to
+    ├── TokenFileError       the file of tokens cannot be read or written
+    ├── UnknownToken         no token has this id
     └── Problem              a request cannot be answered; see `transientcam_server.problems`
 
 Errors of the driver and of the arithmetic become problems in one place,
@@ -84,6 +90,71 @@ class InputError(ServerError):
 
     def __str__(self) -> str:
         return f"{self.file}: {self.key} is {self.found}, but must be {self.expected}"
+
+
+class RecordingError(ServerError):
+    """Something about a recording."""
+
+
+class NotARecording(RecordingError):  # noqa: N818 - says what is wrong
+    """A file cannot be read as a recording."""
+
+    def __init__(self, file: str, reason: str) -> None:
+        super().__init__(file, reason)
+        self.file = file
+        self.reason = reason
+
+    def __str__(self) -> str:
+        return f"{self.file} is no recording that can be read: {self.reason}"
+
+
+class DamagedFrame(RecordingError):  # noqa: N818 - says what is wrong
+    """The bytes of a frame (counted from 0) are not the ones that were written."""
+
+    def __init__(self, file: str, frame: int, reason: str) -> None:
+        super().__init__(file, frame, reason)
+        self.file = file
+        self.frame = frame
+        self.reason = reason
+
+    def __str__(self) -> str:
+        return f"{self.file}: frame {self.frame} is damaged: {self.reason}"
+
+
+class NotConvertible(RecordingError):  # noqa: N818 - says what is wrong
+    """A file's suffix names no format that recordings are converted to."""
+
+    def __init__(self, file: str, known: Sequence[str]) -> None:
+        super().__init__(file, tuple(known))
+        self.file = file
+        self.known = tuple(known)
+
+    def __str__(self) -> str:
+        return f"{self.file}: recordings are converted to {', '.join(self.known)}"
+
+
+class TokenFileError(ServerError):
+    """The file of tokens cannot be read or written."""
+
+    def __init__(self, file: str, reason: str) -> None:
+        super().__init__(file, reason)
+        self.file = file
+        self.reason = reason
+
+    def __str__(self) -> str:
+        return f"the tokens in {self.file} cannot be used: {self.reason}"
+
+
+class UnknownToken(ServerError):  # noqa: N818 - says what is wrong
+    """No token has this id."""
+
+    def __init__(self, token_id: str, file: str) -> None:
+        super().__init__(token_id, file)
+        self.token_id = token_id
+        self.file = file
+
+    def __str__(self) -> str:
+        return f"{self.file} has no token {self.token_id}"
 
 
 class Problem(ServerError):  # noqa: N818 - RFC 9457 calls it so

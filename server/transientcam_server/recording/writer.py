@@ -1,0 +1,102 @@
+"""Writes one recording: ``<file>.part`` while it grows, ``<file>`` once it is whole."""
+
+import contextlib
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+from transientcam_driver import RawFrame
+
+from transientcam_server.recording import layout, swmr
+from transientcam_server.recording.layout import Header
+
+
+class RecordingWriter:
+    """An open recording; all methods on one thread.
+
+    Parameters
+    ----------
+    path
+        Of the finished recording; must not exist.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be made.
+    """
+
+    def __init__(
+        self, path: Path, header: Header, *, annotations: Mapping[str, Any] | None = None
+    ) -> None:
+        self.path = path
+        self.part = path.with_name(path.name + ".part")
+        if path.exists():
+            raise FileExistsError(17, "there is a recording already", str(path))
+        file = h5py.File(self.part, "x", libver=swmr.LIBVER)
+        try:
+            layout.create(file, header, annotations or {})
+            self._rows = swmr.Appender(file, ["raw"], list(layout.SERIES))
+        except BaseException:
+            with contextlib.suppress(RuntimeError, OSError):
+                file.close()
+            self.part.unlink()
+            raise
+        synchronise_directory(path.parent)
+
+    @property
+    def frames(self) -> int:
+        """How many frames are written."""
+        return self._rows.rows
+
+    @property
+    def bytes_written(self) -> int:
+        """Size of the file."""
+        return self._rows.bytes_written()
+
+    def append(self, raw: RawFrame, *, dropped_frames: int = 0) -> None:
+        """Write a frame; once this returns, the death of this process does not take it back.
+
+        Raises
+        ------
+        OSError
+            If the disk does not take it; frames before are safe.
+        """
+        row = layout.row(raw, dropped_frames=dropped_frames)
+        self._rows.append({"raw": raw.images}, row)
+
+    def synchronise(self, now_s: float) -> None:
+        """Bring the file to the disk once a second, which bounds what a power cut takes."""
+        self._rows.synchronise(now_s)
+
+    def annotate(self, annotations: Mapping[str, Any]) -> None:
+        """Replace the annotations."""
+        self._rows.overwrite("annotations", layout.encoded(annotations))
+
+    def close(self, end: Mapping[str, Any]) -> None:
+        """Finish the file and give it its name.
+
+        Raises
+        ------
+        OSError
+            If it cannot be finished; ``.part`` stays, and recovery makes a recording of it.
+        """
+        try:
+            self._rows.overwrite("end", layout.encoded(end))
+        finally:
+            try:
+                self._rows.close()
+            except RuntimeError as error:  # h5py's when closing fails to write
+                raise OSError(str(error)) from error
+        self.part.rename(self.path)
+        synchronise_directory(self.path.parent)
+
+
+def synchronise_directory(directory: Path) -> None:
+    """Bring the names in a directory to the disk."""
+    descriptor = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,193 @@
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as of_numpy
+from isal import isal_zlib
+from transientcam_driver import RawFrame
+from transientcam_server.errors import DamagedFrame, NotARecording
+from transientcam_server.recording import Recording, RecordingWriter, swmr
+
+from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, assert_same, frame, header, record
+
+SHAPE = (APPLIED.images, HEIGHT, WIDTH)
+
+
+def test_every_frame_comes_back_bit_for_bit(tmp_path: Path) -> None:
+    with Recording(record(tmp_path / "a.h5", 5)) as recording:
+        frames = list(recording)
+
+    assert len(frames) == 5
+    for number, got in enumerate(frames):
+        assert_same(got, frame(number))
+
+
+def test_what_was_known_before_the_first_frame_comes_back(tmp_path: Path) -> None:
+    with Recording(record(tmp_path / "a.h5", 1, annotations={"who": "Åsa"})) as recording:
+        assert recording.header == header()
+        assert recording.labels == APPLIED.labels
+        assert recording.annotations == {"who": "Åsa"}
+        assert recording.end["reason"] == "stopped"
+
+
+def test_a_calibration_of_every_pixel_travels_along(tmp_path: Path) -> None:
+    planes = np.exp(1j * np.arange(3 * HEIGHT * WIDTH)).reshape(3, HEIGHT, WIDTH)
+    path = record(tmp_path / "a.h5", 1, calibration_planes=planes.astype(np.complex64))
+
+    with Recording(path) as recording:
+        found = recording.header.calibration_planes
+
+    assert found is not None
+    np.testing.assert_array_equal(found, planes.astype(np.complex64))
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    images=of_numpy.arrays(np.uint16, SHAPE, elements=st.integers(0, 65535)),
+    number=st.integers(0, 2**63 - 1),
+    times=st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * 4),
+    lost=st.integers(0, 2**31),
+    epoch=st.integers(0, 2**32 - 1),
+)
+def test_any_frame_survives_the_way_through_a_file(
+    images: np.ndarray[tuple[int, int, int], np.dtype[np.uint16]],
+    number: int,
+    times: tuple[float, float, float, float],
+    lost: int,
+    epoch: int,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    wanted = RawFrame(number, epoch, images, APPLIED.labels, *times, lost)
+    path = tmp_path_factory.mktemp("any") / "a.h5"
+    writer = RecordingWriter(path, header())
+    writer.append(wanted)
+    writer.close({})
+
+    with Recording(path) as recording:
+        assert_same(recording.frame(0), wanted)
+
+
+@pytest.mark.parametrize("dtype", ["<u2", "<f4", "<f8", "|u1"])
+def test_a_chunk_is_what_the_filters_of_hdf5_would_have_left(tmp_path: Path, dtype: str) -> None:
+    block = np.random.default_rng(1).integers(0, 200, (3, 5, 7)).astype(dtype)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        written = swmr.create_blocks(file, "here", block.shape, dtype)
+        written.resize(1, 0)
+        written.id.write_direct_chunk((0, 0, 0, 0), swmr.compressed(block))
+        theirs = swmr.create_blocks(file, "theirs", block.shape, dtype)
+        theirs.resize(1, 0)
+        theirs[0] = block
+
+        np.testing.assert_array_equal(written[0], block)
+        _, chunk = theirs.id.read_direct_chunk((0, 0, 0, 0))
+        np.testing.assert_array_equal(swmr.expanded(chunk, block.shape, block.dtype), block)
+
+
+def test_an_unfinished_recording_can_be_read_while_it_is_written(tmp_path: Path) -> None:
+    writer = RecordingWriter(tmp_path / "a.h5", header())
+    try:
+        for number in range(3):
+            writer.append(frame(number))
+        with Recording(tmp_path / "a.h5.part") as recording:
+            assert recording.frames == 3
+            assert_same(recording.frame(2), frame(2))
+            assert recording.end == {}
+    finally:
+        writer.close({})
+
+
+def test_a_flipped_byte_in_a_chunk_is_found(tmp_path: Path) -> None:
+    path = record(tmp_path / "a.h5", 3)
+    with h5py.File(path) as file:
+        place = file["raw"].id.get_chunk_info(1)
+    _flip(path, place.byte_offset + place.size // 2)
+
+    with Recording(path) as recording:
+        assert_same(recording.frame(0), frame(0))
+        with pytest.raises(DamagedFrame, match="frame 1 is damaged"):
+            recording.frame(1)
+        assert_same(recording.frame(2), frame(2))
+
+
+def test_a_chunk_of_another_frame_is_found_by_the_checksum(tmp_path: Path) -> None:
+    path = record(tmp_path / "a.h5", 3)
+    with h5py.File(path, "r+") as file:  # a chunk that is whole, but not the right one
+        file["raw"][1] = file["raw"][0]
+
+    with Recording(path) as recording, pytest.raises(DamagedFrame, match="checksum"):
+        recording.frame(1)
+
+
+def test_a_recording_that_was_repacked_reads_the_same(tmp_path: Path) -> None:
+    path = record(tmp_path / "a.h5", 3)
+    with h5py.File(path) as source, h5py.File(tmp_path / "b.h5", "w") as target:
+        target.attrs.update(source.attrs)
+        for name, dataset in source.items():
+            target.create_dataset(name, data=dataset[()], dtype=dataset.dtype)
+
+    with Recording(tmp_path / "b.h5") as recording:
+        for number in range(3):
+            assert_same(recording.frame(number), frame(number))
+
+
+def test_any_hdf5_reader_finds_images_labels_and_documents(tmp_path: Path) -> None:
+    with h5py.File(record(tmp_path / "a.h5", 4)) as file:
+        np.testing.assert_array_equal(file["raw"][2], frame(2).images)
+        assert file["raw"].dims[0][0].name == "/frame"
+        assert json.loads(file.attrs["sequence"])["harmonics"] == 2
+        np.testing.assert_array_equal(
+            file["phase_rad"][()], [label.phase_rad for label in APPLIED.labels]
+        )
+        expected = [isal_zlib.crc32(file["raw"][row].astype("<u2").tobytes()) for row in range(4)]
+        assert file["crc32"][()].tolist() == expected
+
+
+def test_a_frame_that_is_not_there_is_an_index_error(tmp_path: Path) -> None:
+    with Recording(record(tmp_path / "a.h5", 2)) as recording:
+        for index in (-1, 2):
+            with pytest.raises(IndexError, match=f"frame {index} of 2"):
+                recording.frame(index)
+
+
+def test_what_is_no_recording_is_refused_with_the_reason(tmp_path: Path) -> None:
+    text, foreign, newer = (tmp_path / name for name in ("a.txt", "b.h5", "c.h5"))
+    text.write_text("hello")
+    with h5py.File(foreign, "w") as file:
+        file["x"] = 1
+    record(newer, 1)
+    with h5py.File(newer, "r+") as file:
+        file.attrs["format_version"] = 2
+
+    for path, reason in ((text, "file signature"), (foreign, "format"), (newer, "version 2")):
+        with pytest.raises(NotARecording, match=reason):
+            Recording(path)
+    with pytest.raises(FileNotFoundError):
+        Recording(tmp_path / "absent.h5")
+
+
+def test_a_writer_never_replaces_a_recording(tmp_path: Path) -> None:
+    record(tmp_path / "a.h5", 1)
+
+    with pytest.raises(FileExistsError):
+        RecordingWriter(tmp_path / "a.h5", header())
+    assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]
+
+
+def test_a_finished_recording_opens_in_xarray_with_named_axes(tmp_path: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    with xarray.open_dataset(record(tmp_path / "a.h5", 3), engine="h5netcdf") as dataset:
+        assert dataset["raw"].dims == ("frame", "image", "y", "x")
+        assert dataset["frequency_hz"].dims == ("image",)
+        np.testing.assert_array_equal(dataset["raw"][1], frame(1).images)
+
+
+def _flip(path: Path, offset: int) -> None:
+    with path.open("r+b") as file:
+        file.seek(offset)
+        byte = file.read(1)[0]
+        file.seek(offset)
+        file.write(bytes([byte ^ 0x10]))

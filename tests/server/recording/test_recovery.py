@@ -1,0 +1,143 @@
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+import pytest
+from transientcam_server.errors import NotARecording
+from transientcam_server.recording import Recording, RecordingWriter, recover
+from transientcam_server.recording.recovery import recover_all, unfinished
+
+from tests.conftest import ROOT
+from tests.server.recording.made import assert_same, frame, header, record
+
+KILLS = 20
+
+
+def kill_in_mid_recording(path: Path, *, after_frames: int) -> int:
+    """Kill a writer that has written so many frames; return how many it acknowledged."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "tests.server.recording.killed", str(path)],
+        stdout=subprocess.PIPE,
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    ) as writer:
+        assert writer.stdout is not None
+        acknowledged = 0
+        while acknowledged < after_frames:
+            acknowledged = int(writer.stdout.readline())
+        writer.kill()  # wherever it is in the frame after
+        for line in writer.stdout:
+            acknowledged = int(line)
+    return acknowledged
+
+
+@pytest.mark.timeout(240)
+def test_no_acknowledged_frame_is_lost_when_the_writer_is_killed(tmp_path: Path) -> None:
+    random_number = random.Random(6)
+    for kill in range(KILLS):
+        path = tmp_path / f"{kill}.h5"
+        acknowledged = kill_in_mid_recording(path, after_frames=random_number.randint(1, 120))
+        assert not path.exists()
+
+        assert recover(path.with_name(path.name + ".part")) == path
+        with Recording(path) as recording:
+            assert acknowledged <= recording.frames
+            for index in (0, acknowledged // 2, recording.frames - 1):
+                assert_same(recording.frame(index), frame(index % 64))
+        path.unlink()
+
+
+def test_a_recovered_recording_is_whole_and_opens_with_anything(tmp_path: Path) -> None:
+    part = abandoned(tmp_path / "a.h5", 5)
+
+    path = recover(part)
+
+    assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
+    with Recording(path) as recording:
+        assert recording.header == header()
+        assert recording.annotations == {"kept": True}
+        for number in range(5):
+            assert_same(recording.frame(number), frame(number))
+    with h5py.File(path) as file:  # no SWMR, no special version
+        assert file["raw"].dims[0][0].name == "/frame"
+
+
+def test_a_torn_last_frame_is_left_out(tmp_path: Path) -> None:
+    part = abandoned(tmp_path / "a.h5", 5)
+    with h5py.File(part, swmr=True, libver="latest") as file:
+        place = file["raw"].id.get_chunk_info(4)
+    with part.open("r+b") as stream:
+        stream.seek(place.byte_offset + 20)
+        stream.write(bytes(40))
+
+    with Recording(recover(part)) as recording:
+        assert recording.frames == 4
+        assert_same(recording.frame(3), frame(3))
+
+
+def test_a_recording_without_a_frame_is_recovered_too(tmp_path: Path) -> None:
+    with Recording(recover(abandoned(tmp_path / "a.h5", 0))) as recording:
+        assert list(recording) == []
+
+
+def test_what_cannot_be_read_stays_and_stops_nothing(tmp_path: Path) -> None:
+    (tmp_path / "a.h5.part").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
+    abandoned(tmp_path / "b.h5", 2)
+
+    assert recover_all(tmp_path) == [tmp_path / "b.h5"]
+    assert [path.name for path in unfinished(tmp_path)] == ["a.h5.part"]
+    with pytest.raises(NotARecording):
+        recover(tmp_path / "a.h5.part")
+
+
+def test_recovery_never_replaces_a_recording(tmp_path: Path) -> None:
+    record(tmp_path / "a.h5", 3)
+    part = abandoned(tmp_path / "a.h5", 2)
+
+    with pytest.raises(FileExistsError):
+        recover(part)
+    assert part.exists()
+
+
+def test_recovery_without_room_leaves_everything_as_it_was(tmp_path: Path) -> None:
+    part = abandoned(tmp_path / "a.h5", 40)
+
+    with limited_files(part.stat().st_size // 2), pytest.raises((OSError, NotARecording)):
+        recover(part)
+
+    assert [each.name for each in tmp_path.iterdir()] == ["a.h5.part"]
+    with Recording(recover(part)) as recording:
+        assert recording.frames == 40
+
+
+def abandoned(path: Path, frames: int) -> Path:
+    """What a writer leaves that is killed after so many frames."""
+    whole = path.with_name("alive.h5")
+    writer = RecordingWriter(whole, header(), annotations={"kept": True})
+    for number in range(frames):
+        writer.append(frame(number))
+    part = path.with_name(path.name + ".part")
+    part.write_bytes(writer.part.read_bytes())
+    writer.close({})
+    whole.unlink()
+    return part
+
+
+@contextmanager
+def limited_files(size_bytes: int) -> Iterator[None]:
+    """Let no file of this process grow larger: the kernel's own EFBIG."""
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size_bytes, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, handler)
