@@ -38,6 +38,7 @@ def test_every_resource_of_the_interface_is_described(document: dict[str, Any]) 
         "GET /api/v1/frames/latest/pixel",
         "GET /api/v1/frames/latest/{product}",
         "GET /api/v1/simulation",
+        "GET /api/v1/simulation/explain",
         "POST /api/v1/simulation/faults",
         "GET /api/v1/lease",
         "POST /api/v1/lease",

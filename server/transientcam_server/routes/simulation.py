@@ -10,6 +10,7 @@ from transientcam_driver import Simulation
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import Problem
 from transientcam_server.problems import documented
+from transientcam_server.routes.explain_models import ExplanationDocument
 from transientcam_server.routes.models import FaultRequest, SimulationDocument
 from transientcam_server.service import Service, ServiceOf
 
@@ -27,6 +28,17 @@ _FAULTS: Final[dict[str, Callable[[Simulation], None]]] = {
 async def read_simulation(service: ServiceOf) -> SimulationDocument:
     """Say which scene is simulated."""
     return SimulationDocument(scene=_simulation(service).scene, faults=list(_FAULTS))
+
+
+@router.get(
+    "/simulation/explain",
+    summary="What scene and sequence call for",
+    responses=documented(kinds.NOT_SIMULATED),
+)
+async def explain_simulation(service: ServiceOf) -> ExplanationDocument:
+    """Say of each effect whether it is called for, why, how large it is and what it costs."""
+    explanation = await asyncio.to_thread(_simulation(service).explain)
+    return ExplanationDocument.model_validate(explanation.to_document())
 
 
 @router.post(

@@ -12,6 +12,18 @@ def test_the_simulated_scene_is_told(http: httpx.Client) -> None:
     assert set(document["faults"]) == {"unplug", "replug", "corrupt-image", "drop-image"}
 
 
+def test_what_the_scene_calls_for_is_explained(http: httpx.Client) -> None:
+    document = http.get("/api/v1/simulation/explain").json()
+
+    assert (document["scene"], document["device"]) == ("mirrors", "ideal")
+    assert document["sequence"]["harmonics"] == http.get("/api/v1/sequence").json()["harmonics"]
+    effects = {each["effect"]: each for each in document["effects"]}
+    assert effects["mirror-paths"]["built"]
+    assert effects["mirror-paths"]["relative"] > document["called_above"]
+    assert not effects["motion"]["called_for"]
+    assert effects["motion"]["reason"] == "nothing moves"
+
+
 @pytest.mark.parametrize(
     "body", [{}, {"fault": "explode"}, {"fault": 3}, {"fault": "unplug", "a": 1}]
 )
@@ -27,6 +39,7 @@ def test_a_real_camera_has_no_simulation_no_faults_and_no_truth(
 
     for response in (
         http.get("/api/v1/simulation"),
+        http.get("/api/v1/simulation/explain"),
         http.post("/api/v1/simulation/faults", json={"fault": "unplug"}),
     ):
         assert response.json()["type"] == "/problems/not-simulated"
