@@ -119,3 +119,8 @@ def colours(values: NDArray[Any], low: float, high: float, name: str) -> NDArray
     levels = np.minimum(np.nan_to_num(places * 256), 255).astype(int)
     painted: NDArray[np.uint8] = np.where(np.isnan(places)[..., None], 0, table[levels])
     return painted
+
+
+def choose(page: Page, panel: str, action: str) -> None:
+    """Choose from the menu of a panel."""
+    page.locator(f".panel-{panel} .action-menu").select_option(label=action)

@@ -5,7 +5,7 @@ import { useStore } from "./store/store";
 import { shortcuts } from "./ui/shortcuts";
 import { Banner } from "./views/status/Banner";
 import { StatusBar } from "./views/status/StatusBar";
-import { VIEWS } from "./views/registry";
+import { Arrangement } from "./views/Arrangement";
 
 /** The page: how things stand, what is wrong, and the views. */
 export function App({ onRetry }: { onRetry: () => void }) {
@@ -22,11 +22,7 @@ export function App({ onRetry }: { onRetry: () => void }) {
     <>
       <StatusBar />
       <Banner onRetry={onRetry} />
-      <main class="views">
-        {VIEWS.map(({ name, view: View }) => (
-          <View key={name} />
-        ))}
-      </main>
+      <Arrangement />
     </>
   );
 }

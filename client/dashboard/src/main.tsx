@@ -18,6 +18,7 @@ effect(() => {
 });
 store.player.playing.value = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
 
+store.theme.show(document.documentElement);
 const root = document.getElementById("app");
 if (root === null) throw new Error("The page has no place for the application.");
 render(

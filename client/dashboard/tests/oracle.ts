@@ -35,12 +35,12 @@ export function momentsOf(returns: readonly Return[], uniform: number, m: number
   );
 }
 
-/** x with B x = e_0, B[j][k] = b_(j-k), by Gaussian elimination with pivoting. */
-function solveToeplitz(b: readonly Complex[]): Complex[] {
+/** x with B x = y, B[j][k] = b_(j-k), by Gaussian elimination with pivoting; y is e_0 unless given. */
+function solveToeplitz(b: readonly Complex[], y: readonly Complex[] = b.map((_, j) => complex(j === 0 ? 1 : 0))): Complex[] {
   const n = b.length;
   const rows = Array.from({ length: n }, (_, j) => [
     ...Array.from({ length: n }, (_, k) => (j >= k ? b[j - k] : conj(b[k - j]))),
-    complex(j === 0 ? 1 : 0),
+    y[j],
   ]);
   for (let column = 0; column < n; column++) {
     let best = column;
@@ -79,4 +79,23 @@ export function picture(pixels: readonly (readonly Complex[])[], width = pixels.
     });
   });
   return { planes, harmonics, width, height: pixels.length / width, baseFrequency_hz: 23e6 };
+}
+
+/**
+ * Sharp bounds per radian on every density with moments `b`, smoothed with the Poisson kernel of `radius`
+ * (Sec. 5.2): with w = radius exp(i phi), W_j = w^j and p_j = sum_(k<j) w^k b_(j-k) + w^j b_0 / 2,
+ *
+ *     kappa = W* B^-1 W,  F = (2 / kappa) (1 / (1 - r^2) - W* B^-1 p),  R = 2 r^(m+1) / ((1 - r^2) kappa).
+ */
+export function boundsOf(b: readonly Complex[], phase_rad: number, radius: number): { lower: number; upper: number } {
+  const m = b.length - 1;
+  const W = b.map((_, j) => mul(complex(radius ** j), cis(j * phase_rad)));
+  const p = b.map((_, j) =>
+    W.slice(0, j).reduce((sum, w, k) => add(sum, mul(w, b[j - k])), mul(W[j], complex(b[0].re / 2))),
+  );
+  const dot = (x: readonly Complex[]): Complex => x.reduce((sum, value, j) => add(sum, mul(conj(W[j]), value)), complex(0));
+  const kappa = dot(solveToeplitz(b, W)).re;
+  const centre = (2 / kappa) * (1 / (1 - radius ** 2) - dot(solveToeplitz(b, p)).re);
+  const size = (2 * radius ** (m + 1)) / ((1 - radius ** 2) * kappa);
+  return { lower: (centre - size) / (2 * Math.PI), upper: (centre + size) / (2 * Math.PI) };
 }

@@ -1,5 +1,5 @@
 /** The REST side of the service: requests, and problems in plain words. */
-import type { AppliedSequence, CameraDocument, CameraState, Problem, SequenceDocument } from "../stream/protocol";
+import type { AppliedSequence, CameraDocument, CameraState, PixelDocument, Problem, SequenceDocument } from "../stream/protocol";
 
 /** The service refused a request (RFC 9457), or could not be asked at all. */
 export class RequestError extends Error {
@@ -31,6 +31,11 @@ export class Api {
 
   camera(): Promise<CameraDocument> {
     return this.#json("GET", "/camera") as Promise<CameraDocument>;
+  }
+
+  /** Everything about one pixel of the latest frame but its curves, which the page computes itself. */
+  pixel(x: number, y: number): Promise<PixelDocument> {
+    return this.#json("GET", `/frames/latest/pixel?x=${x}&y=${y}&bins=1`) as Promise<PixelDocument>;
   }
 
   validate(sequence: SequenceDocument, signal?: AbortSignal): Promise<AppliedSequence> {

@@ -1,4 +1,4 @@
-import { computed, signal } from "@preact/signals";
+import { computed, signal, type Signal } from "@preact/signals";
 import { createContext } from "preact";
 import { useContext } from "preact/hooks";
 
@@ -6,8 +6,12 @@ import type { AppliedSequence, CameraDocument } from "../stream/protocol";
 import { Api } from "./api";
 import { Frames } from "./frames";
 import { Player } from "./player";
-import { browserShelf, type Shelf } from "./settings";
+import { browserShelf, remembered, type Shelf } from "./settings";
+import { isLayout, OVERVIEW, type Layout } from "../views/layout";
+import { VIEW_NAMES } from "../views/names";
 import { Status } from "./status";
+import { Details } from "./details";
+import { Theme } from "../ui/theme";
 
 /** A place on the sensor: column from the left, row from the top. */
 export interface Pixel {
@@ -37,11 +41,26 @@ export class Store {
     return 1 / (shown ?? this.sequence.value?.base_frequency_hz ?? 23e6);
   });
   readonly player = new Player(this.period_s);
+  /** What only the service knows of the selected pixel. */
+  readonly details: Details;
+  readonly theme: Theme;
+  /** Where the views stand. */
+  readonly layout: Signal<Layout>;
+  /** The one view that is shown alone; null while all are. */
+  readonly alone = signal<string | null>(null);
 
   constructor({ api = new Api(), shelf = browserShelf() }: { api?: Api; shelf?: Shelf | null } = {}) {
     this.api = api;
     this.shelf = shelf;
+    this.details = new Details(api);
+    this.layout = remembered<Layout>(shelf, "layout", OVERVIEW, (value): value is Layout => isLayout(value, VIEW_NAMES));
+    this.theme = new Theme(shelf, systemScheme());
   }
+}
+
+/** Whether the system is dark, as the browser tells; null outside of one. */
+function systemScheme(): MediaQueryList | null {
+  return typeof matchMedia === "undefined" ? null : matchMedia("(prefers-color-scheme: dark)");
 }
 
 export const StoreContext = createContext<Store | null>(null);

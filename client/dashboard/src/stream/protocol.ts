@@ -72,6 +72,34 @@ export interface CameraDocument {
   readonly capabilities: Readonly<Record<string, unknown>>;
 }
 
+/** Light that came back after one time of flight; its weight in units of b_0. */
+export interface Return {
+  readonly time_s: number;
+  readonly weight: number;
+}
+
+/** What `GET /api/v1/frames/latest/pixel` answers, as far as the page reads it. */
+export interface PixelDocument {
+  readonly meta: FrameMeta;
+  readonly x: number;
+  readonly y: number;
+  readonly range_m: number | null;
+  readonly direct: number;
+  readonly indirect: number;
+  readonly brightness: number;
+  readonly uniform: number;
+  readonly validity: number | null;
+  readonly flags: readonly string[];
+  readonly returns: readonly Return[];
+  /** What the simulated scene holds there; null for a real camera. */
+  readonly truth: {
+    readonly kind: string;
+    readonly range_m: number | null;
+    readonly brightness: number;
+    readonly returns: readonly Return[];
+  } | null;
+}
+
 export interface Hello {
   readonly type: "hello";
   readonly session: string;

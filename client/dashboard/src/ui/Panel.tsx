@@ -1,19 +1,31 @@
-import type { ComponentChildren } from "preact";
+import { createContext, type ComponentChildren } from "preact";
+import { useContext } from "preact/hooks";
+
+import { ActionMenu, type Action, type ActionGroup } from "./ActionMenu";
 
 interface PanelProps {
   readonly name: string;
   readonly title: ComponentChildren;
   readonly tools?: ComponentChildren;
+  /** Files that can be made of what the view shows. */
+  readonly downloads?: readonly Action[];
   readonly children: ComponentChildren;
 }
 
+/** What a panel may do with its place on the page. */
+export const SlotContext = createContext<readonly ActionGroup[]>([]);
+
 /** The frame around a view: a title, its tools, its content. */
-export function Panel({ name, title, tools, children }: PanelProps) {
+export function Panel({ name, title, tools, downloads = [], children }: PanelProps) {
+  const slot = useContext(SlotContext);
   return (
     <section class={`panel panel-${name}`} aria-label={name} data-view={name}>
       <header class="panel-head">
         <div class="panel-title">{title}</div>
-        {tools !== undefined && <div class="panel-tools">{tools}</div>}
+        <div class="panel-tools">
+          {tools}
+          <ActionMenu label={`Panel ${name}: views and downloads`} groups={[{ title: "Download", actions: downloads }, ...slot]} />
+        </div>
       </header>
       {children}
     </section>

@@ -4,14 +4,15 @@ import { MapView } from "./map/MapView";
 import { ResponseView } from "./response/ResponseView";
 import { SequenceView } from "./sequence/SequenceView";
 import { TransientView } from "./transient/TransientView";
+import type { ViewName } from "./names";
 
 /**
- * The views of the page, in reading order. A view is a component that takes no properties: it reads the
- * store, and asks it for the products that it shows. Its place in the layout is a grid area of its name.
+ * The views on offer. A view is a component that takes no properties: it reads the store, and asks it for
+ * the products that it shows. Panels choose among them by name; `layout.ts` says where they stand.
  */
-export const VIEWS: readonly { readonly name: string; readonly view: ComponentType }[] = [
-  { name: "map", view: MapView },
-  { name: "transient", view: TransientView },
-  { name: "response", view: ResponseView },
-  { name: "sequence", view: SequenceView },
+export const VIEWS: readonly { readonly name: ViewName; readonly title: string; readonly view: ComponentType }[] = [
+  { name: "map", title: "Maps", view: MapView },
+  { name: "transient", title: "Light in flight", view: TransientView },
+  { name: "response", title: "Impulse response", view: ResponseView },
+  { name: "sequence", title: "Sequence", view: SequenceView },
 ];

@@ -3,29 +3,45 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 import "uplot/dist/uPlot.min.css";
 
 import { rangeOfTime_m } from "../../physics/constants";
-import { impulseResponse, peaks, type Peak } from "../../physics/impulseResponse";
-import { aBoolean, remembered } from "../../store/settings";
+import { peaks } from "../../physics/impulseResponse";
+import { pixelOf } from "../../physics/reflection";
+import { aBoolean, oneOf, remembered } from "../../store/settings";
 import { type Pixel, useStore } from "../../store/store";
-import { Toggle } from "../../ui/controls";
+import { Tabs, Toggle } from "../../ui/controls";
 import { fixed, significant } from "../../ui/format";
+import { save } from "../../ui/download";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { autoLimits, type Span } from "../../ui/scale";
+import { csvOf, curvesOf, type Aspect } from "./curves";
+import { Found, PeakTable } from "./Listings";
+import { MomentsPlane } from "./MomentsPlane";
 import { responsePlot, type ResponsePlot } from "./plot";
 
-/** Even samples of the curve, beside those around its peaks. */
-const SAMPLES = 513;
 /** Share of the height that the axis was made for which is left after a frame without such a peak. */
 const SHRINK = 0.96;
 /** Returns listed beside the plot, and the least share of the light that makes one worth it. */
 const LISTED = 4;
 const LEAST_SHARE = 0.02;
 
-/** The impulse response of the selected pixel, computed here from the streamed coefficients. */
+type Side = Aspect | "moments";
+const ASPECTS: readonly { readonly value: Aspect; readonly text: string; readonly hint: string }[] = [
+  { value: "density", text: "Density", hint: "The maximum entropy density" },
+  { value: "bounds", text: "Bounds", hint: "What every density with these moments, smoothed, lies between" },
+  { value: "cumulative", text: "Cumulative", hint: "Light up to each time of flight" },
+]; // prettier-ignore
+const SIDES: readonly { readonly value: Side; readonly text: string; readonly hint: string }[] = [
+  ...ASPECTS,
+  { value: "moments", text: "Moments", hint: "The trigonometric moments on the complex plane" },
+];
+
+/** Everything about the selected pixel; its curves are computed here from the streamed coefficients. */
 export function ResponseView() {
   const store = useStore();
   useProducts(["coefficients"]);
   const frame = store.frames.of("coefficients");
+  useEffect(() => store.details.follow(store.selected, frame), [store, frame]);
+  const side = useMemo(() => remembered<Side>(store.shelf, "response.side", "density", oneOf(SIDES.map(({ value }) => value))), [store]);
   const shown = useMemo(
     () =>
       computed(() => {
@@ -35,82 +51,25 @@ export function ResponseView() {
         if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return null;
         const index = pixel.y * coefficients.width + pixel.x;
         const found = peaks(coefficients, index).filter(({ share }) => share >= LEAST_SHARE);
-        const response = impulseResponse(coefficients, index, SAMPLES, found);
-        return { pixel, response, peaks: found.slice(0, LISTED).sort((a, b) => a.time_s - b.time_s) };
+        return { pixel, coefficients, index, found, peaks: found.slice(0, LISTED).sort((a, b) => a.time_s - b.time_s) };
       }),
     [frame, store],
   );
-
-  const box = useRef<HTMLDivElement>(null);
-  const size = useMemo(() => signal({ width: 0, height: 0 }), []);
-  useSize(box, size);
-  const plot = useSignal<ResponsePlot | null>(null);
-  const dark = useSignal(window.matchMedia("(prefers-color-scheme: dark)").matches);
-  useEffect(() => {
-    const scheme = window.matchMedia("(prefers-color-scheme: dark)");
-    const change = (): void => {
-      dark.value = scheme.matches;
-    };
-    scheme.addEventListener("change", change);
-    return () => {
-      scheme.removeEventListener("change", change);
-    };
-  }, [dark]);
-
+  const levinson = useComputed(() => (shown.value === null ? null : pixelOf(shown.value.coefficients, shown.value.index)));
   const logarithmic = useMemo(() => remembered(store.shelf, "response.logarithmic", false, aBoolean), [store]);
   const pointed = useSignal("");
-  const held = useRef(0);
-  const heldFor = useRef<Pixel | null>(null);
-  const top = useRef<Span | null>(null);
-  useEffect(() => {
-    if (box.current === null) return undefined;
-    const made = responsePlot(box.current, {
-      logarithmic: logarithmic.value,
-      top: () => top.current?.high ?? 1,
-      seek: (time_ns) => {
-        store.player.playing.value = false;
-        store.player.seek((time_ns * 1e-9) / store.period_s.peek());
-      },
-      point: (sample) => (pointed.value = sample === null ? "" : sampleText(sample.time_ns, sample.density)),
-    });
-    plot.value = made;
-    return () => {
-      plot.value = null;
-      made.plot.destroy();
-    };
-  }, [store, dark.value, logarithmic.value]);
-
-  useDrawing(() => {
-    const { width, height } = size.value;
-    if (width > 0 && height > 0) plot.value?.plot.setSize({ width, height });
-  }, [plot, size]);
-
-  useDrawing(() => {
-    const response = shown.value?.response;
-    if (plot.value === null || size.value.width === 0) return;
-    if (response === undefined) {
-      plot.value.plot.setData([[], []]);
-      return;
-    }
-    const density = response.density.map((value) => value * 1e-9);
-    const highest = density.reduce((a, b) => (b > a ? b : a), 0); // NaN never counts
-    // A peak's height is its noisiest figure: the axis grows with it at once and shrinks slowly.
-    const { pixel } = shown.value ?? { pixel: null };
-    held.current = pixel === heldFor.current ? Math.max(highest, SHRINK * held.current) : highest;
-    heldFor.current = pixel;
-    top.current = autoLimits(top.current, { low: 0, high: held.current });
-    plot.value.plot.setData([response.time_s.map((time_s) => time_s * 1e9), density]);
-  }, [plot, shown]);
-
-  useDrawing(() => {
-    const turn = store.player.turn.value;
-    if (plot.value !== null) plot.value.head.style.left = `${100 * turn}%`;
-  }, [plot]);
-
   const place = useComputed(() => (shown.value === null ? null : `${shown.value.pixel.x}, ${shown.value.pixel.y}`));
+  const download = (aspect: Aspect) => (): void => {
+    const now = shown.peek();
+    if (now === null) return;
+    const truth = store.details.document.peek()?.truth ?? null;
+    const name = `pixel-${now.pixel.x}-${now.pixel.y}-${aspect}-${frame.peek()?.meta.frame ?? 0}.csv`;
+    save(name, new Blob([csvOf(curvesOf(aspect, now.coefficients, now.index, now.found, truth))], { type: "text/csv" }));
+  };
   return (
     <Panel
       name="response"
+      downloads={place.value === null ? [] : ASPECTS.map(({ value, text }) => ({ text: `${text} (CSV)`, run: download(value) }))}
       title={
         <h2>
           Impulse response <span class="quiet">{place.value === null ? "" : `of pixel ${place.value}`}</span>
@@ -118,53 +77,124 @@ export function ResponseView() {
       }
       tools={
         <>
-          <span data-field="sample">{pointed}</span>
-          <Toggle
-            pressed={logarithmic.value}
-            title="Logarithmic density"
-            onToggle={() => (logarithmic.value = !logarithmic.peek())}
-          >
-            log
-          </Toggle>
+          {side.value !== "moments" && <span data-field="sample">{pointed}</span>}
+          <Tabs label="What of the pixel" value={side.value} options={SIDES} onChange={(value) => (side.value = value)} />
+          {side.value === "density" && (
+            <Toggle pressed={logarithmic.value} title="Logarithmic density" onToggle={() => (logarithmic.value = !logarithmic.peek())}>
+              log
+            </Toggle>
+          )}
         </>
       }
     >
       <div class="response">
-        <div class="response-plot" ref={box} data-empty={place.value === null}>
-          {place.value === null && <p class="stage-empty">Click a pixel in one of the pictures.</p>}
-        </div>
-        <PeakTable peaks={shown.value?.peaks ?? []} />
+        {place.value === null && <p class="stage-empty">Click a pixel in one of the pictures.</p>}
+        {side.value === "moments" ? (
+          <MomentsPlane pixel={levinson} />
+        ) : (
+          <Plot key={side.value} aspect={side.value} logarithmic={side.value === "density" && logarithmic.value} shown={shown} pointed={pointed} />
+        )}
+        {place.value !== null && (
+          <aside class="response-side" aria-label="What was found at the pixel" tabIndex={0}>
+            <PeakTable peaks={shown.value?.peaks ?? []} />
+            <Found told={store.details.document.value} />
+          </aside>
+        )}
       </div>
     </Panel>
   );
 }
 
-function sampleText(time_ns: number, density: number): string {
-  const range_m = rangeOfTime_m(time_ns * 1e-9);
-  return `${fixed(time_ns, 2, "ns")} · ${fixed(range_m, 2, "m")} · ${significant(density, 3, "DN/ns")}`;
+interface Shown {
+  readonly pixel: Pixel;
+  readonly coefficients: Parameters<typeof curvesOf>[1];
+  readonly index: number;
+  readonly found: Parameters<typeof curvesOf>[3];
 }
 
-function PeakTable({ peaks: listed }: { peaks: readonly Peak[] }) {
-  if (listed.length === 0) return null;
+interface PlotProps {
+  readonly aspect: Aspect;
+  readonly logarithmic: boolean;
+  readonly shown: { readonly value: Shown | null };
+  /** Set to what is under the pointer, in words. */
+  readonly pointed: { value: string };
+}
+
+/** The curves of one aspect over time of flight. */
+function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
+  const store = useStore();
+  const box = useRef<HTMLDivElement>(null);
+  const size = useMemo(() => signal({ width: 0, height: 0 }), []);
+  useSize(box, size);
+  const plot = useSignal<ResponsePlot | null>(null);
+  const dark = store.theme.dark.value;
+  const held = useRef(0);
+  const heldFor = useRef<Pixel | null>(null);
+  const top = useRef<Span | null>(null);
+  useEffect(() => {
+    if (box.current === null) return undefined;
+    const made = responsePlot(box.current, {
+      aspect,
+      logarithmic,
+      top: () => top.current?.high ?? 1,
+      seek: (time_ns) => {
+        store.player.playing.value = false;
+        store.player.seek((time_ns * 1e-9) / store.period_s.peek());
+      },
+      point: (sample) => (pointed.value = sample === null ? "" : sampleText(sample.time_ns, sample.value, aspect)),
+    });
+    plot.value = made;
+    return () => {
+      plot.value = null;
+      made.plot.destroy();
+    };
+  }, [store, dark, logarithmic, aspect]);
+
+  useDrawing(() => {
+    const { width, height } = size.value;
+    if (width > 0 && height > 0) plot.value?.plot.setSize({ width, height });
+  }, [plot, size]);
+
+  useDrawing(() => {
+    const now = shown.value;
+    const truth = store.details.document.value?.truth ?? null;
+    if (plot.value === null || size.value.width === 0) return;
+    if (now === null) {
+      plot.value.show(null, null);
+      return;
+    }
+    const curves = curvesOf(aspect, now.coefficients, now.index, now.found, truth);
+    let highest = 0; // NaN never counts
+    for (const line of curves.lines) for (const value of line) if (value > highest) highest = value;
+    // A peak's height is its noisiest figure: the axis grows with it at once and shrinks slowly.
+    held.current = now.pixel === heldFor.current ? Math.max(highest, SHRINK * held.current) : highest;
+    heldFor.current = now.pixel;
+    top.current = autoLimits(top.current, { low: 0, high: held.current });
+    plot.value.show(curves, truth);
+  }, [plot, shown, aspect]);
+
+  useDrawing(() => {
+    const turn = store.player.turn.value;
+    if (plot.value !== null) plot.value.head.style.left = `${100 * turn}%`;
+  }, [plot]);
+
+  const simulated = store.details.document.value?.truth != null;
   return (
-    <table class="peaks">
-      <caption class="quiet">Peaks of the density</caption>
-      <thead>
-        <tr>
-          <th scope="col">time</th>
-          <th scope="col">range</th>
-          <th scope="col">light</th>
-        </tr>
-      </thead>
-      <tbody>
-        {listed.map((peak, at) => (
-          <tr key={at}>
-            <td>{fixed(peak.time_s * 1e9, 2, "ns")}</td>
-            <td>{fixed(rangeOfTime_m(peak.time_s), 2, "m")}</td>
-            <td>{fixed(100 * peak.share, 0, "%")}</td>
-          </tr>
-        ))}
-      </tbody>
-    </table>
+    <div class="response-plot-box">
+      <div class="response-plot" ref={box} data-empty={shown.value === null} data-aspect={aspect} />
+      {aspect !== "density" && (
+        <p class="key">
+          {aspect === "bounds" && <span class="key-band">any light with these moments</span>}
+          <span>estimate</span>
+          {simulated && <span class="key-truth">truth</span>}
+          {aspect === "bounds" && <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">all smoothed, r = 0.93</em>}
+        </p>
+      )}
+    </div>
   );
+}
+
+function sampleText(time_ns: number, value: number, aspect: Aspect): string {
+  const range_m = rangeOfTime_m(time_ns * 1e-9);
+  return `${fixed(time_ns, 2, "ns")} · ${fixed(range_m, 2, "m")} · ${significant(value, 3, aspect === "cumulative" ? "DN" : "DN/ns")}`;
 }

@@ -2,31 +2,48 @@ import uPlot from "uplot";
 
 import { rangeOfTime_m } from "../../physics/constants";
 import { grouped, significant } from "../../ui/format";
+import type { Aspect, Curves, Truth } from "./curves";
 
 /** The plot, and the line that marks the player's time in it. */
 export interface ResponsePlot {
   readonly plot: uPlot;
   readonly head: HTMLElement;
+  /** Shows curves of the aspect that the plot was made for, and the times of true returns. */
+  show(curves: Curves | null, truth: Truth | null): void;
 }
 
 export interface PlotOptions {
+  readonly aspect: Aspect;
   readonly logarithmic: boolean;
   /** Upper end of the density's axis. */
   readonly top: () => number;
   /** Called with the time that was clicked. */
   readonly seek: (time_ns: number) => void;
   /** Called with the sample under the pointer; null when it leaves. */
-  readonly point: (sample: { readonly time_ns: number; readonly density: number } | null) => void;
+  readonly point: (sample: { readonly time_ns: number; readonly value: number } | null) => void;
 }
 
-/** A plot of density in DN/ns over time of flight in ns, with the range it stands for on top. */
-export function responsePlot(box: HTMLElement, { logarithmic, top, seek, point }: PlotOptions): ResponsePlot {
+/** A plot of light over time of flight in ns, with the range it stands for on top. */
+export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, seek, point }: PlotOptions): ResponsePlot {
   const style = getComputedStyle(box);
   const ink = style.getPropertyValue("--quiet");
   const hairline = style.getPropertyValue("--hairline");
   const line = style.getPropertyValue("--curve");
   const font = `11px ${style.fontFamily}`;
   const axis = { stroke: ink, font, labelFont: font, grid: { stroke: hairline, width: 1 }, ticks: { stroke: hairline, width: 1, size: 4 } };
+  const wash = style.getPropertyValue("--curve-wash");
+  const truthInk = style.getPropertyValue("--truth");
+  let truth: Truth | null = null;
+  const solid = { stroke: line, width: 1.5, points: { show: false }, spanGaps: false };
+  const edge = { ...solid, width: 0.75 };
+  const true_ = { ...solid, stroke: truthInk, width: 1.25, dash: [5, 4] };
+  const series: Record<Aspect, uPlot.Series[]> = {
+    density: [{ ...solid, fill: wash }],
+    bounds: [edge, edge, solid, true_],
+    cumulative: [{ ...solid, fill: wash }, true_],
+  };
+  // What the hover line reads: the estimate itself.
+  const main = aspect === "bounds" ? 3 : 1;
   const plot = new uPlot(
     {
       width: Math.max(1, box.clientWidth),
@@ -36,9 +53,14 @@ export function responsePlot(box: HTMLElement, { logarithmic, top, seek, point }
       padding: [0, 12, 0, 0],
       hooks: {
         setCursor: [
-          ({ cursor: { idx }, data: [times, densities] }) => {
-            const density = idx == null ? null : densities[idx];
-            point(idx == null || density == null ? null : { time_ns: times[idx], density });
+          ({ cursor: { idx }, data }) => {
+            const value = idx == null ? null : data[main]?.[idx];
+            point(idx == null || value == null ? null : { time_ns: data[0][idx], value });
+          },
+        ],
+        draw: [
+          (drawn) => {
+            if (truth !== null) drawTruth(drawn, truth, truthInk);
           },
         ],
       },
@@ -50,7 +72,7 @@ export function responsePlot(box: HTMLElement, { logarithmic, top, seek, point }
       },
       axes: [
         { ...axis, size: 20, gap: 2, label: "time of flight (ns)", labelSize: 16, labelGap: 0 },
-        { ...axis, size: 52, gap: 4, label: "DN/ns", labelSize: 16, labelGap: 0, space: 28, values: (_plot, splits) => splits.map(tickText), ...(logarithmic ? { splits: powersOfTen, filter: (_plot: uPlot, splits: number[]) => splits } : {}) },
+        { ...axis, size: 52, gap: 4, label: aspect === "cumulative" ? "DN" : "DN/ns", labelSize: 16, labelGap: 0, space: 28, values: (_plot, splits) => splits.map(tickText), ...(logarithmic ? { splits: powersOfTen, filter: (_plot: uPlot, splits: number[]) => splits } : {}) },
         {
           ...axis,
           scale: "x",
@@ -63,12 +85,10 @@ export function responsePlot(box: HTMLElement, { logarithmic, top, seek, point }
           values: (_plot, splits) => splits.map((time_ns) => `${Number((time_ns * METRES_PER_NS).toFixed(2))}\u202fm`),
         },
       ],
-      series: [
-        {},
-        { stroke: line, width: 1.5, fill: style.getPropertyValue("--curve-wash"), points: { show: false }, spanGaps: false },
-      ],
+      series: [{}, ...series[aspect]],
+      bands: aspect === "bounds" ? [{ series: [2, 1], fill: wash }] : [],
     },
-    [[], []],
+    [[], ...series[aspect].map(() => [])],
     box,
   );
   plot.over.addEventListener("click", () => {
@@ -78,7 +98,32 @@ export function responsePlot(box: HTMLElement, { logarithmic, top, seek, point }
   const head = document.createElement("i");
   head.className = "response-head";
   plot.over.append(head);
-  return { plot, head };
+  return {
+    plot,
+    head,
+    show: (curves, truthNow) => {
+      truth = truthNow;
+      plot.setData(curves === null ? [[], ...series[aspect].map(() => [])] : [curves.time_ns, ...curves.lines]);
+    },
+  };
+}
+
+/** A mark at the foot of the plot for each true return, as high as its share of the light. */
+function drawTruth(plot: uPlot, { returns, brightness }: Truth, ink: string): void {
+  const { ctx } = plot;
+  const { top, height } = plot.bbox;
+  ctx.save();
+  ctx.strokeStyle = ink;
+  ctx.lineWidth = 2 * devicePixelRatio;
+  ctx.setLineDash([]);
+  for (const { time_s, weight } of returns) {
+    const x = plot.valToPos(time_s * 1e9, "x", true);
+    ctx.beginPath();
+    ctx.moveTo(x, top + height);
+    ctx.lineTo(x, top + height * (1 - Math.min(1, weight / brightness)));
+    ctx.stroke();
+  }
+  ctx.restore();
 }
 
 /** Decades that the logarithmic axis shows. */

@@ -1,0 +1,48 @@
+/** Files made in the page: what is on screen, as it is on screen. */
+import type { Frame } from "../store/frames";
+
+/** Hands a file to the browser's downloads. */
+export function save(name: string, content: Blob): void {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(content);
+  link.download = name;
+  link.click();
+  // The browser reads the address in a task of its own.
+  setTimeout(() => {
+    URL.revokeObjectURL(link.href);
+  }, 10_000);
+}
+
+/** A canvas as PNG, in its own pixels. Of WebGL only in the task that drew it. */
+export function savePicture(name: string, canvas: HTMLCanvasElement | null): void {
+  canvas?.toBlob((content) => {
+    if (content !== null) save(`${name}.png`, content);
+  }, "image/png");
+}
+
+/** The numbers of a frame as NPY. */
+export function saveNumbers(frame: Frame | null): void {
+  if (frame === null) return;
+  save(`${frame.product}-${frame.meta.frame}.npy`, new Blob([npy(frame.values, frame.shape)]));
+}
+
+const DESCRIPTIONS: readonly (readonly [new (length: number) => Frame["values"], string])[] = [
+  [Float32Array, "<f4"],
+  [Float64Array, "<f8"],
+  [Uint16Array, "<u2"],
+  [Uint8Array, "|u1"],
+];
+
+/** An array in NumPy's format, version 1.0. */
+export function npy(values: Frame["values"], shape: readonly number[]): Uint8Array<ArrayBuffer> {
+  const descr = DESCRIPTIONS.find(([type]) => values instanceof type)?.[1] ?? "<f4";
+  const tuple = shape.length === 1 ? `${shape[0]},` : shape.join(", ");
+  const start = `{'descr': '${descr}', 'fortran_order': False, 'shape': (${tuple}), }`;
+  // Magic, version and length are 10 bytes; data begins at a multiple of 64.
+  const header = `${start.padEnd(Math.ceil((start.length + 11) / 64) * 64 - 11)}\n`;
+  const bytes = new Uint8Array(10 + header.length + values.byteLength);
+  bytes.set([0x93, 0x4e, 0x55, 0x4d, 0x50, 0x59, 1, 0, header.length & 255, header.length >> 8]);
+  bytes.set(new TextEncoder().encode(header), 10);
+  bytes.set(new Uint8Array(values.buffer, values.byteOffset, values.byteLength), 10 + header.length);
+  return bytes;
+}

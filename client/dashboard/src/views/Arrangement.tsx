@@ -1,0 +1,131 @@
+import { Fragment } from "preact";
+import { useRef } from "preact/hooks";
+
+import { useStore } from "../store/store";
+import { SlotContext } from "../ui/Panel";
+import { below, beside, closed, replaced, split, viewsOf, type Layout, type Row } from "./layout";
+import { VIEWS } from "./registry";
+
+/** The views in their places, with splitters between them. */
+export function Arrangement() {
+  const store = useStore();
+  const layout = store.layout.value;
+  const alone = store.alone.value;
+  const rows: Layout = alone === null ? layout : [{ share: 1, slots: [{ view: alone, share: 1 }] }];
+  const change = (made: Layout): void => {
+    store.layout.value = made;
+  };
+  return (
+    <main class="views" data-alone={alone !== null}>
+      {rows.map((row, at) => (
+        <Fragment key={at}>
+          {at > 0 && <Splitter kind="rows" place={rows[at - 1].share / (rows[at - 1].share + row.share)} onMove={(place) => change(split(rows, at - 1, place))} />}
+          <RowOfViews
+            row={row}
+            onChange={(made) => {
+              change(rows.map((each, n) => (n === at ? made : each)));
+            }}
+          />
+        </Fragment>
+      ))}
+    </main>
+  );
+}
+
+function RowOfViews({ row, onChange }: { row: Row; onChange: (row: Row) => void }) {
+  return (
+    <div class="views-row" style={{ "--share": row.share }}>
+      {row.slots.map(({ view, share }, at) => (
+        <Fragment key={view}>
+          {at > 0 && (
+            <Splitter
+              kind="columns"
+              place={row.slots[at - 1].share / (row.slots[at - 1].share + share)}
+              onMove={(place) => {
+                onChange({ ...row, slots: split(row.slots, at - 1, place) });
+              }}
+            />
+          )}
+          <Place view={view} share={share} />
+        </Fragment>
+      ))}
+    </div>
+  );
+}
+
+/** A view and what its panel may do with its place. */
+function Place({ view, share }: { view: string; share: number }) {
+  const store = useStore();
+  const shown = VIEWS.find(({ name }) => name === view);
+  if (shown === undefined) return null;
+  const View = shown.view;
+  const layout = store.layout.value;
+  const set = (made: Layout | null) => (): void => {
+    if (made !== null) store.layout.value = made;
+    store.alone.value = null;
+  };
+  const free = VIEWS.filter(({ name }) => !viewsOf(layout).includes(name));
+  const room = (made: (wanted: string) => Layout | null) => free.filter(({ name }) => made(name) !== null);
+  const groups = [
+    { title: "Show here", actions: VIEWS.filter(({ name }) => name !== view).map(({ name, title }) => ({ text: title, run: set(replaced(layout, view, name)) })) },
+    { title: "Add to the right", actions: room((name) => beside(layout, view, name)).map(({ name, title }) => ({ text: `${title} →`, run: set(beside(layout, view, name)) })) },
+    { title: "Add below", actions: room((name) => below(layout, view, name)).map(({ name, title }) => ({ text: `${title} ↓`, run: set(below(layout, view, name)) })) },
+    {
+      title: "Panel",
+      actions: [
+        { text: store.alone.value === view ? "Show all panels" : "Show alone", run: () => (store.alone.value = store.alone.peek() === view ? null : view) },
+        ...(viewsOf(layout).length > 1 ? [{ text: "Close", run: set(closed(layout, view)) }] : []),
+      ],
+    },
+  ]; // prettier-ignore
+  return (
+    <div class="place" style={{ "--share": share }}>
+      <SlotContext.Provider value={groups}>
+        <View />
+      </SlotContext.Provider>
+    </div>
+  );
+}
+
+/** Moved by pointer and arrow keys. */
+const KEY_STEP = 0.02;
+
+function Splitter({ kind, place, onMove }: { kind: "rows" | "columns"; place: number; onMove: (place: number) => void }) {
+  const bar = useRef<HTMLDivElement>(null);
+  const across = kind === "columns";
+  const placeOf = (event: PointerEvent): number => {
+    const [before, after] = [bar.current?.previousElementSibling, bar.current?.nextElementSibling].map((each) => each?.getBoundingClientRect());
+    if (before === undefined || after === undefined) return place;
+    return across
+      ? (event.clientX - before.left) / (after.right - before.left)
+      : (event.clientY - before.top) / (after.bottom - before.top);
+  };
+  const keys: Readonly<Record<string, number | undefined>> = across ? { ArrowLeft: -KEY_STEP, ArrowRight: KEY_STEP } : { ArrowUp: -KEY_STEP, ArrowDown: KEY_STEP };
+  return (
+    <div
+      ref={bar}
+      class={`splitter splitter-${kind}`}
+      role="separator"
+      aria-orientation={across ? "vertical" : "horizontal"}
+      aria-label={across ? "Width of the panels" : "Height of the panels"}
+      aria-valuenow={Math.round(100 * place)}
+      tabIndex={0}
+      onPointerDown={(event) => {
+        if (event.button === 0) event.currentTarget.setPointerCapture(event.pointerId);
+      }}
+      onPointerMove={(event) => {
+        if (event.currentTarget.hasPointerCapture(event.pointerId)) onMove(placeOf(event));
+      }}
+      onKeyDown={(event) => {
+        const step = keys[event.key];
+        if (step === undefined) return;
+        event.preventDefault();
+        event.stopPropagation();
+        onMove(place + step);
+      }}
+      onDblClick={() => {
+        onMove(0.5);
+      }}
+    />
+  );
+}

@@ -1,0 +1,77 @@
+/** What is plotted of a pixel: curves over time of flight, by what is asked of it. */
+import { impulseResponse, type Peak } from "../../physics/impulseResponse";
+import type { Coefficients } from "../../physics/maximumEntropy";
+import { Poles } from "../../physics/poles";
+import { boundsAt, pixelOf, poissonKernel } from "../../physics/reflection";
+import type { PixelDocument } from "../../stream/protocol";
+
+export type Aspect = "density" | "bounds" | "cumulative";
+export type Truth = NonNullable<PixelDocument["truth"]>;
+
+/** Curves over the same times; what they are is told by their aspect. */
+export interface Curves {
+  readonly aspect: Aspect;
+  readonly time_ns: Float64Array;
+  /** Units of b_0 per ns, or of b_0 for what is cumulative. */
+  readonly lines: readonly Float64Array[];
+}
+
+/** The lines of each aspect, in their order, as the columns of a table call them. */
+export const LINES: Readonly<Record<Aspect, readonly string[]>> = {
+  density: ["density"],
+  bounds: ["lower", "upper", "smoothed", "truth_smoothed"],
+  cumulative: ["cumulative", "truth_cumulative"],
+};
+
+const TURN = 2 * Math.PI;
+/** Even samples of a curve, beside those around its peaks. */
+const SAMPLES = 513;
+/** Returns of the truth that hold less than this of its light do not tell what all of it would look like. */
+const COMPLETE = 0.999;
+
+/** The curves of one pixel. `truth` is drawn beside them where it is complete. */
+export function curvesOf(aspect: Aspect, c: Coefficients, pixel: number, around: readonly Peak[], truth: Truth | null): Curves {
+  const response = impulseResponse(c, pixel, SAMPLES, around);
+  const time_ns = response.time_s.map((time_s) => time_s * 1e9);
+  const lines = (): Float64Array[] => LINES[aspect].map(() => new Float64Array(time_ns.length).fill(NaN));
+  const whole = wholeOf(truth);
+  const phase_rad = response.time_s.map((time_s) => TURN * c.baseFrequency_hz * time_s);
+  if (aspect === "density") return { aspect, time_ns, lines: [response.density.map((value) => value * 1e-9)] };
+  const made = lines();
+  if (aspect === "bounds") {
+    const levinson = pixelOf(c, pixel);
+    const perNs = TURN * c.baseFrequency_hz * 1e-9;
+    phase_rad.forEach((phase, n) => {
+      if (levinson !== null) {
+        const { lower, upper, smoothed } = boundsAt(levinson, phase);
+        [made[0][n], made[1][n], made[2][n]] = [perNs * lower, perNs * upper, perNs * smoothed];
+      }
+      if (whole === null) return;
+      made[3][n] = perNs * whole.returns.reduce((sum, { time_s, weight }) => sum + weight * poissonKernel(phase - TURN * c.baseFrequency_hz * time_s), 0);
+    });
+  } else {
+    const poles = new Poles(c.harmonics, 1);
+    poles.findOne(c, pixel, 0);
+    phase_rad.forEach((phase, n) => {
+      made[0][n] = poles.upTo(0, phase);
+      if (whole === null) return;
+      made[1][n] = whole.returns.reduce((sum, { time_s, weight }) => sum + (time_s * 1e9 <= time_ns[n] ? weight : 0), 0);
+    });
+  }
+  return { aspect, time_ns, lines: made };
+}
+
+function wholeOf(truth: Truth | null): Truth | null {
+  if (truth === null) return null;
+  const told = truth.returns.reduce((sum, { weight }) => sum + weight, 0);
+  return told >= COMPLETE * truth.brightness ? truth : null;
+}
+
+/** A table of the curves: comma-separated, one line a time, units in the names of the columns. */
+export function csvOf({ aspect, time_ns, lines }: Curves): string {
+  const unit = aspect === "cumulative" ? "dn" : "dn_per_ns";
+  const kept = lines.map((line, at) => ({ line, name: LINES[aspect][at] })).filter(({ line }) => line.some((value) => !Number.isNaN(value)));
+  const head = ["time_ns", ...kept.map(({ name }) => `${name}_${unit}`)].join(",");
+  const rows = Array.from(time_ns, (time, n) => [time, ...kept.map(({ line }) => line[n])].map((value) => (Number.isNaN(value) ? "" : String(Number(value.toPrecision(9))))).join(","));
+  return `${[head, ...rows].join("\n")}\n`;
+}

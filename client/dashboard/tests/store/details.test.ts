@@ -1,0 +1,68 @@
+import { signal } from "@preact/signals";
+import { expect, test, vi } from "vitest";
+
+import type { Api } from "../../src/store/api";
+import { Details } from "../../src/store/details";
+import type { Frame } from "../../src/store/frames";
+import type { Pixel } from "../../src/store/store";
+
+const frame = (number: number): Frame => ({ meta: { frame: number, width: 10, height: 10 } }) as Frame;
+const settled = (): Promise<void> => new Promise((done) => setTimeout(done));
+
+function watched() {
+  const asked: string[] = [];
+  let now_s = 0;
+  let number = 1;
+  const api = {
+    pixel: (x: number, y: number) => {
+      asked.push(`${x},${y}`);
+      return Promise.resolve({ x, y, meta: { frame: number } });
+    },
+  } as unknown as Api;
+  const details = new Details(api, () => now_s);
+  const pixel = signal<Pixel | null>(null);
+  const newest = signal<Frame | null>(frame(1));
+  const end = details.follow(pixel, newest);
+  const arrive = (after_s: number): void => {
+    now_s += after_s;
+    number += 1;
+    newest.value = frame(number);
+  };
+  return { asked, details, pixel, arrive, end };
+}
+
+test("nothing is asked before a pixel is chosen, nor about one outside of the picture", async () => {
+  const { asked, pixel, end } = watched();
+  await settled();
+  pixel.value = { x: 10, y: 0 };
+  await settled();
+  expect(asked).toEqual([]);
+  end();
+});
+
+test("a pixel is asked about at once, and again with later frames but not with each", async () => {
+  const { asked, details, pixel, arrive, end } = watched();
+  pixel.value = { x: 3, y: 4 };
+  await settled();
+  expect(details.document.value?.x).toBe(3);
+  for (const after_s of [0.1, 0.1, 0.4]) {
+    arrive(after_s);
+    await settled();
+  }
+  expect(asked).toEqual(["3,4", "3,4"]);
+  end();
+});
+
+test("what is known of one pixel is not shown as another's", async () => {
+  const { asked, details, pixel, end } = watched();
+  pixel.value = { x: 3, y: 4 };
+  await settled();
+  pixel.value = { x: 5, y: 5 };
+  expect(details.document.value).toBeNull();
+  pixel.value = { x: 6, y: 6 }; // while the question about 5, 5 is on its way
+  await vi.waitFor(() => {
+    expect(details.document.value?.x).toBe(6);
+  });
+  expect(asked).toEqual(["3,4", "5,5", "6,6"]);
+  end();
+});

@@ -1,0 +1,126 @@
+import csv
+import io
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+import transientcam_moments as tm
+from numpy.typing import NDArray
+from playwright.sync_api import Page, expect
+
+from tests.browser.dashboard import choose, open_page, point_at, shows_frame, text
+from tests.browser.test_transient import stop
+from tests.serving import Served
+
+F_HZ = 23e6
+PIXEL = (81, 20)
+WORDS = {"biased": "Biased:", "saturated": "Saturated:", "no_signal": "No signal:"}
+
+
+def pixel_of(served: Served) -> dict[str, object]:
+    answer = httpx.get(
+        f"{served.url}/api/v1/frames/latest/pixel", params={"x": 81, "y": 20, "bins": 1}
+    ).raise_for_status()
+    document: dict[str, object] = answer.json()
+    return document
+
+
+def select(page: Page, served: Served) -> None:
+    """A pixel of a frame that stays."""
+    open_page(page)
+    shows_frame(page, stop(served))
+    point_at(page, "map", *PIXEL, click=True)
+    expect(page.locator(".panel-response h2")).to_contain_text("of pixel 81, 20")
+    page.locator(".listing-truth").wait_for()
+
+
+def curves(page: Page, aspect: str) -> dict[str, NDArray[np.float64]]:
+    """The curves of the selected pixel, as the page hands them out."""
+    with page.expect_download() as download:
+        choose(page, "response", f"{aspect} (CSV)")
+    rows = list(csv.DictReader(io.StringIO(Path(download.value.path()).read_text())))
+    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+
+def moments_of(served: Served) -> NDArray[np.complex64]:
+    answer = httpx.get(f"{served.url}/api/v1/frames/latest/moments.npy").raise_for_status()
+    moments: NDArray[np.complex64] = np.load(io.BytesIO(answer.content))
+    return moments[:, PIXEL[1], PIXEL[0], np.newaxis]
+
+
+def test_the_bounds_are_those_of_the_moments_package(page: Page, served: Served) -> None:
+    select(page, served)
+    drawn = curves(page, "Bounds")
+    phase_rad = 2 * np.pi * F_HZ * drawn["time_ns"] * 1e-9
+    per_ns = 2 * np.pi * F_HZ * 1e-9
+    lower, upper = tm.bounds(moments_of(served), phase_rad)
+    scale = float(np.max(upper)) * per_ns
+    for name, expected in (("lower", lower), ("upper", upper)):
+        difference = drawn[f"{name}_dn_per_ns"] - per_ns * np.asarray(expected)[:, 0]
+        assert np.max(np.abs(difference)) < 2e-3 * scale
+    smoothed = tm.smoothed_density(tm.levinson(moments_of(served)), phase_rad)
+    difference = drawn["smoothed_dn_per_ns"] - per_ns * np.asarray(smoothed)[:, 0]
+    assert np.max(np.abs(difference)) < 2e-3 * scale
+    assert drawn["truth_smoothed_dn_per_ns"].max() > 0
+
+
+def test_the_cumulative_curve_is_that_of_the_moments_package(page: Page, served: Served) -> None:
+    select(page, served)
+    drawn = curves(page, "Cumulative")
+    phase_rad = 2 * np.pi * F_HZ * drawn["time_ns"] * 1e-9
+    moments = moments_of(served)
+    expected = np.asarray(tm.cumulative(tm.levinson(moments), phase_rad))[:, 0]
+    brightness = float(moments[0, 0].real)
+    np.testing.assert_allclose(drawn["cumulative_dn"], expected, atol=2e-3 * brightness)
+    # the truth beside it ends where all of its light has come
+    truth = pixel_of(served)["truth"]
+    assert isinstance(truth, dict)
+    np.testing.assert_allclose(drawn["truth_cumulative_dn"][-1], truth["brightness"], rtol=1e-6)
+
+
+def test_returns_truth_and_flags_are_told(page: Page, served: Served) -> None:
+    select(page, served)
+    told = pixel_of(served)
+    truth = told["truth"]
+    assert isinstance(truth, dict)
+    for name, listed in (("returns", told["returns"]), ("truth", truth["returns"])):
+        assert isinstance(listed, list)
+        rows = page.locator(f".listing-{name} tbody tr")
+        expect(rows).to_have_count(len(listed))
+        shown = rows.evaluate_all(
+            "(rows) => rows.map((row) => [...row.cells].map((each) => parseFloat("
+            "each.textContent.replace(/\\u202f(?=\\d)/g, ''))))"
+        )
+        for (time_ns, range_m, weight), each in zip(shown, listed, strict=True):
+            assert time_ns == pytest.approx(1e9 * each["time_s"], abs=0.006)
+            assert range_m == pytest.approx(299_792_458 * each["time_s"] / 2, abs=0.006)
+            assert weight == pytest.approx(each["weight"], abs=0.6)
+    flags = text(page, ".panel-response", "flags")
+    assert isinstance(told["flags"], list)
+    expected = [WORDS[flag] for flag in told["flags"]] or ["Nothing was wrong"]
+    assert all(words in flags for words in expected)
+
+
+def test_the_moments_stand_on_the_plane_where_they_are(page: Page, served: Served) -> None:
+    select(page, served)
+    page.get_by_role("tab", name="Moments").click()
+    moments = moments_of(served)[:, 0]
+    for j in range(1, len(moments)):
+        point = page.locator(f"[data-moment='{j}'] circle")
+        expected = moments[j] / moments[0].real
+        assert float(str(point.get_attribute("cx"))) == pytest.approx(expected.real, abs=1e-3)
+        assert -float(str(point.get_attribute("cy"))) == pytest.approx(expected.imag, abs=1e-3)
+
+
+@pytest.mark.parametrize("aspect", ["Bounds", "Cumulative"])
+def test_every_aspect_is_drawn(page: Page, served: Served, aspect: str) -> None:
+    select(page, served)
+    page.get_by_role("tab", name=aspect).click()
+    page.locator(f".response-plot[data-aspect={aspect.lower()}] canvas").wait_for()
+    ink = page.locator(".response-plot canvas").evaluate(
+        """(canvas) => new Promise((done) => requestAnimationFrame(() => done(
+             new Set(new Uint32Array(canvas.getContext('2d')
+               .getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size)))"""
+    )
+    assert ink > 30, "an empty plot has but its axes' few colours"
