@@ -6,30 +6,21 @@ somebody holds one. A route that is otherwise says so with `needs`.
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import Any, Final, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
-from fastapi import APIRouter, FastAPI, Request
+from fastapi import APIRouter, Depends, FastAPI, Request
 from fastapi.routing import APIRoute
 from transientcam.wire import LEASE_HEADER
 
 from transientcam_server import problem_kinds as kinds
+from transientcam_server.auth import Principal
+from transientcam_server.errors import Problem
 from transientcam_server.problems import document_problems
 from transientcam_server.service import ServiceOf
+from transientcam_server.tokens import Role
 
 _READS: Final = frozenset(("GET", "HEAD", "OPTIONS"))
 _Endpoint = TypeVar("_Endpoint", bound=Callable[..., Any])
-
-
-class Role(IntEnum):
-    """What somebody may do; each role may do what those below it may."""
-
-    VIEWER = 1
-    """Look at everything, change nothing; and switch the light off."""
-    OPERATOR = 2
-    """Control the camera."""
-    ADMIN = 3
-    """Take the lease from anybody, and delete what cannot be made again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +57,27 @@ _MARK: Final = "_transientcam_needs"
 async def admit(request: Request, service: ServiceOf) -> None:
     """Let a request of the interface in, or say what it lacks."""
     wanted = needed(request.scope["endpoint"], request.method)
+    principal: Principal = request.state.principal
+    if principal.role < wanted.role:
+        detail = f"{principal.name} is a {principal.role}, but this takes the role {wanted.role}."
+        raise Problem(
+            kinds.ROLE_TOO_LOW,
+            detail,
+            field="token",
+            value=str(principal.role),
+            limit=str(wanted.role),
+        )
     if wanted.lease:
         service.lease.check(request.headers.get(LEASE_HEADER))
+
+
+async def _principal(request: Request) -> Principal:
+    principal: Principal = request.state.principal
+    return principal
+
+
+PrincipalOf = Annotated[Principal, Depends(_principal)]
+"""Who sent a request."""
 
 
 def describe(app: FastAPI, routers: Iterable[APIRouter], *, prefix: str) -> None:
@@ -86,7 +96,9 @@ def describe(app: FastAPI, routers: Iterable[APIRouter], *, prefix: str) -> None
 
     def openapi() -> dict[str, Any]:
         if app.openapi_schema is None:
-            paths = generate()["paths"]
+            document = generate()
+            document["components"]["securitySchemes"] = _SCHEMES
+            paths = document["paths"]
             for path, method, wanted in guarded:
                 _describe(paths[path][method], wanted)
         return generate()
@@ -95,11 +107,24 @@ def describe(app: FastAPI, routers: Iterable[APIRouter], *, prefix: str) -> None
 
 
 def _describe(operation: dict[str, Any], wanted: Needs) -> None:
+    operation["security"] = [{}, *({name: []} for name in _SCHEMES)]
+    document_problems(operation, kinds.TOKEN_REQUIRED, kinds.TOKEN_REFUSED)
+    if wanted.role > Role.VIEWER:
+        document_problems(operation, kinds.ROLE_TOO_LOW)
     if wanted.lease:
         document_problems(operation, kinds.LEASE_HELD, kinds.LEASE_LOST)
         operation.setdefault("parameters", []).append(_LEASE_PARAMETER)
 
 
+_SCHEMES: Final[dict[str, Any]] = {
+    "bearer": {
+        "type": "http",
+        "scheme": "bearer",
+        "description": "A token made by `transientcam token create`. A service that only its own "
+        "machine can reach asks for none.",
+    },
+    "key": {"type": "apiKey", "in": "header", "name": "X-API-Key", "description": "The same."},
+}
 _LEASE_PARAMETER: Final[dict[str, Any]] = {
     "name": LEASE_HEADER,
     "in": "header",

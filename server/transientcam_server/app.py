@@ -8,6 +8,7 @@ from fastapi import APIRouter, Depends, FastAPI
 from transientcam_driver import Camera
 
 from transientcam_server import access, pages, problems, stream
+from transientcam_server.auth import Authentication
 from transientcam_server.routes import (
     acquisition,
     camera,
@@ -63,6 +64,7 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     access.describe(app, [resource.router for resource in _RESOURCES], prefix=API)
     # the last one added is the first to see a request
     app.add_middleware(BodyLimit)
+    app.add_middleware(Authentication, guard=service.guard)
     app.add_middleware(SameSite, settings=settings)
     app.add_middleware(SecurityHeaders)
     return app

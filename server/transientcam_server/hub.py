@@ -13,6 +13,7 @@ from typing import Any, Final
 from transientcam import wire
 
 from transientcam_server import problem_kinds as kinds
+from transientcam_server.auth import ANYBODY
 from transientcam_server.errors import Problem
 from transientcam_server.pipeline import Frame
 from transientcam_server.products import Product
@@ -71,9 +72,15 @@ class Outbox:
 
     With ``credits`` only that many frames may be on their way unacknowledged, and what waits is
     the newest frame alone.
+
+    Attributes
+    ----------
+    owner
+        Whom the client has shown to be.
     """
 
     def __init__(self, *, depth: int) -> None:
+        self.owner = ANYBODY
         self._depth = depth
         self._channels: tuple[Channel, ...] = ()
         self._credits: int | None = None
@@ -165,6 +172,11 @@ class Hub:
     def clients(self) -> int:
         """How many look on."""
         return len(self._outboxes)
+
+    @property
+    def outboxes(self) -> tuple[Outbox, ...]:
+        """Of everybody, also those who have not said yet what to send."""
+        return tuple(self._outboxes)
 
     def join(self, outbox: Outbox) -> None:
         """Let an outbox take part from the next frame on."""

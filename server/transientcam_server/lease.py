@@ -30,6 +30,8 @@ class Lease:
         The secret that its holder shows with every change.
     holder
         What the holder calls itself.
+    by
+        Who has shown to be asking.
     rank
         The rank of whoever took it; nobody of a lower rank takes it over.
     on_lapse
@@ -40,6 +42,7 @@ class Lease:
 
     id: str = field(repr=False)
     holder: str
+    by: str
     rank: int
     duration_s: float
     on_lapse: OnLapse
@@ -92,7 +95,14 @@ class LeaseDesk:
         return max(0.0, lease.expires_s - self._clock())
 
     def grant(
-        self, *, holder: str, rank: int, duration_s: float, on_lapse: OnLapse, takeover: bool
+        self,
+        *,
+        holder: str,
+        by: str,
+        rank: int,
+        duration_s: float,
+        on_lapse: OnLapse,
+        takeover: bool,
     ) -> Lease:
         """Give the lease to somebody.
 
@@ -104,7 +114,7 @@ class LeaseDesk:
         former = self.current
         if former is not None and not (takeover and rank >= former.rank):
             raise self._held(former)
-        lease = Lease(secrets.token_urlsafe(16), holder, rank, duration_s, on_lapse, 0.0)
+        lease = Lease(secrets.token_urlsafe(16), holder, by, rank, duration_s, on_lapse, 0.0)
         lease = self._keep(lease)
         self._report("granted" if former is None else "taken-over", lease, former)
         return lease

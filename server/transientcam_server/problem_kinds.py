@@ -37,6 +37,26 @@ ORIGIN_NOT_ALLOWED: Final = ProblemKind(
     "A page of another site tried to change something or to open the stream. Add its origin to "
     "the setting allowed_origins if that is meant.",
 )
+TOKEN_REQUIRED: Final = ProblemKind(
+    "token-required",
+    401,
+    "Who are you?",
+    "This service can be reached from other machines and so asks everybody for a token: in the "
+    "header Authorization (Bearer) or X-API-Key, or on the stream in the first message. "
+    "`transientcam token create` makes one. The stream closes with code 4003.",
+)
+TOKEN_REFUSED: Final = ProblemKind(
+    "token-refused",
+    401,
+    "This token is not valid here",
+    "The token is unknown, was revoked or has expired. The stream closes with code 4003.",
+)
+ROLE_TOO_LOW: Final = ProblemKind(
+    "role-too-low",
+    403,
+    "This token may not do that",
+    "The token's role (`value`) may look, but not do this; `limit` is the role it takes.",
+)
 NOT_FOUND: Final = ProblemKind(
     "not-found", 404, "There is nothing here", "No resource has this path. /docs lists all of them."
 )
@@ -52,6 +72,12 @@ NOT_SIMULATED: Final = ProblemKind(
     404,
     "The camera is a real one",
     "The request is about the simulated world behind a simulated camera, and this camera has none.",
+)
+UNKNOWN_RECORDING: Final = ProblemKind(
+    "unknown-recording",
+    404,
+    "There is no such recording",
+    "No recording has this id; the list of recordings has those there are.",
 )
 METHOD_NOT_ALLOWED: Final = ProblemKind(
     "method-not-allowed",
@@ -81,8 +107,27 @@ LEASE_LOST: Final = ProblemKind(
     "The lease that the header Transientcam-Lease names was given back, taken over or not renewed "
     "in time. `holder` says who has one now. Nothing was changed.",
 )
+RECORDING_RUNS: Final = ProblemKind(
+    "recording-runs",
+    409,
+    "There is a recording already",
+    "One recording runs at a time; `recording` is its id. Stop it first.",
+)
+RECORDING_UNFINISHED: Final = ProblemKind(
+    "recording-unfinished",
+    409,
+    "The recording is not finished",
+    "It is still being written, or its writer died and it was not recovered yet; the service "
+    "recovers such ones when it starts.",
+)
 TOO_LARGE: Final = ProblemKind(
     "too-large", 413, "The request is too large", "The body is longer than `limit` bytes."
+)
+RANGE_NOT_SATISFIABLE: Final = ProblemKind(
+    "range-not-satisfiable",
+    416,
+    "The file has no such bytes",
+    "The Range header asks for bytes beyond the end of the file, whose size `limit` states.",
 )
 INVALID_REQUEST: Final = ProblemKind(
     "invalid-request",
@@ -117,6 +162,12 @@ INTERNAL_ERROR: Final = ProblemKind(
     500,
     "The service failed",
     "This is a mistake of the service, not of the request; its log says more.",
+)
+RECORDING_NOT_STORED: Final = ProblemKind(
+    "recording-not-stored",
+    507,
+    "The recording cannot be stored",
+    "The disk is full, read-only, or not allowed to the service. The camera goes on capturing.",
 )
 PRODUCT_FAILED: Final = ProblemKind(
     "product-failed",

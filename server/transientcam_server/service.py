@@ -22,9 +22,10 @@ from transientcam_server.acquisition import (
     Lost,
     SequenceChanged,
 )
+from transientcam_server.auth import Guard
 from transientcam_server.calibration import Calibration, calibration_id, load_calibration
 from transientcam_server.fronts import Fronts
-from transientcam_server.hub import Channel, Hub
+from transientcam_server.hub import Channel, Goodbye, Hub
 from transientcam_server.lease import Alarm, Change, Lease, LeaseDesk
 from transientcam_server.pipeline import Pipeline
 from transientcam_server.settings import Settings
@@ -32,6 +33,8 @@ from transientcam_server.settings import Settings
 _log = logging.getLogger(__name__)
 VERSION: Final = version("transientcam")
 _GOODBYE_S = 1.0
+_TOKENS_EVERY_S = 1.0
+_NO_MORE = "the token is not valid any more"
 
 
 class Service:
@@ -47,6 +50,7 @@ class Service:
         self.camera = camera
         self.settings = settings
         self.hub = Hub()
+        self.guard = Guard(settings)
         self._executor = ThreadPoolExecutor(settings.workers, thread_name_prefix="worker")
         self.accuracy = Accuracy(camera, settings.reconstruction, settings.sensor)
         self.calibration = _calibration(camera, settings)
@@ -70,9 +74,12 @@ class Service:
         """Capture from entry to exit."""
         self._loop = asyncio.get_running_loop()
         self.acquisition.start()
+        watching = asyncio.create_task(self._watch_tokens())
         try:
             yield
         finally:
+            watching.cancel()
+            await asyncio.gather(watching, return_exceptions=True)
             self.lease.close()
             self.hub.close()
             await self._loop.run_in_executor(self._executor, self.acquisition.stop)
@@ -85,6 +92,14 @@ class Service:
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(_GOODBYE_S):
                 await self.hub.deserted.wait()
+
+    async def _watch_tokens(self) -> None:
+        """Send those away whose token was revoked or has expired since they came."""
+        while True:
+            await asyncio.sleep(_TOKENS_EVERY_S)
+            for outbox in self.hub.outboxes:
+                if not self.guard.still_valid(outbox.owner):
+                    outbox.put(Goodbye(wire.CloseCode.AUTHENTICATION_FAILED, _NO_MORE))
 
     def channel_table(self, channels: Iterable[Channel]) -> tuple[wire.Channel, ...]:
         """Return what frames of these channels look like with the present sequence."""
@@ -136,11 +151,17 @@ class Service:
 
     def _lease_changed(self, change: Change, lease: Lease, former: Lease | None) -> None:
         if former is not None:
-            _log.warning("%r took the lease over from %r", lease.holder, former.holder)
+            _log.warning(
+                "%r (%s) took the lease over from %r (%s)",
+                lease.holder,
+                lease.by,
+                former.holder,
+                former.by,
+            )
         elif change == "lapsed":
             _log.warning("the lease of %r lapsed; on lapse: %s", lease.holder, lease.on_lapse)
         else:
-            _log.info("the lease of %r was %s", lease.holder, change)
+            _log.info("the lease of %r (%s) was %s", lease.holder, lease.by, change)
         details = {"change": change, "holder": lease.holder}
         self.hub.tell("lease-changed", details | ({"from": former.holder} if former else {}))
         if change == "lapsed" and lease.on_lapse == "stop":

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import transientcam_moments as tm
+from platformdirs import user_config_path, user_data_path
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_settings import (
     BaseSettings,
@@ -24,13 +25,18 @@ from pydantic_settings import (
 from pydantic_settings import SettingsError as UnreadableVariable
 from transientcam.wire import FIRST_MESSAGE_WITHIN_S
 
-from transientcam_server.errors import SettingsError, SettingsMistake
+from transientcam_server.errors import SettingsError, SettingsMistake, TokenFileError
+from transientcam_server.tokens import TokenFile
 
 ENVIRONMENT_PREFIX: Final = "TRANSIENTCAM_"
 DEFAULT_FILES: Final = (Path("transientcam.toml"), Path("/etc/transientcam/transientcam.toml"))
 
 _DEFAULTS = tm.Settings()  # the paper's
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+def _default_tokens_file() -> Path:
+    return user_config_path("transientcam") / "tokens.json"
 
 
 class _Group(BaseModel):
@@ -87,11 +93,33 @@ class StreamSettings(_Group):
     """Time a client has to subscribe."""
 
 
+def default_recordings_directory() -> Path:
+    """Return where recordings are kept: the service manager's place for state, or the user's."""
+    state = os.environ.get("STATE_DIRECTORY", "").partition(":")[0]  # systemd
+    return (Path(state) if state else user_data_path("transientcam")) / "recordings"
+
+
+class RecordingSettings(_Group):
+    """Where recordings are kept, and when one ends by itself."""
+
+    directory: Path = Field(default_factory=default_recordings_directory)
+    """Made with the first recording."""
+    max_duration_s: _Finite | None = Field(default=None, gt=0.0)
+    """No recording lasts longer."""
+    max_bytes: int | None = Field(default=None, ge=1)
+    """No recording grows larger."""
+    min_free_bytes: int = Field(default=1024**3, ge=0)
+    """Recordings end when the disk has no more than this left."""
+    queue_bytes: int = Field(default=256 * 1024**2, ge=0)
+    """Frames that wait for the disk before some are dropped."""
+
+
 class Settings(_Group):
     """Everything that can be set."""
 
     camera: str = Field(default="sim:mirrors", min_length=1)
-    """Which camera: ``usb``, ``usb:SERIAL``, ``sim:SCENE`` or ``sim:measured:FILE``."""
+    """Which camera: ``usb``, ``usb:SERIAL``, ``sim:SCENE``, ``sim:measured:FILE`` or
+    ``recording:FILE``."""
     host: str = Field(default="127.0.0.1", min_length=1)
     """Address to listen on."""
     port: int = Field(default=8000, ge=0, le=65535)
@@ -102,6 +130,12 @@ class Settings(_Group):
     """Names, beside the address listened on, that clients may call this service by."""
     allowed_origins: tuple[str, ...] = ()
     """Origins of foreign pages that may control the camera, as in ``https://lab.example``."""
+    tokens_file: Path = Field(
+        default_factory=lambda: user_config_path("transientcam") / "tokens.json"
+    )
+    """Where `transientcam token` keeps what it keeps of the tokens."""
+    require_token: bool = False
+    """Ask for a token also where only this machine reaches the service, as behind a proxy."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     """The least important messages to log."""
     calibration: Path | None = None
@@ -111,6 +145,12 @@ class Settings(_Group):
     reconstruction: ReconstructionSettings = ReconstructionSettings()
     sensor: SensorSettings = SensorSettings()
     stream: StreamSettings = StreamSettings()
+    recordings: RecordingSettings = Field(default_factory=RecordingSettings)
+
+    @property
+    def needs_token(self) -> bool:
+        """Whether nobody gets in without a token."""
+        return self.require_token or not (self.on_loopback or self.insecure)
 
     @property
     def on_loopback(self) -> bool:
@@ -135,29 +175,65 @@ def load_settings(
     SettingsError
         Naming every value that cannot be used and where it was given.
     """
+    settings, places = _load(command_line, file=file, environment=environment)
+    _require_safety(settings, places)
+    return settings
+
+
+def tokens_file_of(file: Path | None, *, environment: Mapping[str, str]) -> Path:
+    """Return where a service with these settings looks for its tokens.
+
+    Raises
+    ------
+    SettingsError
+        As `load_settings`, but it does not matter whether there are tokens yet.
+    """
+    settings, _ = _load({}, file=file, environment=environment)
+    return settings.tokens_file
+
+
+def _load(
+    command_line: Mapping[str, Any], *, file: Path | None, environment: Mapping[str, str]
+) -> "tuple[Settings, _Places]":
     given = {name: value for name, value in command_line.items() if value is not None}
     path = file if file is not None else next((p for p in DEFAULT_FILES if p.is_file()), None)
     from_file = _read(path) if path is not None else {}
     layers = _layers(given, from_file)
+    places = _Places(given, environment, from_file, path)
     try:
         settings = Settings.model_validate(layers().model_dump())
     except UnreadableVariable as error:
         raise SettingsError([SettingsMistake("environment", None, str(error))]) from error
     except ValidationError as error:
-        places = _Places(given, environment, from_file, path)
         raise SettingsError([_mistake(each, places) for each in error.errors()]) from error
-    if not (settings.on_loopback or settings.insecure):
+    return settings, places
+
+
+def _require_safety(settings: Settings, places: "_Places") -> None:
+    """Refuse settings under which everybody or nobody would get in by mistake."""
+    if settings.insecure and settings.require_token:
+        reason = "contradicts require_token"
+        raise SettingsError([SettingsMistake(places.of(("insecure",)), True, reason)])
+    try:
+        locked_out = settings.needs_token and not TokenFile(settings.tokens_file)
+    except TokenFileError as error:
+        place = places.of(("tokens_file",))
+        raise SettingsError(
+            [SettingsMistake(place, str(settings.tokens_file), error.reason)]
+        ) from error
+    if locked_out:
+        place, value = ("require_token", True) if settings.on_loopback else ("host", settings.host)
         raise SettingsError(
             [
                 SettingsMistake(
-                    _Places(given, environment, from_file, path).of(("host",)),
-                    settings.host,
-                    "other machines can reach this address and nothing asks them who they are; "
-                    "add --insecure to accept that, or listen on 127.0.0.1",
+                    places.of((place,)),
+                    value,
+                    "whoever asks will need a token, and there is none: make one with "
+                    "`transientcam token create`; or listen on 127.0.0.1, or add --insecure to "
+                    "let anybody who reaches the port control the camera",
                 )
             ]
         )
-    return settings
 
 
 def _layers(given: Mapping[str, Any], from_file: Mapping[str, Any]) -> type[BaseSettings]:

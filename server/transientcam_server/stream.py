@@ -10,6 +10,7 @@ from transientcam import wire
 from transientcam.errors import ProtocolError
 
 from transientcam_server import problem_kinds as kinds
+from transientcam_server.auth import log_refusal
 from transientcam_server.encoding import MSGPACK
 from transientcam_server.errors import Problem
 from transientcam_server.hub import Channel, Delivery, Goodbye, Outbox
@@ -67,7 +68,7 @@ class _Client:
             try:
                 await self._first_message()
             except Problem as problem:
-                await self._dismiss(problem, wire.CloseCode.BAD_FIRST_MESSAGE)
+                await self._refuse(problem)
                 return
             await self._exchange()
         finally:
@@ -96,7 +97,17 @@ class _Client:
                 value="ack",
                 limit="subscribe",
             )
+        self._outbox.owner = self._service.guard.identify(
+            self._websocket.headers, first_message=message.token
+        )
         self._subscribe(message)
+
+    async def _refuse(self, problem: Problem) -> None:
+        code = wire.CloseCode.BAD_FIRST_MESSAGE
+        if problem.kind in (kinds.TOKEN_REQUIRED, kinds.TOKEN_REFUSED):
+            log_refusal(self._websocket.scope, problem)
+            code = wire.CloseCode.AUTHENTICATION_FAILED
+        await self._dismiss(problem, code)
 
     async def _exchange(self) -> None:
         """Send beside receiving; whichever ends first ends the other."""

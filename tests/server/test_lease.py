@@ -70,7 +70,12 @@ def grant(
     takeover: bool = False,
 ) -> Lease:
     return desk.grant(
-        holder=holder, rank=rank, duration_s=duration_s, on_lapse=on_lapse, takeover=takeover
+        holder=holder,
+        by="somebody",
+        rank=rank,
+        duration_s=duration_s,
+        on_lapse=on_lapse,
+        takeover=takeover,
     )
 
 

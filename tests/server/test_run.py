@@ -25,7 +25,8 @@ PATIENCE_S = 60.0
 def environment(**variables: str) -> dict[str, str]:
     clean = {k: v for k, v in os.environ.items() if not k.startswith(ENVIRONMENT_PREFIX)}
     # nothing is compiled here: it would go on long after the test
-    return clean | {"TRANSIENTCAM_KERNELS": "off"} | variables
+    clean |= {"TRANSIENTCAM_KERNELS": "off", "TRANSIENTCAM_TOKENS_FILE": "/nowhere/tokens.json"}
+    return clean | variables
 
 
 @contextmanager

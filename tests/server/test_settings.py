@@ -3,6 +3,7 @@ from pathlib import Path
 import pytest
 from transientcam_server.errors import SettingsError
 from transientcam_server.settings import ENVIRONMENT_PREFIX, Settings, load_settings
+from transientcam_server.tokens import Role, TokenFile, utc_now
 
 
 @pytest.fixture(autouse=True)
@@ -13,6 +14,7 @@ def clean_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         if name.startswith(ENVIRONMENT_PREFIX):
             monkeypatch.delenv(name)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))  # where no token is
 
 
 def load(
@@ -129,6 +131,41 @@ def test_an_address_others_can_reach_needs_insecure(
         load(monkeypatch, host=host)
 
     assert load(monkeypatch, host=host, insecure=True).host == host
+
+
+def test_a_token_makes_an_address_others_can_reach_safe(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    path = tmp_path / "tokens.json"
+    TokenFile(path).create("a", Role.VIEWER, now=utc_now())
+
+    settings = load(monkeypatch, host="0.0.0.0", tokens_file=path)
+
+    assert settings.needs_token
+
+
+def test_asking_for_tokens_where_there_are_none_would_lock_everybody_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with pytest.raises(SettingsError, match=r"REQUIRE_TOKEN.*token create"):
+        load(monkeypatch, environment={"TRANSIENTCAM_REQUIRE_TOKEN": "true"})
+
+
+def test_asking_for_tokens_and_for_none_contradict_each_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with pytest.raises(SettingsError, match="contradicts"):
+        load(monkeypatch, insecure=True, require_token=True)
+
+
+def test_a_file_of_tokens_that_cannot_be_read_is_named(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    path = tmp_path / "tokens.json"
+    path.write_text("{")
+
+    with pytest.raises(SettingsError, match=r"tokens-file.*tokens\.json"):
+        load(monkeypatch, host="0.0.0.0", tokens_file=path)
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.8.8.8", "::1", "localhost"])

@@ -1,4 +1,4 @@
-"""Verbs of the command line: functions that packages offer in an entry-point group.
+"""Verbs of the command line: functions, or groups of them, that packages offer as entry points.
 
 Only the verb that is asked for is imported, so that the client's verbs start fast and a server's
 verb that lacks its packages stands in nobody's way.
@@ -40,7 +40,7 @@ def extra_of(module: str, verb: str) -> str | None:
 
 def _add(app: typer.Typer, point: EntryPoint) -> None:
     try:
-        function: Callable[..., Any] = point.load()
+        function: Callable[..., Any] | typer.Typer = point.load()
     except ModuleNotFoundError as error:
         missing = CommandUnavailable(point.name, error.name or "", extra_of("", point.name))
         remedy = f"pip install 'transientcam[{missing.extra}]'" if missing.extra else str(missing)
@@ -51,7 +51,10 @@ def _add(app: typer.Typer, point: EntryPoint) -> None:
             add_help_option=False,
         )(_unavailable(missing))
     else:
-        app.command(point.name)(function)
+        if isinstance(function, typer.Typer):
+            app.add_typer(function, name=point.name)
+        else:
+            app.command(point.name)(function)
 
 
 def _unavailable(missing: CommandUnavailable) -> Callable[[typer.Context], None]:

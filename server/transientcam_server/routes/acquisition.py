@@ -5,10 +5,11 @@ import asyncio
 from fastapi import APIRouter
 
 from transientcam_server import problem_kinds as kinds
-from transientcam_server.access import Role, needs
+from transientcam_server.access import needs
 from transientcam_server.problems import documented
 from transientcam_server.routes.models import AcquisitionDocument, AcquisitionRequest
 from transientcam_server.service import Service, ServiceOf
+from transientcam_server.tokens import Role
 
 router = APIRouter(tags=["acquisition"])
 

@@ -7,7 +7,7 @@ from transientcam.wire import LEASE_HEADER
 
 from transientcam_server import lease as leases
 from transientcam_server import problem_kinds as kinds
-from transientcam_server.access import Role, needs
+from transientcam_server.access import PrincipalOf, needs
 from transientcam_server.problems import documented
 from transientcam_server.routes.lease_models import (
     GrantedLeaseDocument,
@@ -16,6 +16,7 @@ from transientcam_server.routes.lease_models import (
     LeaseRequest,
 )
 from transientcam_server.service import Service, ServiceOf
+from transientcam_server.tokens import Role
 
 router = APIRouter(tags=["lease"])
 _THE_SAME: Final = LeaseRenewal()
@@ -41,7 +42,7 @@ async def read_lease(service: ServiceOf) -> LeaseDocument:
 )
 @needs(Role.OPERATOR, lease=False)
 async def take_lease(
-    service: ServiceOf, response: Response, wanted: LeaseRequest
+    service: ServiceOf, principal: PrincipalOf, response: Response, wanted: LeaseRequest
 ) -> GrantedLeaseDocument:
     """Let only those change anything who send this lease's id, until it is given back or lapses.
 
@@ -50,7 +51,8 @@ async def take_lease(
     """
     lease = service.lease.grant(
         holder=wanted.holder,
-        rank=Role.OPERATOR,
+        rank=principal.role,
+        by=principal.name,
         duration_s=wanted.duration_s,
         on_lapse=wanted.on_lapse,
         takeover=wanted.takeover,

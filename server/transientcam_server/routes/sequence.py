@@ -8,10 +8,11 @@ from pydantic import WithJsonSchema
 from transientcam_driver import Sequence
 
 from transientcam_server import problem_kinds as kinds
-from transientcam_server.access import Role, needs
+from transientcam_server.access import needs
 from transientcam_server.problems import documented
 from transientcam_server.routes.models import AppliedDocument, SequenceDocument
 from transientcam_server.service import ServiceOf
+from transientcam_server.tokens import Role
 
 router = APIRouter(tags=["sequence"])
 

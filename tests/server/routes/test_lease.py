@@ -109,7 +109,7 @@ def test_a_takeover_is_told_to_everybody_and_logged(
         told = watcher.notice("lease-changed")
 
     assert told.details == {"change": "taken-over", "holder": "bert", "from": "anna"}
-    assert "'bert' took the lease over from 'anna'" in caplog.text
+    assert "'bert' (anybody) took the lease over from 'anna' (anybody)" in caplog.text
     lost = http.put("/api/v1/acquisition", json={"running": True}, headers=mine).json()
     assert (lost["type"], lost["holder"]) == ("/problems/lease-lost", "bert")
     assert http.delete(PATH, headers=theirs).status_code == 200
