@@ -209,13 +209,15 @@ def plan(
 
 
 def _captured(camera: "Camera") -> tuple["Recipe", "tm.Reconstruction"]:
-    """Take one frame with four harmonics, which resolve what most scenes hold."""
+    """Have a good look: as many harmonics as matter, and little noise."""
     from transientcam_driver import Sequence
 
     from transientcam_server.products import STAGES, Recipe
     from transientcam_server.settings import ReconstructionSettings
 
-    applied = camera.configure(Sequence(harmonics=4))
+    applied = camera.configure(
+        camera.capabilities.nearest(Sequence(harmonics=6, takes=16, exposure_s=0.0015))
+    )
     camera.start()
     frame = camera.read_frame()
     camera.stop()
@@ -263,6 +265,8 @@ def _told(document: dict[str, Any], *, computing: bool) -> Iterator[str]:
         f"range to {std['median'] * 1e3:.2f} mm ({std['low'] * 1e3:.2f} to "
         f"{std['high'] * 1e3:.2f}), 90 % of the pixels to {std['p90'] * 1e3:.2f} mm"
     )
+    if document["predicted"]["beyond_scene"]:
+        yield "at best: this sees more of the scene than it was judged by"
     if document["predicted"]["separation_share"] is not None:
         yield f"finds both returns in {document['predicted']['separation_share']:.0%} of captures"
     if document["predicted"]["bound_width"] is not None:

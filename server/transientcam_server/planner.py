@@ -10,6 +10,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Final, Literal
 
 from transientcam_driver import AppliedSequence, Capabilities, Sequence, SequenceError
@@ -99,7 +100,14 @@ class Choice:
     range_std
         Predicted deviation of the range.
     range_bias_m
-        How far the range of 90 % of the pixels is off at most without any noise.
+        How far the range of the median pixel is off without any noise.
+    resolves
+        Whether noise is what limits the range, and not returns that are taken for one.
+    beyond_scene
+        Whether it sees more than what the scene was judged by, so that the prediction is a bound
+        on how good it can be.
+    range_std_interval
+        Gives where that of a typical pixel lies with 95 %; computed when it is asked for.
     bound_width, separation_share
         Predicted where they were asked for.
     """
@@ -108,13 +116,11 @@ class Choice:
     reconstruct_s: float
     range_std: Deviation
     range_bias_m: float
+    resolves: bool
+    beyond_scene: bool
+    range_std_interval: Callable[[], tuple[float, float]] = field(compare=False)
     bound_width: float | None = None
     separation_share: float | None = None
-
-    @property
-    def resolves(self) -> bool:
-        """Whether noise is what limits the range, and not returns that are taken for one."""
-        return self.range_bias_m <= max(0.1 * self.range_std.median_m, RESOLVED_M)
 
     @property
     def computing_share(self) -> float:
@@ -134,6 +140,7 @@ class Choice:
         document = self.applied.to_document()
         del document["sequence_id"]
         std = self.range_std
+        low_m, high_m = self.range_std_interval()
         return {
             "sequence": self.applied.sequence.to_document(),
             "applied": document,
@@ -144,11 +151,12 @@ class Choice:
             "predicted": {
                 "range_std_m": {
                     "median": std.median_m,
-                    "low": std.low_m,
-                    "high": std.high_m,
+                    "low": low_m,
+                    "high": high_m,
                     "p90": std.p90_m,
                 },
                 "range_bias_m": self.range_bias_m,
+                "beyond_scene": self.beyond_scene,
                 "first_order_share": std.first_order_share,
                 "bound_width": self.bound_width,
                 "separation_share": self.separation_share,
@@ -249,6 +257,8 @@ def candidates(
     are there.
     """
     longest_s = predictor.longest_exposure_s() * MARGIN
+    # what noise made of the scene's own ranges is no bias
+    known_m = 2 * predictor.scene.range_std_m
     chosen = []
     for sequence in _grid(goal, capabilities, longest_s):
         try:
@@ -258,12 +268,16 @@ def candidates(
         if predictor.scene.furthest_m >= applied.unambiguous_range_m:
             continue
         separation = goal.separation_m
+        range_std, bias_m = predictor.range_std(sequence), predictor.range_bias_m(sequence)
         chosen.append(
             Choice(
                 applied,
                 reconstruct_s(sequence),
-                predictor.range_std(sequence),
-                predictor.range_bias_m(sequence),
+                range_std,
+                bias_m,
+                bias_m <= max(range_std.median_m / 2, known_m, RESOLVED_M),
+                predictor.beyond_scene(sequence),
+                partial(predictor.range_std_interval, sequence),
                 predictor.bound_width(sequence) if goal.bound_width is not None else None,
                 None if separation is None else predictor.separation(sequence, separation),
             )

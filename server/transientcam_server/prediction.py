@@ -8,6 +8,7 @@ and number of takes.
 
 from dataclasses import dataclass
 from functools import lru_cache
+from statistics import NormalDist
 from typing import Any, Final
 
 import numpy as np
@@ -24,6 +25,8 @@ DRAWS: Final = 24
 """Noisy captures of each pixel and noise level."""
 LEVELS: Final = np.geomspace(5e-5, 0.5, 12)
 """Standard deviation of a moment over the brightness."""
+_NORMAL: Final = np.array([NormalDist().inv_cdf(0.5 + (k + 0.5) / 64) for k in range(32)])
+"""Absolute values of a standard normal variable, each as likely."""
 _BOUND_PHASES: Final = 32
 _BOUND_DRAWS: Final = 8
 _RESAMPLED: Final = 200
@@ -31,21 +34,17 @@ _RESAMPLED: Final = 200
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """Standard deviation of the range, and how far it is known.
+    """Standard deviation of the range.
 
     Attributes
     ----------
     median_m, p90_m
-        Of the pixels: half of them, 90 % of them are better.
-    low_m, high_m
-        Where the median lies with 95 %, as the pixels that stand for the scene and the draws tell.
+        Of a typical pixel, and one that 90 % of the pixels are better than.
     first_order_share
         Share of the pixels where first order holds; of the others noise was drawn.
     """
 
     median_m: float
-    low_m: float
-    high_m: float
     p90_m: float
     first_order_share: float
 
@@ -90,29 +89,44 @@ class Predictor:
 
     def range_std(self, sequence: Sequence) -> Deviation:
         """Predict the deviation of the range."""
+        each, holds = self._deviations(sequence)
+        return Deviation(_typical(each), float(np.quantile(each, 0.9)), float((holds > 0.5).mean()))
+
+    def range_std_interval(self, sequence: Sequence) -> tuple[float, float]:
+        """Say where the typical pixel's deviation lies with 95 %, in m.
+
+        As the pixels that stand for the scene and the draws tell (bootstrap over the pixels).
+        """
+        each, _ = self._deviations(sequence)
+        picks = np.random.default_rng(self._seed).integers(0, each.size, (_RESAMPLED, each.size))
+        low, high = np.quantile([_typical(each[pick]) for pick in picks], [0.025, 0.975])
+        return float(low), float(high)
+
+    def _deviations(self, sequence: Sequence) -> tuple[_Array, _Array]:
+        """Deviation in m of each pixel, and share of first order in it."""
         noise = self._relative_noise(sequence)
         key = (sequence.harmonics, sequence.base_frequency_hz, self._zeroth_of(sequence))
         deviation, holds = self._ranges(*key)
-        each = _interpolated(noise, deviation, log=True)
-        random = np.random.default_rng(self._seed)
-        picks = random.integers(0, each.size, (_RESAMPLED, each.size))
-        low, high = np.quantile(np.median(each[picks], axis=1), [0.025, 0.975])
-        share = _interpolated(noise, holds.astype(float), log=False)
-        return Deviation(
-            float(np.median(each)),
-            float(low),
-            float(high),
-            float(np.quantile(each, 0.9)),
-            float((share > 0.5).mean()),
+        return (
+            _interpolated(noise, deviation, log=True),
+            _interpolated(noise, holds.astype(float), log=False),
         )
 
     def range_bias_m(self, sequence: Sequence) -> float:
-        """Predict by how much the range is off without any noise, for 90 % of the pixels at most.
+        """Predict by how much the range of the median pixel is off without any noise.
 
-        That is where a pixel has more returns than the estimator can tell apart.
+        That is where it has more returns than the estimator can tell apart.
         """
         key = (sequence.harmonics, sequence.base_frequency_hz, self._zeroth_of(sequence))
         return self._biases(*key)
+
+    def beyond_scene(self, sequence: Sequence) -> bool:
+        """Whether a sequence would see more of the scene than what it was judged by."""
+        scene = self.scene
+        if scene.harmonics is None:
+            return False
+        finer = float(np.median(self._relative_noise(sequence))) < 0.5 * scene.relative_noise
+        return finer or sequence.harmonics > scene.harmonics
 
     def bound_width(self, sequence: Sequence) -> float:
         """Predict the width of the bounds on the density, over the mean density, median pixel."""
@@ -186,9 +200,9 @@ class Predictor:
     def _bias_of(self, harmonics: int, base_frequency_hz: float, zeroth: str) -> float:
         b = self.scene.relative_moments(harmonics, base_frequency_hz)
         found = self._reconstructed(b, base_frequency_hz, zeroth)
-        first_m = np.nanmin(self.scene.delay_s, axis=0) * tm.SPEED_OF_LIGHT_M_S / 2
-        bias = np.abs(np.asarray(found.range_m) - first_m)
-        return float(np.quantile(np.nan_to_num(bias, nan=np.inf), 0.9))
+        true_m = self.scene.direct_m(self._settings.return_threshold)
+        bias_m = np.abs(np.asarray(found.range_m) - true_m)
+        return float(np.median(np.nan_to_num(bias_m, nan=np.inf)))
 
     def _width_table(self, harmonics: int, base_frequency_hz: float, zeroth: str) -> _Array:
         """Width of the bounds over the mean density (L, P)."""
@@ -241,6 +255,15 @@ def both_found(returns: tm.Returns, phase_rad: _Array, *, threshold: float) -> _
     ]
     both: _Array = found[0] & found[1]
     return both
+
+
+def _typical(deviations: _Array) -> float:
+    """Return the typical difference of two captures over all pixels, as a deviation.
+
+    The same measure as of captured frames, whose bright and dark pixels are mixed.
+    """
+    mixed = np.median(_NORMAL[:, None] * deviations)
+    return float(mixed / MEDIAN_OF_NORMAL)
 
 
 def _white(b: _Array, level: float, zeroth: str) -> tm.noise.MomentNoise:

@@ -13,8 +13,6 @@ PIXELS: Final = 256
 """How many pixels stand for a scene."""
 BRIGHT_SHARE: Final = 0.99
 """Share of the pixels that no planned exposure may saturate."""
-_SIGNIFICANT: Final = 3.0
-"""Standard deviations from which a return of a measured frame counts as there."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,6 +30,12 @@ class SceneStatistic:
         unused). What the shares leave to 1 comes back evenly at all times.
     ambient_dn_per_s
         Light that is not the camera's, in DN an image for each second of exposure.
+    harmonics
+        How many the scene was seen with; None where it is given and all is known.
+    relative_noise
+        Deviation of a typical pixel's moments over its brightness when it was seen.
+    range_std_m
+        Deviation of a typical pixel's range when it was seen.
     """
 
     brightness_dn_per_s: _Array
@@ -39,6 +43,15 @@ class SceneStatistic:
     delay_s: _Array
     share: _Array
     ambient_dn_per_s: float = 0.0
+    harmonics: int | None = None
+    relative_noise: float = 0.0
+    range_std_m: float = 0.0
+
+    def direct_m(self, threshold: float) -> _Array:
+        """Return the range (P) of the first return with a share of the strongest one's light."""
+        counts = (self.share >= threshold * self.share.max(axis=0)) & (self.share > 0)
+        first_s = np.where(counts, self.delay_s, np.inf).min(axis=0)
+        return np.asarray(first_s * tm.SPEED_OF_LIGHT_M_S / 2)
 
     @property
     def furthest_m(self) -> float:
@@ -86,7 +99,7 @@ def given(
 
 def of_frame(
     found: tm.Reconstruction,
-    noise_of: tm.noise.MomentNoise,
+    noise: tm.noise.MomentNoise,
     *,
     exposure_s: float,
     base_frequency_hz: float,
@@ -98,8 +111,8 @@ def of_frame(
     ----------
     found
         Of moments (m + 1, H, W).
-    noise_of
-        Noise of its smoothed moments, (m + 1, H, W).
+    noise
+        Of its smoothed moments, (m + 1, H, W).
     exposure_s, base_frequency_hz
         What the frame was captured with.
     ambient_dn_per_s
@@ -112,8 +125,9 @@ def of_frame(
 
     Notes
     -----
-    Returns count that are strong enough to be the direct one and clearly above the noise; the rest
-    of what Pisarenko's estimate finds is mostly made of noise, and counts as light at all times.
+    The returns of Pisarenko's estimate are all of the frame's moments, also where they stand for
+    continuous light and where they are made of noise: what they do to a sequence with no more
+    harmonics and no less noise is what the scene does.
     """
     bad = int(tm.INVALID | tm.Flags.SATURATED)
     usable = ((np.asarray(found.flags) & bad) == 0).ravel()
@@ -122,22 +136,32 @@ def of_frame(
         return None
     chosen = there[np.linspace(0, there.size - 1, PIXELS).astype(int)]
     brightness = np.maximum(np.asarray(found.smoothed[0].real, dtype=float), 0).ravel()
-    returns = tm.Returns(*(np.asarray(part) for part in found.returns))
-    m = returns.weight.shape[0]
-    weight = returns.weight.reshape((m, -1))[:, chosen].astype(float)
-    phase = returns.phase_rad.reshape((m, -1))[:, chosen].astype(float)
-    variance = noise_of.variance.reshape((m + 1, -1))[:, chosen]
-    with np.errstate(all="ignore"):
-        bound = tm.noise.cramer_rao(phase, weight, tm.noise.MomentNoise(variance))
-        strong = weight >= found.settings.threshold * weight.max(axis=0)
-        clear = weight > _SIGNIFICANT * bound.weight_std
-        # the strongest is there in any case
-        counts = (strong & clear) | ((weight == weight.max(axis=0)) & (weight > 0))
+    m = found.returns.weight.shape[0]
+    weight = np.asarray(found.returns.weight, dtype=float).reshape((m, -1))[:, chosen]
+    phase = np.asarray(found.returns.phase_rad, dtype=float).reshape((m, -1))[:, chosen]
+    variance = noise.variance.reshape((m + 1, -1))[:, chosen]
     total = np.maximum(brightness[chosen], weight.sum(axis=0))
     return SceneStatistic(
         total / exposure_s,
         float(np.quantile(brightness[there], BRIGHT_SHARE)) / exposure_s,
-        np.where(counts, phase / (2 * np.pi * base_frequency_hz), np.nan),
-        np.where(counts, weight / total, 0.0),
+        np.where(weight > 0, phase / (2 * np.pi * base_frequency_hz), np.nan),
+        weight / total,
         ambient_dn_per_s,
+        m,
+        float(np.median(np.sqrt(variance[1]) / total)),
+        _range_std_m(found, phase, weight, tm.noise.MomentNoise(variance), base_frequency_hz),
     )
+
+
+def _range_std_m(
+    found: tm.Reconstruction,
+    phase: _Array,
+    weight: _Array,
+    noise: tm.noise.MomentNoise,
+    base_frequency_hz: float,
+) -> float:
+    returns = tm.Returns(phase, weight, np.zeros(phase.shape[1]), (weight > 0).sum(axis=0))
+    deviation = tm.noise.return_noise(returns, noise, threshold=found.settings.threshold)
+    std_rad = deviation.direct_phase_std_rad
+    known = std_rad[np.isfinite(std_rad)]
+    return float(tm.range_m(np.median(known), base_frequency_hz)) if known.size else 0.0

@@ -51,10 +51,17 @@ class ClosedForm:
     def range_std(self, sequence: Sequence) -> Deviation:
         m, light = sequence.harmonics, sequence.exposure_s * sequence.takes
         std_m = 1e-4 / np.sqrt(light * m * (m + 1)) / (sequence.base_frequency_hz / 23e6)
-        return Deviation(std_m, std_m, std_m, std_m, 1.0)
+        return Deviation(std_m, std_m, 1.0)
+
+    def range_std_interval(self, sequence: Sequence) -> tuple[float, float]:
+        std_m = self.range_std(sequence).median_m
+        return 0.9 * std_m, 1.1 * std_m
 
     def range_bias_m(self, sequence: Sequence) -> float:
         return 0.0 if sequence.harmonics >= 3 else 1.0
+
+    def beyond_scene(self, sequence: Sequence) -> bool:
+        return False
 
     def bound_width(self, sequence: Sequence) -> float:
         return 6.0 / (sequence.harmonics + 1) + (0.5 if sequence.zeroth == "estimated" else 0.0)
@@ -303,7 +310,7 @@ def captured(camera: Camera, sequence: Sequence, frames: int) -> list[tm.Reconst
 
 @pytest.fixture(scope="module")
 def predictor(camera: Camera) -> Predictor:
-    sequence = Sequence(harmonics=4)
+    sequence = Sequence(harmonics=6, takes=16, exposure_s=0.0015)
     accuracy = Accuracy(camera, SETTINGS, SensorSettings())
     (found,) = captured(camera, sequence, 1)
     recipe = Recipe(camera.applied, SETTINGS, 4095.0)

@@ -95,7 +95,10 @@ class PredictedDocument(Document):
 
     range_std_m: DeviationDocument
     range_bias_m: float
-    """How far the range of 90 % of the pixels is off at most without any noise."""
+    """How far the range of the median pixel is off without any noise."""
+    beyond_scene: bool
+    """Whether it sees more of the scene than the frame that the scene was judged by, so that the
+    prediction is a bound on how good it can be."""
     first_order_share: float
     """Share of the pixels where the noise model holds to first order; noise was drawn for the
     others."""
