@@ -21,7 +21,7 @@ def report(folder: Path, records: Records) -> list[Path]:
                 continue
             plots[scene, name] = images["svg"]
             for suffix, data in images.items():
-                path = folder / f"{_file_name(scene)}-{name}.{suffix}"
+                path = folder / f"{file_name(scene)}-{name}.{suffix}"
                 path.write_bytes(data)
                 written.append(path)
     path = folder / "index.html"
@@ -29,7 +29,7 @@ def report(folder: Path, records: Records) -> list[Path]:
     return [*written, path]
 
 
-def _file_name(scene: str) -> str:
+def file_name(scene: str) -> str:
     """Return what of a scene's name a file can be called by."""
     stem = Path(scene.partition("?")[0]).stem
     return "".join(each if each.isalnum() or each in "-_" else "-" for each in stem)

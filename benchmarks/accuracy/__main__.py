@@ -1,0 +1,124 @@
+"""Run ``python -m benchmarks.accuracy [--quick] [-o FOLDER] [--write]``.
+
+A run that is interrupted goes on where it stopped when it is given the same folder. ``--write``
+keeps the page and its figures in docs/. The measured composite needs TRANSIENTCAM_TEST_DATA.
+"""
+
+import argparse
+import os
+import tempfile
+import time
+from functools import partial
+from pathlib import Path
+
+import transientcam_moments as tm
+from rich.progress import Progress, TaskID
+from transientcam_server import tradeoff
+from transientcam_server.tradeoff.report import file_name
+
+from benchmarks.accuracy.capturing import SEED, known_scenes
+from benchmarks.accuracy.noise import draw_noise, predicted_and_observed
+from benchmarks.accuracy.page import report
+from benchmarks.accuracy.plans import planned
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+SCENES = ("wall", "corner", "mirrors", "visitor")
+COMPOSITE = """
+name = "composite"
+description = "One photon-counting measurement and two through foam, one after the other"
+[light]
+electrons_per_s = 1.0e7
+[[response]]
+file = "{data}/measured/capture_direct.npz"
+background = "median"
+time_zero_file = "{data}/measured/capture_direct.npz"
+weight = 0.55
+delay_s = 3e-9
+[[response]]
+file = "{data}/measured/capture_1_0_inch.npz"
+background = "median"
+time_zero_file = "{data}/measured/capture_direct.npz"
+weight = 0.30
+delay_s = 9e-9
+[[response]]
+file = "{data}/measured/capture_3_0_inch.npz"
+background = "median"
+time_zero_file = "{data}/measured/capture_direct.npz"
+weight = 0.5
+delay_s = 20e-9
+"""
+
+
+def main() -> None:
+    """Measure, print the page, and with ``--write`` keep it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="few sequences instead of the paper's")
+    parser.add_argument("-o", "--output", type=Path, help="folder of results; is resumed")
+    parser.add_argument("--write", action="store_true", help="write docs/accuracy.md and figures")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = arguments.output or Path(temporary, "results")
+        scenes = {name: name for name in SCENES if name in known_scenes()}
+        composite = composite_scene(Path(temporary))
+        if composite is not None:
+            scenes["composite"] = composite
+        records, took_s = measured(scenes, folder, "quick" if arguments.quick else "paper")
+        noise = predicted_and_observed()
+        plans = [each for name in ("wall", "mirrors", "corner") for each in planned(name)]
+        page = report(scenes, records, noise, plans, took_s)
+        print(page)
+        if arguments.write:
+            (DOCS / "figures").mkdir(exist_ok=True)
+            (DOCS / "accuracy.md").write_text(page, encoding="utf-8")
+            draw_noise(noise, DOCS / "figures" / "noise-prediction.png")
+            for spec in scenes.values():
+                for name in ("repeatability", "cumulative"):
+                    source = folder / f"{file_name(spec)}-{name}.png"
+                    if source.exists():
+                        target = DOCS / "figures" / f"accuracy-{file_name(spec)}-{name}.png"
+                        target.write_bytes(source.read_bytes())
+
+
+def composite_scene(folder: Path) -> str | None:
+    """Write the measured composite as a scene, if the data are there."""
+    default = ROOT.parent / "shared" / "data"
+    data = Path(os.environ.get("TRANSIENTCAM_TEST_DATA", default)).resolve()
+    if not (data / "measured" / "capture_direct.npz").is_file():
+        return None
+    path = folder / "composite.toml"
+    path.write_text(COMPOSITE.format(data=data), encoding="utf-8")
+    return str(path)
+
+
+def _advance(progress: Progress, task: TaskID, kind: str) -> None:
+    progress.advance(task)
+
+
+def measured(
+    scenes: dict[str, str], folder: Path, grid: str
+) -> tuple[tradeoff.Records, dict[str, float]]:
+    """Run the whole tradeoff; return its results, and how long each scene took."""
+    tm.kernels.compile()
+    records, took_s = tradeoff.Records(folder), {}
+    with Progress() as progress:
+        for name, spec in scenes.items():
+            points = tradeoff.points_of(
+                tradeoff.load_grid(grid), scene=spec, repetitions=5, seed=SEED
+            )
+            task = progress.add_task(name, total=len(points))
+            begin_s = time.perf_counter()
+            tradeoff.measure(
+                points,
+                records,
+                scene=spec,
+                seed=SEED,
+                progress=partial(_advance, progress, task),
+            )
+            took_s[name] = time.perf_counter() - begin_s
+    tradeoff.report(folder, records)
+    return records, took_s
+
+
+if __name__ == "__main__":
+    main()
