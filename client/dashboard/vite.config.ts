@@ -13,6 +13,8 @@ export default defineConfig({
     // A data: URL would need its own line in the Content-Security-Policy.
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
+    // three, which is loaded when points in space are first shown
+    chunkSizeWarningLimit: 800,
   },
   worker: { format: "es" },
   server: { proxy: { "/api": { target: DAEMON, ws: true } } },

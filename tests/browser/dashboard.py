@@ -56,7 +56,12 @@ def shows_frame(page: Page, frame: int) -> None:
 
 def map_pixels(page: Page) -> NDArray[np.uint8]:
     """RGBA of the map as it is drawn, (H, W, 4)."""
-    return _image(map_canvas(page).evaluate(_READ_CANVAS))
+    return canvas_pixels(map_canvas(page))
+
+
+def canvas_pixels(canvas: Locator) -> NDArray[np.uint8]:
+    """RGBA of a canvas as it is drawn, (H, W, 4)."""
+    return _image(canvas.evaluate(_READ_CANVAS))
 
 
 def transient_pixels(page: Page, turn: float) -> NDArray[np.uint8]:

@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 import transientcam_moments as tm
 from numpy.typing import NDArray
+from PIL import Image
 from playwright.sync_api import Page, expect
 from transientcam.wire.codec import pack_with_array
 
 from tests.browser.conftest import Watch
 from tests.browser.dashboard import (
+    choose,
+    colours,
     density_of,
     open_page,
     point_at,
@@ -269,3 +272,48 @@ def test_a_click_into_the_response_moves_the_light_there(page: Page) -> None:
     over.click(position={"x": box["width"] / 2, "y": box["height"] / 2})
     shown_ns = float(text(page, ".panel-transient", "time").split()[0])
     assert abs(shown_ns - 0.5e9 / F_HZ) < 0.1
+
+
+def test_light_so_far_is_what_the_daemon_integrates(page: Page, served: Served) -> None:
+    open_page(page)
+    page.get_by_role("button", name="sum").click()
+    page.locator("canvas[data-renderer=closed-form][data-frame]").wait_for()
+    shows_frame(page, stop(served))
+    page.locator(".panel-transient").get_by_label("Tone").select_option("linear")
+    white = float(str(transient_canvas(page).get_attribute("data-white")))
+    for turn in (0.1, 0.27, 0.45, 0.9):
+        answer = httpx.get(
+            f"{served.url}/api/v1/frames/latest/cumulative.npy", params={"time_s": turn / F_HZ}
+        ).raise_for_status()
+        light = np.load(io.BytesIO(answer.content))[0]
+        expected = colours(light, 0.0, white, "inferno").astype(int)
+        painted = transient_pixels(page, turn).astype(int)
+        beside = np.abs(painted - expected).max(axis=-1) > 12
+        assert beside.mean() < 0.005, "but for colours that round to their neighbours"
+    assert expected.std() > 5
+
+
+def test_the_light_so_far_at_a_pixel_is_told(page: Page, served: Served) -> None:
+    open_page(page)
+    shows_frame(page, stop(served))
+    page.get_by_role("button", name="sum").click()
+    point_at(page, "map", 81, 20, click=True)
+    page.evaluate("() => transientcam.store.player.seek(0.4)")
+    answer = httpx.get(
+        f"{served.url}/api/v1/frames/latest/cumulative.npy", params={"time_s": 0.4 / F_HZ}
+    ).raise_for_status()
+    light = np.load(io.BytesIO(answer.content))[0, 20, 81]
+    expect(page.locator(".panel-transient [data-field=density]")).to_contain_text("DN")
+    shown = float(text(page, ".panel-transient", "density").split()[0])
+    assert shown == pytest.approx(light, rel=2e-3, abs=0.6)
+
+
+def test_the_picture_of_light_is_handed_out_as_it_is_on_screen(page: Page, served: Served) -> None:
+    open_page(page)
+    shows_frame(page, stop(served))
+    shown = transient_pixels(page, 0.27)
+    with page.expect_download() as download:
+        choose(page, "transient", "Picture (PNG)")
+    with Image.open(download.value.path()) as image:
+        np.testing.assert_array_equal(np.array(image.convert("RGBA")), shown)
+    assert shown[..., :3].std() > 5

@@ -2,6 +2,7 @@ import { useEffect } from "preact/hooks";
 import { effect } from "@preact/signals";
 
 import { useStore } from "./store/store";
+import { Help } from "./ui/Help";
 import { shortcuts } from "./ui/shortcuts";
 import { Banner } from "./views/status/Banner";
 import { StatusBar } from "./views/status/StatusBar";
@@ -23,6 +24,7 @@ export function App({ onRetry }: { onRetry: () => void }) {
       <StatusBar />
       <Banner onRetry={onRetry} />
       <Arrangement />
+      <Help />
     </>
   );
 }

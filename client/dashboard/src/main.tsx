@@ -2,6 +2,7 @@ import { render } from "preact";
 import { effect } from "@preact/signals";
 
 import { App } from "./App";
+import { keepAddress } from "./store/permalink";
 import { Store, StoreContext } from "./store/store";
 import { StreamClient } from "./stream/client";
 import { AnimationLoop } from "./ui/animation";
@@ -19,6 +20,7 @@ effect(() => {
 store.player.playing.value = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 store.theme.show(document.documentElement);
+keepAddress(window, store);
 const root = document.getElementById("app");
 if (root === null) throw new Error("The page has no place for the application.");
 render(

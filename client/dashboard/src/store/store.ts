@@ -6,8 +6,9 @@ import type { AppliedSequence, CameraDocument } from "../stream/protocol";
 import { Api } from "./api";
 import { Frames } from "./frames";
 import { Player } from "./player";
-import { browserShelf, remembered, type Shelf } from "./settings";
+import { browserShelf, oneOf, remembered, type Shelf } from "./settings";
 import { isLayout, OVERVIEW, type Layout } from "../views/layout";
+import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
 import { Status } from "./status";
 import { Details } from "./details";
@@ -44,6 +45,10 @@ export class Store {
   /** What only the service knows of the selected pixel. */
   readonly details: Details;
   readonly theme: Theme;
+  /** The product that the map view shows. */
+  readonly mapProduct: Signal<string>;
+  /** Whether the list of keys is open. */
+  readonly help = signal(false);
   /** Where the views stand. */
   readonly layout: Signal<Layout>;
   /** The one view that is shown alone; null while all are. */
@@ -53,6 +58,7 @@ export class Store {
     this.api = api;
     this.shelf = shelf;
     this.details = new Details(api);
+    this.mapProduct = remembered(shelf, "map.product", "range", oneOf(MAP_PRODUCTS.map(({ product }) => product)));
     this.layout = remembered<Layout>(shelf, "layout", OVERVIEW, (value): value is Layout => isLayout(value, VIEW_NAMES));
     this.theme = new Theme(shelf, systemScheme());
   }

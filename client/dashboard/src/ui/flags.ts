@@ -13,7 +13,7 @@ export interface Flag {
 /** The gravest first: a pixel with several is shown by the first. */
 export const FLAGS: readonly Flag[] = [
   { bit: 8, name: "non_finite", title: "Not finite", words: "a moment is not a number, or too large", colour: "#cc79a7" },
-  { bit: 2, name: "no_signal", title: "No signal", words: "no light came back", colour: "#3b4149" },
+  { bit: 2, name: "no_signal", title: "No signal", words: "no light came back", colour: "#1b2a6b" },
   { bit: 4, name: "saturated", title: "Saturated", words: "an image was at the end of its scale", colour: "#d55e00" },
   { bit: 32, name: "replaced", title: "Replaced", words: "a bad pixel that shows the mean of its neighbours", colour: "#e6c700" },
   { bit: 16, name: "degenerate", title: "Degenerate", words: "the moments do not determine a density", colour: "#009e73" },

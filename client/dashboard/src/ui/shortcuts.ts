@@ -1,44 +1,76 @@
 import type { Store } from "../store/store";
+import { SPEEDS_NS } from "../store/player";
+import { MAP_PRODUCTS } from "../views/map/catalogue";
+import { LAYOUTS } from "../views/layout";
 
 /** Flight passed by one press of an arrow key, in s. */
 const STEP_S = 0.1e-9;
 const LONG_STEP_S = 1e-9;
 
+/** A key for the whole page. */
+export interface Shortcut {
+  /** As `KeyboardEvent.key` has it. */
+  readonly keys: readonly string[];
+  /** As it is written in the list of keys. */
+  readonly shown: string;
+  readonly words: string;
+  readonly run: (store: Store, event: KeyboardEvent) => void;
+}
+
+function scrub({ player }: Store, flight_s: number): void {
+  player.playing.value = false;
+  player.step(flight_s);
+}
+
+function speedUp({ player }: Store, by: number): void {
+  const at = SPEEDS_NS.findIndex((speed) => speed === player.speed_ns.peek()) + by;
+  player.speed_ns.value = SPEEDS_NS[Math.min(SPEEDS_NS.length - 1, Math.max(0, at))];
+}
+
+/** The panel that keys are meant for: the one with the focus, or under the pointer. */
+function panelNow(): string | null {
+  const panel = document.querySelector<HTMLElement>(".panel:focus-within") ?? document.querySelector<HTMLElement>(".panel:hover");
+  return panel?.dataset["view"] ?? null;
+}
+
+/** All keys of the page, in the order they are listed. */
+export const SHORTCUTS: readonly Shortcut[] = [
+  { keys: [" "], shown: "Space", words: "play or pause the light", run: ({ player }) => { player.toggle(); } },
+  { keys: ["ArrowLeft"], shown: "←", words: "back by 0.1 ns, with Shift by 1 ns", run: (store, { shiftKey }) => { scrub(store, shiftKey ? -LONG_STEP_S : -STEP_S); } },
+  { keys: ["ArrowRight"], shown: "→", words: "on by 0.1 ns, with Shift by 1 ns", run: (store, { shiftKey }) => { scrub(store, shiftKey ? LONG_STEP_S : STEP_S); } },
+  { keys: ["Home"], shown: "Home", words: "to the start of the flight", run: ({ player }) => { player.seek(0); } },
+  { keys: [","], shown: ",", words: "slower", run: (store) => { speedUp(store, -1); } },
+  { keys: ["."], shown: ".", words: "faster", run: (store) => { speedUp(store, 1); } },
+  { keys: ["h"], shown: "H", words: "hold the frame, or let it go", run: ({ held }) => { held.value = !held.peek(); } },
+  { keys: MAP_PRODUCTS.map((_, at) => String(at + 1)), shown: `1 to ${MAP_PRODUCTS.length}`, words: MAP_PRODUCTS.map(({ name }) => name.toLowerCase()).join(", "), run: ({ mapProduct }, { key }) => { mapProduct.value = MAP_PRODUCTS[Number(key) - 1].product; } },
+  { keys: ["f"], shown: "F", words: "show the panel under the pointer alone, or all again", run: ({ alone }) => { alone.value = alone.peek() === null ? panelNow() : null; } },
+  { keys: ["l"], shown: "L", words: "the next layout", run: (store) => { nextLayout(store); } },
+  { keys: ["t"], shown: "T", words: "light, dark, or as the system", run: ({ theme }) => { theme.next(); } },
+  { keys: ["?"], shown: "?", words: "this list", run: ({ help }) => { help.value = !help.peek(); } },
+]; // prettier-ignore
+
+function nextLayout({ layout, alone }: Store): void {
+  const all = Object.values(LAYOUTS);
+  const now = JSON.stringify(layout.peek());
+  const at = all.findIndex((each) => JSON.stringify(each) === now);
+  layout.value = all[(at + 1) % all.length];
+  alone.value = null;
+}
+
 /** Keys for the whole page; the answer takes them away again. */
 export function shortcuts(target: Window, store: Store): () => void {
   const onKeyDown = (event: KeyboardEvent): void => {
     if (event.ctrlKey || event.metaKey || event.altKey || typesText(event.target)) return;
-    const action = actionOf(event, store);
-    if (action === null) return;
+    const shortcut = SHORTCUTS.find(({ keys }) => keys.includes(event.key));
+    // A focused button is pressed by the space bar already.
+    if (shortcut === undefined || (event.key === " " && event.target instanceof HTMLButtonElement)) return;
     event.preventDefault();
-    action();
+    shortcut.run(store, event);
   };
   target.addEventListener("keydown", onKeyDown);
   return () => {
     target.removeEventListener("keydown", onKeyDown);
   };
-}
-
-function actionOf(event: KeyboardEvent, { player, held }: Store): (() => void) | null {
-  const scrub = (flight_s: number) => () => {
-    player.playing.value = false;
-    player.step(flight_s);
-  };
-  switch (event.key) {
-    case " ":
-      // A focused button is pressed by the space bar already.
-      return event.target instanceof HTMLButtonElement ? null : () => { player.toggle(); }; // prettier-ignore
-    case "ArrowRight":
-      return scrub(event.shiftKey ? LONG_STEP_S : STEP_S);
-    case "ArrowLeft":
-      return scrub(event.shiftKey ? -LONG_STEP_S : -STEP_S);
-    case "Home":
-      return () => { player.seek(0); }; // prettier-ignore
-    case "h":
-      return () => (held.value = !held.peek());
-    default:
-      return null;
-  }
 }
 
 /** Whether keys belong to what has the focus: text is typed there, or an option chosen. */

@@ -1,9 +1,12 @@
 import type { ComponentType } from "preact";
 
 import { MapView } from "./map/MapView";
+import { PointsView } from "./points/PointsView";
 import { ResponseView } from "./response/ResponseView";
 import { SequenceView } from "./sequence/SequenceView";
+import { StreakView } from "./streak/StreakView";
 import { TransientView } from "./transient/TransientView";
+import { ValidityView } from "./validity/ValidityView";
 import type { ViewName } from "./names";
 
 /**
@@ -14,5 +17,8 @@ export const VIEWS: readonly { readonly name: ViewName; readonly title: string; 
   { name: "map", title: "Maps", view: MapView },
   { name: "transient", title: "Light in flight", view: TransientView },
   { name: "response", title: "Impulse response", view: ResponseView },
+  { name: "streak", title: "Streak", view: StreakView },
+  { name: "points", title: "Points in space", view: PointsView },
+  { name: "validity", title: "Validity", view: ValidityView },
   { name: "sequence", title: "Sequence", view: SequenceView },
 ];

@@ -1,11 +1,12 @@
 import { computed, useComputed, type ReadonlySignal } from "@preact/signals";
+import type { RefObject } from "preact";
 import { useMemo, useRef } from "preact/hooks";
 
 import type { Frame } from "../../store/frames";
-import { oneOf, remembered } from "../../store/settings";
 import { useStore, type Pixel } from "../../store/store";
 import { COLOUR_MAPS } from "../../ui/colourMaps";
 import { Choice, Tabs, Toggle } from "../../ui/controls";
+import { saveNumbers, savePicture } from "../../ui/download";
 import { fixed, NOTHING } from "../../ui/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
@@ -26,16 +27,18 @@ function valueOf(frame: Frame | null, pixel: Pixel | null): number {
 /** A map of one number a pixel: range, or one of the lights. */
 export function MapView() {
   const store = useStore();
-  const choice = useMemo(
-    () => remembered(store.shelf, "map.product", "range", oneOf(MAP_PRODUCTS.map(({ product }) => product))),
-    [store],
-  );
+  const choice = store.mapProduct;
   const shown = MAP_PRODUCTS.find(({ product }) => product === choice.value) ?? MAP_PRODUCTS[0];
   const frame = store.frames.of(shown.product);
   const look = useMemo(() => new MapLook(shown, frame, store.shelf), [shown, frame, store]);
+  const canvas = useRef<HTMLCanvasElement>(null);
   return (
     <Panel
       name="map"
+      downloads={[
+        { text: "Picture (PNG)", run: () => { savePicture(`${shown.product}-${frame.peek()?.meta.frame ?? 0}`, canvas.current); } },
+        { text: `${shown.name} in ${shown.unit} (NPY)`, run: () => { saveNumbers(frame.peek()); } },
+      ]} // prettier-ignore
       title={
         <Tabs
           label="Map"
@@ -62,7 +65,7 @@ export function MapView() {
         </>
       }
     >
-      <Map key={shown.product} shown={shown} frame={frame} look={look} />
+      <Map key={shown.product} shown={shown} frame={frame} look={look} canvas={canvas} />
     </Panel>
   );
 }
@@ -71,9 +74,10 @@ interface MapProps {
   readonly shown: MapProduct;
   readonly frame: ReadonlySignal<Frame | null>;
   readonly look: MapLook;
+  readonly canvas: RefObject<HTMLCanvasElement | null>;
 }
 
-function Map({ shown, frame, look }: MapProps) {
+function Map({ shown, frame, look, canvas }: MapProps) {
   const store = useStore();
   useProducts([shown.product, AMPLITUDE]);
   const size = useComputed(() => {
@@ -84,7 +88,6 @@ function Map({ shown, frame, look }: MapProps) {
   const looked = useMemo(() => computed(() => store.pointed.value ?? store.selected.value), [store]);
   const marked = useMemo(() => computed(() => valueOf(frame.value, looked.value)), [frame, looked]);
 
-  const canvas = useRef<HTMLCanvasElement>(null);
   useDrawing(() => {
     const newest = frame.value;
     const scale = look.scale.value;

@@ -4,7 +4,10 @@ import { RequestError } from "../../store/api";
 import { useStore } from "../../store/store";
 import { fixed, grouped, NOTHING } from "../../ui/format";
 import { HoldIcon, PauseIcon, PlayIcon } from "../../ui/icons";
+import { ActionMenu } from "../../ui/ActionMenu";
 import { Toggle } from "../../ui/controls";
+import { THEMES, type ThemeChoice } from "../../ui/theme";
+import { LAYOUTS } from "../layout";
 
 /** One line on how things stand: connection, camera, and the flow of frames. */
 export function StatusBar() {
@@ -138,6 +141,48 @@ function Steering() {
           {running ? <PauseIcon /> : <PlayIcon />} {running ? "Stop" : "Start"}
         </button>
       )}
+      <PageMenu />
     </div>
   );
 }
+
+/** What concerns the page and not the camera. */
+function PageMenu() {
+  const store = useStore();
+  const { choice } = store.theme;
+  const link = async (): Promise<void> => {
+    try {
+      await navigator.clipboard.writeText(window.location.href);
+    } catch {
+      // Refused, or not over https: the address is the same.
+      store.status.unreadable.value = `The link is this page's address: ${window.location.href}`;
+    }
+  };
+  return (
+    <ActionMenu
+      label="Page: layout, colours, help"
+      groups={[
+        {
+          title: "Layout",
+          actions: Object.entries(LAYOUTS).map(([text, layout]) => ({
+            text,
+            run: () => {
+              store.layout.value = layout;
+              store.alone.value = null;
+            },
+          })),
+        },
+        { title: "Colours", actions: THEMES.map((theme) => ({ text: THEME_NAMES[theme] + (theme === choice.value ? " ✓" : ""), run: () => (choice.value = theme) })) },
+        {
+          title: "Help",
+          actions: [
+            { text: "Keys (?)", run: () => (store.help.value = true) },
+            { text: "Copy a link to what is shown", run: () => void link() },
+          ],
+        },
+      ]} // prettier-ignore
+    />
+  );
+}
+
+const THEME_NAMES: Record<ThemeChoice, string> = { auto: "As the system", light: "Light", dark: "Dark" };

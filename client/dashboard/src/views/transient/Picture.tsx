@@ -46,7 +46,7 @@ export function Picture({ look }: { look: TransientLook }) {
     };
   }, [attempt.value]);
 
-  useDrawing(() => {
+  const draw = (): void => {
     const coefficients = frame.value?.coefficients ?? null;
     const brightness = scene.value;
     const phase_rad = store.player.phase_rad.value;
@@ -62,7 +62,12 @@ export function Picture({ look }: { look: TransientLook }) {
         : null;
     renderer.value.draw(coefficients, { phase_rad, tone, colours, backdrop });
     if (canvas.current !== null) canvas.current.dataset["frame"] = String(frame.peek()?.meta.frame);
-  }, [renderer, look]);
+    look.snapshot = () => {
+      draw();
+      return canvas.current;
+    };
+  };
+  useDrawing(draw, [renderer, look]);
 
   return (
     <Stage width={width} height={height} label="Light in flight">

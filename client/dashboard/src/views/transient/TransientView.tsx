@@ -1,18 +1,21 @@
 import { computed, useComputed } from "@preact/signals";
-import { useMemo } from "preact/hooks";
+import { useMemo, useRef } from "preact/hooks";
 
 import { TONES, type ToneKind } from "../../gl/tone";
 import { densityAt } from "../../physics/maximumEntropy";
+import { Poles } from "../../physics/poles";
 import { SPEEDS_NS } from "../../store/player";
 import { useStore } from "../../store/store";
 import { COLOUR_MAPS } from "../../ui/colourMaps";
 import { Choice, Toggle } from "../../ui/controls";
-import { significant, superscript, withUnit } from "../../ui/format";
+import { savePicture } from "../../ui/download";
+import { fixed, significant, superscript, withUnit } from "../../ui/format";
 import { useProducts } from "../../ui/hooks";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
 import { AMPLITUDE } from "../map/catalogue";
 import { TransientLook } from "./look";
+import { LightSoFar } from "./LightSoFar";
 import { Picture } from "./Picture";
 import { Timeline, TimeReadout } from "./Timeline";
 
@@ -25,12 +28,29 @@ export function TransientView() {
   const frame = store.frames.of("coefficients");
   const look = useMemo(() => new TransientLook(frame, store.shelf), [frame, store]);
   const { player } = store;
+  const cumulative = look.play.value === "cumulative";
   return (
     <Panel
       name="transient"
-      title={<h2>Light in flight</h2>}
+      title={<h2>{cumulative ? "Light so far" : "Light in flight"}</h2>}
+      downloads={[
+        {
+          text: "Picture (PNG)",
+          run: () => {
+            const time_ps = Math.round(player.time_s.peek() * 1e12);
+            savePicture(`${look.play.peek()}-${time_ps}ps-${frame.peek()?.meta.frame ?? 0}`, look.snapshot());
+          },
+        },
+      ]}
       tools={
         <>
+          <Toggle
+            pressed={cumulative}
+            title="Let the light stay once it has come"
+            onToggle={() => (look.play.value = cumulative ? "density" : "cumulative")}
+          >
+            sum
+          </Toggle>
           <Choice
             label="Tone"
             value={look.tone.value}
@@ -43,13 +63,15 @@ export function TransientView() {
             options={STOPS.map((stops) => ({ value: stops, text: stopsText(stops) }))}
             onChange={(stops) => (look.stops.value = stops)}
           />
-          <Toggle
-            pressed={look.backdrop.value}
-            title="Show the still scene behind the light"
-            onToggle={() => (look.backdrop.value = !look.backdrop.peek())}
-          >
-            scene
-          </Toggle>
+          {!cumulative && (
+            <Toggle
+              pressed={look.backdrop.value}
+              title="Show the still scene behind the light"
+              onToggle={() => (look.backdrop.value = !look.backdrop.peek())}
+            >
+              scene
+            </Toggle>
+          )}
           <Choice
             label="Colours"
             value={look.colours.value}
@@ -59,7 +81,7 @@ export function TransientView() {
         </>
       }
     >
-      <Picture look={look} />
+      {cumulative ? <LightSoFar look={look} /> : <Picture look={look} />}
       <footer class="panel-foot">
         <Timeline />
         <div class="panel-row">
@@ -75,7 +97,7 @@ export function TransientView() {
             {player.playing.value ? <PauseIcon /> : <PlayIcon />}
           </button>
           <TimeReadout />
-          <DensityReadout />
+          <DensityReadout cumulative={cumulative} />
           <div class="panel-tools">
             <span class="quiet slowed" title="How many times slower than light really is">
               1 : {slowness(player.speed_ns.value)}
@@ -107,8 +129,9 @@ function slowness(speed_ns: number): string {
   return `${mantissa === 1 ? "" : `${Number(mantissa.toFixed(1))}·`}10${superscript(exponent)}`;
 }
 
-/** The density at the pixel looked at, at the player's time. */
-function DensityReadout() {
+/** The density at the pixel looked at, at the player's time; or the light up to then. */
+function DensityReadout({ cumulative }: { cumulative: boolean }) {
+  const poles = useRef<Poles | null>(null);
   const store = useStore();
   const density = useMemo(
     () =>
@@ -117,11 +140,16 @@ function DensityReadout() {
         const pixel = store.pointed.value ?? store.selected.value;
         if (!coefficients || pixel === null) return NaN;
         if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return NaN;
-        return densityAt(coefficients, pixel.y * coefficients.width + pixel.x, store.player.phase_rad.value);
+        const index = pixel.y * coefficients.width + pixel.x;
+        const phase_rad = store.player.phase_rad.value;
+        if (!cumulative) return densityAt(coefficients, index, phase_rad);
+        if (poles.current?.harmonics !== coefficients.harmonics) poles.current = new Poles(coefficients.harmonics, 1);
+        poles.current.findOne(coefficients, index, 0);
+        return poles.current.upTo(0, phase_rad);
       }),
-    [store],
+    [store, cumulative],
   );
-  const text = useComputed(() => (Number.isNaN(density.value) ? "" : significant(density.value * 1e-9, 3, "DN/ns")));
+  const text = useComputed(() => (Number.isNaN(density.value) ? "" : cumulative ? fixed(density.value, 0, "DN") : significant(density.value * 1e-9, 3, "DN/ns")));
   return (
     <span class="readout-density" data-field="density">
       {text}

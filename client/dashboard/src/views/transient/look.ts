@@ -6,6 +6,10 @@ import type { Frame } from "../../store/frames";
 import { aBoolean, aNumber, oneOf, remembered, type Shelf } from "../../store/settings";
 import { COLOUR_MAPS, type ColourMapName } from "../../ui/colourMaps";
 
+/** Light as it comes, or all that has come so far. */
+export const PLAYS = ["density", "cumulative"] as const;
+export type Play = (typeof PLAYS)[number];
+
 /** How light in flight is shown. */
 export class TransientLook {
   readonly colours: Signal<ColourMapName>;
@@ -13,6 +17,9 @@ export class TransientLook {
   /** Exposure compensation in stops: +1 shows half as much light as brightest. */
   readonly stops: Signal<number>;
   readonly backdrop: Signal<boolean>;
+  readonly play: Signal<Play>;
+  /** Draws the picture anew and answers its canvas, which can be read in this task. */
+  snapshot: () => HTMLCanvasElement | null = () => null;
   readonly white: ReadonlySignal<number>;
   #metered: number | null = null;
 
@@ -21,6 +28,7 @@ export class TransientLook {
     this.tone = remembered<ToneKind>(shelf, "transient.tone", "root", oneOf(TONES));
     this.stops = remembered(shelf, "transient.stops", 0, aNumber);
     this.backdrop = remembered(shelf, "transient.backdrop", true, aBoolean);
+    this.play = remembered<Play>(shelf, "transient.play", "density", oneOf(PLAYS));
     this.white = computed(() => this.#meter(frame.value?.light?.peak ?? NaN) / 2 ** this.stops.value);
   }
 

@@ -1,0 +1,81 @@
+/** A range map as points in space: written into the arrays of a geometry, nothing allocated a frame. */
+import { colourTable, levelOf, type ColourMapName } from "../../ui/colourMaps";
+import { gravest } from "../../ui/flags";
+
+export interface Cloud {
+  /** x to the right, y up, z towards the viewer, in m: the camera stands at 0 and looks along -z. */
+  readonly positions: Float32Array;
+  /** RGB bytes. */
+  readonly colours: Uint8Array;
+}
+
+export function makeCloud(pixels: number): Cloud {
+  return { positions: new Float32Array(3 * pixels), colours: new Uint8Array(3 * pixels) };
+}
+
+/** Focal length of a pinhole camera in pixels. */
+export function focalLength(width: number, fieldOfView_rad: number): number {
+  return width / (2 * Math.tan(fieldOfView_rad / 2));
+}
+
+/**
+ * Writes the points of a range map, range along each pixel's ray; returns how many have one.
+ *
+ * `colourOf` writes the RGB of a pixel into `colours` at an index.
+ */
+export function fillCloud(
+  cloud: Cloud,
+  range_m: ArrayLike<number>,
+  width: number,
+  fieldOfView_rad: number,
+  colourOf: (pixel: number, colours: Uint8Array, at: number) => void,
+): number {
+  const height = range_m.length / width;
+  const focal = focalLength(width, fieldOfView_rad);
+  let at = 0;
+  for (let y = 0, pixel = 0; y < height; y++) {
+    const up = (height / 2 - y - 0.5) / focal;
+    for (let x = 0; x < width; x++, pixel++) {
+      const range = range_m[pixel];
+      if (!Number.isFinite(range)) continue;
+      const right = (x + 0.5 - width / 2) / focal;
+      const depth = range / Math.sqrt(1 + right * right + up * up);
+      cloud.positions[at] = right * depth;
+      cloud.positions[at + 1] = up * depth;
+      cloud.positions[at + 2] = -depth;
+      colourOf(pixel, cloud.colours, at);
+      at += 3;
+    }
+  }
+  return at / 3;
+}
+
+/** Colours by a value between two ends of a scale. */
+export function byValue(values: ArrayLike<number>, low: number, high: number, colours: ColourMapName): (pixel: number, out: Uint8Array, at: number) => void {
+  const table = colourTable(colours);
+  return (pixel, out, at) => {
+    const place = (values[pixel] - low) / (high - low);
+    const level = 4 * levelOf(place >= 0 ? place : 0);
+    out[at] = table[level];
+    out[at + 1] = table[level + 1];
+    out[at + 2] = table[level + 2];
+  };
+}
+
+const VALID: readonly [number, number, number] = [150, 160, 170];
+const REASONS = Array.from({ length: 256 }, (_, bits): readonly [number, number, number] => {
+  const flag = gravest(bits);
+  if (flag === null) return VALID;
+  const rgb = parseInt(flag.colour.slice(1), 16);
+  return [rgb >> 16, (rgb >> 8) & 255, rgb & 255];
+});
+
+/** Colours by the gravest flag. */
+export function byFlags(flags: ArrayLike<number>): (pixel: number, out: Uint8Array, at: number) => void {
+  return (pixel, out, at) => {
+    const [red, green, blue] = REASONS[flags[pixel] & 255];
+    out[at] = red;
+    out[at + 1] = green;
+    out[at + 2] = blue;
+  };
+}

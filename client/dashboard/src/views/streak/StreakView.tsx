@@ -1,0 +1,160 @@
+import { computed, useComputed, useSignal } from "@preact/signals";
+import { useMemo, useRef } from "preact/hooks";
+
+import { TONES, type ToneKind } from "../../gl/tone";
+import { rangeOfTime_m } from "../../physics/constants";
+import { oneOf, remembered } from "../../store/settings";
+import { useStore } from "../../store/store";
+import { COLOUR_MAPS, type ColourMapName } from "../../ui/colourMaps";
+import { Choice } from "../../ui/controls";
+import { npy, save, savePicture } from "../../ui/download";
+import { fixed, significant } from "../../ui/format";
+import { useDrawing, useProducts } from "../../ui/hooks";
+import { Panel } from "../../ui/Panel";
+import { ticks } from "../../ui/scale";
+import { BINS, paintStreak, Streak, whiteOf } from "./streak";
+
+const TONE_NAMES: Record<ToneKind, string> = { linear: "linear", root: "root", logarithmic: "log" };
+
+/** One row of the picture over time of flight: columns across, time downwards. */
+export function StreakView() {
+  const store = useStore();
+  useProducts(["coefficients"]);
+  const frame = store.frames.of("coefficients");
+  const tone = useMemo(() => remembered<ToneKind>(store.shelf, "streak.tone", "root", oneOf(TONES)), [store]);
+  const colours = useMemo(() => remembered<ColourMapName>(store.shelf, "streak.colours", "inferno", oneOf(COLOUR_MAPS)), [store]);
+  const streak = useMemo(() => new Streak(), []);
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const white = useRef(NaN);
+  const pointed = useSignal<{ x: number; bin: number } | null>(null);
+  const size = useMemo(() => computed(() => `${frame.value?.coefficients?.width ?? 163}x${frame.value?.coefficients?.height ?? 120}`), [frame]);
+  const [width, height] = size.value.split("x").map(Number);
+  const row = useComputed(() => Math.min(height - 1, store.selected.value?.y ?? height >> 1));
+
+  useDrawing(() => {
+    const coefficients = frame.value?.coefficients;
+    const [y, toneNow, coloursNow] = [row.value, tone.value, colours.value];
+    const context = canvas.current?.getContext("2d");
+    if (!coefficients || canvas.current === null || !context || y >= coefficients.height) return;
+    streak.compute(coefficients, y);
+    const bright = whiteOf(streak.values);
+    if (!(Math.abs(Math.log(bright / white.current)) < 0.2)) white.current = bright; // not with every frame's noise
+    if (canvas.current.width !== streak.width || canvas.current.height !== BINS) [canvas.current.width, canvas.current.height] = [streak.width, BINS];
+    const image = context.createImageData(streak.width, BINS);
+    paintStreak(streak.values, white.current, toneNow, coloursNow, image.data);
+    context.putImageData(image, 0, 0);
+    Object.assign(canvas.current.dataset, { frame: frame.peek()?.meta.frame, row: y, white: white.current, colours: coloursNow });
+  }, [frame, row]);
+
+  const placeOf = (event: PointerEvent): { x: number; turn: number } => {
+    const box = (event.currentTarget as HTMLElement).getBoundingClientRect();
+    const inside = (share: number): number => Math.min(1 - 1e-9, Math.max(0, share));
+    return { x: Math.floor(inside((event.clientX - box.left) / box.width) * width), turn: inside((event.clientY - box.top) / box.height) };
+  };
+  const choose = (event: PointerEvent): void => {
+    const { x, turn } = placeOf(event);
+    store.selected.value = { x, y: row.peek() };
+    store.player.playing.value = false;
+    store.player.seek(turn);
+  };
+  const period_ns = store.period_s.value * 1e9;
+  const name = (): string => `streak-row-${row.peek()}-${frame.peek()?.meta.frame ?? 0}`;
+  return (
+    <Panel
+      name="streak"
+      title={
+        <h2>
+          Streak <span class="quiet">of row {row.value}</span>
+        </h2>
+      }
+      tools={
+        <>
+          <Choice label="Tone" value={tone.value} options={TONES.map((kind) => ({ value: kind, text: TONE_NAMES[kind] }))} onChange={(kind) => (tone.value = kind)} />
+          <Choice label="Colours" value={colours.value} options={COLOUR_MAPS.map((each) => ({ value: each, text: each }))} onChange={(each) => (colours.value = each)} />
+        </>
+      }
+      downloads={[
+        { text: "Picture (PNG)", run: () => { savePicture(name(), canvas.current); } },
+        { text: "Density in DN/s (NPY)", run: () => { save(`${name()}.npy`, new Blob([npy(streak.values, [BINS, streak.width])])); } },
+      ]} // prettier-ignore
+    >
+      <div class="streak">
+        <div class="streak-axis" aria-hidden="true">
+          {ticks({ low: 0, high: period_ns, kind: "linear" }, 6).map((time_ns) => (
+            <span key={time_ns} style={{ top: `${(100 * time_ns) / period_ns}%` }}>
+              {fixed(time_ns, 0, "ns")}
+            </span>
+          ))}
+        </div>
+        <div
+          class="streak-picture"
+          role="img"
+          aria-label={`Streak image of row ${row.value}: columns across, time of flight downwards`}
+          onPointerMove={(event) => {
+            const { x, turn } = placeOf(event);
+            pointed.value = { x, bin: Math.floor(turn * BINS) };
+          }}
+          onPointerLeave={() => (pointed.value = null)}
+          onPointerDown={(event) => {
+            if (event.button === 0) choose(event);
+          }}
+        >
+          <canvas ref={canvas} data-product="streak" />
+          <Marks width={width} />
+        </div>
+      </div>
+      <footer class="panel-foot">
+        <div class="panel-row">
+          <label class="scanline">
+            <span class="quiet">Scanline</span>
+            <input
+              type="range"
+              min={0}
+              max={height - 1}
+              value={row.value}
+              aria-label="Scanline"
+              onInput={(event) => (store.selected.value = { x: store.selected.peek()?.x ?? width >> 1, y: event.currentTarget.valueAsNumber })}
+            />
+          </label>
+          <Readout frame={frame} streak={streak} pointed={pointed} width={width} period_ns={period_ns} />
+        </div>
+      </footer>
+    </Panel>
+  );
+}
+
+interface ReadoutProps {
+  readonly frame: { readonly value: unknown };
+  readonly streak: Streak;
+  readonly pointed: { readonly value: { readonly x: number; readonly bin: number } | null };
+  readonly width: number;
+  readonly period_ns: number;
+}
+
+function Readout({ frame, streak, pointed, width, period_ns }: ReadoutProps) {
+  const text = useComputed(() => {
+    const at = pointed.value;
+    if (frame.value === null || at === null) return "";
+    const time_ns = ((at.bin + 0.5) / BINS) * period_ns;
+    const density = streak.values[at.bin * width + at.x] * 1e-9;
+    return `column ${at.x} · ${fixed(time_ns, 1, "ns")} · ${fixed(rangeOfTime_m(time_ns * 1e-9), 2, "m")} · ${significant(density, 3, "DN/ns")}`;
+  });
+  return <span data-field="streak">{text}</span>;
+}
+
+/** The player's time and the selected column. */
+function Marks({ width }: { width: number }) {
+  const store = useStore();
+  const time = useRef<HTMLElement>(null);
+  useDrawing(() => {
+    const turn = store.player.turn.value;
+    if (time.current !== null) time.current.style.top = `${100 * turn}%`;
+  }, [store]);
+  const selected = store.selected.value;
+  return (
+    <>
+      <i ref={time} class="streak-time" />
+      {selected !== null && <i class="streak-column" style={{ left: `${(100 * (selected.x + 0.5)) / width}%` }} />}
+    </>
+  );
+}

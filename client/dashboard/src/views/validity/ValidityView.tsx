@@ -1,0 +1,95 @@
+import { useComputed, type ReadonlySignal } from "@preact/signals";
+import { useRef } from "preact/hooks";
+
+import type { Frame } from "../../store/frames";
+import { useStore } from "../../store/store";
+import { saveNumbers, savePicture } from "../../ui/download";
+import { FLAGS } from "../../ui/flags";
+import { fixed, grouped } from "../../ui/format";
+import { useDrawing, useProducts } from "../../ui/hooks";
+import { Panel } from "../../ui/Panel";
+import { Stage } from "../../ui/Stage";
+import { AMPLITUDE } from "../map/catalogue";
+import { countFlags, paintFlags } from "./reasons";
+
+/** Which pixels something is wrong with, and what. */
+export function ValidityView() {
+  const store = useStore();
+  useProducts(["flags", AMPLITUDE]);
+  const frame = store.frames.of("flags");
+  const scene = store.frames.of(AMPLITUDE);
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const size = useComputed(() => (frame.value?.shape ?? [120, 163]).join("x"));
+  const [height, width] = size.value.split("x").map(Number);
+  useDrawing(() => {
+    const [newest, brightness] = [frame.value, scene.value];
+    const context = canvas.current?.getContext("2d");
+    if (newest === null || canvas.current === null || !context) return;
+    const [rows, columns] = newest.shape;
+    if (canvas.current.width !== columns || canvas.current.height !== rows) [canvas.current.width, canvas.current.height] = [columns, rows];
+    const image = context.createImageData(columns, rows);
+    const fits = brightness?.values.length === newest.values.length;
+    paintFlags(newest.values, fits ? brightness.values : null, brightness?.map?.high ?? 1, image.data);
+    context.putImageData(image, 0, 0);
+    canvas.current.dataset["frame"] = String(newest.meta.frame);
+  }, [frame, scene]);
+  const empty = useComputed(() => frame.value === null);
+  return (
+    <Panel
+      name="validity"
+      title={<h2>Validity</h2>}
+      downloads={[
+        { text: "Picture (PNG)", run: () => { savePicture(`validity-${frame.peek()?.meta.frame ?? 0}`, canvas.current); } },
+        { text: "Flags (NPY)", run: () => { saveNumbers(frame.peek()); } },
+      ]} // prettier-ignore
+    >
+      <Stage width={width} height={height} label="Validity map">
+        <canvas ref={canvas} data-product="flags" />
+        {empty.value && <p class="stage-empty">Waiting for the first frame</p>}
+      </Stage>
+      <Legend frame={frame} />
+    </Panel>
+  );
+}
+
+function Legend({ frame }: { frame: ReadonlySignal<Frame | null> }) {
+  const counts = useComputed(() => countFlags(frame.value?.values ?? []));
+  const { total, valid, byFlag } = counts.value;
+  const share = (count: number): string => fixed(total === 0 ? NaN : (100 * count) / total, count === 0 || count === total ? 0 : 1, "%");
+  return (
+    <table class="listing legend">
+      <tbody>
+        <tr data-flag="valid">
+          <th scope="row">
+            <Swatch colour="url(#valid)" /> Valid
+          </th>
+          <td>{grouped(valid)}</td>
+          <td>{share(valid)}</td>
+          <td class="legend-words">nothing was wrong</td>
+        </tr>
+        {FLAGS.map(({ name, title, words, colour }) => (
+          <tr key={name} data-flag={name} class={byFlag[name] === 0 ? "quiet" : ""} title={words}>
+            <th scope="row">
+              <Swatch colour={colour} /> {title}
+            </th>
+            <td>{grouped(byFlag[name])}</td>
+            <td>{share(byFlag[name])}</td>
+            <td class="legend-words">{words}</td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
+function Swatch({ colour }: { colour: string }) {
+  return (
+    <svg class="swatch" viewBox="0 0 12 12" width="12" height="12" aria-hidden="true">
+      <linearGradient id="valid">
+        <stop offset="0" stop-color="#222" />
+        <stop offset="1" stop-color="#ddd" />
+      </linearGradient>
+      <rect width="12" height="12" rx="2" fill={colour} />
+    </svg>
+  );
+}
