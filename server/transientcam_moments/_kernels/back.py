@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 from numba import njit
 
 from transientcam_moments._kernels import simd
@@ -134,5 +135,7 @@ def scatter(
         count[p] = wide_count[i]
         residual[p] = wide_residual[i]
         for k in range(len(order)):
-            phase[k, p] = wide_phase[k, i]
             weight[k, p] = wide_weight[k, i]
+            phase[k, p] = wide_phase[k, i]
+            if phase[k, p] >= 2 * np.pi:  # rounded up
+                phase[k, p] = 0.0

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from transientcam_moments._arrays import in_turn
 from transientcam_moments._kernels.registry import LEAST_PIXELS, REGISTRY, Key
 
 
@@ -35,5 +36,12 @@ def redo(planes: Any, found: tuple[Any, ...], ill: Any, noise: float) -> None:
         better = _pisarenko(part, noise=noise)
         if noise == np.finfo(np.float64).eps:
             better = _improved(part, better)
+    phase, weight, uniform, _ = better
+    weight = weight.astype(found[1].dtype)
+    # what is less than the least number of that precision isn't a return
+    phase = in_turn(np.where(weight > 0, phase, np.nan).astype(found[0].dtype))
+    order = np.argsort(phase, axis=0)
+    phase, weight = (np.take_along_axis(part, order, axis=0) for part in (phase, weight))
+    better = (phase, weight, uniform, (weight > 0).sum(axis=0))
     for plane, new in zip(found, better, strict=True):
         plane[..., ill] = new

@@ -176,7 +176,7 @@ def find_returns(
 
     b_0 comes from ``zeroth`` if it is ``apart``.
 
-    ``noise`` is the precision of the data. ``residual`` becomes the largest error of a moment that
+    ``noise`` is the precision of the data. ``residual`` becomes the error of all moments that
     the returns leave, relative to their sum; infinite where they could not be found, 0 where there
     is no light. Returns how many pixels have one larger than rounding explains.
     """
@@ -219,7 +219,7 @@ def find_returns(
         for i in range(m):
             w, x, y = weigh(order, gr, gi, inverse, wr[i], wi[i])
             zr, zi = x * x - y * y, 2.0 * x * y
-            used = lit & (w > least)
+            used = lit & (w > least) & (w * total > 0.0)
             # a surplus return next to one of the others takes a share of that one's weight
             doubtful = doubtful | (fewer & used & (w < _FAINT * floor))
             found = found + simd.select(used, one, 0.0)
@@ -233,7 +233,7 @@ def find_returns(
                 re[k], im[k] = re[k] - ur, im[k] - ui
         worst = re[0] * re[0]
         for k in range(1, m + 1):
-            worst = simd.maximum(re[k] * re[k] + im[k] * im[k], worst)
+            worst = worst + re[k] * re[k] + im[k] * im[k]  # NaN stays, as in no maximum
         worst = simd.select((worst < 1.0) & ~doubtful, simd.sqrt(worst), simd.infinity(one))
         worst = simd.select(lit, worst, 0.0)
         simd.store(residual, p, worst)
