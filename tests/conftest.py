@@ -10,17 +10,37 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let a real camera take part: ``pytest tests/driver --usb=real``."""
+    parser.addoption(
+        "--usb",
+        choices=("emulated", "real"),
+        default="emulated",
+        help="Run the tests of every mount with a real camera, too, which must be plugged in.",
+    )
+
+
 # Threads that libraries keep for the life of the process, by the start of their name.
 _LIBRARY_THREADS = ("pydev", "OpenBLAS", "transientcam-compile")
 
 
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
-    """The directory of measurements nobody here made; tests that need it skip where it is absent."""
+    """The directory of measurements nobody here made; tests skip where it is absent."""
     directory = Path(os.environ.get("TRANSIENTCAM_TEST_DATA", ROOT.parent / "shared" / "data"))
     if not directory.is_dir():
         pytest.skip(f"no measured data at {directory} (set TRANSIENTCAM_TEST_DATA)")
     return directory
+
+
+@pytest.fixture(scope="session", autouse=True)
+def data_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep recordings that belong to somebody out of the tests' reach, and theirs out of his."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_DATA_HOME", str(tmp_path_factory.mktemp("data")))
+        patch.delenv("STATE_DIRECTORY", raising=False)
+        yield
 
 
 @pytest.fixture(autouse=True)

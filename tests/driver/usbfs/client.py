@@ -1,65 +1,48 @@
-"""A program that uses ``open_camera("usb")``, driven line by line by a test."""
+"""A process that owns cameras on behalf of a test: pickled requests in, pickled answers out.
 
-import json
+``python client.py N`` keeps N descriptors open: umockdev names the socket of a monitor after its
+descriptor, so that two processes with equal ones take the news of plugs from each other.
+"""
+
+import os
+import pickle
 import sys
 from typing import Any
 
-from transientcam_driver import Camera, DriverError, Sequence, open_camera
-
-VIDEO = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.5e-3)
-
-
-class Session:
-    """One camera, and what may be asked of it."""
-
-    camera: Camera
-
-    def open(self) -> dict[str, Any]:
-        self.camera = open_camera("usb")
-        return {"serial": self.camera.capabilities.serial, "state": self.camera.state}
-
-    def open_another(self) -> None:
-        open_camera("usb").close()
-
-    def open_wrong(self) -> None:
-        open_camera("usb:NOT-THIS-ONE")
-
-    def start(self) -> dict[str, Any]:
-        applied = self.camera.configure(VIDEO)
-        self.camera.start()
-        return {"images": applied.images, "epoch": applied.epoch}
-
-    def read(self) -> dict[str, Any]:
-        frame = self.camera.read_frame(timeout_s=20)
-        return {
-            "number": frame.number,
-            "shape": frame.images.shape,
-            "mean": float(frame.images.mean()),
-            "lost": frame.lost_images,
-            "state": self.camera.state,
-            "resyncs": self.camera.counters.resyncs,
-        }
-
-    def status(self) -> bool:
-        return self.camera.status().light_on
-
-    def reconnect(self) -> str:
-        self.camera.reconnect()
-        return self.camera.state
-
-    def close(self) -> str:
-        self.camera.close()
-        return self.camera.state
+from transientcam_driver import Camera, DriverError, open_camera
 
 
 def main() -> None:
-    session = Session()
-    for line in sys.stdin:
+    for _ in range(int(sys.argv[1])):
+        os.open(os.devnull, os.O_RDONLY)
+    cameras: dict[int, Camera] = {}
+    while True:
         try:
-            answer = {"value": getattr(session, line.strip())()}
+            action, *arguments = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            return
+        try:
+            answer: tuple[str, Any] = "value", _answer(cameras, action, arguments)
         except DriverError as error:
-            answer = {"error": type(error).__name__, "text": str(error)}
-        print(json.dumps(answer), flush=True)  # noqa: T201 - the protocol of this process
+            answer = "error", error
+        pickle.dump(answer, sys.stdout.buffer)
+        sys.stdout.buffer.flush()
+
+
+def _answer(cameras: dict[int, Camera], action: str, arguments: list[Any]) -> Any:
+    match action, arguments:
+        case "open", [spec, sequence]:
+            camera = open_camera(spec)
+            number = max(cameras, default=0) + 1
+            cameras[number] = camera
+            if sequence is not None:
+                camera.configure(sequence)
+            return number
+        case "get", [number, name]:
+            return getattr(cameras[number], name)
+        case "call", [number, name, positional, named]:
+            return getattr(cameras[number], name)(*positional, **named)
+    raise AssertionError(action)
 
 
 if __name__ == "__main__":

@@ -1,35 +1,51 @@
-"""The emulated camera as a process: ``python server.py ROOT``; commands come on standard input."""
+"""The emulated camera as a process: ``python server.py ROOT``; commands come on standard input.
+
+A command is a JSON list: what to do, and its arguments.
+"""
 
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 from transientcam_driver.protocol import Request, Status
-from transientcam_driver.simulation.build import build, find_scene
+from transientcam_driver.simulation.build import build, find_scene, without_noise
 from transientcam_driver.simulation.clock import RealClock
+from transientcam_driver.simulation.faults import Fault
 from usbfs import UsbfsMount  # type: ignore[import-not-found]  # beside this script, no package
 
 
 def main() -> None:
-    device, _ = build(find_scene("mirrors"), width=163, height=120, seed=1, clock=RealClock())
+    scene = without_noise(find_scene("mirrors"))
+    device, _ = build(scene, width=163, height=120, seed=1, clock=RealClock())
     mount = UsbfsMount(device, Path(sys.argv[1]))
-    answer: object = "ready"
-    print(json.dumps(answer), flush=True)  # noqa: T201 - the protocol of this process
-    for line in sys.stdin:
-        answer = "done"
-        match line.strip():
+
+    def obey(command: str, *arguments: Any) -> object:
+        match command:
             case "unplug":
                 mount.unplug()
             case "replug":
                 mount.replug()
             case "halt":
                 device.halt()
+            case "expect":
+                device.expect(Fault(arguments[0]), arguments[1])
+            case "stall":
+                device.stall_next(arguments[0])
+            case "interlock":
+                device.set_interlock(closed=arguments[0])
+            case "memory":
+                mount.memory_bytes = arguments[0]
             case "light":
                 status = device.control(0xC0, Request.GET_STATUS, 0, 0, Status.BYTES, b"")
-                answer = Status.unpack(status).light_on
+                return Status.unpack(status).light_on
             case _:
-                answer = "unknown"
-        print(json.dumps(answer), flush=True)  # noqa: T201 - the same
+                return "unknown"
+        return "done"
+
+    print(json.dumps("ready"), flush=True)  # noqa: T201 - the protocol of this process
+    for line in sys.stdin:
+        print(json.dumps(obey(*json.loads(line))), flush=True)  # noqa: T201 - the same
     mount.close()
 
 

@@ -87,6 +87,7 @@ class UsbfsMount:
         self.device = device
         self.clients: list[Client] = []
         self.owners: dict[int, Client] = {}
+        self.memory_bytes: int | None = None  # what usbfs_memory_mb leaves for a transfer
         self._root = root
         self._events = 0
         self._closing = False
@@ -344,6 +345,8 @@ class Client:
         if kind == _CONTROL_URB:
             self._control(urb)
             return
+        if self._mount.memory_bytes is not None and length > self._mount.memory_bytes:
+            raise Refused(errno.ENOMEM)
         with self._device.changed:
             self.in_flight[address] = urb
             self._device.changed.notify_all()
