@@ -9,6 +9,7 @@ from transientcam_driver import Camera
 
 from transientcam_server import access, pages, problems, stream
 from transientcam_server.auth import Authentication
+from transientcam_server.requests import Requests
 from transientcam_server.routes import (
     acquisition,
     camera,
@@ -16,6 +17,7 @@ from transientcam_server.routes import (
     health,
     info,
     lease,
+    metrics,
     plan,
     sequence,
     simulation,
@@ -57,7 +59,7 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
         api.include_router(resource.router, dependencies=[Depends(access.admit)])
     api.include_router(stream.router)
     app.include_router(api)
-    for router in (info.versions, health.router, pages.router):
+    for router in (info.versions, health.router, metrics.router, pages.router):
         app.include_router(router)
     pages.add_dashboard(app)
     problems.install(app)
@@ -66,5 +68,6 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     app.add_middleware(BodyLimit)
     app.add_middleware(Authentication, guard=service.guard)
     app.add_middleware(SameSite, settings=settings)
+    app.add_middleware(Requests, metrics=service.metrics)
     app.add_middleware(SecurityHeaders)
     return app

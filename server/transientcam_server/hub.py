@@ -106,19 +106,21 @@ class Outbox:
             self._unacknowledged.popleft()
         self._changed.set()
 
-    def put_frame(self, frame: Frame) -> None:
-        """Let a frame wait; where too many do, drop the oldest and count it."""
+    def put_frame(self, frame: Frame) -> int:
+        """Let a frame wait; where too many do, drop the oldest and return how many."""
         due = tuple(c for c in self._channels if c.take(frame.raw.device_time_s))
         if not due:
-            return
+            return 0
         waiting = [item for item in self._waiting if isinstance(item, Delivery)]
         depth = self._depth if self._credits is None else 1
-        for oldest in waiting[: max(0, len(waiting) + 1 - depth)]:
+        dropped = waiting[: max(0, len(waiting) + 1 - depth)]
+        for oldest in dropped:
             self._waiting.remove(oldest)
             for channel in oldest.channels:
                 channel.dropped += 1
         self._waiting.append(Delivery(frame, due))
         self._changed.set()
+        return len(dropped)
 
     def put(self, item: wire.Hello | wire.Notice | wire.ErrorMessage | Goodbye) -> None:
         """Let a message wait; a client with too many of them is told goodbye instead."""
@@ -155,12 +157,15 @@ class Hub:
     ----------
     latest
         The newest frame, None before the first.
+    dropped
+        Frames that clients were too slow for, of all clients together.
     deserted
         Set while nobody looks on.
     """
 
     def __init__(self) -> None:
         self.latest: Frame | None = None
+        self.dropped = 0
         self._outboxes: set[Outbox] = set()
         self._arrived = asyncio.Event()
         self._closed = False
@@ -201,7 +206,7 @@ class Hub:
         arrived, self._arrived = self._arrived, asyncio.Event()
         arrived.set()
         for outbox in self._outboxes:
-            outbox.put_frame(frame)
+            self.dropped += outbox.put_frame(frame)
         if frame.raw.lost_images:
             self.tell("lost-images", {"count": frame.raw.lost_images, "frame": frame.number})
 

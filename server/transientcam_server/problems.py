@@ -19,6 +19,7 @@ from transientcam_moments import ParameterError
 
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import Problem
+from transientcam_server.logs import request_id
 from transientcam_server.problem_kinds import ProblemKind
 
 _log = logging.getLogger(__name__)
@@ -39,6 +40,9 @@ class ProblemDocument(BaseModel):
     status: int = Field(description="the HTTP status")
     detail: str = Field(description="this occurrence in one sentence")
     instance: str | None = Field(default=None, description="the path that was asked for")
+    request_id: str | None = Field(
+        default=None, description="names the request in the service's log; also in X-Request-ID"
+    )
     field: str | None = Field(default=None, description="the part of the request that was refused")
     value: Any = Field(default=None, description="what it was")
     limit: Any = Field(default=None, description="what it may be")
@@ -100,8 +104,10 @@ def problem_of(error: Exception) -> Problem:
 
 def problem_response(problem: Problem, *, instance: str | None = None) -> Response:
     """Return a problem as an HTTP answer."""
+    document = problem_document(problem, instance=instance)
+    identifier = request_id.get()
     return JSONResponse(
-        problem_document(problem, instance=instance),
+        document if identifier is None else document | {"request_id": identifier},
         status_code=problem.kind.status,
         media_type=PROBLEM_MEDIA_TYPE,
         headers={"Cache-Control": "no-store"},
@@ -167,10 +173,6 @@ def install(app: FastAPI) -> None:
     async def known(request: Request, error: Exception) -> Response:
         return problem_response(problem_of(error), instance=request.url.path)
 
-    async def unknown(request: Request, error: Exception) -> Response:
-        # the middleware that calls this re-raises the error for the server to log
-        return problem_response(problem_of(error), instance=request.url.path)
-
     async def invalid(request: Request, error: Exception) -> Response:
         assert isinstance(error, RequestValidationError)  # noqa: S101 - registered for it below
         return problem_response(_of_validation(error), instance=request.url.path)
@@ -187,7 +189,6 @@ def install(app: FastAPI) -> None:
         app.add_exception_handler(kind, known)
     app.add_exception_handler(RequestValidationError, invalid)
     app.add_exception_handler(HTTPException, http)
-    app.add_exception_handler(Exception, unknown)
 
 
 def _of_http(error: HTTPException, request: Request) -> Problem:
@@ -207,10 +208,11 @@ def _allowed(request: Request) -> str:
     """Return every method a path answers; the framework knows only those of one route of it."""
     app: FastAPI = request.app
     methods = {
-        method.upper()
+        allowed
         for template, operations in app.openapi()["paths"].items()
         if compile_path(template)[0].match(request.url.path)
         for method in operations
+        for allowed in (["GET", "HEAD"] if method == "get" else [method.upper()])
     }
     return ", ".join(sorted(methods))
 
@@ -276,4 +278,5 @@ def _shown(value: object) -> str:
 
 
 def _shortened(text: str) -> str:
+    text = text.encode("utf-8", "replace").decode()  # JSON may bring half a character
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"

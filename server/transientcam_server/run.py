@@ -1,6 +1,5 @@
 """The service as a process: its socket, its server, its signals."""
 
-import logging
 import signal
 import socket
 import threading
@@ -12,6 +11,7 @@ import uvicorn
 from fastapi import FastAPI
 from transientcam.wire import MAX_CLIENT_MESSAGE_BYTES
 
+from transientcam_server import logs
 from transientcam_server.errors import AddressUnavailable
 from transientcam_server.service import Service
 from transientcam_server.settings import Settings
@@ -87,7 +87,7 @@ class Server(uvicorn.Server):
                 ws_max_size=MAX_CLIENT_MESSAGE_BYTES,
                 log_config=None,
                 log_level="info" if settings.log_level == "debug" else "warning",
-                access_log=settings.log_level == "debug",
+                access_log=False,  # `requests` logs what it may: queries are not repeated
                 server_header=False,
                 proxy_headers=False,
                 timeout_graceful_shutdown=SHUTDOWN_S,
@@ -153,6 +153,4 @@ def serve(
 
 def configure_logging(settings: Settings) -> None:
     """Log to standard error, one line a message."""
-    logging.basicConfig(
-        level=settings.log_level.upper(), format="%(asctime)s %(levelname)-7s %(name)s: %(message)s"
-    )
+    logs.configure(level=settings.log_level, form=settings.log_format)

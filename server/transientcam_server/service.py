@@ -27,6 +27,7 @@ from transientcam_server.calibration import Calibration, calibration_id, load_ca
 from transientcam_server.fronts import Fronts
 from transientcam_server.hub import Channel, Goodbye, Hub
 from transientcam_server.lease import Alarm, Change, Lease, LeaseDesk
+from transientcam_server.metrics import Metrics
 from transientcam_server.pipeline import Pipeline
 from transientcam_server.settings import Settings
 
@@ -67,6 +68,7 @@ class Service:
         self.acquisition = Acquisition(camera, report=self._from_acquisition)
         self.applied: AppliedSequence = camera.applied
         self.lease = LeaseDesk(report=self._lease_changed, alarm=self._alarm)
+        self.metrics = Metrics(self)
         self.identity = {"name": "transientcam", "version": VERSION}
 
     @contextlib.asynccontextmanager
@@ -134,8 +136,11 @@ class Service:
         self._loop.call_soon_threadsafe(self._happened, event)
 
     def _happened(self, event: Event) -> None:
+        self.metrics.happened(event)
         match event:
             case Captured(raw, applied):
+                if self.hub.latest is not None:
+                    self.metrics.superseded(self.hub.latest.meta())
                 self.hub.publish(self.pipeline.frame(raw, applied))
             case Lost(reason):
                 self.hub.tell("camera-lost", {"reason": reason})

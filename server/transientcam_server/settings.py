@@ -140,6 +140,8 @@ class Settings(_Group):
     """The least important messages to log."""
     calibration: Path | None = None
     """A file written by `transientcam calibrate`; nominal gains are used without one."""
+    log_format: Literal["auto", "text", "json"] = "auto"
+    """``auto`` is text on a terminal and JSON elsewhere."""
     workers: int = Field(default_factory=lambda: max(2, os.cpu_count() or 2), ge=2, le=256)
     """Threads that reconstruct and encode; at least 2, so that one long answer delays nobody."""
     reconstruction: ReconstructionSettings = ReconstructionSettings()

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import secrets
+import time
 from typing import Any
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
@@ -14,6 +15,7 @@ from transientcam_server.auth import log_refusal
 from transientcam_server.encoding import MSGPACK
 from transientcam_server.errors import Problem
 from transientcam_server.hub import Channel, Delivery, Goodbye, Outbox
+from transientcam_server.metrics import Metrics
 from transientcam_server.problems import problem_document, problem_of, problem_response
 from transientcam_server.service import Service
 
@@ -52,7 +54,7 @@ class _Client:
         self._service = service
         self._session = secrets.token_hex(8)
         self._outbox = Outbox(depth=service.settings.stream.queue_frames)
-        self._sender = _Sender(websocket, self._outbox)
+        self._sender = _Sender(websocket, self._outbox, service.metrics)
 
     async def serve(self) -> None:
         """Subscribe, then send and receive until either end has enough."""
@@ -192,8 +194,9 @@ class _Client:
 class _Sender:
     """Empties an outbox into a WebSocket."""
 
-    def __init__(self, websocket: WebSocket, outbox: Outbox) -> None:
+    def __init__(self, websocket: WebSocket, outbox: Outbox, metrics: Metrics) -> None:
         self._websocket = websocket
+        self._metrics = metrics
         self._outbox = outbox
         self._failing: set[str] = set()
 
@@ -223,6 +226,7 @@ class _Sender:
                 else:
                     self._failing.discard(channel.product.name)
                     await self._websocket.send_bytes(data)
+                    self._metrics.sent(time.time() - delivery.frame.raw.host_time_s)
         finally:
             for task in tasks:
                 task.cancel()

@@ -48,6 +48,7 @@ def test_every_resource_of_the_interface_is_described(document: dict[str, Any]) 
         "POST /api/v1/plan",
         "GET /api/v1/tradeoff",
         "GET /livez",
+        "GET /metrics",
         "GET /readyz",
     }
 

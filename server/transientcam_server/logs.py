@@ -1,0 +1,48 @@
+"""Logs: for eyes on a terminal, JSON for everything else; each line names its request."""
+
+import logging
+import sys
+from contextvars import ContextVar
+from typing import Final, Literal, TextIO
+
+from pythonjsonlogger.json import JsonFormatter
+
+LogFormat = Literal["auto", "text", "json"]
+
+request_id: Final[ContextVar[str | None]] = ContextVar("request_id", default=None)
+"""The id of the request that is being answered; None outside of any."""
+
+_NOISY: Final = ("websockets", "asyncio", "multipart", "PIL", "numba", "h5py")
+"""Libraries that tell their own debugging at `debug`, some of it headers."""
+
+
+def configure(*, level: str, form: LogFormat, stream: TextIO = sys.stderr) -> None:
+    """Log to ``stream``, one line a message."""
+    handler = logging.StreamHandler(stream)
+    handler.setFormatter(formatter(form if form != "auto" else _form_for(stream)))
+    handler.addFilter(_add_request_id)
+    logging.basicConfig(level=level.upper(), handlers=[handler], force=True)
+    for name in _NOISY:
+        logging.getLogger(name).setLevel(max(logging.INFO, logging.getLevelName(level.upper())))
+
+
+def formatter(form: Literal["text", "json"]) -> logging.Formatter:
+    """Return what makes lines of records."""
+    if form == "text":
+        return logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s")
+    return JsonFormatter(
+        "%(levelname)s %(name)s %(message)s",
+        rename_fields={"levelname": "level", "name": "logger", "exc_info": "exception"},
+        timestamp="time",
+    )
+
+
+def _form_for(stream: TextIO) -> Literal["text", "json"]:
+    return "text" if stream.isatty() else "json"
+
+
+def _add_request_id(record: logging.LogRecord) -> bool:
+    current = request_id.get()
+    if current is not None:
+        record.request_id = current
+    return True

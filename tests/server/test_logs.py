@@ -1,0 +1,101 @@
+import asyncio
+import io
+import json
+import logging
+from collections.abc import Iterator
+
+import pytest
+from transientcam_server import logs
+
+
+@pytest.fixture(autouse=True)
+def root_as_it_was() -> Iterator[None]:
+    root = logging.getLogger()
+    handlers, level = list(root.handlers), root.level
+    yield
+    root.handlers[:] = handlers
+    root.setLevel(level)
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def lines(stream: io.StringIO) -> list[str]:
+    return stream.getvalue().splitlines()
+
+
+def test_elsewhere_than_on_a_terminal_each_line_is_json() -> None:
+    stream = io.StringIO()
+    logs.configure(level="info", form="auto", stream=stream)
+
+    logging.getLogger("a.b").info("%d frames\nlost", 3, extra={"camera": "x"})
+
+    (line,) = lines(stream)
+    document = json.loads(line)
+    assert document["message"] == "3 frames\nlost"
+    assert (document["level"], document["logger"], document["camera"]) == ("INFO", "a.b", "x")
+    assert document["time"].endswith("+00:00")
+    assert "request_id" not in document
+
+
+def test_on_a_terminal_lines_are_for_eyes() -> None:
+    stream = Terminal()
+    logs.configure(level="info", form="auto", stream=stream)
+
+    logging.getLogger("a").warning("look")
+
+    assert lines(stream)[0].endswith("WARNING a: look")
+
+
+@pytest.mark.parametrize("form", ["text", "json"])
+def test_a_form_that_was_chosen_is_taken(form: logs.LogFormat) -> None:
+    stream = Terminal() if form == "json" else io.StringIO()
+    logs.configure(level="info", form=form, stream=stream)
+
+    logging.getLogger("a").info("x")
+
+    assert lines(stream)[0].startswith("{") == (form == "json")
+
+
+def test_an_exception_is_one_line_too() -> None:
+    stream = io.StringIO()
+    logs.configure(level="info", form="json", stream=stream)
+
+    try:
+        _ = 1 / 0
+    except ZeroDivisionError:
+        logging.getLogger("a").exception("failed")
+
+    (line,) = lines(stream)
+    assert "ZeroDivisionError" in json.loads(line)["exception"]
+
+
+def test_each_line_names_the_request_it_is_about() -> None:
+    stream = io.StringIO()
+    logs.configure(level="info", form="json", stream=stream)
+
+    async def answer(identifier: str) -> None:
+        logs.request_id.set(identifier)
+        await asyncio.sleep(0)
+        logging.getLogger("a").info(identifier)
+
+    async def both() -> None:
+        await asyncio.gather(answer("first"), answer("second"))
+
+    asyncio.run(both())
+
+    documents = [json.loads(line) for line in lines(stream)]
+    assert [each["request_id"] for each in documents] == [each["message"] for each in documents]
+
+
+def test_libraries_that_tell_headers_stay_quiet_at_debug() -> None:
+    stream = io.StringIO()
+    logs.configure(level="debug", form="json", stream=stream)
+
+    logging.getLogger("websockets.server").debug("< Authorization: Bearer secret")
+    logging.getLogger("transientcam_server").debug("ours")
+
+    assert "secret" not in stream.getvalue()
+    assert "ours" in stream.getvalue()

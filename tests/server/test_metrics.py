@@ -1,0 +1,125 @@
+"""What a scrape tells, and that it stays small."""
+
+import httpx
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+from transientcam import wire
+
+from tests.server.streaming import streaming
+from tests.serving import Served
+
+Samples = dict[str, float]
+
+
+def scrape(http: httpx.Client) -> Samples:
+    """Return every sample by its name and labels."""
+    response = http.get("/metrics")
+    assert response.status_code == 200
+    assert response.headers["content-type"].startswith("text/plain; version=")
+    samples: Samples = {}
+    for family in text_string_to_metric_families(response.text):
+        assert family.documentation, family.name
+        for sample in family.samples:
+            labels = ",".join(f"{key}={value}" for key, value in sorted(sample.labels.items()))
+            samples[f"{sample.name}{{{labels}}}" if labels else sample.name] = sample.value
+    return samples
+
+
+def test_frames_clients_and_latency_are_counted(served: Served, http: httpx.Client) -> None:
+    with streaming(served.stream_url) as client:
+        client.subscribe("range")
+        for _ in range(4):
+            client.frame()
+        samples = scrape(http)
+
+    assert samples["transientcam_stream_clients"] == 1
+    assert samples["transientcam_frames_captured_total"] >= 3
+    assert samples["transientcam_frame_latency_seconds_count"] >= 2
+    assert samples["transientcam_frame_latency_seconds_sum"] > 0.0
+    assert samples["transientcam_frame_interval_seconds_count"] >= 2
+    assert samples["transientcam_reconstruction_duration_seconds_count"] >= 1
+    assert samples["transientcam_images_total{result=received}"] >= 3 * 16
+    assert samples["transientcam_device_connected"] == 1
+    assert samples["transientcam_acquisition_running"] == 1
+    assert 0.0 <= samples["transientcam_pixels_flagged_ratio{flag=biased}"] <= 1.0
+    assert samples["transientcam_http_requests_total{status=5xx}"] == 0
+
+
+def test_the_mean_interval_is_the_sequence_s(served: Served, http: httpx.Client) -> None:
+    for after in range(4):
+        http.get("/api/v1/frames/latest", params={"wait_s": 10.0, "after": after})
+
+    samples = scrape(http)
+
+    count = samples["transientcam_frame_interval_seconds_count"]
+    mean_s = samples["transientcam_frame_interval_seconds_sum"] / count
+    expected_s = 1.0 / http.get("/api/v1/sequence").json()["frame_rate_hz"]
+    assert mean_s == pytest.approx(expected_s, rel=0.01)
+
+
+def test_a_loss_and_a_return_are_counted(served: Served, http: httpx.Client) -> None:
+    with streaming(served.stream_url) as client:
+        client.subscribe("flags")
+        client.frame()
+        http.post("/api/v1/simulation/faults", json={"fault": "unplug"})
+        client.notice("camera-lost")
+        lost = scrape(http)
+        http.post("/api/v1/simulation/faults", json={"fault": "replug"})
+        client.notice("camera-back")
+        back = scrape(http)
+
+    assert (lost["transientcam_device_connected"], back["transientcam_device_connected"]) == (0, 1)
+    assert lost["transientcam_device_losses_total"] == 1
+    assert lost["transientcam_device_reconnects_total"] == 0
+    assert back["transientcam_device_reconnects_total"] == 1
+
+
+def test_frames_that_a_client_was_too_slow_for_are_counted(
+    served: Served, http: httpx.Client
+) -> None:
+    with streaming(served.stream_url) as slow:
+        slow.subscribe("range", credits=1)
+        first = slow.frame()
+        http.get("/api/v1/frames/latest", params={"wait_s": 10.0, "after": first.frame + 3})
+        dropped = scrape(http)["transientcam_frames_dropped_total"]
+        slow.send(wire.Ack(first.frame).to_document())
+        notice = slow.notice("dropped")
+
+    assert dropped >= 1
+    assert notice.details["count"] >= dropped
+
+
+def test_requests_are_counted_by_class(served: Served, http: httpx.Client) -> None:
+    before = scrape(http)
+    http.get("/api/v1/nothing")
+    http.get("/livez")
+    after = scrape(http)
+
+    def grown(status: str) -> float:
+        name = f"transientcam_http_requests_total{{status={status}}}"
+        return after[name] - before[name]
+
+    assert grown("4xx") == 1
+    assert grown("2xx") == 2  # and the first scrape
+
+
+def test_the_number_of_series_does_not_grow_with_the_clients(
+    served: Served, http: httpx.Client
+) -> None:
+    with streaming(served.stream_url) as first:
+        first.subscribe("flags")
+        first.frame()
+        before = set(scrape(http))
+        with streaming(served.stream_url) as second:
+            second.subscribe("flags", "range", "direct")
+            second.frame()
+            http.get("/api/v1/frames/latest/flags.npy")
+            after = set(scrape(http))
+
+    assert after == before
+
+
+def test_two_services_in_one_process_have_metrics_of_their_own(served: Served) -> None:
+    from transientcam_server.metrics import Metrics
+
+    assert Metrics(served.service).registry is not served.service.metrics.registry
