@@ -6,9 +6,10 @@ from typing import Any, Final
 import numpy as np
 import transientcam_moments as tm
 from numpy.typing import NDArray
-from transientcam_driver import Camera, Truth
+from transientcam_driver import Truth
 
 from transientcam_server import problem_kinds as kinds
+from transientcam_server.cameras import Camera
 from transientcam_server.computing_time import ComputingTime
 from transientcam_server.errors import Problem
 from transientcam_server.planner import Choice, Goal, Plan, candidates, choices_on_front, plan

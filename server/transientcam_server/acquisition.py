@@ -16,13 +16,14 @@ from typing import Final, Literal, TypeVar
 
 from transientcam_driver import (
     AppliedSequence,
-    Camera,
     CameraError,
     FrameTimeout,
     RawFrame,
     Sequence,
     Status,
 )
+
+from transientcam_server.cameras import Camera
 
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")

@@ -5,10 +5,10 @@ from contextlib import asynccontextmanager
 from typing import Final
 
 from fastapi import APIRouter, Depends, FastAPI
-from transientcam_driver import Camera
 
 from transientcam_server import access, pages, problems, stream
 from transientcam_server.auth import Authentication
+from transientcam_server.cameras import Camera
 from transientcam_server.requests import Requests
 from transientcam_server.routes import (
     acquisition,
@@ -19,6 +19,7 @@ from transientcam_server.routes import (
     lease,
     metrics,
     plan,
+    recordings,
     sequence,
     simulation,
 )
@@ -27,7 +28,7 @@ from transientcam_server.service import VERSION, Service
 from transientcam_server.settings import Settings
 
 API: Final = "/api/v1"
-_RESOURCES = (info, camera, lease, sequence, acquisition, frames, simulation, plan)
+_RESOURCES = (info, camera, lease, sequence, acquisition, frames, recordings, simulation, plan)
 
 
 def build_app(camera: Camera, settings: Settings) -> FastAPI:

@@ -27,7 +27,7 @@ Background = Literal["none", "median"]
 def serve(
     camera: Annotated[
         str | None,
-        typer.Option(help="usb[:SERIAL] or sim:SCENE  [default: sim:mirrors]"),
+        typer.Option(help="usb[:SERIAL], sim:SCENE or recording:FILE  [default: sim:mirrors]"),
     ] = None,
     host: Annotated[
         str | None, typer.Option(help="Address to listen on.  [default: 127.0.0.1]")
@@ -62,10 +62,10 @@ def serve(
     settings = load_settings(command_line, file=config, environment=os.environ)
 
     import transientcam_moments as tm
-    from transientcam_driver import open_camera
 
     from transientcam_server import run
     from transientcam_server.app import build_app
+    from transientcam_server.cameras import open_camera
 
     run.configure_logging(settings)
     # the address first: where another daemon has it, the camera is not touched

@@ -279,4 +279,5 @@ def _shown(value: object) -> str:
 
 def _shortened(text: str) -> str:
     text = text.encode("utf-8", "replace").decode()  # JSON may bring half a character
+    text = text.encode("utf-8", "replace").decode()  # JSON may bring half a character
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"

@@ -3,14 +3,14 @@
 import asyncio
 import contextlib
 import logging
-from collections.abc import AsyncIterator, Callable, Iterable
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from importlib.metadata import version
 from typing import Annotated, Any, Final
 
 from fastapi import Depends, Request
 from transientcam import wire
-from transientcam_driver import AppliedSequence, Camera
+from transientcam_driver import AppliedSequence
 from transientcam_driver.calibration import DEVICE_FIELDS
 
 from transientcam_server.accuracy import Accuracy
@@ -24,11 +24,14 @@ from transientcam_server.acquisition import (
 )
 from transientcam_server.auth import Guard
 from transientcam_server.calibration import Calibration, calibration_id, load_calibration
+from transientcam_server.cameras import Camera
 from transientcam_server.fronts import Fronts
 from transientcam_server.hub import Channel, Goodbye, Hub
 from transientcam_server.lease import Alarm, Change, Lease, LeaseDesk
 from transientcam_server.metrics import Metrics
 from transientcam_server.pipeline import Pipeline
+from transientcam_server.recording import Header
+from transientcam_server.recording.library import Library
 from transientcam_server.settings import Settings
 
 _log = logging.getLogger(__name__)
@@ -69,12 +72,16 @@ class Service:
         self.applied: AppliedSequence = camera.applied
         self.lease = LeaseDesk(report=self._lease_changed, alarm=self._alarm)
         self.metrics = Metrics(self)
+        self.recordings = Library(
+            settings.recordings, header=self._recording_header, tell=self._tell_from_thread
+        )
         self.identity = {"name": "transientcam", "version": VERSION}
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Capture from entry to exit."""
         self._loop = asyncio.get_running_loop()
+        await asyncio.to_thread(self.recordings.open)
         self.acquisition.start()
         watching = asyncio.create_task(self._watch_tokens())
         try:
@@ -85,6 +92,7 @@ class Service:
             self.lease.close()
             self.hub.close()
             await self._loop.run_in_executor(self._executor, self.acquisition.stop)
+            await self._loop.run_in_executor(self._executor, self.recordings.close)
             await self.pipeline.close()
             self._executor.shutdown(wait=True, cancel_futures=True)
 
@@ -133,7 +141,33 @@ class Service:
     def _from_acquisition(self, event: Event) -> None:
         """Carry an event from the acquisition's thread to the loop."""
         assert self._loop is not None  # noqa: S101 - the thread is started after it is set
+        if isinstance(event, Captured):
+            self.recordings.offer(event.raw, event.applied)
         self._loop.call_soon_threadsafe(self._happened, event)
+
+    def _tell_from_thread(self, kind: str, details: Mapping[str, Any]) -> None:
+        assert self._loop is not None  # noqa: S101 - nothing is recorded before it is set
+        self._loop.call_soon_threadsafe(self.hub.tell, kind, details)
+
+    def _recording_header(self, recording_id: str, name: str, started_s: float) -> Header:
+        """Return what a recording that starts now has to know to be evaluated alone."""
+        camera, simulation = self.camera, self.camera.simulation
+        applied = camera.applied
+        calibration = self.pipeline.calibration_for(applied)
+        return Header(
+            recording_id=recording_id,
+            name=name,
+            started_s=started_s,
+            applied=applied,
+            capabilities=camera.capabilities,
+            camera={
+                "spec": self.settings.camera,
+                "scene": None if simulation is None else simulation.scene,
+            },
+            calibration={"id": calibration_id(calibration)},
+            calibration_planes=None if calibration is None else calibration.gains,
+            reconstruction=self.settings.reconstruction.model_dump(),
+        )
 
     def _happened(self, event: Event) -> None:
         self.metrics.happened(event)

@@ -10,13 +10,12 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Any, Final, get_type_hints
 
-import h5py
 import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 from transientcam_driver import AppliedSequence, Capabilities, ImageLabel, RawFrame, Sequence
 
-from transientcam_server.recording import swmr
+from transientcam_server.recording import hdf5, swmr
 
 FORMAT: Final = "transientcam recording"
 FORMAT_VERSION: Final = 1
@@ -87,7 +86,7 @@ def checksum(images: NDArray[np.uint16]) -> int:
     return isal_zlib.crc32(np.ascontiguousarray(images, dtype="<u2").data.cast("B"))
 
 
-def create(file: h5py.File, header: Header, annotations: Mapping[str, Any]) -> None:
+def create(file: hdf5.File, header: Header, annotations: Mapping[str, Any]) -> None:
     """Lay out an empty recording, complete but for its frames."""
     capabilities, labels = header.capabilities, header.applied.labels
     file.attrs.update(
@@ -129,7 +128,7 @@ def create(file: h5py.File, header: Header, annotations: Mapping[str, Any]) -> N
     _scale(file)
 
 
-def _create_calibration(file: h5py.File, planes: NDArray[Any]) -> None:
+def _create_calibration(file: hdf5.File, planes: NDArray[Any]) -> None:
     file.create_dataset("moment", data=np.arange(len(planes), dtype="<i4"))
     file["moment"].make_scale("moment")
     dataset = file.create_dataset("calibration_planes", data=planes)
@@ -140,7 +139,7 @@ def _create_calibration(file: h5py.File, planes: NDArray[Any]) -> None:
 _LABEL_DTYPES: Final[dict[object, str]] = {int: "<i4", float: "<f8", bool: "|u1"}
 
 
-def _scale(file: h5py.File) -> None:
+def _scale(file: hdf5.File) -> None:
     """Name the axes, so that xarray and netCDF know them."""
     for axis, name in enumerate(_AXES):
         file["raw"].dims[axis].attach_scale(file[name])
@@ -170,7 +169,7 @@ def row(raw: RawFrame, *, dropped_frames: int) -> dict[str, object]:
     }
 
 
-def read_header(file: h5py.File) -> Header:
+def read_header(file: hdf5.File) -> Header:
     """Return what `create` wrote.
 
     Raises
@@ -205,12 +204,15 @@ def read_header(file: h5py.File) -> Header:
 
 def _capabilities(document: Mapping[str, Any]) -> Capabilities:
     names = get_type_hints(Capabilities)
-    given = {name: value for name, value in document.items() if name in names}
-    lists = {name: tuple(value) for name, value in given.items() if isinstance(value, list)}
-    return Capabilities(**(given | lists))
+    given: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value  # JSON has no tuples
+        for name, value in document.items()
+        if name in names
+    }
+    return Capabilities(**given)
 
 
-def read_labels(file: h5py.File) -> tuple[ImageLabel, ...]:
+def read_labels(file: hdf5.File) -> tuple[ImageLabel, ...]:
     """Return what each image shows."""
     columns = {name: file[name][()].tolist() for name in _LABELS.keys() - {"index"}}
     columns["index"] = list(range(file["raw"].shape[1]))
@@ -221,7 +223,7 @@ def read_labels(file: h5py.File) -> tuple[ImageLabel, ...]:
     )
 
 
-def read_document(file: h5py.File, name: str) -> dict[str, Any]:
+def read_document(file: hdf5.File, name: str) -> dict[str, Any]:
     """Return a JSON document in a scalar dataset; empty where none was written or it is torn."""
     try:
         document = json.loads(bytes(file[name][()]).rstrip(b"\0") or b"{}")

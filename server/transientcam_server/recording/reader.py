@@ -6,13 +6,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 from transientcam_driver import DriverError, RawFrame
 
 from transientcam_server.errors import DamagedFrame, NotARecording
-from transientcam_server.recording import layout, swmr
+from transientcam_server.recording import hdf5, layout, swmr
 
 
 class Recording:
@@ -35,7 +34,9 @@ class Recording:
             pass  # says what is wrong better than h5py
         try:
             # the writer of an unfinished one may be alive or dead: only SWMR readers may look
-            self._file = h5py.File(path, "r", libver="latest", swmr=path.name.endswith(".part"))
+            self._file = hdf5.open_file(
+                path, "r", libver="latest", swmr=path.name.endswith(".part")
+            )
         except OSError as error:
             raise NotARecording(str(path), _reason(error)) from error
         try:

@@ -5,10 +5,8 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-import h5py
-
 from transientcam_server.errors import DamagedFrame, NotARecording
-from transientcam_server.recording import layout, swmr
+from transientcam_server.recording import hdf5, layout, swmr
 from transientcam_server.recording.reader import Recording
 from transientcam_server.recording.writer import synchronise_directory
 
@@ -38,7 +36,7 @@ def recover(part: Path, *, target: Path | None = None) -> Path:
         with Recording(part) as recording:
             frames = whole_frames(recording)
         _require_room(part, path.parent)
-        with h5py.File(part, "r", libver="latest", swmr=True) as source:
+        with hdf5.open_file(part, "r", libver="latest", swmr=True) as source:
             swmr.salvage(source, scratch, frames, row_axis=layout.ROW_AXIS)
         with Recording(scratch) as copy:
             if copy.frames != frames:

@@ -15,10 +15,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-import h5py
 import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
+
+from transientcam_server.recording import hdf5
 
 LIBVER: Final = ("v110", "v110")
 _SERIES_CHUNK: Final = 1024
@@ -51,9 +52,17 @@ def expanded(chunk: bytes, shape: Sequence[int], dtype: np.dtype[Any]) -> NDArra
     return values.view(dtype).reshape(shape)
 
 
+def in_words(error: Exception) -> str:
+    """Return what the system said; HDF5 tells with it where it was and at what address."""
+    if isinstance(error, OSError) and error.errno is not None:
+        own = error.strerror or ""
+        return os.strerror(error.errno) if "errno =" in own else own
+    return str(error).partition("\n")[0]
+
+
 def create_blocks(
-    file: h5py.File, name: str, shape: Sequence[int], dtype: str, **attributes: object
-) -> h5py.Dataset:
+    file: hdf5.File, name: str, shape: Sequence[int], dtype: str, **attributes: object
+) -> hdf5.Dataset:
     """Create a dataset of blocks (rows, *shape), one chunk a row."""
     dataset = file.create_dataset(
         name,
@@ -69,7 +78,7 @@ def create_blocks(
     return dataset
 
 
-def create_series(file: h5py.File, name: str, dtype: str, **attributes: object) -> h5py.Dataset:
+def create_series(file: hdf5.File, name: str, dtype: str, **attributes: object) -> hdf5.Dataset:
     """Create a dataset of numbers, one a row."""
     dataset = file.create_dataset(name, (0,), dtype, maxshape=(None,), chunks=(_SERIES_CHUNK,))
     dataset.attrs.update(attributes)
@@ -88,7 +97,7 @@ class Appender:
         one whose length counts the rows last.
     """
 
-    def __init__(self, file: h5py.File, blocks: Sequence[str], series: Sequence[str]) -> None:
+    def __init__(self, file: hdf5.File, blocks: Sequence[str], series: Sequence[str]) -> None:
         self._file = file
         self._blocks = {name: file[name] for name in blocks}
         self._series = {name: file[name] for name in series}
@@ -144,7 +153,7 @@ class Appender:
             os.close(self._descriptor)
 
 
-def salvage(source: h5py.File, target: Path, rows: int, *, row_axis: str) -> None:
+def salvage(source: hdf5.File, target: Path, rows: int, *, row_axis: str) -> None:
     """Copy what is consistent of an unfinished file into a new one that anything can open.
 
     Chunks are copied as they are. ``row_axis`` is the series whose length counts the rows; every
@@ -152,7 +161,7 @@ def salvage(source: h5py.File, target: Path, rows: int, *, row_axis: str) -> Non
     (`h5clear`) were tried and fail on such files: the end of the allocated space that the file
     states is out of date.
     """
-    with h5py.File(target, "w", libver=LIBVER) as copy:
+    with hdf5.open_file(target, "w", libver=LIBVER) as copy:
         copy.attrs.update(source.attrs)
         growing = [name for name, item in source.items() if item.maxshape[:1] == (None,)]
         for name, dataset in source.items():
@@ -166,7 +175,7 @@ def salvage(source: h5py.File, target: Path, rows: int, *, row_axis: str) -> Non
         raise ValueError(f"no series {row_axis}")
 
 
-def _copy_rows(dataset: h5py.Dataset, copy: h5py.File, rows: int) -> None:
+def _copy_rows(dataset: hdf5.Dataset, copy: hdf5.File, rows: int) -> None:
     if dataset.ndim == 1:
         create_series(copy, dataset.name, dataset.dtype)
         copy[dataset.name].resize(rows, 0)
@@ -185,13 +194,13 @@ _SCALE_ATTRIBUTES: Final = frozenset(
 )
 
 
-def _copy_attributes(dataset: h5py.Dataset, copy: h5py.Dataset) -> None:
+def _copy_attributes(dataset: hdf5.Dataset, copy: hdf5.Dataset) -> None:
     for name in dataset.attrs:
         if name not in _SCALE_ATTRIBUTES:
             copy.attrs[name] = dataset.attrs[name]
 
 
-def _restore_scales(source: h5py.File, copy: h5py.File) -> None:
+def _restore_scales(source: hdf5.File, copy: hdf5.File) -> None:
     for name, dataset in source.items():
         if dataset.is_scale:
             copy[name].make_scale(name)

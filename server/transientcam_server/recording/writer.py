@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import h5py
 from transientcam_driver import RawFrame
 
-from transientcam_server.recording import layout, swmr
+from transientcam_server.recording import hdf5, layout, swmr
 from transientcam_server.recording.layout import Header
 
 
@@ -34,7 +33,7 @@ class RecordingWriter:
         self.part = path.with_name(path.name + ".part")
         if path.exists():
             raise FileExistsError(17, "there is a recording already", str(path))
-        file = h5py.File(self.part, "x", libver=swmr.LIBVER)
+        file = hdf5.open_file(self.part, "x", libver=swmr.LIBVER)
         try:
             layout.create(file, header, annotations or {})
             self._rows = swmr.Appender(file, ["raw"], list(layout.SERIES))

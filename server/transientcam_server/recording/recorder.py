@@ -1,0 +1,253 @@
+"""One recording while it runs: a thread that writes, and a short queue that the camera fills.
+
+The camera's thread never waits: a frame that finds the queue full is dropped and counted.
+"""
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+from transientcam_driver import AppliedSequence, RawFrame
+
+from transientcam_server.recording.layout import Header
+from transientcam_server.recording.swmr import in_words
+from transientcam_server.recording.writer import RecordingWriter
+
+_log = logging.getLogger(__name__)
+LOOK_S: Final = 0.2
+"""How often limits are looked at while no frame comes."""
+_LOOK_AT_DISK_S: Final = 1.0
+
+Reason = Literal[
+    "stopped", "duration", "size", "frames", "disk-space", "sequence-changed", "failed", "shutdown"
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """When a recording ends by itself; None for never.
+
+    ``free_bytes`` is what it leaves free on the disk.
+    """
+
+    duration_s: float | None = None
+    size_bytes: int | None = None
+    frames: int | None = None
+    free_bytes: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a recording is; ``reason`` and ``problem`` once it has ended."""
+
+    frames: int
+    dropped_frames: int
+    size_bytes: int
+    duration_s: float
+    reason: Reason | None
+    problem: str | None
+    finished: bool
+
+
+class Recorder:
+    """Writes what is offered until a limit is reached or somebody stops it.
+
+    Parameters
+    ----------
+    writer
+        Owned from now on.
+    queue_frames
+        How many frames may wait for the disk.
+    free_bytes
+        Says how much the disk has left.
+    on_dropped
+        Called on the writing thread, at most once a second, with how many frames were dropped
+        since the call before, and in all.
+    on_end
+        Called last, on the writing thread.
+    """
+
+    def __init__(
+        self,
+        writer: RecordingWriter,
+        header: Header,
+        *,
+        limits: Limits,
+        queue_frames: int,
+        free_bytes: Callable[[], int],
+        on_dropped: Callable[[int, int], None] = lambda count, total: None,
+        on_end: Callable[["Recorder"], None] = lambda recorder: None,
+        clock: Callable[[], float] = time.monotonic,
+        unix_s: Callable[[], float] = time.time,
+    ) -> None:
+        self.header = header
+        self.limits = limits
+        self._writer = writer
+        self._depth = queue_frames
+        self._free_bytes = free_bytes
+        self._on_dropped = on_dropped
+        self._on_end = on_end
+        self._clock = clock
+        self._unix_s = unix_s
+        self._changed = threading.Condition()
+        self._waiting: deque[tuple[RawFrame, int]] = deque()
+        self._work: deque[Callable[[], None]] = deque()
+        self._reason: Reason | None = None
+        self._problem: str | None = None
+        self._dropped = 0
+        self._dropped_before_next = 0
+        self._told_dropped = 0
+        self._began_s = clock()
+        self._ended_s: float | None = None
+        self._looked_s = -float("inf")
+        self._size_bytes = writer.bytes_written
+        self._finished = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
+
+    # -- from any thread -----------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def offer(self, raw: RawFrame, applied: AppliedSequence) -> None:
+        """Take a frame; never waits for the disk."""
+        ours = self.header.applied
+        if (applied.sequence, applied.low_frequency_hz) != (ours.sequence, ours.low_frequency_hz):
+            self.stop("sequence-changed")
+            return
+        with self._changed:
+            if self._reason is not None:
+                return
+            if len(self._waiting) >= self._depth:
+                self._dropped += 1
+                self._dropped_before_next += 1
+                return
+            self._waiting.append((raw, self._dropped_before_next))
+            self._dropped_before_next = 0
+            self._changed.notify()
+
+    def stop(self, reason: Reason = "stopped") -> None:
+        """Take no more frames; what waits is still written."""
+        with self._changed:
+            self._reason = self._reason or reason
+            self._changed.notify()
+
+    def annotate(self, annotations: Mapping[str, Any]) -> bool:
+        """Replace the annotations soon; false when it has ended already."""
+        with self._changed:
+            if self._reason is not None:
+                return False
+            self._work.append(lambda: self._writer.annotate(annotations))
+            self._changed.notify()
+            return True
+
+    def wait(self, timeout_s: float | None = None) -> bool:
+        """Wait until it has ended; return whether it has."""
+        return self._finished.wait(timeout_s)
+
+    def join(self) -> None:
+        """Wait for the thread."""
+        self._thread.join()
+
+    @property
+    def progress(self) -> Progress:
+        """How far it is; never waits."""
+        until_s = self._clock() if self._ended_s is None else self._ended_s
+        return Progress(
+            frames=self._writer.frames,
+            dropped_frames=self._dropped,
+            size_bytes=self._size_bytes,
+            duration_s=until_s - self._began_s,
+            reason=self._reason,
+            problem=self._problem,
+            finished=self._finished.is_set(),
+        )
+
+    # -- on the thread -------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        try:
+            while self._step():
+                pass
+        except Exception as error:
+            self._fail(error)
+        self._ended_s = self._clock()
+        try:
+            self._writer.close(self._end())
+        except Exception as error:
+            self._fail(error)
+        self._tell_dropped()
+        try:
+            self._on_end(self)
+        finally:
+            self._finished.set()
+
+    def _step(self) -> bool:
+        """Write what is next; false once there is nothing more to come."""
+        with self._changed:
+            if not (self._waiting or self._work or self._reason):
+                self._changed.wait(LOOK_S)
+            work = list(self._work)
+            self._work.clear()
+            frame = self._waiting.popleft() if self._waiting else None
+            ending = self._reason is not None
+        for each in work:
+            each()
+        if frame is not None:
+            self._writer.append(frame[0], dropped_frames=frame[1])
+        self._look()
+        return frame is not None or not ending
+
+    def _look(self) -> None:
+        """Bring it to the disk, and hold it to its limits."""
+        now_s = self._clock()
+        self._size_bytes = self._writer.bytes_written
+        if now_s - self._looked_s >= _LOOK_AT_DISK_S:
+            self._looked_s = now_s
+            self._writer.synchronise(now_s)
+            self._tell_dropped()
+            if self._free_bytes() < self.limits.free_bytes:
+                self._end_at_once("disk-space")
+        limits = self.limits
+        if limits.frames is not None and self._writer.frames >= limits.frames:
+            self._end_at_once("frames")
+        if limits.size_bytes is not None and self._size_bytes >= limits.size_bytes:
+            self._end_at_once("size")
+        if limits.duration_s is not None and now_s - self._began_s >= limits.duration_s:
+            self.stop("duration")
+
+    def _end_at_once(self, reason: Reason) -> None:
+        with self._changed:
+            if self._reason is None:
+                self._reason = reason
+            self._waiting.clear()
+
+    def _fail(self, error: Exception) -> None:
+        # the first failure says why; that of closing afterwards follows from it
+        if self._problem is None:
+            _log.error("recording %s failed: %s", self.header.recording_id, error)
+            self._problem = in_words(error)
+        with self._changed:
+            self._reason = "failed"
+            self._waiting.clear()
+
+    def _tell_dropped(self) -> None:
+        total = self._dropped
+        if total > self._told_dropped:
+            self._on_dropped(total - self._told_dropped, total)
+            self._told_dropped = total
+
+    def _end(self) -> dict[str, Any]:
+        return {
+            "reason": self._reason,
+            "problem": self._problem,
+            "ended_s": self._unix_s(),
+            "duration_s": self.progress.duration_s,
+            "frames": self._writer.frames,
+            "dropped_frames": self._dropped,
+        }

@@ -1,0 +1,155 @@
+"""The JSON documents of recordings."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, ConfigDict, Field, JsonValue
+
+from transientcam_server.routes.models import AppliedDocument, Document
+
+_ID_EXAMPLE = "20261120T081500Z-3f9c2a"
+_ANNOTATIONS_EXAMPLE: dict[str, JsonValue] = {"sample": "corner, white paint", "operator": "Åsa"}
+_SEQUENCE_EXAMPLE: dict[str, JsonValue] = {
+    "base_frequency_hz": 23e6,
+    "harmonics": 3,
+    "zeroth": "low-frequency",
+    "exposure_s": 0.00192,
+    "takes": 1,
+    "take_order": "sequential",
+    "sub_phases": {"scheme": "arccos", "n": 8},
+    "sequence_id": 1,
+    "images": 16,
+    "capture_s": 0.0904,
+    "frame_rate_hz": 10.593220338983052,
+    "unambiguous_range_m": 6.517227,
+    "data_rate_bytes_s": 6641355.93,
+}
+RECORDING_EXAMPLE: dict[str, JsonValue] = {
+    "id": _ID_EXAMPLE,
+    "name": "corner at 3 m",
+    "state": "complete",
+    "frames": 318,
+    "dropped_frames": 0,
+    "size_bytes": 114873344,
+    "started_s": 1795161600.25,
+    "duration_s": 30.02,
+    "reason": "duration",
+    "problem": None,
+    "annotations": _ANNOTATIONS_EXAMPLE,
+    "sequence": _SEQUENCE_EXAMPLE,
+    "camera": {"model": "AMCW lidar (simulated)", "serial": "SIM-mirrors", "scene": "mirrors"},
+    "calibration": {"id": "nominal"},
+    "width": 163,
+    "height": 120,
+    "versions": {"transientcam": "0.1.0"},
+    "limits": None,
+}
+
+
+def _printable(name: str) -> str:
+    if not name.isprintable() or not name.strip():
+        raise ValueError("must be text that can be printed")
+    return name
+
+
+class RecordingDocument(Document):
+    """A recording: what is in it, and how it is."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [RECORDING_EXAMPLE]})
+
+    id: str
+    """What requests call it."""
+    name: str
+    """What people call it."""
+    state: Literal["recording", "finishing", "complete", "interrupted", "recovering", "damaged"]
+    """`interrupted`: its writer died, and the next start of the service recovers it."""
+    frames: int
+    dropped_frames: int
+    """Frames the disk was too slow for; each frame in the file says how many before it."""
+    size_bytes: int
+    started_s: float | None = None
+    """Unix time."""
+    duration_s: float
+    reason: str | None = None
+    """Why it ended: `stopped`, `duration`, `size`, `frames`, `disk-space`, `sequence-changed`,
+    `failed`, `shutdown`, or `interrupted`; null while it runs."""
+    problem: str | None = None
+    """What went wrong, if anything did."""
+    annotations: dict[str, Any]
+    sequence: AppliedDocument | None = None
+    camera: dict[str, Any]
+    calibration: dict[str, Any]
+    width: int | None = None
+    height: int | None = None
+    versions: dict[str, str]
+    """Of the software that recorded it."""
+    limits: dict[str, float | None] | None = None
+    """When it ends by itself; null once it has ended."""
+
+
+class RecordingsDocument(Document):
+    """All recordings, the newest first."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "directory": "/var/lib/transientcam/recordings",
+                    "free_bytes": 214748364800,
+                    "active": None,
+                    "recordings": [RECORDING_EXAMPLE],
+                }
+            ]
+        }
+    )
+
+    directory: str
+    """Where they are kept, on the machine of the service."""
+    free_bytes: int | None = None
+    """What its disk has left; null before the first recording made the directory."""
+    active: str | None = None
+    """The one that runs."""
+    recordings: list[RecordingDocument]
+
+
+class RecordingRequest(Document):
+    """What should be recorded, and until when; the least of all limits ends it."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {
+                    "name": "corner at 3 m",
+                    "duration_s": 30.0,
+                    "annotations": _ANNOTATIONS_EXAMPLE,
+                },
+                {},
+            ]
+        },
+    )
+
+    name: Annotated[str, AfterValidator(_printable)] | None = Field(
+        default=None, min_length=1, max_length=200
+    )
+    """For people; without one it is named after the time."""
+    duration_s: float | None = Field(default=None, gt=0, allow_inf_nan=False)
+    max_bytes: int | None = Field(default=None, ge=1)
+    frames: int | None = Field(default=None, ge=1)
+    annotations: dict[str, Any] = Field(default_factory=dict)
+    """Anything worth keeping with it, at most 16 KiB as JSON."""
+
+
+class RecordingChange(Document):
+    """What can be changed of a recording."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"annotations": _ANNOTATIONS_EXAMPLE}]}
+    )
+
+    annotations: dict[str, Any]
+    """Replace those it has."""
+
+
+def document(described: dict[str, Any]) -> RecordingDocument:
+    """Return what the library says of a recording as its document."""
+    return RecordingDocument.model_validate(described)

@@ -1,0 +1,196 @@
+"""Recordings: start one, stop it, look through them, take them home."""
+
+import asyncio
+import re
+from pathlib import Path as FilePath
+from typing import Annotated, Final
+
+from fastapi import APIRouter, Header, Path, status
+from fastapi.responses import FileResponse
+
+from transientcam_server import problem_kinds as kinds
+from transientcam_server.access import needs
+from transientcam_server.errors import Problem
+from transientcam_server.problems import documented
+from transientcam_server.recording.library import Wanted
+from transientcam_server.recording.recorder import Limits
+from transientcam_server.routes.recording_models import (
+    RecordingChange,
+    RecordingDocument,
+    RecordingRequest,
+    RecordingsDocument,
+    document,
+)
+from transientcam_server.service import ServiceOf
+from transientcam_server.tokens import Role
+
+router = APIRouter(tags=["recordings"])
+
+HDF5: Final = "application/x-hdf5"
+_RANGES: Final = re.compile(r"bytes=\s*(\d+-\d*|-\d+)(\s*,\s*(\d+-\d*|-\d+))*\s*", re.ASCII)
+_Recording = Annotated[
+    str,
+    Path(
+        description="its id, as the list has it",
+        max_length=200,
+        examples=["20261120T081500Z-3f9c2a"],
+    ),
+]
+
+
+@router.get("/recordings", summary="All recordings")
+async def read_recordings(service: ServiceOf) -> RecordingsDocument:
+    """List the recordings, the newest first, with the one that runs."""
+    library = service.recordings
+    described = await asyncio.to_thread(library.describe_all)
+    return RecordingsDocument(
+        directory=str(library.directory),
+        free_bytes=await asyncio.to_thread(library.free_bytes),
+        active=library.active_id,
+        recordings=[document(each) for each in described],
+    )
+
+
+@router.post(
+    "/recordings",
+    status_code=status.HTTP_201_CREATED,
+    summary="Start a recording",
+    responses=documented(
+        kinds.BAD_REQUEST, kinds.RECORDING_RUNS, kinds.INVALID_REQUEST, kinds.RECORDING_NOT_STORED
+    ),
+)
+@needs(Role.OPERATOR, lease=False)  # it disturbs nobody who controls the camera
+async def start_recording(service: ServiceOf, wanted: RecordingRequest) -> RecordingDocument:
+    """Record every frame from now on, raw, until it is stopped or a limit is reached.
+
+    One recording runs at a time. A change of the sequence ends it.
+    """
+    limits = Limits(duration_s=wanted.duration_s, size_bytes=wanted.max_bytes, frames=wanted.frames)
+    order = Wanted(name=wanted.name, limits=limits, annotations=wanted.annotations)
+    return document(await asyncio.to_thread(service.recordings.start, order))
+
+
+@router.get(
+    "/recordings/{recording}",
+    summary="A recording",
+    responses=documented(kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST),
+)
+async def read_recording(service: ServiceOf, recording: _Recording) -> RecordingDocument:
+    """Describe a recording."""
+    return document(await asyncio.to_thread(service.recordings.describe, recording))
+
+
+@router.patch(
+    "/recordings/{recording}",
+    summary="Annotate a recording",
+    responses=documented(
+        kinds.BAD_REQUEST,
+        kinds.UNKNOWN_RECORDING,
+        kinds.RECORDING_UNFINISHED,
+        kinds.INVALID_REQUEST,
+        kinds.RECORDING_NOT_STORED,
+    ),
+)
+@needs(Role.OPERATOR, lease=False)
+async def annotate_recording(
+    service: ServiceOf, recording: _Recording, change: RecordingChange
+) -> RecordingDocument:
+    """Replace what is written about a recording, also while it runs."""
+    annotate = service.recordings.annotate
+    return document(await asyncio.to_thread(annotate, recording, change.annotations))
+
+
+@router.post(
+    "/recordings/{recording}/stop",
+    summary="Stop a recording",
+    responses=documented(kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST),
+)
+@needs(Role.OPERATOR, lease=False)
+async def stop_recording(service: ServiceOf, recording: _Recording) -> RecordingDocument:
+    """End a recording and wait until it is on the disk; one that has ended stays as it is."""
+    return document(await asyncio.to_thread(service.recordings.stop, recording))
+
+
+@router.delete(
+    "/recordings/{recording}",
+    summary="Delete a recording",
+    responses=documented(
+        kinds.UNKNOWN_RECORDING,
+        kinds.RECORDING_UNFINISHED,
+        kinds.INVALID_REQUEST,
+        kinds.RECORDING_NOT_STORED,
+    ),
+)
+@needs(Role.ADMIN, lease=False)
+async def delete_recording(service: ServiceOf, recording: _Recording) -> RecordingDocument:
+    """Delete a recording for good; the answer says what it was."""
+    return document(await asyncio.to_thread(service.recordings.delete, recording))
+
+
+@router.get(
+    "/recordings/{recording}/file",
+    summary="The file of a recording",
+    response_class=FileResponse,
+    responses={
+        200: {"description": "the whole file", "content": {HDF5: {}}},
+        206: {"description": "the bytes asked for", "content": {HDF5: {}}},
+        **documented(
+            kinds.UNKNOWN_RECORDING,
+            kinds.RECORDING_UNFINISHED,
+            kinds.RANGE_NOT_SATISFIABLE,
+            kinds.INVALID_REQUEST,
+        ),
+    },
+)
+async def read_recording_file(
+    service: ServiceOf,
+    recording: _Recording,
+    wanted: Annotated[
+        str | None,
+        Header(alias="range", description="which bytes, to go on with a broken download"),
+    ] = None,
+) -> FileResponse:
+    """Download a recording as HDF5; h5py, xarray and MATLAB open it."""
+    path = await asyncio.to_thread(service.recordings.path, recording)
+    size = (await asyncio.to_thread(path.stat)).st_size
+    _check_range(wanted, size)
+    return _File(path, media_type=HDF5, filename=path.name)
+
+
+def _check_range(wanted: str | None, size: int) -> None:
+    """Refuse ranges that cannot be served, which would be answered with plain text."""
+    if wanted is None:
+        return
+    if not _RANGES.fullmatch(wanted.strip()):
+        limit = "bytes=first-last"
+        raise Problem(
+            kinds.INVALID_REQUEST,
+            "The range is no range.",
+            field="range",
+            value=wanted,
+            limit=limit,
+        )
+    for each in wanted.partition("=")[2].split(","):
+        first, _, last = each.strip().partition("-")
+        if (first and int(first) >= size) or (not first and not int(last)):
+            detail = f"The file has {size} bytes."
+            raise Problem(
+                kinds.RANGE_NOT_SATISFIABLE, detail, field="range", value=wanted, limit=size
+            )
+        if first and last and int(last) < int(first):
+            raise Problem(
+                kinds.INVALID_REQUEST,
+                "The range ends before it begins.",
+                field="range",
+                value=wanted,
+                limit="bytes=first-last",
+            )
+
+
+class _File(FileResponse):
+    """A file, in larger pieces than the framework's 64 KiB."""
+
+    chunk_size = 1024 * 1024
+
+    def __init__(self, path: FilePath, *, media_type: str, filename: str) -> None:
+        super().__init__(path, media_type=media_type, filename=filename)

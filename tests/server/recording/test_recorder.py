@@ -1,0 +1,231 @@
+import errno
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from transientcam_driver import Sequence
+from transientcam_server.recording import Recording, RecordingWriter, recover
+from transientcam_server.recording.recorder import Limits, Recorder
+
+from tests.server.recording.made import APPLIED, CAPABILITIES, assert_same, frame, header
+from tests.server.recording.test_recovery import limited_files
+
+PATIENCE_S = 30.0
+PLENTY = 10**15
+Start = Callable[..., Recorder]
+
+
+class GatedWriter(RecordingWriter):
+    """A disk that takes nothing until it is let."""
+
+    def __init__(self, *arguments: Any, **keywords: Any) -> None:
+        super().__init__(*arguments, **keywords)
+        self.gate = threading.Event()
+        self.waiting = threading.Event()
+        self.error: OSError | None = None
+
+    def append(self, *arguments: Any, **keywords: Any) -> None:
+        self.waiting.set()
+        assert self.gate.wait(PATIENCE_S)
+        if self.error is not None:
+            raise self.error
+        super().append(*arguments, **keywords)
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Start]:
+    """Starts recorders into a.h5, and ends them with the test."""
+    started: list[Recorder] = []
+
+    def begin(
+        writer: RecordingWriter | None = None,
+        *,
+        limits: Limits | None = None,
+        queue_frames: int = 8,
+        **more: Any,
+    ) -> Recorder:
+        recorder = Recorder(
+            writer or RecordingWriter(tmp_path / "a.h5", header()),
+            header(),
+            limits=limits or Limits(),
+            queue_frames=queue_frames,
+            **{"free_bytes": lambda: PLENTY, **more},
+        )
+        recorder.start()
+        started.append(recorder)
+        return recorder
+
+    yield begin
+    for recorder in started:
+        recorder.stop()
+        recorder.join()
+
+
+def test_what_is_offered_before_the_stop_is_in_the_file(start: Start, tmp_path: Path) -> None:
+    recorder = start()
+    for number in range(6):
+        recorder.offer(frame(number), APPLIED)
+    recorder.stop()
+    recorder.offer(frame(6), APPLIED)
+
+    assert recorder.wait(PATIENCE_S)
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.frames == 6
+        assert recording.end["reason"] == "stopped"
+        assert recording.end["frames"] == 6
+        assert_same(recording.frame(5), frame(5))
+
+
+def test_a_slow_disk_costs_frames_and_never_the_camera(start: Start, tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    writer = GatedWriter(tmp_path / "a.h5", header())
+    recorder = start(
+        writer, queue_frames=3, on_dropped=lambda count, total: told.append((count, total))
+    )
+    recorder.offer(frame(0), APPLIED)
+    assert writer.waiting.wait(PATIENCE_S)
+    for number in range(1, 9):  # three fit the queue; none of this waits for the disk
+        recorder.offer(frame(number), APPLIED)
+    assert recorder.progress.dropped_frames == 5
+    writer.gate.set()
+    while recorder.progress.frames < 4:
+        assert not recorder.wait(0.01)
+    recorder.offer(frame(9), APPLIED)
+    recorder.stop()
+
+    assert recorder.wait(PATIENCE_S)
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.series("frame").tolist() == [0, 1, 2, 3, 9]
+        assert recording.series("dropped_frames").tolist() == [0, 0, 0, 0, 5]
+        assert recording.end["dropped_frames"] == 5
+    assert sum(count for count, _ in told) == 5
+    assert told[-1][1] == 5
+
+
+def test_it_ends_after_the_frames_wanted(start: Start, tmp_path: Path) -> None:
+    recorder = start(limits=Limits(frames=3))
+    for number in range(8):
+        recorder.offer(frame(number), APPLIED)
+
+    assert recorder.wait(PATIENCE_S)
+    assert recorder.progress.reason == "frames"
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.frames == 3
+
+
+def test_it_ends_after_the_time_wanted_also_without_a_frame(start: Start) -> None:
+    now_s = [100.0]
+    recorder = start(limits=Limits(duration_s=30.0), clock=lambda: now_s[0])
+    assert not recorder.wait(0.5)
+
+    now_s[0] = 130.0
+
+    assert recorder.wait(PATIENCE_S)
+    assert recorder.progress.reason == "duration"
+    assert recorder.progress.duration_s == 30.0
+
+
+def test_it_ends_before_the_file_outgrows_its_limit_by_more_than_a_frame(
+    start: Start, tmp_path: Path
+) -> None:
+    recorder = start(limits=Limits(size_bytes=200_000), queue_frames=1000)
+    for number in range(1000):
+        recorder.offer(frame(number), APPLIED)
+
+    assert recorder.wait(PATIENCE_S)
+    assert recorder.progress.reason == "size"
+    assert 200_000 <= (tmp_path / "a.h5").stat().st_size < 200_000 + 2 * frame(0).images.nbytes
+
+
+def test_it_ends_while_the_disk_still_has_what_is_to_stay_free(start: Start) -> None:
+    recorder = start(limits=Limits(free_bytes=1000), free_bytes=lambda: 999)
+
+    assert recorder.wait(PATIENCE_S)
+    assert recorder.progress.reason == "disk-space"
+
+
+def test_another_sequence_ends_it(start: Start, tmp_path: Path) -> None:
+    recorder = start()
+    recorder.offer(frame(0), APPLIED)
+    other = CAPABILITIES.apply(Sequence(harmonics=2, zeroth="estimated", exposure_s=2e-3), epoch=8)
+    recorder.offer(frame(1), other)
+
+    assert recorder.wait(PATIENCE_S)
+    assert recorder.progress.reason == "sequence-changed"
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.frames == 1
+
+
+def test_the_same_sequence_counted_anew_after_an_unplug_does_not(
+    start: Start, tmp_path: Path
+) -> None:
+    recorder = start()
+    recorder.offer(frame(0), APPLIED)
+    recorder.offer(replace(frame(1), epoch=1), replace(APPLIED, epoch=1))
+    recorder.stop()
+
+    assert recorder.wait(PATIENCE_S)
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.series("epoch").tolist() == [APPLIED.epoch, 1]
+
+
+def test_annotations_can_be_replaced_while_it_runs(start: Start, tmp_path: Path) -> None:
+    recorder = start()
+    assert recorder.annotate({"first": 1})
+    recorder.offer(frame(0), APPLIED)
+    assert recorder.annotate({"seen": "a fly"})
+    recorder.offer(frame(1), APPLIED)
+    recorder.stop()
+    assert recorder.wait(PATIENCE_S)
+
+    assert not recorder.annotate({"late": True})
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.annotations == {"seen": "a fly"}
+
+
+def test_a_disk_that_fails_ends_it_with_the_reason_and_keeps_what_was_written(
+    start: Start, tmp_path: Path
+) -> None:
+    writer = GatedWriter(tmp_path / "a.h5", header())
+    writer.gate.set()
+    ended: list[Recorder] = []
+    recorder = start(writer, on_end=ended.append)
+    for number in range(3):
+        recorder.offer(frame(number), APPLIED)
+    while recorder.progress.frames < 3:
+        assert not recorder.wait(0.01)
+    writer.error = OSError(errno.ENOSPC, "No space left on device")
+    recorder.offer(frame(3), APPLIED)
+
+    assert recorder.wait(PATIENCE_S)
+    assert ended == [recorder]
+    assert recorder.progress.reason == "failed"
+    assert recorder.progress.problem is not None
+    assert "No space left" in recorder.progress.problem
+    recorder.offer(frame(4), APPLIED)  # the camera goes on
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.frames == 3
+        assert recording.end["reason"] == "failed"
+
+
+def test_a_disk_that_is_really_full_loses_no_frame_that_was_acknowledged(
+    start: Start, tmp_path: Path
+) -> None:
+    with limited_files(300_000):
+        recorder = start(queue_frames=1000)
+        for number in range(200):
+            recorder.offer(frame(number), APPLIED)
+        assert recorder.wait(PATIENCE_S)
+        recorder.join()
+    acknowledged = recorder.progress.frames
+
+    assert recorder.progress.reason == "failed"
+    assert "File too large" in (recorder.progress.problem or "")
+    assert acknowledged > 10
+    # HDF5 could not even finish the file; recovery can
+    with Recording(recover(tmp_path / "a.h5.part")) as recording:
+        assert recording.frames == acknowledged
+        assert_same(recording.frame(acknowledged - 1), frame(acknowledged - 1))
