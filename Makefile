@@ -9,7 +9,7 @@ CAMERA ?= sim:mirrors
 BIN := .venv/bin
 PAGE := server/transientcam_server/static/index.html
 DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f 2>/dev/null)
-DEBIAN_PACKAGES := umockdev libusb-1.0-0 chromium
+DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium
 
 .DEFAULT_GOAL := help
 .PHONY: help serve test check bench docs clean dashboard debian-packages

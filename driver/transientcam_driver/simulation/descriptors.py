@@ -59,7 +59,8 @@ MS_OS_20_DESCRIPTOR = _ms_os_20()
 
 
 def _bos() -> bytes:
-    usb_20_extension = struct.pack("<BBBI", 7, 0x10, 2, 0)
+    link_power_management = 0x02  # "shall be set" (USB 3.2, 9.6.2.1)
+    usb_20_extension = struct.pack("<BBBI", 7, 0x10, 2, link_power_management)
     microsoft = struct.pack("<BBBx16s", 28, 0x10, 5, _MS_OS_20_UUID)
     microsoft += struct.pack("<IHBB", _WINDOWS_8_1, len(MS_OS_20_DESCRIPTOR), MS_OS_20_REQUEST, 0)
     below = usb_20_extension + microsoft

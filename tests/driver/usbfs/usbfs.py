@@ -105,6 +105,7 @@ class UsbfsMount:
             for client in self.clients:
                 for urb in tuple(client.in_flight.values()):
                     client.complete(urb, status=-errno.ESHUTDOWN)
+            self.owners.clear()
         self._announce("remove")
 
     def replug(self) -> None:
@@ -121,6 +122,10 @@ class UsbfsMount:
             self.device.changed.notify_all()
         self._pump.join()
         self._withdraw()
+        with self.device.changed:
+            clients = tuple(self.clients)
+        for client in clients:
+            client.close()
 
     # --- the tree of files ----------------------------------------------------------------
 
@@ -141,6 +146,10 @@ class UsbfsMount:
             "bConfigurationValue": "1\n",
             "idVendor": f"{VENDOR_ID:04x}\n",
             "idProduct": f"{PRODUCT_ID:04x}\n",
+            # the kernel has read these when the device was plugged in
+            "manufacturer": self._string(1),
+            "product": self._string(2),
+            "serial": self._string(3),
             "uevent": self._properties.replace("/dev/", ""),
         }
         for name, text in attributes.items():
@@ -163,13 +172,12 @@ class UsbfsMount:
         self._listener.listen()
         threading.Thread(target=self._accept, args=(self._listener,)).start()
 
+    def _string(self, index: int) -> str:
+        return self.device.strings[index][2:].decode("utf-16-le") + "\n"
+
     def _withdraw(self) -> None:
         self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()
-        with self.device.changed:
-            clients = tuple(self.clients)
-        for client in clients:
-            client.close()
         (self._root / "ioctl" / self._node.relative_to(self._root)).unlink()
         self._node.unlink()
         os.close(self._pipe)
@@ -236,14 +244,23 @@ class UsbfsMount:
 
 
 class Client:
-    """One open file descriptor of the device node."""
+    """One open file descriptor of the device node.
+
+    It outlives the device, as in usbfs, and stays dead when that is plugged in again.
+    """
 
     def __init__(self, mount: UsbfsMount, connection: socket.socket) -> None:
         self.in_flight: dict[int, Urb] = {}
         self._mount = mount
         self._device = mount.device
+        self._address = mount.device.address
         self._connection = connection
         self._completed: deque[Urb] = deque()
+
+    @property
+    def gone(self) -> bool:
+        """Whether the device was unplugged since this was opened."""
+        return not self._device.plugged or self._device.address != self._address
 
     def serve(self) -> None:
         """Answer ioctls until the file is closed."""
@@ -297,14 +314,18 @@ class Client:
         del self.in_flight[urb.address]
         urb.status = status
         self._completed.append(urb)
-        self._mount.show_reapable(True)
+        self._show_reapable(True)
+
+    def _show_reapable(self, reapable: bool) -> None:
+        if self._device.address == self._address:  # another node stands for another address
+            self._mount.show_reapable(reapable)
 
     # --- ioctls ---------------------------------------------------------------------------
 
     def _ioctl(self, request: int, argument: int) -> int:
         if request in (Ioctl.REAPURB, Ioctl.REAPURBNDELAY):
             return self._reap(argument)
-        if not self._device.plugged:
+        if self.gone:
             raise Refused(errno.ENODEV)
         match request:
             case Ioctl.SUBMITURB:
@@ -373,10 +394,10 @@ class Client:
     def _reap(self, argument: int) -> int:
         with self._device.changed:
             if not self._completed:
-                self._mount.show_reapable(not self._device.plugged)
-                raise Refused(errno.EAGAIN if self._device.plugged else errno.ENODEV)
+                self._show_reapable(self.gone)
+                raise Refused(errno.ENODEV if self.gone else errno.EAGAIN)
             urb = self._completed.popleft()
-            self._mount.show_reapable(bool(self._completed) or not self._device.plugged)
+            self._show_reapable(bool(self._completed) or self.gone)
         done = bytearray(urb.raw)
         struct.pack_into("<i", done, 4, urb.status)
         struct.pack_into("<i", done, 28, urb.actual)
