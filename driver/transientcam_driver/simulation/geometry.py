@@ -122,6 +122,18 @@ class Rectangle:
             columns,
         )
 
+    def seen_through(self, apex: Points, low: Points, high: Points) -> bool:
+        """Whether a box may hold points that see a point through the rectangle.
+
+        It holds none if all of it lies beyond one of the planes through point and rim.
+        """
+        corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+        box = low + corners * (high - low) - apex
+        rim = self.extent() - apex
+        inward = np.cross(rim, np.roll(rim, -1, axis=0))
+        inward *= np.sign(inward @ (self.centre - apex))[:, None]
+        return bool((box @ inward.T >= 0).any(axis=0).all())
+
     def in_front(self, points: Points) -> NDArray[np.bool_]:
         """Which points lie on the side the rectangle faces."""
         front: NDArray[np.bool_] = (points - self.centre) @ self.normal > 0
@@ -194,13 +206,11 @@ class Ellipsoid:
     def hit(self, start: Points, end: Points) -> NDArray[np.float64]:
         """Fraction of the way at which segments enter or leave it; infinity where they miss."""
         # |origin + fraction way| = 1, one coordinate after the other
-        a, b, c = (np.zeros(np.broadcast_shapes(start.shape, end.shape)[:-1]) for _ in range(3))
-        for axis in range(3):
-            radius = self.radii[axis]
-            origin = (start[..., axis] - self.centre[axis]) / radius
-            way = (end[..., axis] - start[..., axis]) / radius
-            a, b, c = a + way * way, b + origin * way, c + origin * origin
-        c = c - 1
+        origins = [(start[..., k] - self.centre[k]) / self.radii[k] for k in range(3)]
+        ways = [(end[..., k] - start[..., k]) / self.radii[k] for k in range(3)]
+        a = ways[0] * ways[0] + ways[1] * ways[1] + ways[2] * ways[2]
+        b = origins[0] * ways[0] + origins[1] * ways[1] + origins[2] * ways[2]
+        c = origins[0] * origins[0] + origins[1] * origins[1] + origins[2] * origins[2] - 1
         discriminant = b * b - a * c
         at = np.full(discriminant.shape, np.inf)
         met = discriminant > 0

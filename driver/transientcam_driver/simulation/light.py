@@ -69,6 +69,16 @@ class Lit:
     delay_s: NDArray[np.float64]
     weight: NDArray[np.float64]
 
+    def moments(self, frequency_hz: float, scatter: Scatter | None) -> NDArray[np.complex128]:
+        """``int g(tau) exp(2 pi i f tau) dtau`` of each ray (P), over all chains of mirrors."""
+        moments = np.zeros(len(self.surface), dtype=np.complex128)
+        for delay_s, weight in zip(self.delay_s, self.weight, strict=True):
+            if weight.any():
+                moments += weight * np.exp(2j * np.pi * frequency_hz * delay_s)
+        if scatter is not None:
+            moments *= scatter.transfer(frequency_hz)
+        return moments
+
     def scatter(self, scene: Scene) -> Scatter | None:
         """Return how the surfaces' depths spread the light of each ray, if any does."""
         return scatter_of(scene, self.surface)
@@ -246,6 +256,11 @@ def light_on(
     scene: Scene, light: ImageLight, point: Points, normal: Points
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Length of the way in m, and irradiance, by one chain of mirrors at points on surfaces."""
+    if light.mirrors and len(point):
+        # most mirrors send no light to any of them
+        box = point.min(axis=0), point.max(axis=0)
+        if not light.mirrors[0].mirror.seen_through(light.positions_m[0], *box):
+            return np.zeros(len(point)), np.zeros(len(point))
     way = light.positions_m[0] - point
     length_m = np.sqrt(np.einsum("pc,pc->p", way, way))
     towards = way / length_m[:, None]

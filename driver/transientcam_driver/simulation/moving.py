@@ -267,12 +267,8 @@ class MovingResponses:
         moments = total.copy()
         for chain, dark in zip(each, self._shadows, strict=True):
             moments[dark] -= chain[dark]
-        lit = self._in_front
-        phasors = lit.weight * np.exp(2j * np.pi * frequency_hz * lit.delay_s)
-        scatter = lit.scatter(self._scene)
-        if scatter is not None:
-            phasors = phasors * scatter.transfer(frequency_hz)
-        moments[self._front] = phasors.sum(axis=0)
+        scatter = self._in_front.scatter(self._scene)
+        moments[self._front] = self._in_front.moments(frequency_hz, scatter)
         return moments.reshape(self._shape)
 
     def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

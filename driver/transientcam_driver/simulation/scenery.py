@@ -24,8 +24,10 @@ from transientcam_driver.simulation.scene import Scene
 
 _ROUGH_PATCHES = 6  # a side, to judge how much light interreflection is about
 _JUMP = 0.03  # of the range, from one pixel to the next: an edge
-_RAYS = 3  # a side, in a pixel at an edge
-_RAYS_MOVING = 2  # the same where it is computed for every image
+_WITHIN = tuple((x / 3, y / 3) for x in (-1, 0, 1) for y in (-1, 0, 1))
+"""Rays of a pixel at an edge, right and down by these shares of a pixel."""
+_WITHIN_MOVING = ((-0.25, -0.125), (0.125, -0.25), (0.25, 0.125), (-0.125, 0.25))
+"""The same where they are followed for every image: no two in a row or a column."""
 _GLANCES = 5  # moments in time at which a moving scene is looked at to judge it
 
 View = Callable[[float], "Seen"]
@@ -132,7 +134,7 @@ class SurfaceScenery:
         size = {"width": self._width, "height": self._height}
         responses: Responses = now
         if MixedPixels.name in effects:
-            responses = with_mixed_pixels(now.scene, now.distance_m, now, rays=_RAYS_MOVING)
+            responses = with_mixed_pixels(now.scene, now.distance_m, now, rays=_WITHIN_MOVING)
         if DiffuseInterreflection.name in effects:
             further = Interreflection(now.scene, now.lit, **size)
             responses = WithInterreflection(responses, further)
@@ -166,7 +168,7 @@ class SurfaceScenery:
         responses: Responses = sparse(scene, lit, width=width, height=height)
         if MixedPixels.name in effects:
             distance_m = lit.distance_m.reshape(height, width)
-            responses = with_mixed_pixels(scene, distance_m, responses, rays=_RAYS)
+            responses = with_mixed_pixels(scene, distance_m, responses, rays=_WITHIN)
         if DiffuseInterreflection.name in effects:
             further = Interreflection(scene, lit, width=width, height=height)
             responses = WithInterreflection(responses, further)
@@ -250,11 +252,8 @@ class WithMixedPixels:
 
     def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
         """Those of the base, but for the pixels replaced."""
-        phasors = self._lit.weight * np.exp(2j * np.pi * frequency_hz * self._lit.delay_s)
-        if self._scatter is not None:
-            phasors *= self._scatter.transfer(frequency_hz)
         moments = self._base.moments(frequency_hz)
-        of_rays = phasors.sum(axis=0).reshape(-1, len(self._at[0]))
+        of_rays = self._lit.moments(frequency_hz, self._scatter).reshape(-1, len(self._at[0]))
         moments[self._at] = of_rays.mean(axis=0)
         return moments
 
@@ -295,17 +294,20 @@ class WithMixedPixels:
 
 
 def with_mixed_pixels(
-    scene: Scene, distance_m: NDArray[np.float64], responses: Responses, *, rays: int
+    scene: Scene,
+    distance_m: NDArray[np.float64],
+    responses: Responses,
+    *,
+    rays: tuple[tuple[float, float], ...],
 ) -> Responses:
-    """Replace pixels at edges by the mean over a grid of rays in them, so many a side."""
+    """Replace pixels at edges by the mean over several rays in them."""
     height, width = distance_m.shape
     rows, columns = np.nonzero(edges(distance_m)[0])
     if not rows.size:
         return responses
     assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
     # ray by ray over the places in a pixel, then pixel by pixel
-    within = (2 * np.arange(rays) + 1) / (2 * rays) - 0.5
-    right, down = (grid.reshape(-1, 1) for grid in np.meshgrid(within, within))
+    right, down = np.array(rays).T[:, :, None]
     through = rays_through(
         scene.camera, (columns + right).ravel(), (rows + down).ravel(), width=width, height=height
     )

@@ -1,0 +1,196 @@
+"""What a simulated frame costs: by scene, with nothing, with what is called for, with everything.
+
+Run it with ``OMP_NUM_THREADS=1 python -m benchmarks.simulation [--write]``. Frames are those of the
+paper's video setting (Sec. 6.3: m = 3, 0.5 ms, 12 images, 18.6 Hz). Times are processor time on one
+core, the least of several frames, so that what else the machine does matters little.
+"""
+
+import argparse
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from transientcam_driver import Sequence
+from transientcam_driver.simulation.build import find_scene, world_of
+from transientcam_driver.simulation.effects import EFFECTS
+from transientcam_driver.simulation.scene import Scene
+from transientcam_driver.simulation.world import World
+
+from benchmarks.corner import RangeError, range_errors
+from benchmarks.machine import machine
+
+VIDEO = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005)
+VIDEO_HZ = 18.6
+READOUT_S = 3.98e-3
+BARRED = ("wall", "corner", "mirrors", "visitor")
+SCENES = (*BARRED, "corner-left", "translucent", "calibration")
+SIZES = ((163, 120), (640, 480))
+OPTIONAL = tuple(effect.name for effect in EFFECTS if effect.optional)
+PAGE = Path(__file__).parents[1] / "docs" / "simulation.md"
+_ENOUGH_S = 1.5
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Processor time in s: to open a scene, and of a frame."""
+
+    open_s: float
+    frame_s: float
+
+
+@dataclass(frozen=True)
+class Scenes:
+    """A scene's costs with no effect, those that are called for, and all of them."""
+
+    scene: str
+    size: tuple[int, int]
+    none: Cost
+    called: Cost
+    everything: Cost
+    built: tuple[str, ...]
+
+
+def measure(scene: Scene, effects: Mapping[str, str], size: tuple[int, int]) -> Cost:
+    """Build a world and make frames."""
+    start_s = time.process_time()
+    world = _world(scene, effects, size)
+    world.configure(VIDEO, VIDEO.labels)
+    open_s = time.process_time() - start_s
+    frame = _frames(world)
+    frame()  # what is computed once
+    times_s: list[float] = []
+    while not times_s or (sum(times_s) < _ENOUGH_S and len(times_s) < 15):
+        start_s = time.process_time()
+        frame()
+        times_s.append(time.process_time() - start_s)
+    return Cost(open_s, min(times_s))
+
+
+def _world(scene: Scene, effects: Mapping[str, str], size: tuple[int, int]) -> World:
+    changed = {name: effects.get(name, scene.effects.get(name, "auto")) for name in OPTIONAL}
+    fields = {name: getattr(scene, name) for name in Scene.__slots__}
+    width, height = size
+    return world_of(
+        Scene(**(fields | {"effects": changed})), width=width, height=height, readout_s=READOUT_S
+    )
+
+
+def _frames(world: World) -> Callable[[], None]:
+    """Return what makes one frame after the other, in the device's time."""
+    period_s = VIDEO.exposure_s + READOUT_S
+    made = 0
+
+    def frame() -> None:
+        nonlocal made
+        for label in VIDEO.labels:
+            # a visitor is there from the fifth second on
+            world.image(label, number=made, device_time_s=5.0 + made * period_s)
+            made += 1
+
+    return frame
+
+
+def measure_scenes(names: tuple[str, ...], size: tuple[int, int]) -> list[Scenes]:
+    """Measure each scene with nothing, with what it calls for, and with everything."""
+    results = []
+    for name in names:
+        scene = find_scene(name)
+        off, on = dict.fromkeys(OPTIONAL, "off"), dict.fromkeys(OPTIONAL, "on")
+        explained = _world(scene, {}, size).explain(name, VIDEO)
+        built = tuple(each.effect for each in explained.effects if each.built)
+        none, called = measure(scene, off, size), measure(scene, {}, size)
+        results.append(Scenes(name, size, none, called, measure(scene, on, size), built))
+    return results
+
+
+def measure_effects(name: str, size: tuple[int, int]) -> list[tuple[str, float]]:
+    """Return what each effect alone adds to a frame without any, in s."""
+    scene = find_scene(name)
+    off = dict.fromkeys(OPTIONAL, "off")
+    bare_s = measure(scene, off, size).frame_s
+    return [
+        (effect, measure(scene, off | {effect: "on"}, size).frame_s - bare_s) for effect in OPTIONAL
+    ]
+
+
+def report(
+    scenes: list[Scenes],
+    effects: dict[str, list[tuple[str, float]]],
+    errors: tuple[RangeError, ...],
+) -> str:
+    """Return the page."""
+    lines = [
+        "# What the simulated camera costs, and how true it is",
+        "",
+        "Written by `OMP_NUM_THREADS=1 python -m benchmarks.simulation --write` on",
+        f"{machine()}.",
+        "",
+        "Frames of the paper's video setting (m = 3, 0.5 ms, 12 images); processor time on one core.",
+        f"At {VIDEO_HZ} Hz a frame may take {1e3 / VIDEO_HZ:.0f} ms.",
+        "",
+        "| scene | pixels | none | called for | everything | everything / called for "
+        "| frames/s, called for | opening, called for | what is called for |",
+        "|---|---|---|---|---|---|---|---|---|",
+        *map(_row, scenes),
+        "",
+        "What one effect adds to a frame without any, at 163 x 120; what a still scene computes once",
+        "costs nothing a frame:",
+        "",
+        "| effect | " + " | ".join(f"on {name}" for name in effects) + " |",
+        "|---" * (1 + len(effects)) + "|",
+        *(
+            f"| {effect} | "
+            + " | ".join(
+                f"{max(0.0, dict(costs)[effect]) * 1e3:.1f} ms" for costs in effects.values()
+            )
+            + " |"
+            for effect in OPTIONAL
+        ),
+        "",
+        "The range of the paper's Fig. 12 on `sim:corner` (f = 23 MHz, 4 takes), over all pixels:",
+        "",
+        "| estimate | RMS error | mean error | median of the absolute error | off by more than 0.1 m |",
+        "|---|---|---|---|---|",
+        *(
+            f"| {each.name} | {each.rms_m * 1e3:.0f} mm | {each.bias_m * 1e3:.0f} mm "
+            f"| {each.median_m * 1e3:.0f} mm | {each.outliers:.1%} |"
+            for each in errors
+        ),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _row(each: Scenes) -> str:
+    def ms(cost: Cost) -> str:
+        return f"{cost.frame_s * 1e3:.1f} ms"
+
+    width, height = each.size
+    return (
+        f"| {each.scene} | {width} x {height} | {ms(each.none)} | {ms(each.called)} "
+        f"| {ms(each.everything)} | {each.everything.frame_s / each.called.frame_s:.1f} "
+        f"| {1 / each.called.frame_s:.0f} | {each.called.open_s:.2f} s | {', '.join(each.built)} |"
+    )
+
+
+def main() -> None:
+    """Measure, print, and with ``--write`` keep the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
+    parser.add_argument("--small", action="store_true", help="only 163 x 120")
+    arguments = parser.parse_args()
+    scenes = [
+        each
+        for size in SIZES[: 1 if arguments.small else None]
+        for each in measure_scenes(SCENES if size == SIZES[0] else BARRED, size)
+    ]
+    effects = {name: measure_effects(name, SIZES[0]) for name in ("mirrors", "visitor")}
+    page = report(scenes, effects, range_errors())
+    print(page)
+    if arguments.write:
+        PAGE.write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
