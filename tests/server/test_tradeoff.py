@@ -153,14 +153,26 @@ def camera() -> Iterator[Camera]:
 
 def measured(camera: Camera, sequence: Sequence) -> dict[str, float | None]:
     applied = camera.configure(sequence)
-    frames, truth = capture.capture(camera, 2)
-    sample = sample_pixels(truth, pixels=100, seed=1)
-    settings = ReconstructionSettings(smoothing_px=0.0)
     values, _ = capture.accuracy(
-        frames, truth, sample, applied, settings=settings, bits=camera.capabilities.bits
+        capture.capture(camera, 2),
+        lambda truth: sample_pixels(truth, pixels=100, seed=1),
+        applied,
+        settings=ReconstructionSettings(smoothing_px=0.0),
+        bits=camera.capabilities.bits,
     )
     assert set(values) == set(capture.QUANTITIES)
     return values
+
+
+def test_a_scene_that_moves_is_held_against_the_truth_of_each_frame(tmp_path: Path) -> None:
+    grid = tradeoff.Grid((Sequence(harmonics=2, zeroth="estimated", exposure_s=0.0005),), ())
+    points = tradeoff.points_of(grid, scene="visitor", repetitions=3, seed=1)
+    records = tradeoff.Records(tmp_path)
+
+    tradeoff.measure(points, records, scene="visitor", seed=1, progress=lambda kind: None)
+
+    (found,) = records
+    assert 0 < (found.values["range_median_m"] or 0) < 0.02
 
 
 def test_without_noise_three_returns_are_measured_as_they_are(camera: Camera) -> None:
@@ -316,7 +328,9 @@ def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
 
     assert (tmp_path / "points.jsonl").read_bytes().startswith(kept)
     assert len(again) == len(points) == len(resumed)
-    assert {point.key for point in points} == {each.key for each in tradeoff.Records(tmp_path)}
+    whole = tradeoff.Records(tmp_path / "in one go")
+    tradeoff.measure(points, whole, scene="mirrors", seed=3, progress=again.append)
+    assert list(tradeoff.Records(tmp_path)) == list(whole)
 
 
 # -- what is made of them -------------------------------------------------------------------------

@@ -1,7 +1,8 @@
 """Capture time against accuracy: one sequence on a scene, held against the scene's truth."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -43,30 +44,39 @@ QUANTITIES: Final[dict[str, str]] = {
 """What is measured, in words."""
 
 
-def capture(camera: Camera, frames: int) -> tuple[list[RawFrame], Truth]:
-    """Take frames with the sequence that is set, and the truth behind them."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Shot:
+    """A frame, and the truth when its last image was taken."""
+
+    frame: RawFrame
+    truth: Truth
+
+
+def capture(camera: Camera, frames: int) -> list[Shot]:
+    """Take frames with the sequence that is set."""
     assert camera.simulation is not None  # noqa: S101 - only simulated cameras are measured
     camera.start()
-    taken = [camera.read_frame() for _ in range(frames)]
-    truth = camera.simulation.truth()
+    taken = [Shot(camera.read_frame(), camera.simulation.truth()) for _ in range(frames)]
     camera.stop()
-    return taken, truth
+    return taken
 
 
 def accuracy(
-    frames: list[RawFrame],
-    truth: Truth,
-    sample: Sample,
+    shots: list[Shot],
+    sample_of: Callable[[Truth], Sample],
     applied: AppliedSequence,
     *,
     settings: ReconstructionSettings,
     bits: int,
 ) -> tuple[dict[str, float | None], dict[str, float | None]]:
-    """Return mean and spread over the frames of each of `QUANTITIES`."""
+    """Return mean and spread over the frames of each of `QUANTITIES`.
+
+    ``sample_of`` gives the pixels whose whole impulse responses are compared.
+    """
     recipe = Recipe(applied, settings, 2.0**bits - 1.0)
     ranges, each = [], []
-    for frame in frames:
-        range_m, values = _of_frame(frame, truth, sample, recipe)
+    for shot in shots:
+        range_m, values = _of_shot(shot, sample_of(shot.truth), recipe)
         ranges.append(range_m)
         each.append(values)
     means, spreads = summarised(each)
@@ -104,10 +114,9 @@ def repeatability(ranges: _Array) -> float | None:
     return float(np.median(difference) / (math.sqrt(2) * MEDIAN_OF_NORMAL))
 
 
-def _of_frame(
-    frame: RawFrame, truth: Truth, sample: Sample, recipe: Recipe
-) -> tuple[_Array, dict[str, float]]:
-    found: tm.Reconstruction = STAGES["moments"].compute(recipe, frame)
+def _of_shot(shot: Shot, sample: Sample, recipe: Recipe) -> tuple[_Array, dict[str, float]]:
+    found: tm.Reconstruction = STAGES["moments"].compute(recipe, shot.frame)
+    truth = shot.truth
     f_hz = recipe.base_frequency_hz
     lit = np.isfinite(truth.range_m) & (truth.brightness > 0)
     seen = lit & np.asarray(found.has_range)

@@ -1,12 +1,13 @@
 """All points of a grid on a scene, one after the other, each kept before the next begins."""
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 import transientcam_moments as tm
-from transientcam_driver import Camera, Sequence, open_camera
+from transientcam_driver import Camera, Sequence, Truth, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
 
 from transientcam_server.products import STAGES, Recipe
@@ -14,10 +15,12 @@ from transientcam_server.settings import ReconstructionSettings
 from transientcam_server.tradeoff import capture, computing, transport
 from transientcam_server.tradeoff.grid import Grid
 from transientcam_server.tradeoff.records import Record, Records, key_of
-from transientcam_server.tradeoff.truth import sample_pixels
+from transientcam_server.tradeoff.truth import Sample, sample_pixels
 
 SAMPLE_PIXELS: Final = 400
 """Pixels whose whole impulse responses are compared."""
+BEGINS_S: Final = 5.0
+"""When a capture begins after power-up: in a scene that moves, something is going on by then."""
 _Summary = tuple[dict[str, float | None], dict[str, float | None]]
 
 
@@ -105,12 +108,11 @@ def measure(
             progress(point.kind)
     if not left:
         return
-    with open_camera(spec_of(scene, seed=seed), clock=VirtualClock()) as camera:
-        bench = _Bench(camera, seed=seed)
-        for point in left:
-            values, spread = point.run(bench)
-            records.append(Record(point.kind, scene, point.point, point.conditions, values, spread))
-            progress(point.kind)
+    bench = _Bench(spec_of(scene, seed=seed), seed=seed)
+    for point in left:
+        values, spread = point.run(bench)
+        records.append(Record(point.kind, scene, point.point, point.conditions, values, spread))
+        progress(point.kind)
 
 
 def spec_of(scene: str, *, seed: int) -> str:
@@ -120,35 +122,56 @@ def spec_of(scene: str, *, seed: int) -> str:
 
 
 class _Bench:
-    """A camera before a scene, and what several points share."""
+    """Cameras before a scene, and what several points share.
 
-    def __init__(self, camera: Camera, *, seed: int) -> None:
-        self._camera = camera
+    Every point gets a camera that was just switched on, at the same time of the scene: what is
+    measured does not depend on what was measured before, nor on an interruption in between.
+    """
+
+    def __init__(self, spec: str, *, seed: int) -> None:
+        self._spec = spec
         self._seed = seed
         self._settings = ReconstructionSettings()
         self._moments: dict[int, Any] = {}
+        self._sampled: tuple[Truth, Sample] | None = None
 
     def capture(self, sequence: Sequence, repetitions: int) -> _Summary:
-        applied = self._camera.configure(sequence)
-        frames, truth = capture.capture(self._camera, repetitions)
-        return capture.accuracy(
-            frames,
-            truth,
-            sample_pixels(truth, pixels=SAMPLE_PIXELS, seed=self._seed),
-            applied,
-            settings=self._settings,
-            bits=self._camera.capabilities.bits,
-        )
+        with self._camera() as camera:
+            applied = camera.configure(sequence)
+            return capture.accuracy(
+                capture.capture(camera, repetitions),
+                self._sample_of,
+                applied,
+                settings=self._settings,
+                bits=camera.capabilities.bits,
+            )
+
+    @contextmanager
+    def _camera(self) -> Iterator[Camera]:
+        clock = VirtualClock()
+        with open_camera(self._spec, clock=clock) as camera:
+            clock.sleep(BEGINS_S)
+            yield camera
+
+    def _sample_of(self, truth: Truth) -> Sample:
+        """Sample pixels; of a scene that stands still, only once."""
+        if self._sampled is None or not _same_light(self._sampled[0], truth):
+            sample = sample_pixels(truth, pixels=SAMPLE_PIXELS, seed=self._seed)
+            self._sampled = truth, sample
+        return self._sampled[1]
 
     def moments(self, harmonics: int) -> Any:
         """Return the scene's moments in double precision, of one frame, fit for reconstruction."""
         if harmonics not in self._moments:
-            most_hz = self._camera.capabilities.max_frequency_hz / harmonics
-            sequence = replace(Sequence(harmonics=harmonics), base_frequency_hz=min(23e6, most_hz))
-            applied = self._camera.configure(sequence)
-            (frame,), _ = capture.capture(self._camera, 1)
-            recipe = Recipe(applied, self._settings, 2.0**self._camera.capabilities.bits - 1.0)
-            b = STAGES["moments"].compute(recipe, frame).moments.astype(np.complex128)
+            with self._camera() as camera:
+                most_hz = camera.capabilities.max_frequency_hz / harmonics
+                sequence = replace(
+                    Sequence(harmonics=harmonics), base_frequency_hz=min(23e6, most_hz)
+                )
+                applied = camera.configure(sequence)
+                (shot,) = capture.capture(camera, 1)
+                recipe = Recipe(applied, self._settings, 2.0**camera.capabilities.bits - 1.0)
+            b = STAGES["moments"].compute(recipe, shot.frame).moments.astype(np.complex128)
             # rounding to single precision took from what biasing had given
             self._moments[harmonics] = tm.bias(b, self._settings.bias).moments
         return self._moments[harmonics]
@@ -159,6 +182,12 @@ class _Bench:
         return tm.range_m(phase, 23e6)
 
 
-def scenes_in(records: Records) -> Iterator[str]:
-    """Yield the scenes that there are results of, in the order of measurement."""
-    yield from dict.fromkeys(record.scene for record in records)
+def _same_light(one: Truth, other: Truth) -> bool:
+    """Whether two truths hold the same light, whatever the exposure."""
+    if one.kind != other.kind or one.delay_s.shape != other.delay_s.shape:
+        return False
+    share, other_share = (
+        truth.weight / max(float(truth.weight.sum()), 1e-30) for truth in (one, other)
+    )
+    same_times = np.array_equal(one.delay_s, other.delay_s, equal_nan=True)
+    return same_times and np.allclose(share, other_share)
