@@ -1,5 +1,5 @@
 /** The REST side of the service: requests, and problems in plain words. */
-import type { AppliedSequence, CameraDocument, CameraState, PixelDocument, Problem, SequenceDocument } from "../stream/protocol";
+import type { AppliedSequence, CameraDocument, CameraState, PixelDocument, Plan, Problem, SequenceDocument, Tradeoff } from "../stream/protocol";
 
 /** The service refused a request (RFC 9457), or could not be asked at all. */
 export class RequestError extends Error {
@@ -36,6 +36,16 @@ export class Api {
   /** Everything about one pixel of the latest frame but its curves, which the page computes itself. */
   pixel(x: number, y: number): Promise<PixelDocument> {
     return this.#json("GET", `/frames/latest/pixel?x=${x}&y=${y}&bins=1`) as Promise<PixelDocument>;
+  }
+
+  /** What accuracy costs on the scene of the latest frame; takes the service many seconds. */
+  tradeoff(signal: AbortSignal): Promise<Tradeoff> {
+    return this.#json("GET", "/tradeoff", undefined, signal) as Promise<Tradeoff>;
+  }
+
+  /** The quickest sequence that reaches the target, or the most accurate within the budget. */
+  plan(goal: { target: { range_std_m?: number }; budget: { frame_rate_hz?: number } }, signal: AbortSignal): Promise<Plan> {
+    return this.#json("POST", "/plan", goal, signal) as Promise<Plan>;
   }
 
   validate(sequence: SequenceDocument, signal?: AbortSignal): Promise<AppliedSequence> {

@@ -37,6 +37,8 @@ export interface FrameMeta {
   readonly temperature_c: number;
   readonly lost_images: number;
   readonly pixels: Readonly<Record<string, number>> | null;
+  /** Standard deviation that the sensor's noise gives the range, in m; null until the range was computed. */
+  readonly predicted_range_std_m?: { readonly median: number; readonly p90: number } | null;
 }
 
 /** A sequence as it was really set, with the figures that follow from it. */
@@ -57,6 +59,8 @@ export interface SequenceDocument {
   readonly zeroth: Zeroth;
   readonly exposure_s: number;
   readonly takes: number;
+  /** In which order takes follow each other. */
+  readonly take_order?: string;
   readonly sub_phases: { readonly scheme: string; readonly n: number };
 }
 
@@ -98,6 +102,38 @@ export interface PixelDocument {
     readonly brightness: number;
     readonly returns: readonly Return[];
   } | null;
+}
+
+/** A sequence and what is predicted of it. */
+export interface Choice {
+  /** The body for `PUT /sequence`. */
+  readonly sequence: SequenceDocument;
+  readonly capture_s: number;
+  readonly frame_rate_hz: number;
+  /** Computing time of one frame. */
+  readonly reconstruct_s: number;
+  readonly predicted: {
+    readonly range_std_m: { readonly median: number; readonly low: number; readonly high: number; readonly p90: number };
+  };
+}
+
+/** What `POST /api/v1/plan` answers. */
+export interface Plan extends Choice {
+  readonly half_time: Choice | null;
+  readonly twice_accuracy: Choice | null;
+}
+
+/** What `GET /api/v1/tradeoff` answers. */
+export interface Tradeoff {
+  readonly scene_of_frame: number;
+  readonly current: {
+    readonly meta: FrameMeta;
+    readonly sequence: SequenceDocument;
+    readonly capture_s: number;
+    readonly range_error_m: { readonly median: number; readonly rms: number } | null;
+  };
+  /** By rising capture time and falling error. */
+  readonly front: readonly Choice[];
 }
 
 export interface Hello {

@@ -1,5 +1,6 @@
 import type { ComponentType } from "preact";
 
+import { AccuracyView } from "./accuracy/AccuracyView";
 import { MapView } from "./map/MapView";
 import { PointsView } from "./points/PointsView";
 import { ResponseView } from "./response/ResponseView";
@@ -21,4 +22,5 @@ export const VIEWS: readonly { readonly name: ViewName; readonly title: string; 
   { name: "points", title: "Points in space", view: PointsView },
   { name: "validity", title: "Validity", view: ValidityView },
   { name: "sequence", title: "Sequence", view: SequenceView },
+  { name: "accuracy", title: "Accuracy against time", view: AccuracyView },
 ];

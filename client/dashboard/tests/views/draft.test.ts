@@ -18,7 +18,9 @@ describe("a sequence being typed", () => {
   });
 
   test("comes back as the document it was made from, with what is not edited", () => {
-    expect(documentOf(draftOf(SEQUENCE), SEQUENCE)).toEqual(SEQUENCE);
+    for (const whole of [SEQUENCE, { ...SEQUENCE, take_order: "interleaved" }]) {
+      expect(documentOf(draftOf(whole), whole)).toEqual(whole);
+    }
   });
 
   test("is no document while a field is empty or no number", () => {

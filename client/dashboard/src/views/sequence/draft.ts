@@ -44,6 +44,7 @@ export function documentOf(draft: Draft, base: SequenceDocument): SequenceDocume
     exposure_s: exact(exposure_ms / 1e3),
     takes,
     sub_phases: base.sub_phases,
+    ...(base.take_order === undefined ? {} : { take_order: base.take_order }),
   };
 }
 

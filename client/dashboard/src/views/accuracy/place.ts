@@ -1,0 +1,64 @@
+/** Where choices of sequences stand in the plot of accuracy against time, both logarithmic. */
+import type { AppliedSequence, Choice, FrameMeta, Tradeoff } from "../../stream/protocol";
+import { fraction, ticks, type Scale } from "../../ui/scale";
+
+export interface Ends {
+  readonly time: Scale;
+  readonly error: Scale;
+}
+
+export interface Standing {
+  readonly capture_s: number;
+  readonly range_std_m: number;
+}
+
+/** Room around what is shown, as a factor. */
+const ROOM = 1.25;
+
+/** Scales, in s and m, that hold the front and where the camera stands now. */
+export function endsOf({ front }: Tradeoff, now: Standing | null): Ends {
+  const times = [...(now === null ? [] : [now.capture_s]), ...front.map(({ capture_s }) => capture_s)];
+  const errors = front.flatMap(({ predicted }) => [predicted.range_std_m.low, predicted.range_std_m.high, predicted.range_std_m.median]);
+  if (now !== null) errors.push(now.range_std_m);
+  const scale = (values: readonly number[]): Scale => ({ low: Math.min(...values) / ROOM, high: Math.max(...values) * ROOM, kind: "logarithmic" });
+  return { time: scale(times), error: scale(errors) };
+}
+
+/** Where the camera stands: by the frame on screen, or by that which the front was predicted with; null if neither tells. */
+export function standingOf(meta: FrameMeta | null, sequence: AppliedSequence | null, { current }: Pick<Tradeoff, "current">): Standing | null {
+  const live = meta?.predicted_range_std_m?.median;
+  if (live !== undefined && sequence !== null && sequence.sequence_id === meta?.sequence_id) {
+    return { capture_s: sequence.capture_s, range_std_m: live };
+  }
+  const then = current.meta.predicted_range_std_m?.median;
+  return then === undefined ? null : { capture_s: current.capture_s, range_std_m: then };
+}
+
+/** Place of a choice, 0 to 1 from the left and from the bottom. */
+export function placeOf({ time, error }: Ends, capture_s: number, range_std_m: number): { x: number; y: number } {
+  return { x: fraction(time, capture_s), y: fraction(error, range_std_m) };
+}
+
+/** Round numbers along a scale. */
+export function marksOf(scale: Scale): { value: number; place: number }[] {
+  return ticks(scale, 6).map((value) => ({ value, place: fraction(scale, value) }));
+}
+
+/** Whether two choices are the same sequence. */
+export function sameSequence(a: Choice | null, b: Choice | null): boolean {
+  return a !== null && b !== null && JSON.stringify(a.sequence) === JSON.stringify(b.sequence);
+}
+
+/** How far from a point a click may be to mean it, in px. */
+const REACH_PX = 30;
+
+/** The point that a click means: the nearest, as points stand closer than fingers are wide; null for none. */
+export function nearest<T extends { readonly x: number; readonly y: number }>(points: readonly T[], x: number, y: number): T | null {
+  let found: T | null = null;
+  let least = REACH_PX;
+  for (const point of points) {
+    const distance = Math.hypot(point.x - x, point.y - y);
+    if (distance < least) [found, least] = [point, distance];
+  }
+  return found;
+}

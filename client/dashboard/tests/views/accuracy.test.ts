@@ -1,0 +1,59 @@
+import { describe, expect, test } from "vitest";
+
+import type { AppliedSequence, Choice, FrameMeta, Tradeoff } from "../../src/stream/protocol";
+import { endsOf, marksOf, nearest, placeOf, sameSequence, standingOf } from "../../src/views/accuracy/place";
+
+const choice = (capture_s: number, median: number): Choice =>
+  ({ capture_s, sequence: { takes: capture_s }, predicted: { range_std_m: { median, low: 0.9 * median, high: 1.1 * median, p90: 2 * median } } }) as unknown as Choice;
+const TRADEOFF = {
+  front: [choice(0.05, 0.04), choice(5, 0.0004)],
+  current: { capture_s: 0.09, meta: { predicted_range_std_m: { median: 0.011 } } },
+} as unknown as Tradeoff;
+
+describe("the plot of accuracy against time", () => {
+  test("holds the front with its uncertainty and where the camera stands", () => {
+    const ends = endsOf(TRADEOFF, { capture_s: 20, range_std_m: 0.2 });
+    for (const [capture_s, range_std_m] of [[0.05, 0.044], [5, 0.00036], [20, 0.2]]) {
+      const { x, y } = placeOf(ends, capture_s, range_std_m);
+      expect(Math.min(x, y)).toBeGreaterThan(0);
+      expect(Math.max(x, y)).toBeLessThan(1);
+    }
+  });
+
+  test("is logarithmic: equal factors are equal ways", () => {
+    const ends = endsOf(TRADEOFF, null);
+    const [a, b, c] = [0.1, 0.4, 1.6].map((capture_s) => placeOf(ends, capture_s, 0.01).x);
+    expect(b - a).toBeCloseTo(c - b, 12);
+    expect(marksOf(ends.time).map(({ value }) => value)).toContainEqual(expect.closeTo(1, 9));
+  });
+});
+
+describe("where the camera stands", () => {
+  const meta = (sequence_id: number, median: number | null): FrameMeta =>
+    ({ sequence_id, predicted_range_std_m: median === null ? null : { median, p90: 1 } }) as unknown as FrameMeta;
+  const sequence = { sequence_id: 2, capture_s: 0.2 } as AppliedSequence;
+
+  test("is told by the newest frame of the sequence in use", () => {
+    expect(standingOf(meta(2, 0.005), sequence, TRADEOFF)).toEqual({ capture_s: 0.2, range_std_m: 0.005 });
+  });
+
+  test("is that of the prediction's own frame where the newest does not tell or is of another sequence", () => {
+    for (const newest of [null, meta(1, 0.005), meta(2, null)]) {
+      expect(standingOf(newest, sequence, TRADEOFF)).toEqual({ capture_s: 0.09, range_std_m: 0.011 });
+    }
+  });
+});
+
+test("two choices are the same where their sequences are", () => {
+  expect(sameSequence(choice(1, 2), choice(1, 3))).toBe(true);
+  expect(sameSequence(choice(1, 2), choice(2, 2))).toBe(false);
+  expect(sameSequence(null, null)).toBe(false);
+});
+
+test("a click means the nearest point within reach", () => {
+  const points = [{ x: 10, y: 10 }, { x: 18, y: 10 }];
+  expect(nearest(points, 15, 12)).toBe(points[1]);
+  expect(nearest(points, 13, 41)).toBeNull();
+  expect(nearest(points, 200, 10)).toBeNull();
+  expect(nearest([], 0, 0)).toBeNull();
+});
