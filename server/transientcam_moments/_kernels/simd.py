@@ -197,7 +197,6 @@ def _room(size: Callable[[int, int], int]) -> Any:
 # so that all sizes are known when compiled.
 registers = _room(lambda m, extra: m + extra)
 matrix = _room(lambda m, extra: (m + extra) * (m + extra))
-planes = _room(lambda m, extra: (2 * m + 2) * extra)
 
 
 @intrinsic
@@ -317,28 +316,6 @@ def store_within(typingctx: Any, bank: Any, index: Any, value: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(bank, types.intp, bank.item), codegen
-
-
-@intrinsic
-def store_first(typingctx: Any, array: Any, index: Any, value: Any, count: Any) -> Any:
-    """Write only the first ``count`` lanes."""
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        vector = args[2].type
-        numbers = ir.VectorType(ir.IntType(64), vector.count)
-        lane = ir.Constant(numbers, list(range(vector.count)))
-        mask = builder.icmp_signed("<", lane, _spread(builder, numbers, args[3]))
-        pointer = _pointer(context, builder, array, args[0], args[1], vector)
-        align = value.element.bitwidth // 8
-        kind = [vector, pointer.type, _INDEX, mask.type]
-        name = f"llvm.masked.store.v{vector.count}f{value.element.bitwidth}.p0"
-        callee = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(ir.VoidType(), kind), name
-        )
-        builder.call(callee, [args[2], pointer, _INDEX(align), mask])
-        return context.get_dummy_value()
-
-    return types.void(array, types.intp, value, types.intp), codegen
 
 
 @intrinsic
