@@ -57,7 +57,8 @@ def serving(camera: str = "sim:mirrors?noise=off", **settings: Any) -> Iterator[
             thread.start()
             try:
                 assert listening.wait(START_S), "the daemon did not start"
-                yield Served(address(listener), app, opened, chosen)
+                tls = chosen.tls_certificate is not None
+                yield Served(address(listener, tls=tls), app, opened, chosen)
             finally:
                 server.should_exit = True
                 thread.join()

@@ -46,6 +46,12 @@ def serve(
         bool,
         typer.Option("--insecure", help="Let anybody who reaches the port control the camera."),
     ] = False,
+    tls_certificate: Annotated[
+        Path | None, typer.Option(help="Certificate chain in PEM: serve https and wss.")
+    ] = None,
+    tls_key: Annotated[
+        Path | None, typer.Option(help="Its private key in PEM, where it is in another file.")
+    ] = None,
     log_level: Annotated[str | None, typer.Option(help="debug, info, warning or error.")] = None,
 ) -> None:
     """Run the daemon: a camera on the network, with its dashboard."""
@@ -57,6 +63,8 @@ def serve(
         "host": host,
         "port": port,
         "insecure": insecure or None,
+        "tls_certificate": tls_certificate,
+        "tls_key": tls_key,
         "log_level": log_level,
     }
     settings = load_settings(command_line, file=config, environment=os.environ)
@@ -70,7 +78,7 @@ def serve(
     run.configure_logging(settings)
     # the address first: where another daemon has it, the camera is not touched
     with run.listen(settings.host, settings.port) as listener:
-        url = run.address(listener)
+        url = run.address(listener, tls=settings.tls_certificate is not None)
         with open_camera(settings.camera) as opened:
             # NumPy serves until the compiled kernels are ready
             tm.kernels.compile_in_background()

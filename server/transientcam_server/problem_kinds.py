@@ -120,6 +120,31 @@ RECORDING_UNFINISHED: Final = ProblemKind(
     "It is still being written, or its writer died and it was not recovered yet; the service "
     "recovers such ones when it starts.",
 )
+REQUEST_LATE: Final = ProblemKind(
+    "request-late",
+    408,
+    "The request took too long to arrive",
+    "Its head or its body was not complete within `limit` seconds; see limits.head_s and "
+    "limits.body_s. The connection is closed.",
+)
+HEAD_TOO_LARGE: Final = ProblemKind(
+    "head-too-large",
+    431,
+    "The head of the request is too large",
+    "Request line and headers together are longer than `limit` bytes; see limits.head_bytes.",
+)
+TOO_MANY_FROM_ONE_ADDRESS: Final = ProblemKind(
+    "too-many-from-one-address",
+    429,
+    "Too many connections from one address",
+    "As many connections as limits.max_connections_per_address allows are open from there.",
+)
+TOO_MANY_CONNECTIONS: Final = ProblemKind(
+    "too-many-connections",
+    503,
+    "Too many connections",
+    "As many connections as limits.max_connections allows are open. Try again in a while.",
+)
 TOO_LARGE: Final = ProblemKind(
     "too-large", 413, "The request is too large", "The body is longer than `limit` bytes."
 )

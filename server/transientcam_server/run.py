@@ -5,6 +5,7 @@ import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Final
 
 import uvicorn
@@ -12,6 +13,7 @@ from fastapi import FastAPI
 from transientcam.wire import MAX_CLIENT_MESSAGE_BYTES
 
 from transientcam_server import logs
+from transientcam_server.connections import BoundedConnection
 from transientcam_server.errors import AddressUnavailable
 from transientcam_server.service import Service
 from transientcam_server.settings import Settings
@@ -62,12 +64,13 @@ def _prepare(listener: socket.socket) -> None:
             listener.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
 
 
-def address(listener: socket.socket) -> str:
+def address(listener: socket.socket, *, tls: bool = False) -> str:
     """Return the URL of the service behind a listening socket."""
+    scheme = "https" if tls else "http"
     host, port = listener.getsockname()[:2]
     if host in ("0.0.0.0", "::"):  # noqa: S104 - compared with, not bound to
         host = socket.gethostname()
-    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+    return f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"
 
 
 class Server(uvicorn.Server):
@@ -80,6 +83,10 @@ class Server(uvicorn.Server):
             uvicorn.Config(
                 app,
                 lifespan="on",
+                # a class would do as well, but could not know its limits
+                http=partial(BoundedConnection, limits=settings.limits),  # type: ignore[arg-type]
+                ssl_certfile=settings.tls_certificate,
+                ssl_keyfile=settings.tls_key,
                 ws="websockets-sansio",
                 ws_per_message_deflate=False,  # 17 ms a frame for a tenth of its size
                 ws_ping_interval=PING_S,

@@ -6,6 +6,7 @@
 """
 
 import os
+import ssl
 import tomllib
 from collections.abc import Mapping
 from ipaddress import ip_address
@@ -114,6 +115,21 @@ class RecordingSettings(_Group):
     """Frames that wait for the disk before some are dropped."""
 
 
+class LimitSettings(_Group):
+    """What one client may take of the service, so that something is left for the others."""
+
+    max_connections: int = Field(default=512, ge=1, le=100_000)
+    """Connections open at the same time, streams included."""
+    max_connections_per_address: int = Field(default=256, ge=1, le=100_000)
+    """The same, of one address; a proxy is one address."""
+    head_s: _Finite = Field(default=10.0, gt=0.0, le=3600.0)
+    """Time for the head of a request to arrive."""
+    body_s: _Finite = Field(default=30.0, gt=0.0, le=3600.0)
+    """Time for its body."""
+    head_bytes: int = Field(default=128 * 1024, ge=1024, le=16 * 1024 * 1024)
+    """Length of request line and headers; the line alone may have 64 KiB whatever this says."""
+
+
 class Settings(_Group):
     """Everything that can be set."""
 
@@ -130,6 +146,10 @@ class Settings(_Group):
     """Names, beside the address listened on, that clients may call this service by."""
     allowed_origins: tuple[str, ...] = ()
     """Origins of foreign pages that may control the camera, as in ``https://lab.example``."""
+    tls_certificate: Path | None = None
+    """A certificate and those it rests on, in PEM; https and wss instead of http and ws."""
+    tls_key: Path | None = None
+    """Its private key, in PEM, where it is not in the same file."""
     tokens_file: Path = Field(
         default_factory=lambda: user_config_path("transientcam") / "tokens.json"
     )
@@ -147,6 +167,7 @@ class Settings(_Group):
     reconstruction: ReconstructionSettings = ReconstructionSettings()
     sensor: SensorSettings = SensorSettings()
     stream: StreamSettings = StreamSettings()
+    limits: LimitSettings = LimitSettings()
     recordings: RecordingSettings = Field(default_factory=RecordingSettings)
 
     @property
@@ -179,6 +200,7 @@ def load_settings(
     """
     settings, places = _load(command_line, file=file, environment=environment)
     _require_safety(settings, places)
+    _require_certificate(settings, places)
     return settings
 
 
@@ -236,6 +258,31 @@ def _require_safety(settings: Settings, places: "_Places") -> None:
                 )
             ]
         )
+
+
+def _require_certificate(settings: Settings, places: "_Places") -> None:
+    """Refuse a certificate that cannot be served."""
+    if settings.tls_certificate is None:
+        if settings.tls_key is None:
+            return
+        mistake = SettingsMistake(
+            places.of(("tls_key",)), str(settings.tls_key), "needs a certificate beside it"
+        )
+        raise SettingsError([mistake])
+    try:
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.load_cert_chain(settings.tls_certificate, settings.tls_key, password=_no_password)
+    except OSError as error:  # what ssl raises is one, too
+        reason = f"cannot be served: {error.strerror or error}"
+        place = places.of(("tls_certificate",))
+        raise SettingsError(
+            [SettingsMistake(place, str(settings.tls_certificate), reason)]
+        ) from error
+
+
+def _no_password() -> str:
+    """Keep ssl from asking a terminal that may not be there."""
+    return ""
 
 
 def _layers(given: Mapping[str, Any], from_file: Mapping[str, Any]) -> type[BaseSettings]:

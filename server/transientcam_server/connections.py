@@ -1,0 +1,152 @@
+"""Connections that cannot hurt: how many there are, and how long each may take for a request.
+
+The HTTP server waits for ever for the rest of a request and reads heads of any length; here is
+what bounds both.
+"""
+
+import asyncio
+from typing import Any, Final, cast
+
+from starlette.responses import Response
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+from transientcam_server import problem_kinds as kinds
+from transientcam_server.errors import Problem
+from transientcam_server.problems import problem_response
+from transientcam_server.settings import LimitSettings
+
+STALLED_S: Final = 30.0
+"""A client that takes nothing of an answer for so long is sent away."""
+
+
+class BoundedConnection(HttpToolsProtocol):
+    """One connection, until it ends or becomes a WebSocket."""
+
+    def __init__(self, *arguments: Any, limits: LimitSettings, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._limits = limits
+        self._deadline: asyncio.TimerHandle | None = None
+        self._stalled: asyncio.TimerHandle | None = None
+        self._in_head = True
+        self._head_bytes = 0
+
+    # -- of the transport ----------------------------------------------------------------------
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Take part, or refuse where there are too many already."""
+        super().connection_made(cast("asyncio.Transport", transport))  # uvloop has its own class
+        problem = self._too_many()
+        if problem is None:
+            self._expect_within(self._limits.head_s)
+        else:
+            self._refuse(problem)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget every timer."""
+        self._expect_within(None)
+        self._cancel_stalled()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Read on, as long as the head of the request is short."""
+        if self.transport.is_closing():
+            return
+        if self._deadline is None and self._idle:  # the first bytes of one more request
+            self._expect_within(self._limits.head_s)
+        if self._in_head:
+            self._head_bytes += len(data)
+        super().data_received(data)
+        if self._in_head and self._head_bytes > self._limits.head_bytes:
+            limit = self._limits.head_bytes
+            detail = f"Request line and headers are longer than {limit} bytes."
+            self._refuse(Problem(kinds.HEAD_TOO_LARGE, detail, field="headers", limit=limit))
+
+    def pause_writing(self) -> None:
+        """Start to lose patience with a client that does not read."""
+        super().pause_writing()
+        self._cancel_stalled()
+        self._stalled = self.loop.call_later(STALLED_S, self.transport.abort)
+
+    def resume_writing(self) -> None:
+        """Find it again."""
+        self._cancel_stalled()
+        super().resume_writing()
+
+    # -- of the parser -------------------------------------------------------------------------
+
+    def on_headers_complete(self) -> None:
+        """Expect the body."""
+        self._in_head = False
+        self._head_bytes = 0
+        self._expect_within(self._limits.body_s)
+        super().on_headers_complete()
+
+    def on_message_complete(self) -> None:
+        """Expect nothing more for now."""
+        self._in_head = True
+        self._expect_within(None)
+        super().on_message_complete()
+
+    def handle_websocket_upgrade(self) -> None:
+        """Leave the connection to the WebSocket, which has deadlines of its own."""
+        self._expect_within(None)
+        super().handle_websocket_upgrade()
+
+    def send_400_response(self, msg: str) -> None:
+        """Answer what is no HTTP as everything else is answered."""
+        self._refuse(Problem(kinds.BAD_REQUEST, msg))
+
+    # ------------------------------------------------------------------------------------------
+
+    @property
+    def _idle(self) -> bool:
+        return self.cycle is None or bool(self.cycle.response_complete)
+
+    def _too_many(self) -> Problem | None:
+        most, most_of_one = self._limits.max_connections, self._limits.max_connections_per_address
+        if len(self.connections) > most:
+            return Problem(kinds.TOO_MANY_CONNECTIONS, f"{most} connections are open.", limit=most)
+        if self.client is None:
+            return None
+        here = self.client[0]
+        # WebSockets too are in the set; it is as short as the limit
+        clients = (getattr(each, "client", None) for each in self.connections)
+        if sum(client is not None and client[0] == here for client in clients) > most_of_one:
+            return Problem(
+                kinds.TOO_MANY_FROM_ONE_ADDRESS,
+                f"{most_of_one} connections are open from {here}.",
+                limit=most_of_one,
+            )
+        return None
+
+    def _expect_within(self, duration_s: float | None) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+        self._deadline = (
+            None if duration_s is None else self.loop.call_later(duration_s, self._too_late)
+        )
+
+    def _too_late(self) -> None:
+        limit_s = self._limits.head_s if self._in_head else self._limits.body_s
+        detail = f"The request did not arrive within {limit_s:g} s."
+        self._refuse(Problem(kinds.REQUEST_LATE, detail, limit=limit_s))
+
+    def _refuse(self, problem: Problem) -> None:
+        if self._idle:  # an answer that is on its way cannot become another one
+            self.transport.write(_bytes(problem_response(problem)))
+        self.transport.close()
+
+    def _cancel_stalled(self) -> None:
+        if self._stalled is not None:
+            self._stalled.cancel()
+            self._stalled = None
+
+
+def _bytes(response: Response) -> bytes:
+    """Return an answer as it travels when no application is there to give it."""
+    lines = [f"HTTP/1.1 {response.status_code} ".encode(), *_headers(response)]
+    return b"\r\n".join([*lines, b"Connection: close", b"", b""]) + bytes(response.body)
+
+
+def _headers(response: Response) -> list[bytes]:
+    return [name + b": " + value for name, value in response.raw_headers]

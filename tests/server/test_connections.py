@@ -1,0 +1,207 @@
+"""Clients that send slowly, half, too much or nothing at all, and the others beside them."""
+
+import json
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any
+from urllib.parse import urlsplit
+
+import httpx
+import pytest
+from transientcam_server.settings import LimitSettings
+from websockets.exceptions import InvalidStatus
+
+from tests.server.streaming import streaming
+from tests.serving import Served, serving
+
+PATIENCE_S = 60.0
+
+
+@contextmanager
+def limited(**limits: Any) -> Iterator[Served]:
+    with serving("sim:mirrors?noise=off", limits=LimitSettings(**limits)) as served:
+        yield served
+
+
+@contextmanager
+def raw(served: Served, data: bytes = b"") -> Iterator[socket.socket]:
+    """Connect and send bytes, and no more."""
+    split = urlsplit(served.url)
+    assert split.port is not None
+    with socket.create_connection(("127.0.0.1", split.port), timeout=PATIENCE_S) as connection:
+        connection.sendall(data)
+        yield connection
+
+
+def rest_of(connection: socket.socket) -> bytes:
+    """Read until the other end closes; a reset is an end too."""
+    received = b""
+    try:
+        while data := connection.recv(65536):
+            received += data
+    except ConnectionResetError:
+        pass
+    return received
+
+
+def problem(answer: bytes) -> tuple[int, dict[str, Any]]:
+    head, _, body = answer.partition(b"\r\n\r\n")
+    assert b"content-type: application/problem+json" in head.lower()
+    assert b"connection: close" in head.lower()
+    return int(head.split(b" ")[1]), json.loads(body)
+
+
+@pytest.mark.parametrize(
+    "begun",
+    [
+        b"",
+        b"GET",
+        b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: ",
+        b"\r\n\r\n",
+    ],
+)
+def test_a_head_that_does_not_end_is_given_up(begun: bytes) -> None:
+    with limited(head_s=0.2) as served, raw(served, begun) as connection:
+        status, document = problem(rest_of(connection))
+
+    assert (status, document["type"]) == (408, "/problems/request-late")
+    assert document["limit"] == 0.2
+
+
+def test_one_byte_now_and_then_does_not_buy_more_time() -> None:
+    with limited(head_s=0.3) as served, raw(served, b"GET / HTTP/1.1\r\nX: ") as connection:
+        connection.settimeout(0.05)
+        received = b""
+        for _ in range(1000):  # 50 s and more, if it did
+            try:
+                connection.sendall(b"x")
+                received = connection.recv(65536)
+                break
+            except TimeoutError:
+                continue
+            except (BrokenPipeError, ConnectionResetError):
+                break
+        else:
+            pytest.fail("the connection stayed open")
+
+    assert not received or problem(received)[0] == 408
+
+
+def test_a_second_request_has_a_deadline_of_its_own() -> None:
+    get = b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+    with limited(head_s=0.2) as served, raw(served, get) as connection:
+        assert connection.recv(65536).startswith(b"HTTP/1.1 200")
+        connection.sendall(b"GET /livez HTTP/1.1\r\n")
+        answer = rest_of(connection)
+
+    status, _ = problem(answer[answer.index(b"HTTP/1.1 408") :])
+    assert status == 408
+
+
+def test_a_body_that_does_not_come_is_given_up_without_an_answer_of_its_own() -> None:
+    head = (
+        b"PUT /api/v1/sequence HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+        b"Content-Length: 20\r\n\r\n{"
+    )
+    with limited(body_s=0.2) as served, raw(served, head) as connection:
+        assert rest_of(connection) == b""
+        before = httpx.get(f"{served.url}/api/v1/sequence").json()
+
+    assert before["harmonics"] == 3
+
+
+def test_a_head_without_end_is_cut_short() -> None:
+    line = b"X-Long: " + b"x" * 1000 + b"\r\n"
+    with limited(head_bytes=4096) as served, raw(served, b"GET / HTTP/1.1\r\n") as connection:
+        try:
+            for _ in range(1000):
+                connection.sendall(line)
+        except (BrokenPipeError, ConnectionResetError):
+            pass
+        assert httpx.get(f"{served.url}/livez").status_code == 200
+
+    with limited(head_bytes=4096) as served, raw(served, b"GET /" + b"a" * 5000) as connection:
+        status, document = problem(rest_of(connection))
+    assert (status, document["type"], document["limit"]) == (431, "/problems/head-too-large", 4096)
+
+
+def test_thousands_of_times_of_flight_fit_into_a_head() -> None:
+    times = "&".join(f"time_s={i * 1.000000001e-11 + 1e-13!r}" for i in range(2500))
+    head = f"GET /api/v1/frames/latest/flags.npy?{times} HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+    request = head.encode() + b"Connection: close\r\n\r\n"
+    with limited() as served, raw(served, request) as connection:
+        answer = rest_of(connection)
+
+    assert len(head) > 48 * 1024
+    assert b"/problems/head-too-large" not in answer
+    assert answer.split(b" ")[1] in (b"200", b"422", b"503")  # of the route, not of the connection
+
+
+def test_what_is_no_http_is_a_problem_too() -> None:
+    with limited() as served, raw(served, b"\x16\x03\x01\x02\x00\x01\x00\r\n\r\n") as connection:
+        status, document = problem(rest_of(connection))
+
+    assert (status, document["type"]) == (400, "/problems/bad-request")
+
+
+def test_silent_connections_do_not_stop_the_service() -> None:
+    with limited(head_s=30.0) as served, ExitStack() as stack:
+        for index in range(100):
+            stack.enter_context(raw(served, b"GET / HTTP/1.1\r\n" if index % 2 else b""))
+        assert httpx.get(f"{served.url}/livez").status_code == 200
+        with streaming(served.stream_url) as client:
+            client.subscribe("flags")
+            assert client.frame().product == "flags"
+
+
+def test_one_connection_too_many_is_refused_and_one_that_ends_makes_room() -> None:
+    with limited(max_connections=3) as served, ExitStack() as stack:
+        silent = [stack.enter_context(raw(served)) for _ in range(3)]
+        with raw(served) as refused:
+            status, document = problem(rest_of(refused))
+        assert (status, document["type"]) == (503, "/problems/too-many-connections")
+
+        silent[0].close()
+        with httpx.Client(base_url=served.url) as client:
+            # the service hears of the end a moment later
+            statuses = iter(lambda: client.get("/livez").status_code, 200)
+            assert set(statuses) <= {503}
+
+
+def test_one_address_does_not_take_all_of_them() -> None:
+    # streams count as well
+    with (
+        limited(max_connections_per_address=2) as served,
+        streaming(served.stream_url) as client,
+        raw(served),
+    ):
+        client.subscribe("flags")
+        with raw(served) as refused:
+            status, document = problem(rest_of(refused))
+        with pytest.raises(InvalidStatus) as caught, streaming(served.stream_url):
+            pass
+        assert client.frame().product == "flags"
+
+    assert (status, document["type"]) == (429, "/problems/too-many-from-one-address")
+    assert caught.value.response.status_code == 429
+
+
+def test_a_stream_outlives_the_deadlines_of_requests() -> None:
+    with limited(head_s=0.2, body_s=0.2) as served, streaming(served.stream_url) as client:
+        client.subscribe("flags")
+        begin_s = client.frame().meta["device_time_s"]
+        while client.frame().meta["device_time_s"] - begin_s < 1.0:
+            pass
+
+
+def test_a_long_poll_outlives_the_deadlines_of_requests() -> None:
+    with (
+        limited(head_s=0.2, body_s=0.2) as served,
+        httpx.Client(base_url=served.url, timeout=PATIENCE_S) as client,
+    ):
+        client.put("/api/v1/acquisition", json={"running": False})
+        params = {"wait_s": 1.0, "after": 2**50}
+        answer = client.get("/api/v1/frames/latest", params=params)
+
+    assert answer.json()["type"] == "/problems/no-frame-yet"
