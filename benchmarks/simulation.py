@@ -126,7 +126,7 @@ def report(
         "Written by `OMP_NUM_THREADS=1 python -m benchmarks.simulation --write` on",
         f"{machine()}.",
         "",
-        "Frames of the paper's video setting (m = 3, 0.5 ms, 12 images); processor time on one core.",
+        "Frames of the paper's video setting (m = 3, 0.5 ms, 12 images); processor time, one core.",
         f"At {VIDEO_HZ} Hz a frame may take {1e3 / VIDEO_HZ:.0f} ms.",
         "",
         "| scene | pixels | none | called for | everything | everything / called for "
@@ -134,8 +134,8 @@ def report(
         "|---|---|---|---|---|---|---|---|---|",
         *map(_row, scenes),
         "",
-        "What one effect adds to a frame without any, at 163 x 120; what a still scene computes once",
-        "costs nothing a frame:",
+        "What one effect adds to a frame without any, at 163 x 120; what a still scene computes",
+        "once costs nothing a frame:",
         "",
         "| effect | " + " | ".join(f"on {name}" for name in effects) + " |",
         "|---" * (1 + len(effects)) + "|",
@@ -150,7 +150,7 @@ def report(
         "",
         "The range of the paper's Fig. 12 on `sim:corner` (f = 23 MHz, 4 takes), over all pixels:",
         "",
-        "| estimate | RMS error | mean error | median of the absolute error | off by more than 0.1 m |",
+        "| estimate | RMS error | mean error | median absolute error | off by more than 0.1 m |",
         "|---|---|---|---|---|",
         *(
             f"| {each.name} | {each.rms_m * 1e3:.0f} mm | {each.bias_m * 1e3:.0f} mm "

@@ -8,7 +8,10 @@ import numpy as np
 from transientcam_driver.errors import SceneError
 from transientcam_driver.simulation.clock import Clock
 from transientcam_driver.simulation.device import EmulatedDevice
+from transientcam_driver.simulation.device_profile import DeviceProfile
 from transientcam_driver.simulation.effects import NOISE
+from transientcam_driver.simulation.effects.modulation_harmonics import measured_harmonics
+from transientcam_driver.simulation.effects.pixel_pattern import read_offsets_rad
 from transientcam_driver.simulation.firmware import Firmware
 from transientcam_driver.simulation.handle import Simulation
 from transientcam_driver.simulation.measured import load_responses
@@ -79,7 +82,14 @@ def through_diffusor(diffusor: Diffusor, *, width: int, height: int) -> SparseRe
 def world_of(
     scene: Scene, *, width: int, height: int, seed: int | None = None, readout_s: float
 ) -> World:
-    """Put a sensor in front of a scene."""
+    """Put a sensor in front of a scene.
+
+    Raises
+    ------
+    SceneError
+        A file that the scene names cannot be read, or holds something else.
+    """
+    _read_device_files(scene.device)
     return World(
         scenery_of(scene, width=width, height=height),
         scene.sensor,
@@ -90,6 +100,14 @@ def world_of(
         ambient_electrons_per_s=scene.ambient_electrons_per_s,
         readout_s=readout_s,
     )
+
+
+def _read_device_files(device: DeviceProfile) -> None:
+    """Find out now what is wrong with them, rather than when a sequence is set."""
+    if device.waveform is not None and device.waveform.file is not None:
+        measured_harmonics(device.waveform.file)
+    if device.pattern is not None and device.pattern.file is not None:
+        read_offsets_rad(device.pattern.file)
 
 
 def build(

@@ -122,18 +122,6 @@ class Rectangle:
             columns,
         )
 
-    def seen_through(self, apex: Points, low: Points, high: Points) -> bool:
-        """Whether a box may hold points that see a point through the rectangle.
-
-        It holds none if all of it lies beyond one of the planes through point and rim.
-        """
-        corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-        box = low + corners * (high - low) - apex
-        rim = self.extent() - apex
-        inward = np.cross(rim, np.roll(rim, -1, axis=0))
-        inward *= np.sign(inward @ (self.centre - apex))[:, None]
-        return bool((box @ inward.T >= 0).any(axis=0).all())
-
     def in_front(self, points: Points) -> NDArray[np.bool_]:
         """Which points lie on the side the rectangle faces."""
         front: NDArray[np.bool_] = (points - self.centre) @ self.normal > 0

@@ -34,6 +34,16 @@ class Seen:
     distance_m: NDArray[np.float64]
     throughput: NDArray[np.float64]
 
+    def with_more(self, more: "Seen", rays: NDArray[np.intp]) -> "Seen":
+        """Put what other rays see behind what ``rays`` see."""
+        return Seen(
+            np.concatenate([self.ray, more.ray + len(rays)]),
+            np.concatenate([self.point, more.point]),
+            np.concatenate([self.surface, more.surface]),
+            np.concatenate([self.distance_m, more.distance_m]),
+            np.concatenate([self.throughput, more.throughput]),
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class ImageLight:
@@ -255,25 +265,29 @@ def image_lights(scene: Scene) -> Iterator[ImageLight]:
 def light_on(
     scene: Scene, light: ImageLight, point: Points, normal: Points
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Length of the way in m, and irradiance, by one chain of mirrors at points on surfaces."""
-    if light.mirrors and len(point):
-        # most mirrors send no light to any of them
-        box = point.min(axis=0), point.max(axis=0)
-        if not light.mirrors[0].mirror.seen_through(light.positions_m[0], *box):
-            return np.zeros(len(point)), np.zeros(len(point))
+    """Length of the way in m, and irradiance, by one chain of mirrors at points on surfaces.
+
+    The length is 0 where the light is not seen in the mirrors.
+    """
+    length_m, irradiance = np.zeros(len(point)), np.zeros(len(point))
+    near = np.arange(len(point))
+    if light.mirrors:  # few points see the light in the mirror
+        image_m = np.broadcast_to(light.positions_m[0], point.shape)
+        near = np.flatnonzero(light.mirrors[0].shape.hit(point, image_m) < 1)
+        point, normal = point[near], normal[near]
     way = light.positions_m[0] - point
-    length_m = np.sqrt(np.einsum("pc,pc->p", way, way))
-    towards = way / length_m[:, None]
+    distance_m = np.sqrt(np.einsum("pc,pc->p", way, way))
+    towards = way / distance_m[:, None]
     cosine = np.einsum("pc,pc->p", towards, normal)
-    irradiance = np.maximum(cosine, 0) / length_m**2
-    irradiance *= _beam(scene.light, -towards @ light.axis)
+    received = np.maximum(cosine, 0) / distance_m**2
+    received *= _beam(scene.light, -towards @ light.axis)
     for mirror in light.mirrors:
-        irradiance *= mirror.reflectivity
-    shone_at = np.flatnonzero(irradiance)
+        received *= mirror.reflectivity
+    shone_at = np.flatnonzero(received)
     reached = shone_at[_unobstructed(scene, light, point[shone_at])]
-    result = np.zeros_like(irradiance)
-    result[reached] = irradiance[reached]
-    return length_m, result
+    length_m[near] = distance_m
+    irradiance[near[reached]] = received[reached]
+    return length_m, irradiance
 
 
 def normals_at(scene: Scene, point: Points, surface: NDArray[np.intp]) -> Points:

@@ -15,8 +15,8 @@ from transientcam_driver.simulation.light import (
     ImageLight,
     Lit,
     Seen,
+    first_scattering,
     image_lights,
-    joined,
     light_rays,
     light_seen,
 )
@@ -119,6 +119,7 @@ class MovingLight:
     def at(self, time_s: float) -> "MovingResponses":
         """Look at the scene at a time."""
         scene = self.scene.at(time_s)
+        assert scene.camera is not None  # noqa: S101  (checked when made)
         shapes = {index: scene.surfaces[index].shape for index in self._movers}
         straight, *by_mirrors = self._sight
         nearest = np.full(len(self._directions), np.inf)
@@ -131,7 +132,7 @@ class MovingLight:
         for index, shape in shapes.items():  # again in double precision, or points shade themselves
             mine = np.flatnonzero(which == index)
             nearest[mine] = straight.again(shape, mine)
-        lit = self._in_front(scene, front, which[front], nearest[front])
+        seen = self._in_front(scene, front, which[front], nearest[front])
         over = np.zeros(len(self._directions), dtype=bool)
         for ways in by_mirrors:
             for shape in shapes.values():
@@ -139,8 +140,10 @@ class MovingLight:
         over[front] = False
         mirrored = np.flatnonzero(over)
         if mirrored.size:
-            lit = joined([lit, light_rays(scene, self._directions[mirrored])])
+            eye = scene.camera.position_m
+            seen = seen.with_more(first_scattering(scene, eye, self._directions[mirrored]), front)
             front = np.concatenate([front, mirrored])
+        lit = light_seen(scene, self._lights, seen, rays=len(front))
         hidden = np.zeros(len(self._directions), dtype=bool)
         hidden[front] = True
         shadows = []
@@ -158,14 +161,13 @@ class MovingLight:
         front: NDArray[np.intp],
         surface: NDArray[np.intp],
         at: NDArray[np.float64],
-    ) -> Lit:
-        """Light what moves and is seen straight from the camera."""
+    ) -> Seen:
+        """Return what moves and is seen straight from the camera."""
         assert scene.camera is not None  # noqa: S101  (checked when made)
         distance_m = at * self._reach_m[front]
         point = scene.camera.position_m + distance_m[:, None] * self._directions[front]
         count = len(front)
-        seen = Seen(np.arange(count), point, surface, distance_m, np.ones(count))
-        return light_seen(scene, self._lights, seen, rays=count)
+        return Seen(np.arange(count), point, surface, distance_m, np.ones(count))
 
     def phasors(self, frequency_hz: float) -> tuple[NDArray[np.complex64], NDArray[np.complex128]]:
         """Moments of what stands still: (K, H W) by chain of mirrors, and (H W) in all."""

@@ -26,8 +26,8 @@ _ROUGH_PATCHES = 6  # a side, to judge how much light interreflection is about
 _JUMP = 0.03  # of the range, from one pixel to the next: an edge
 _WITHIN = tuple((x / 3, y / 3) for x in (-1, 0, 1) for y in (-1, 0, 1))
 """Rays of a pixel at an edge, right and down by these shares of a pixel."""
-_WITHIN_MOVING = ((-0.25, -0.125), (0.125, -0.25), (0.25, 0.125), (-0.125, 0.25))
-"""The same where they are followed for every image: no two in a row or a column."""
+_WITHIN_MOVING = ((-0.25, -0.25), (0.25, 0.25))
+"""The same where they are followed again and again, because the scene moves."""
 _GLANCES = 5  # moments in time at which a moving scene is looked at to judge it
 
 View = Callable[[float], "Seen"]

@@ -127,7 +127,8 @@ class Conditions:
     @property
     def images_per_moment_s(self) -> float:
         """Time from the first to the last of the four images of a moment."""
-        return 3 * self.image_period_s
+        between = self.sequence.takes if self.sequence.take_order == "interleaved" else 1
+        return 3 * self.image_period_s * between
 
     def sub_phase_gain(self, harmonic: int) -> complex:
         """G_k: what the division of the exposure leaves of a harmonic (Sec. 4.1)."""
