@@ -141,9 +141,11 @@ class Acquisition:
         self._commands.put(lambda: None)
         self._thread.join()
 
-    def configure(self, sequence: Sequence) -> "Future[AppliedSequence]":
-        """Change the sequence."""
-        return self.submit(lambda: self._configure(sequence))
+    def configure(
+        self, sequence: Sequence, *, check: Callable[[AppliedSequence], None] | None = None
+    ) -> "Future[AppliedSequence]":
+        """Change the sequence, unless ``check`` raises for the one that is running then."""
+        return self.submit(lambda: self._configure(sequence, check))
 
     def set_running(self, running: bool) -> "Future[None]":
         """Start or stop capturing."""
@@ -248,7 +250,11 @@ class Acquisition:
         while len(self._applied) > 8:  # frames of older sequences have long been read
             del self._applied[next(iter(self._applied))]
 
-    def _configure(self, sequence: Sequence) -> AppliedSequence:
+    def _configure(
+        self, sequence: Sequence, check: Callable[[AppliedSequence], None] | None = None
+    ) -> AppliedSequence:
+        if check is not None:
+            check(self._camera.applied)
         applied = self._camera.configure(sequence)
         self._remember(applied)
         self._arrivals_s.clear()

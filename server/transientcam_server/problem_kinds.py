@@ -127,6 +127,13 @@ REQUEST_LATE: Final = ProblemKind(
     "Its head or its body was not complete within `limit` seconds; see limits.head_s and "
     "limits.body_s. The connection is closed.",
 )
+SEQUENCE_CHANGED: Final = ProblemKind(
+    "sequence-changed",
+    412,
+    "Somebody else has changed the sequence",
+    "The request was about the sequence that If-Match names, which is not the running one any "
+    "more. `value` repeats the tag, `current` is that of the running one. Nothing was changed.",
+)
 HEAD_TOO_LARGE: Final = ProblemKind(
     "head-too-large",
     431,

@@ -1,3 +1,4 @@
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import httpx
@@ -5,7 +6,8 @@ import pytest
 
 from tests.serving import Served
 
-VIDEO = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}
+PATH = "/api/v1/sequence"
+VIDEO: dict[str, Any] = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}
 
 
 def test_the_running_sequence_is_told_with_what_follows_from_it(http: httpx.Client) -> None:
@@ -131,3 +133,52 @@ def test_numbers_that_are_none_are_refused_and_told_back_as_text(
 
     assert response.status_code == 422
     assert response.json()["value"] in ("nan", "inf", "-inf")
+
+
+def test_a_sequence_is_named_by_its_tag(http: httpx.Client) -> None:
+    first = http.get(PATH)
+    same = http.get(PATH)
+    put = http.put(PATH, json=VIDEO)
+    second = http.get(PATH)
+
+    assert first.headers["etag"] == same.headers["etag"]
+    assert put.headers["etag"] == second.headers["etag"] != first.headers["etag"]
+
+
+def test_a_sequence_that_is_known_is_not_told_again(http: httpx.Client) -> None:
+    tag = http.get(PATH).headers["etag"]
+
+    known = http.get(PATH, headers={"If-None-Match": f'"other", W/{tag}'})
+    other = http.get(PATH, headers={"If-None-Match": '"other"'})
+
+    assert (known.status_code, known.content, known.headers["etag"]) == (304, b"", tag)
+    assert other.status_code == 200
+
+
+def test_a_change_of_a_sequence_that_was_changed_meanwhile_is_refused(http: httpx.Client) -> None:
+    mine = http.get(PATH).headers["etag"]
+    http.put(PATH, json=VIDEO)
+    before = http.get(PATH)
+
+    late = http.put(PATH, json={"harmonics": 5}, headers={"If-Match": mine})
+
+    problem = late.json()
+    assert (late.status_code, problem["type"]) == (412, "/problems/sequence-changed")
+    assert (problem["value"], problem["current"]) == (mine, before.headers["etag"])
+    assert http.get(PATH).json() == before.json()
+    assert http.put(PATH, json=VIDEO, headers={"If-Match": problem["current"]}).status_code == 200
+    assert http.put(PATH, json=VIDEO, headers={"If-Match": "*"}).status_code == 200
+
+
+def test_of_two_who_change_the_same_sequence_at_once_one_is_refused(http: httpx.Client) -> None:
+    tag = http.get(PATH).headers["etag"]
+
+    def change(takes: int) -> int:
+        with httpx.Client(base_url=http.base_url, timeout=60.0) as client:
+            body = VIDEO | {"takes": takes}
+            return client.put(PATH, json=body, headers={"If-Match": tag}).status_code
+
+    with ThreadPoolExecutor(4) as executor:
+        statuses = sorted(executor.map(change, (1, 2, 3, 4)))
+
+    assert statuses == [200, 412, 412, 412]
