@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import AsyncExitStack
+from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -191,6 +192,52 @@ class AsyncCamera:
     async def cause(self, fault: str) -> dict[str, Any]:
         """Let something go wrong in the simulation: unplug, replug, corrupt-image, drop-image."""
         return await self._ask(rest.fault(fault))
+
+    async def record(
+        self,
+        *,
+        name: str | None = None,
+        duration_s: float | None = None,
+        frames: int | None = None,
+        annotations: Mapping[str, Any] | None = None,
+    ) -> dict[str, Any]:
+        """Let the daemon record raw frames, until a limit or `stop_recording`; describe it."""
+        return await self._ask(
+            rest.record(name=name, duration_s=duration_s, frames=frames, annotations=annotations)
+        )
+
+    async def recordings(self) -> dict[str, Any]:
+        """Return all recordings of the daemon, the newest first."""
+        return await self._ask(rest.document("recordings"))
+
+    async def recording(self, recording_id: str) -> dict[str, Any]:
+        """Describe a recording."""
+        return await self._ask(rest.recording(recording_id))
+
+    async def stop_recording(self, recording_id: str) -> dict[str, Any]:
+        """End a recording, wait until it is on the disk, and describe it."""
+        stop = rest.recording(recording_id, method="POST", part="/stop", patience_s=60.0)
+        return await self._ask(stop)
+
+    async def download_recording(self, recording_id: str, output: Path) -> None:
+        """Fetch a recording's file; until it is whole it is called ``<output>.part``.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
+        """
+        part = output.with_name(output.name + ".part")
+        url = f"{self._address.api}/{rest.recording_file(recording_id)}"
+        with translated(self.url):
+            async with self._http.stream("GET", url) as response:
+                if response.status_code != httpx.codes.OK:
+                    await response.aread()
+                    raise rest.problem(answer(response))
+                with part.open("wb") as file:
+                    async for piece in response.aiter_bytes():
+                        file.write(piece)
+        part.rename(output)
 
     def stream(
         self,

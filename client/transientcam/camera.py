@@ -1,6 +1,7 @@
 """A camera on the network, as one object."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -218,6 +219,52 @@ class Camera:
     def cause(self, fault: str) -> dict[str, Any]:
         """Let something go wrong in the simulation: unplug, replug, corrupt-image, drop-image."""
         return self._ask(rest.fault(fault))
+
+    def record(
+        self,
+        *,
+        name: str | None = None,
+        duration_s: float | None = None,
+        frames: int | None = None,
+        annotations: Mapping[str, Any] | None = None,
+    ) -> dict[str, Any]:
+        """Let the daemon record raw frames, until a limit or `stop_recording`; describe it."""
+        return self._ask(
+            rest.record(name=name, duration_s=duration_s, frames=frames, annotations=annotations)
+        )
+
+    def recordings(self) -> dict[str, Any]:
+        """Return all recordings of the daemon, the newest first."""
+        return self._ask(rest.document("recordings"))
+
+    def recording(self, recording_id: str) -> dict[str, Any]:
+        """Describe a recording."""
+        return self._ask(rest.recording(recording_id))
+
+    def stop_recording(self, recording_id: str) -> dict[str, Any]:
+        """End a recording, wait until it is on the disk, and describe it."""
+        stop = rest.recording(recording_id, method="POST", part="/stop", patience_s=60.0)
+        return self._ask(stop)
+
+    def download_recording(self, recording_id: str, output: Path) -> None:
+        """Fetch a recording's file; until it is whole it is called ``<output>.part``.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
+        """
+        part = output.with_name(output.name + ".part")
+        url = f"{self._address.api}/{rest.recording_file(recording_id)}"
+        with translated(self.url):
+            with self._http.stream("GET", url) as response:
+                if response.status_code != httpx.codes.OK:
+                    response.read()
+                    raise rest.problem(answer(response))
+                with part.open("wb") as file:
+                    for piece in response.iter_bytes():
+                        file.write(piece)
+        part.rename(output)
 
     def stream(
         self,

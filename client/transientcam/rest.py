@@ -136,6 +136,40 @@ def lease_id(granted: Mapping[str, Any]) -> str:
     return value
 
 
+def record(
+    *,
+    name: str | None,
+    duration_s: float | None,
+    frames: int | None,
+    annotations: Mapping[str, Any] | None,
+) -> Request[dict[str, Any]]:
+    """Build the request that starts a recording."""
+    wanted = {
+        "name": name,
+        "duration_s": duration_s,
+        "frames": frames,
+        "annotations": None if annotations is None else dict(annotations),
+    }
+    body = {key: value for key, value in wanted.items() if value is not None}
+    return document("recordings", method="POST", body=body)
+
+
+def recording(
+    recording_id: str, *, method: str = "GET", part: str = "", patience_s: float = 0.0
+) -> Request[dict[str, Any]]:
+    """Build a request about one recording."""
+    return document(_recording(recording_id) + part, method=method, patience_s=patience_s)
+
+
+def recording_file(recording_id: str) -> str:
+    """Return the path of a recording's file."""
+    return _recording(recording_id) + "/file"
+
+
+def _recording(recording_id: str) -> str:
+    return f"recordings/{_segment(recording_id)}"
+
+
 @dataclass(frozen=True, slots=True)
 class Newest:
     """Which frame is new enough: one after frame ``after``, waited for as long as ``wait_s``."""

@@ -99,10 +99,13 @@ def reconstruct(
         Path,
         typer.Argument(
             help="An .npz with moments and base_frequency_hz, counts and bin_s, or h with "
-            "start_opl_m and bin_opl_m."
+            "start_opl_m and bin_opl_m; or a recording."
         ),
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The .npz to write.")],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="The .npz to write; of a recording, the .h5."),
+    ],
     frequency_hz: Annotated[
         float | None, typer.Option(help="Base frequency for impulse responses.  [default: 23e6]")
     ] = None,
@@ -123,11 +126,19 @@ def reconstruct(
     background: Annotated[
         Background, typer.Option(help="What to subtract from photon counts first.")
     ] = "none",
+    product: Annotated[
+        list[str] | None,
+        typer.Option(help="Of a recording: what to compute; may be repeated.  [default: images]"),
+    ] = None,
     plot: Annotated[Path | None, typer.Option(help="Also draw a picture into this .png.")] = None,
 ) -> None:
-    """Reconstruct a measurement in a file: density, cumulative density, range, direct, indirect."""
+    """Reconstruct a measurement in a file: density, cumulative density, range, direct, indirect.
+
+    Of a recording every frame is reconstructed; run again, it goes on where it stopped.
+    """
     from pydantic import ValidationError
 
+    from transientcam_server import commands_recording
     from transientcam_server import plot as pictures
     from transientcam_server import reconstruct as offline
     from transientcam_server.settings import ReconstructionSettings
@@ -141,6 +152,11 @@ def reconstruct(
     except ValidationError as error:
         mistake = error.errors()[0]
         raise typer.BadParameter(f"{mistake['loc'][0]}: {mistake['msg']}") from error
+    if commands_recording.is_recording(input):
+        commands_recording.reconstruct_recording(
+            input, output, products=product, settings=settings, bins=bins
+        )
+        return
     measurement = offline.load(
         input, frequency_hz=frequency_hz, harmonics=harmonics, background=background
     )

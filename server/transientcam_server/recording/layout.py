@@ -60,7 +60,9 @@ class Header:
     calibration
         Of the moments: its id and whatever else is known of it.
     calibration_planes
-        complex (m+1,) or (m+1, H, W); None where the nominal one held.
+        complex (m+1,) or (m+1, H, W): what moments are divided by; None for the nominal gains.
+    calibration_bad
+        bool (H, W): pixels that show their neighbours' mean instead.
     reconstruction
         Settings at the time of recording.
     versions
@@ -75,6 +77,7 @@ class Header:
     camera: Mapping[str, Any] = field(default_factory=dict)
     calibration: Mapping[str, Any] = field(default_factory=lambda: {"id": "nominal"})
     calibration_planes: NDArray[np.complexfloating[Any, Any]] | None = None
+    calibration_bad: NDArray[np.bool_] | None = None
     reconstruction: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(
         default_factory=lambda: {name: version(name) for name in ("transientcam", "h5py", "numpy")}
@@ -124,16 +127,22 @@ def create(file: hdf5.File, header: Header, annotations: Mapping[str, Any]) -> N
     file.create_dataset("annotations", data=encoded(annotations), dtype=f"S{ANNOTATIONS_BYTES}")
     file.create_dataset("end", data=b"", dtype=f"S{END_BYTES}")
     if header.calibration_planes is not None:
-        _create_calibration(file, header.calibration_planes)
+        _create_calibration(file, header.calibration_planes, header.calibration_bad)
     _scale(file)
 
 
-def _create_calibration(file: hdf5.File, planes: NDArray[Any]) -> None:
+def _create_calibration(
+    file: hdf5.File, planes: NDArray[Any], bad: NDArray[np.bool_] | None
+) -> None:
     file.create_dataset("moment", data=np.arange(len(planes), dtype="<i4"))
     file["moment"].make_scale("moment")
     dataset = file.create_dataset("calibration_planes", data=planes)
     for axis, name in enumerate(("moment", "y", "x")[: planes.ndim]):
         dataset.dims[axis].attach_scale(file[name])
+    if bad is not None:
+        file.create_dataset("calibration_bad", data=bad.astype("|u1"))
+        for axis, name in enumerate(("y", "x")):
+            file["calibration_bad"].dims[axis].attach_scale(file[name])
 
 
 _LABEL_DTYPES: Final[dict[object, str]] = {int: "<i4", float: "<f8", bool: "|u1"}
@@ -188,6 +197,7 @@ def read_header(file: hdf5.File) -> Header:
         Sequence.from_document(document), epoch=int(document["sequence_id"])
     )
     planes = file["calibration_planes"][()] if "calibration_planes" in file else None
+    bad = file["calibration_bad"][()].astype(bool) if "calibration_bad" in file else None
     return Header(
         recording_id=str(attributes["recording_id"]),
         name=str(attributes["title"]),
@@ -197,6 +207,7 @@ def read_header(file: hdf5.File) -> Header:
         camera=json.loads(attributes["camera"]),
         calibration=json.loads(attributes["calibration"]),
         calibration_planes=planes,
+        calibration_bad=bad,
         reconstruction=json.loads(attributes["reconstruction"]),
         versions=json.loads(attributes["versions"]),
     )

@@ -57,6 +57,12 @@ class Recording:
         )
 
     @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """Frames, images of a frame, height and width."""
+        images, height, width = self._raw.shape[1:]
+        return self.frames, images, height, width
+
+    @property
     def annotations(self) -> dict[str, Any]:
         """What people wrote about it."""
         return layout.read_document(self._file, "annotations")

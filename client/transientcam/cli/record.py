@@ -1,0 +1,64 @@
+"""``transientcam record``: let the daemon record, and fetch the file if wanted."""
+
+import json
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from transientcam.camera import Camera
+from transientcam.cli.options import JsonOption, TokenOption, UrlArgument
+
+_LOOK_S = 0.5
+
+
+def record(
+    url: UrlArgument,
+    name: Annotated[str | None, typer.Option(help="What to call the recording.")] = None,
+    duration_s: Annotated[
+        float | None, typer.Option("--duration", help="Stop after so many seconds.")
+    ] = None,
+    frames: Annotated[int | None, typer.Option(min=1, help="Stop after so many frames.")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Also download the recording into this .h5."),
+    ] = None,
+    note: Annotated[str | None, typer.Option(help="Annotate the recording with this text.")] = None,
+    token: TokenOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Record raw frames where the daemon runs, until the time is over or Ctrl-C."""
+    annotations = None if note is None else {"note": note}
+    console = Console(stderr=True)
+    with Camera(url, token=token) as camera:
+        running = camera.record(
+            name=name, duration_s=duration_s, frames=frames, annotations=annotations
+        )
+        try:
+            with console.status("recording") as status:
+                while running["state"] in ("recording", "finishing"):
+                    status.update(_line(running))
+                    time.sleep(_LOOK_S)
+                    running = camera.recording(running["id"])
+        except KeyboardInterrupt:  # the way to end it, not a failure
+            running = camera.stop_recording(running["id"])
+        if output is not None:
+            camera.download_recording(running["id"], output)
+    if as_json:
+        typer.echo(json.dumps(running))
+    else:
+        place = "" if output is None else f", downloaded into {output}"
+        typer.echo(f"{running['id']}: {_line(running)}{place}")
+    if running["problem"] is not None:
+        typer.echo(f"transientcam: {running['problem']}", err=True)
+        raise typer.Exit(code=1)
+
+
+def _line(recording: dict[str, Any]) -> str:
+    dropped = recording["dropped_frames"]
+    return (
+        f"{recording['frames']} frames, {recording['size_bytes'] / 1e6:.1f} MB, "
+        f"{recording['duration_s']:.1f} s" + (f", {dropped} dropped" if dropped else "")
+    )
