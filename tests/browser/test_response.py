@@ -124,3 +124,15 @@ def test_every_aspect_is_drawn(page: Page, served: Served, aspect: str) -> None:
                .getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size)))"""
     )
     assert ink > 30, "an empty plot has but its axes' few colours"
+
+
+def test_what_is_told_beside_a_held_frame_says_of_which_it_is(page: Page, served: Served) -> None:
+    open_page(page)
+    page.keyboard.press("h")
+    expect(page.locator("[data-field=state]")).to_have_text("Held")
+    held = str(page.locator("canvas[data-product=transient]").get_attribute("data-frame"))
+    httpx.get(
+        f"{served.url}/api/v1/frames/latest", params={"after": held, "wait_s": 10}
+    ).raise_for_status()
+    point_at(page, "map", *PIXEL, click=True)
+    expect(page.locator(".response-side")).to_contain_text(f"the curves are of frame {held}")

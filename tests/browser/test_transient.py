@@ -1,4 +1,5 @@
 import io
+from itertools import pairwise
 from typing import Any
 
 import httpx
@@ -317,3 +318,23 @@ def test_the_picture_of_light_is_handed_out_as_it_is_on_screen(page: Page, serve
     with Image.open(download.value.path()) as image:
         np.testing.assert_array_equal(np.array(image.convert("RGBA")), shown)
     assert shown[..., :3].std() > 5
+
+
+def test_a_strip_shows_light_at_the_times_it_arrives(page: Page, served: Served) -> None:
+    open_page(page)
+    shows_frame(page, stop(served))
+    page.evaluate("() => transientcam.store.player.seek(0.4)")
+    before = text(page, ".panel-transient", "time")
+    with page.expect_download() as download:
+        choose(page, "transient", "Strip of 8 times (PNG)")
+    with Image.open(download.value.path()) as image:
+        strip = np.array(image.convert("RGB"))
+    assert strip.shape == (2 * 134, 4 * 165 - 2, 3)
+    pictures = [
+        strip[134 * row : 134 * row + 120, 165 * column : 165 * column + 163]
+        for row in range(2)
+        for column in range(4)
+    ]
+    for one, other in pairwise(pictures):
+        assert np.mean(one != other) > 0.05, "the light has moved"
+    assert text(page, ".panel-transient", "time") == before, "and is where it was"

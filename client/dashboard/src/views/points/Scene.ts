@@ -90,7 +90,7 @@ export class PointScene {
     this.#eye = false;
     const distance = this.#distance();
     this.#controls.target.set(0, 0, -distance);
-    this.#camera.position.set(0.55 * distance, 0.35 * distance, 0.1 * distance);
+    this.#camera.position.set(0.5 * distance, 0.3 * distance, -0.05 * distance);
     this.#fit();
     this.#controls.update();
     this.#draw();

@@ -30,12 +30,17 @@ export function PeakTable({ peaks: listed }: { peaks: readonly Peak[] }) {
   );
 }
 
-/** What the service found at the pixel: flags in words, sparse returns, and the truth where it is known. */
-export function Found({ told }: { told: PixelDocument | null }) {
+/** What the service found at the pixel: flags in words, sparse returns, and the truth where it is known. `held` is the number of the frame that is held. */
+export function Found({ told, held }: { told: PixelDocument | null; held: number | null }) {
   if (told === null) return null;
   const { truth } = told;
   return (
     <>
+      {held !== null && held !== told.meta.frame && (
+        <p class="quiet">
+          The service tells of frame {told.meta.frame}; the curves are of frame {held}, which is held.
+        </p>
+      )}
       <ul class="flag-words" data-field="flags">
         {told.flags.length === 0 && <li>Nothing was wrong with this pixel.</li>}
         {FLAGS.filter(({ name }) => told.flags.includes(name)).map(({ name, title, words }) => (

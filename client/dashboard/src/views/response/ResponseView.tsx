@@ -97,7 +97,7 @@ export function ResponseView() {
         {place.value !== null && (
           <aside class="response-side" aria-label="What was found at the pixel" tabIndex={0}>
             <PeakTable peaks={shown.value?.peaks ?? []} />
-            <Found told={store.details.document.value} />
+            <Found told={store.details.document.value} held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null} />
           </aside>
         )}
       </div>

@@ -17,6 +17,7 @@ import { AMPLITUDE } from "../map/catalogue";
 import { TransientLook } from "./look";
 import { LightSoFar } from "./LightSoFar";
 import { Picture } from "./Picture";
+import { stripOf, turnsOf } from "./strip";
 import { Timeline, TimeReadout } from "./Timeline";
 
 const TONE_NAMES: Record<ToneKind, string> = { linear: "linear", root: "root", logarithmic: "log" };
@@ -39,6 +40,20 @@ export function TransientView() {
           run: () => {
             const time_ps = Math.round(player.time_s.peek() * 1e12);
             savePicture(`${look.play.peek()}-${time_ps}ps-${frame.peek()?.meta.frame ?? 0}`, look.snapshot());
+          },
+        },
+        {
+          text: "Strip of 8 times (PNG)",
+          run: () => {
+            const arrivals = frame.peek()?.light?.arrivals;
+            if (arrivals === undefined) return;
+            const turn = player.turn.peek();
+            const strip = stripOf(turnsOf(arrivals), store.period_s.peek(), (each) => {
+              player.seek(each);
+              return look.snapshot();
+            });
+            player.seek(turn);
+            savePicture(`${look.play.peek()}-strip-${frame.peek()?.meta.frame ?? 0}`, strip);
           },
         },
       ]}

@@ -61,7 +61,7 @@ function Legend({ frame }: { frame: ReadonlySignal<Frame | null> }) {
       <tbody>
         <tr data-flag="valid">
           <th scope="row">
-            <Swatch colour="url(#valid)" /> Valid
+            <Swatch colour={null} /> Valid
           </th>
           <td>{grouped(valid)}</td>
           <td>{share(valid)}</td>
@@ -82,14 +82,17 @@ function Legend({ frame }: { frame: ReadonlySignal<Frame | null> }) {
   );
 }
 
-function Swatch({ colour }: { colour: string }) {
+/** A spot of a flag's colour; the greys of what is valid for null. */
+function Swatch({ colour }: { colour: string | null }) {
   return (
     <svg class="swatch" viewBox="0 0 12 12" width="12" height="12" aria-hidden="true">
-      <linearGradient id="valid">
-        <stop offset="0" stop-color="#222" />
-        <stop offset="1" stop-color="#ddd" />
-      </linearGradient>
-      <rect width="12" height="12" rx="2" fill={colour} />
+      {colour === null && (
+        <linearGradient id="legend-valid">
+          <stop offset="0" stop-color="#222" />
+          <stop offset="1" stop-color="#ddd" />
+        </linearGradient>
+      )}
+      <rect width="12" height="12" rx="2" fill={colour ?? "url(#legend-valid)"} />
     </svg>
   );
 }
