@@ -256,14 +256,13 @@ class Camera:
         """
         part = output.with_name(output.name + ".part")
         url = f"{self._address.api}/{rest.recording_file(recording_id)}"
-        with translated(self.url):
-            with self._http.stream("GET", url) as response:
-                if response.status_code != httpx.codes.OK:
-                    response.read()
-                    raise rest.problem(answer(response))
-                with part.open("wb") as file:
-                    for piece in response.iter_bytes():
-                        file.write(piece)
+        with translated(self.url), self._http.stream("GET", url) as response:
+            if response.status_code != httpx.codes.OK:
+                response.read()
+                raise rest.problem(answer(response))
+            with part.open("wb") as file:
+                for piece in response.iter_bytes():
+                    file.write(piece)
         part.rename(output)
 
     def stream(

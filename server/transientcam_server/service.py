@@ -71,6 +71,9 @@ class Service:
         self.acquisition = Acquisition(camera, report=self._from_acquisition)
         self.applied: AppliedSequence = camera.applied
         self.lease = LeaseDesk(report=self._lease_changed, alarm=self._alarm)
+        self.recordings = Library(
+            settings.recordings, header=self._recording_header, tell=self._tell_from_thread
+        )
         self.metrics = Metrics(self)
         self.recordings = Library(
             settings.recordings, header=self._recording_header, tell=self._tell_from_thread
@@ -166,6 +169,7 @@ class Service:
             },
             calibration={"id": calibration_id(calibration)},
             calibration_planes=None if calibration is None else calibration.gains,
+            calibration_bad=None if calibration is None else calibration.bad,
             reconstruction=self.settings.reconstruction.model_dump(),
         )
 
