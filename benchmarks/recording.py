@@ -155,7 +155,9 @@ def report(cost: Cost, kills: Kills) -> str:
             "",
             f"Simulated frames of {SEQUENCE.images} images at 163 x 120 with all noise, written at "
             f"{RATE_HZ:g} frames/s for {cost.seconds:.0f} s by one",
-            "process that does nothing else; brought to the disk every second.",
+            "process that does nothing else; brought to the disk every second. Whatever other "
+            "programs the machine",
+            "ran meanwhile is in these times; the share of a core is the process's own.",
             "",
             "| frames | share of one core | append, median / 99 % / longest | compression "
             "| reading back, with checksum |",

@@ -75,9 +75,6 @@ class Service:
             settings.recordings, header=self._recording_header, tell=self._tell_from_thread
         )
         self.metrics = Metrics(self)
-        self.recordings = Library(
-            settings.recordings, header=self._recording_header, tell=self._tell_from_thread
-        )
         self.identity = {"name": "transientcam", "version": VERSION}
 
     @contextlib.asynccontextmanager
