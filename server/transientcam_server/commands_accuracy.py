@@ -68,7 +68,8 @@ def tradeoff(
     console = Console(stderr=True)
     interrupted = False
     with _progress(console) as progress:
-        if any(point.key not in records for each in points.values() for point in each):
+        left = (point for each in points.values() for point in each if point.key not in records)
+        if any(point.kind == "computing" for point in left):  # only times need compiled kernels
             compiling = progress.add_task("compiling kernels", total=None)
             tm.kernels.compile(
                 progress=lambda done, total, _: progress.update(

@@ -1,16 +1,18 @@
 """Plans: the search against brute force, and what is predicted against what is then measured."""
 
 import dataclasses
+import json
 from collections.abc import Iterator
 from typing import Any, cast
 
 import numpy as np
 import pytest
 import transientcam_moments as tm
+import typer
 from numpy.typing import NDArray
 from transientcam_driver import Camera, Capabilities, Sequence, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
-from transientcam_server import planner, statistic
+from transientcam_server import commands_accuracy, planner, statistic
 from transientcam_server.accuracy import Accuracy
 from transientcam_server.computing_time import ComputingTime
 from transientcam_server.errors import Problem
@@ -380,3 +382,51 @@ def test_computing_time_is_measured_once_and_grows_with_takes(capabilities: Capa
     assert first == again == 1.0
     assert next(ticks) == used + 1
     assert seconds(Sequence(harmonics=3, takes=4)) >= first
+
+
+# -- the command --------------------------------------------------------------------------------
+
+NEARBY: dict[str, Any] = {
+    "camera": "sim:mirrors",
+    "brightness_dn_per_s": 8e5,
+    "returns": ["1.5", "3:0.5"],
+    "fixed": ["harmonics=3", "zeroth=on-off", "base_frequency_hz=23e6"],
+}
+
+
+def test_the_command_prints_a_plan_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    commands_accuracy.plan(**NEARBY, range_std_m=0.01, as_json=True)
+
+    said = json.loads(capsys.readouterr().out)
+    assert said["sequence"]["harmonics"] == 3
+    assert said["sequence"]["zeroth"] == "on-off"
+    assert said["predicted"]["range_std_m"]["median"] <= 0.01
+
+
+def test_the_command_tells_a_plan_in_words(capsys: pytest.CaptureFixture[str]) -> None:
+    commands_accuracy.plan(**NEARBY, capture_s=0.1, separation_m=1.0, bound_width=9.0)
+
+    first, *words = capsys.readouterr().out.splitlines()
+    assert Sequence.from_document(json.loads(first)).harmonics == 3
+    assert any(line.startswith("captures in") for line in words)
+    assert any("both returns" in line for line in words)
+    assert any("mean density" in line for line in words)
+    assert any(line.startswith("half the time") for line in words)
+
+
+def test_the_command_fails_with_the_best_where_a_target_is_out_of_reach(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(typer.Exit) as ended:
+        commands_accuracy.plan(**NEARBY, range_std_m=1e-9, as_json=True)
+
+    assert ended.value.exit_code == 1
+    assert json.loads(capsys.readouterr().out)["field"] == "range_std_m"
+
+
+@pytest.mark.parametrize(
+    "mistake", [{"fixed": ["harmonics"]}, {"returns": ["near"]}, {"returns": ["1:-2"]}]
+)
+def test_the_command_refuses_what_it_cannot_read(mistake: dict[str, Any]) -> None:
+    with pytest.raises(typer.BadParameter):
+        commands_accuracy.plan(**(NEARBY | mistake), capture_s=0.1)

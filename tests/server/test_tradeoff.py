@@ -388,9 +388,8 @@ def test_ids_in_the_page_are_unique(reported: Path) -> None:
 
 
 def test_the_command_measures_reports_and_says_so_as_json(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(tm.kernels, "compile", lambda progress: progress(1, 1, "none"))
     grid = tmp_path / "grid.toml"
     grid.write_text("harmonics = []\n[[sequence]]\nharmonics = 2\n")
     output = tmp_path / "results"
