@@ -1,9 +1,15 @@
 """What a scrape tells, and that it stays small."""
 
+from types import SimpleNamespace
+from typing import cast
+
 import httpx
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from transientcam import wire
+from transientcam_driver import RawFrame
+from transientcam_server.acquisition import Captured, Lost
+from transientcam_server.metrics import Metrics
 
 from tests.server.streaming import streaming
 from tests.serving import Served
@@ -45,16 +51,19 @@ def test_frames_clients_and_latency_are_counted(served: Served, http: httpx.Clie
     assert samples["transientcam_http_requests_total{status=5xx}"] == 0
 
 
-def test_the_mean_interval_is_the_sequence_s(served: Served, http: httpx.Client) -> None:
-    for after in range(4):
-        http.get("/api/v1/frames/latest", params={"wait_s": 10.0, "after": after})
+def test_intervals_are_those_of_the_camera_s_clock_within_one_sequence(served: Served) -> None:
+    metrics = Metrics(served.service)
+    for epoch, time_s in ((1, 0.0), (1, 0.1), (1, 0.3), (2, 9.0), (2, 9.25)):
+        raw = cast("RawFrame", SimpleNamespace(epoch=epoch, device_time_s=time_s))
+        metrics.happened(Captured(raw, served.service.applied))
+    metrics.happened(Lost("unplugged"))
+    metrics.happened(Captured(raw, served.service.applied))
 
-    samples = scrape(http)
+    def sample(name: str) -> float | None:
+        return metrics.registry.get_sample_value(f"transientcam_frame_interval_seconds_{name}")
 
-    count = samples["transientcam_frame_interval_seconds_count"]
-    mean_s = samples["transientcam_frame_interval_seconds_sum"] / count
-    expected_s = 1.0 / http.get("/api/v1/sequence").json()["frame_rate_hz"]
-    assert mean_s == pytest.approx(expected_s, rel=0.01)
+    assert sample("count") == 3
+    assert sample("sum") == pytest.approx(0.1 + 0.2 + 0.25)
 
 
 def test_a_loss_and_a_return_are_counted(served: Served, http: httpx.Client) -> None:
@@ -120,6 +129,4 @@ def test_the_number_of_series_does_not_grow_with_the_clients(
 
 
 def test_two_services_in_one_process_have_metrics_of_their_own(served: Served) -> None:
-    from transientcam_server.metrics import Metrics
-
     assert Metrics(served.service).registry is not served.service.metrics.registry
