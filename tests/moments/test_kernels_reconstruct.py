@@ -194,9 +194,11 @@ def test_what_a_workspace_cannot_do_is_left_to_the_stages(settings: tm.Settings)
 
 def test_without_lanes_there_is_no_workspace() -> None:
     assert tm.kernels.reconstructor((4, 5), M, tm.Settings()) is None
-    assert tm.kernels.reconstructor(SHAPE, M + 1, tm.Settings()) is None
     with without_lanes():
         assert tm.kernels.reconstructor(SHAPE, M, tm.Settings()) is None
+        with lanes(M, precisions=("float32",)):
+            assert tm.kernels.reconstructor(SHAPE, M, tm.Settings()) is not None
+            assert tm.kernels.reconstructor(SHAPE, M + 1, tm.Settings()) is None
 
 
 @pytest.mark.parametrize("shape", [(M,), (M + 1, 3, 3), (M + 2, *SHAPE)])
