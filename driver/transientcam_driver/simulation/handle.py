@@ -24,9 +24,9 @@ class Simulation:
         self._world = world
         self._device = device
 
-    def truth(self) -> Truth:
-        """Ground truth of the scene, at the exposure set."""
-        return self._world.truth()
+    def truth(self, *, device_time_s: float | None = None) -> Truth:
+        """Ground truth of the scene at the exposure set: of the last image, or at a time."""
+        return self._world.truth(device_time_s=device_time_s)
 
     def explain(self, sequence: Sequence | None = None) -> Explanation:
         """Say what each effect makes of the scene and a sequence, by default the one set."""

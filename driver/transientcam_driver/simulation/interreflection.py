@@ -16,7 +16,7 @@ from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_driver.simulation.geometry import Points
 from transientcam_driver.simulation.light import Lit, image_lights, light_on, normals_at, scatter_of
 from transientcam_driver.simulation.patches import Patches, form_factors
-from transientcam_driver.simulation.responses import BIN_S
+from transientcam_driver.simulation.responses import BIN_S, Scatter
 from transientcam_driver.simulation.scene import Scene
 
 _SAMPLES = 3  # a side, of the direct light on a patch: its edge may cross the patch
@@ -125,8 +125,6 @@ class _Exchange:
 def _spread(
     given: NDArray[np.float64], width_s: float, decay_s: float, tail: int
 ) -> NDArray[np.float64]:
-    from transientcam_driver.simulation.responses import Scatter
-
     if not width_s and not decay_s:
         return given
     edges_s = BIN_S * (np.arange(tail + 1) - 0.5)
@@ -210,6 +208,7 @@ class Interreflection:
         change = np.sqrt(np.mean(np.abs(fine - coarse.moments(frequency_hz)) ** 2))
         return float(change / np.sqrt(np.mean(np.abs(fine) ** 2)) / 3)
 
+    @cached_property
     def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Mean delay and weight of this light, (H, W)."""
         weight = self.moments(0.0).real

@@ -7,6 +7,7 @@ within its rectangle and nothing stands in between.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -311,15 +312,22 @@ def _beam(light: Light, cosine: NDArray[np.float64]) -> NDArray[np.float64]:
 def _unobstructed(scene: Scene, light: ImageLight, point: Points) -> NDArray[np.intp]:
     """Walk back from points over the chain of mirrors to the light; tell which ones arrive."""
     left = np.arange(len(point))
-    start = point
+    stops = [point]
+    # first whether all mirrors are met, which few points' ways do; then what stands in between
     for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
+        start = stops[-1]
         fraction = mirror.shape.hit(start, np.broadcast_to(image_m, start.shape))
         on = (fraction < 1) & mirror.shape.in_front(start)
-        left, start = left[on], start[on]
-        end = start + fraction[on][:, None] * (image_m - start)
-        clear = ~blocked(scene, start, end)
-        left, start = left[clear], end[clear]
-    clear = ~blocked(scene, start, np.broadcast_to(light.positions_m[-1], start.shape))
+        stops = [stop[on] for stop in stops]
+        stops.append(stops[-1] + fraction[on][:, None] * (image_m - stops[-1]))
+        left = left[on]
+    stops.append(np.broadcast_to(light.positions_m[-1], stops[-1].shape))
+    clear = np.ones(len(left), dtype=bool)
+    for start, end in pairwise(stops):
+        still = np.flatnonzero(clear)
+        end_m = end[:1] if end.strides[0] == 0 else end[still]
+        start_m = start[still]
+        clear[still] = ~blocked(scene, start_m, np.broadcast_to(end_m, start_m.shape))
     return left[clear]
 
 
@@ -343,7 +351,7 @@ def blocked(scene: Scene, start: Points, end: Points) -> NDArray[np.bool_]:
 
 def _box(start: Points, end: Points) -> tuple[Points, Points]:
     """Lowest and highest coordinates of segments, all of which may end at one point."""
-    ends = end[:1] if end.strides[0] == 0 else end
+    ends = end[:1] if end.strides[0] == 0 else end  # as broadcasting makes it
     axes = range(3)
     low = [min(start[:, axis].min(), ends[:, axis].min()) for axis in axes]
     high = [max(start[:, axis].max(), ends[:, axis].max()) for axis in axes]

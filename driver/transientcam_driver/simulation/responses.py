@@ -133,7 +133,8 @@ class SparseResponses:
         mass = np.zeros(len(edges_s) - 1)
         for at_s, of, width, decay in zip(delay_s, weight, width_s, decay_s, strict=True):
             mass += of * np.diff(Scatter(width, decay).cumulated(edges_s - at_s))
-        return edges_s[:-1] + BIN_S / 2, mass / BIN_S
+        time_s: NDArray[np.float64] = np.asarray(edges_s[:-1] + BIN_S / 2, dtype=np.float64)
+        return time_s, np.asarray(mass / BIN_S, dtype=np.float64)
 
 
 BIN_S = 5e-11

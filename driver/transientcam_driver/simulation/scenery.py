@@ -94,14 +94,22 @@ class SurfaceScenery:
         """Whether anything moves."""
         return self._scene.moves
 
-    @cached_property
+    @property
     def glimpse(self) -> Seen:
         """Direct light and mirrors."""
+        return self._glimpse
+
+    @property
+    def facts(self) -> Facts:
+        """What the scene is like, at several times if it moves."""
+        return self._facts
+
+    @cached_property
+    def _glimpse(self) -> Seen:
         return self._see(self._scene.at(0.0), frozenset())
 
     @cached_property
-    def facts(self) -> Facts:
-        """Look at the scene, at several times if it moves."""
+    def _facts(self) -> Facts:
         if not self.moves:
             return _Glance(self._scene, self._lit(self._scene), self._width, self._height)
         period_s = max(motion.period_s for each in self._scene.surfaces for motion in each.motions)
@@ -192,7 +200,7 @@ class WithInterreflection:
     def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the direct returns, and one for all the rest at its mean delay."""
         delay_s, weight = self._direct.returns()
-        mean_s, rest = self._further.returns()
+        mean_s, rest = self._further.returns
         mean_s = np.where(rest > 0, mean_s, np.nan)
         delay_s, weight = (
             np.concatenate([delay_s, mean_s[None]]),
@@ -203,7 +211,7 @@ class WithInterreflection:
 
     def of_pixel(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Density per s over equal bins; a sharp return fills one bin."""
-        _, rest = self._further.returns()
+        _, rest = self._further.returns
         start_s, mass = self._further.of_pixel(x, y, weight=float(rest[y, x]))
         time_s, value = self._direct.of_pixel(x, y)
         if self._direct.kind == "dense":
@@ -217,7 +225,8 @@ class WithInterreflection:
         bins = np.zeros(max(int(into.max(initial=0)) + 1, shift + len(mass)))
         bins[shift : shift + len(mass)] += mass
         np.add.at(bins, into, value)
-        return np.asarray(first_s + BIN_S * (np.arange(len(bins)) + 0.5)), bins / BIN_S
+        time_s = np.float64(first_s) + BIN_S * (np.arange(len(bins), dtype=np.float64) + 0.5)
+        return np.asarray(time_s, dtype=np.float64), bins / BIN_S
 
 
 class WithMixedPixels:
@@ -355,8 +364,12 @@ class _Glance:
             return 0.0
         return float(self._lit.weight[1:].sum() / self.brightness)
 
-    @cached_property
+    @property
     def indirect_share(self) -> float:
+        return self._indirect_share
+
+    @cached_property
+    def _indirect_share(self) -> float:
         transport = self._scene.transport
         scattering = [each for each in self._scene.surfaces if each.scatters]
         flat = len(scattering) == 1 and isinstance(scattering[0].shape, Rectangle)
@@ -384,8 +397,12 @@ class _Glance:
     def scatter_share(self) -> float:
         return float(np.mean(self._depths[1] > 0))
 
-    @cached_property
+    @property
     def edges(self) -> tuple[float, float]:
+        return self._edges
+
+    @cached_property
+    def _edges(self) -> tuple[float, float]:
         edge, steps = edges(self._lit.distance_m.reshape(self._height, self._width))
         return float(edge.mean()), float(np.sqrt(np.mean(steps**2))) if steps.size else 0.0
 
@@ -409,8 +426,12 @@ class _Glances:
     def mirror_share(self) -> float:
         return self._mean([glance.mirror_share for glance in self._glances])
 
-    @cached_property
+    @property
     def indirect_share(self) -> float:
+        return self._indirect_share
+
+    @cached_property
+    def _indirect_share(self) -> float:
         return self._mean([glance.indirect_share for glance in self._glances])
 
     @property

@@ -162,8 +162,8 @@ def test_one_bounce_in_a_corner_is_the_integral_over_the_other_wall(frequency_hz
 def test_a_second_bounce_adds_less_than_the_first_and_later() -> None:
     one, two = further(right_angle(bounces=1)), further(right_angle(bounces=2))
 
-    first_s, first = one.returns()
-    both_s, both = two.returns()
+    first_s, first = one.returns
+    both_s, both = two.returns
 
     assert (both > first).all()
     assert (both - first < 0.6 * first).all()
