@@ -4,10 +4,10 @@ import argparse
 import importlib
 from pathlib import Path
 
-import transientcam_moments as tm
 from rich.console import Console
 from rich.progress import Progress, TextColumn, TimeElapsedColumn
 
+import transientcam_moments as tm
 from benchmarks.machine import machine
 from benchmarks.tables import Table, write_page
 

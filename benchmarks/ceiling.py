@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from transientcam_moments._kernels import simd
 
 from benchmarks.timing import measure
+from transientcam_moments._kernels import simd
 
 _ROUNDS = 1_000_000
 _OFTEN = 50

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import transientcam_moments as tm
 from numpy.typing import NDArray
+
+import transientcam_moments as tm
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
 

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
-import transientcam_moments as tm
 from scipy.integrate import cumulative_trapezoid
 
+import transientcam_moments as tm
 from benchmarks.data import Array, moments
 from benchmarks.tables import Table
 from benchmarks.timing import duration, measure

@@ -6,8 +6,9 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-import transientcam_moments as tm
 from numpy.typing import NDArray
+
+import transientcam_moments as tm
 from transientcam_moments._kernels.registry import REGISTRY
 
 Array = NDArray[Any]

@@ -5,8 +5,8 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
-import transientcam_moments as tm
 
+import transientcam_moments as tm
 from benchmarks.ceiling import Ceiling, measured
 from benchmarks.data import CORES, PAPER, lane, moments, numpy_alone
 from benchmarks.tables import Table, verdict

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-import transientcam_moments as tm
 
+import transientcam_moments as tm
 from benchmarks.data import Array
 
 

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
-import transientcam_moments as tm
 
+import transientcam_moments as tm
 from benchmarks import obvious
 from benchmarks.data import PAPER, VGA, moments, numpy_alone
 from benchmarks.tables import Table, verdict

@@ -7,9 +7,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import transientcam_moments as tm
 from scipy.linalg import solve_toeplitz
 
+import transientcam_moments as tm
 from benchmarks import obvious
 from benchmarks.data import CORES, PAPER, VGA, Array, images, moments, numpy_alone
 from benchmarks.tables import Table, verdict

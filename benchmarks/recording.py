@@ -20,11 +20,11 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+
+from benchmarks.machine import machine
 from transientcam_driver import AppliedSequence, Capabilities, RawFrame, Sequence, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
 from transientcam_server.recording import Header, Recording, RecordingWriter, recover
-
-from benchmarks.machine import machine
 
 PAGE = Path(__file__).parents[1] / "docs" / "recording-cost.md"
 RATE_HZ = 60.0

@@ -5,7 +5,6 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import transientcam_moments as tm
-
 from benchmarks.data import CORES, images
 from benchmarks.reconstruction import workspace
 from benchmarks.tables import Table

@@ -11,14 +11,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from benchmarks.corner import RangeError, range_errors
+from benchmarks.machine import machine
 from transientcam_driver import Sequence
 from transientcam_driver.simulation.build import find_scene, world_of
 from transientcam_driver.simulation.effects import EFFECTS
 from transientcam_driver.simulation.scene import Scene
 from transientcam_driver.simulation.world import World
-
-from benchmarks.corner import RangeError, range_errors
-from benchmarks.machine import machine
 
 VIDEO = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005)
 VIDEO_HZ = 18.6

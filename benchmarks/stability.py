@@ -11,17 +11,17 @@ from time import perf_counter
 import matplotlib as mpl
 import mpmath as mp
 import numpy as np
-import transientcam_moments as tm
 from numpy.typing import NDArray
-from transientcam_moments._arrays import by_blocks
-from transientcam_moments.pisarenko import _pisarenko
-from transientcam_moments.polishing import residual, size
 
+import transientcam_moments as tm
 from benchmarks.machine import machine
 from benchmarks.tables import Table
 from tests.moments import oracles
 from tests.stability import exact
 from tests.stability.cases import ORDERS, PRECISIONS, Signal, dense_signals, sparse_signals
+from transientcam_moments._arrays import by_blocks
+from transientcam_moments.pisarenko import _pisarenko
+from transientcam_moments.polishing import residual, size
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt

@@ -6,14 +6,14 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import transientcam_moments as tm
-from transientcam_moments._kernels.reconstruct import reconstruct_entries
-from transientcam_moments._kernels.reconstructor import Reconstructor
-from transientcam_moments.smoothing import gaussian_taps
 
+import transientcam_moments as tm
 from benchmarks.data import PAPER, VGA, images, lane, moments, numpy_alone
 from benchmarks.tables import Table
 from benchmarks.timing import duration, measure
+from transientcam_moments._kernels.reconstruct import reconstruct_entries
+from transientcam_moments._kernels.reconstructor import Reconstructor
+from transientcam_moments.smoothing import gaussian_taps
 
 _ORDERS = (3, 4, 8)
 _FRAMES = 15

@@ -7,6 +7,7 @@ python examples/range_map.py http://127.0.0.1:8000
 import sys
 
 import numpy as np
+
 import transientcam
 
 SHADES = "@%#*+=-:. "

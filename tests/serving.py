@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fastapi import FastAPI
+
 from transientcam_server.app import build_app
 from transientcam_server.cameras import Camera, open_camera
 from transientcam_server.run import Server, address, listen

@@ -12,15 +12,15 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import transientcam_moments as tm
 from rich.progress import Progress, TaskID
-from transientcam_server import tradeoff
-from transientcam_server.tradeoff.report import file_name
 
+import transientcam_moments as tm
 from benchmarks.accuracy.capturing import SEED, known_scenes
 from benchmarks.accuracy.noise import draw_noise, predicted_and_observed
 from benchmarks.accuracy.page import report
 from benchmarks.accuracy.plans import planned
+from transientcam_server import tradeoff
+from transientcam_server.tradeoff.report import file_name
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

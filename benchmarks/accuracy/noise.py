@@ -5,17 +5,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import transientcam_moments as tm
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from benchmarks.accuracy.capturing import SEED, SETTINGS, captured, short
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
 from transientcam_server.accuracy import Accuracy
 from transientcam_server.settings import SensorSettings
 from transientcam_server.tradeoff.measuring import spec_of
-
-from benchmarks.accuracy.capturing import SEED, SETTINGS, captured, short
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,14 @@
 """The page docs/accuracy.md: tables of what was measured, and advice drawn from them."""
 
 import numpy as np
-from transientcam_driver import Sequence
-from transientcam_server import tradeoff
-from transientcam_server.tradeoff.report import file_name
 
 from benchmarks.accuracy.capturing import short
 from benchmarks.accuracy.noise import FRAMES, Compared
 from benchmarks.accuracy.plans import Planned
 from benchmarks.machine import machine
+from transientcam_driver import Sequence
+from transientcam_server import tradeoff
+from transientcam_server.tradeoff.report import file_name
 
 
 def report(

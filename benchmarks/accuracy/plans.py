@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+
+from benchmarks.accuracy.capturing import SEED, SETTINGS, captured, known_scenes
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
 from transientcam_server.accuracy import Accuracy
@@ -12,8 +14,6 @@ from transientcam_server.prediction import Predictor
 from transientcam_server.settings import SensorSettings
 from transientcam_server.tradeoff.capture import repeatability
 from transientcam_server.tradeoff.measuring import spec_of
-
-from benchmarks.accuracy.capturing import SEED, SETTINGS, captured, known_scenes
 
 
 @dataclass(frozen=True)

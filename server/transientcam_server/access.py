@@ -10,8 +10,8 @@ from typing import Annotated, Any, Final, TypeVar
 
 from fastapi import APIRouter, Depends, FastAPI, Request
 from fastapi.routing import APIRoute
-from transientcam.wire import LEASE_HEADER
 
+from transientcam.wire import LEASE_HEADER
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.auth import Principal
 from transientcam_server.errors import Problem

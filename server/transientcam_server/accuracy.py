@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import transientcam_moments as tm
 from numpy.typing import NDArray
-from transientcam_driver import Truth
 
+import transientcam_moments as tm
+from transientcam_driver import Truth
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.cameras import Camera
 from transientcam_server.computing_time import ComputingTime

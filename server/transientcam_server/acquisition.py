@@ -22,7 +22,6 @@ from transientcam_driver import (
     Sequence,
     Status,
 )
-
 from transientcam_server.cameras import Camera
 
 _log = logging.getLogger(__name__)

@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import transientcam_moments as tm
 from numpy.typing import NDArray
+
+import transientcam_moments as tm
 from transientcam_driver import CalibrationCapture, Sequence
 
 _Array = NDArray[Any]

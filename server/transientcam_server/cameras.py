@@ -13,7 +13,6 @@ from transientcam_driver import (
     Simulation,
     Status,
 )
-
 from transientcam_server.recording.replay import PREFIX, ReplayCamera, parse_replay
 
 

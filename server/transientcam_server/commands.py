@@ -70,7 +70,6 @@ def serve(
     settings = load_settings(command_line, file=config, environment=os.environ)
 
     import transientcam_moments as tm
-
     from transientcam_server import run
     from transientcam_server.app import build_app
     from transientcam_server.cameras import open_camera
@@ -186,6 +185,7 @@ def _tell(
     console: Console, measurement: "Measurement", result: "Reconstruction", output: Path
 ) -> None:
     import numpy as np
+
     import transientcam_moments as tm
 
     height, width = result.flags.shape

@@ -22,7 +22,6 @@ from rich.progress import (
 if TYPE_CHECKING:
     import transientcam_moments as tm
     from transientcam_driver import Camera
-
     from transientcam_server.products import Recipe
 
 
@@ -53,7 +52,6 @@ def tradeoff(
     same command goes on where it stopped.
     """
     import transientcam_moments as tm
-
     from transientcam_server import tradeoff as measuring
     from transientcam_server.tradeoff import plots
 
@@ -159,7 +157,6 @@ def plan(
     """
     import transientcam_moments as tm
     from transientcam_driver import Sequence, open_camera
-
     from transientcam_server.accuracy import Accuracy
     from transientcam_server.errors import Problem
     from transientcam_server.planner import Goal
@@ -212,7 +209,6 @@ def plan(
 def _captured(camera: "Camera") -> tuple["Recipe", "tm.Reconstruction"]:
     """Have a good look: as many harmonics as matter, and little noise."""
     from transientcam_driver import Sequence
-
     from transientcam_server.products import STAGES, Recipe
     from transientcam_server.settings import ReconstructionSettings
 

@@ -12,7 +12,6 @@ from rich.console import Console
 
 if TYPE_CHECKING:
     from transientcam_driver import Camera
-
     from transientcam_server.calibration import Calibration
 
 
@@ -54,10 +53,10 @@ def calibrate(
 
 
 def _measure(camera: "Camera", takes: int) -> "Calibration":
-    import transientcam_moments as tm
     from rich.progress import Progress
-    from transientcam_driver import capture_calibration
 
+    import transientcam_moments as tm
+    from transientcam_driver import capture_calibration
     from transientcam_server.calibration import evaluate
 
     with Progress(console=Console(stderr=True)) as shown:

@@ -5,10 +5,10 @@ from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
-import transientcam_moments as tm
 from numpy.typing import NDArray
-from transientcam_driver import Capabilities, Sequence
 
+import transientcam_moments as tm
+from transientcam_driver import Capabilities, Sequence
 from transientcam_server.settings import ReconstructionSettings
 
 _REPEATED: Final = 3

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from transientcam import wire
 
+from transientcam import wire
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import Problem
 from transientcam_server.products import Product

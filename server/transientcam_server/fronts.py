@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from transientcam_driver import AppliedSequence
-
 from transientcam_server.accuracy import Accuracy, range_error
 from transientcam_server.pipeline import Frame, Pipeline
 from transientcam_server.planner import Choice, Goal

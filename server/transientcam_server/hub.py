@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from transientcam import wire
-
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.auth import ANYBODY
 from transientcam_server.errors import Problem

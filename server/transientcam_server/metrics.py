@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import prometheus_client as prometheus
-import transientcam_moments as tm
 from prometheus_client import Histogram
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, InfoMetricFamily, Metric
 from prometheus_client.registry import Collector
 
+import transientcam_moments as tm
 from transientcam_server.acquisition import Back, Captured, Event, Lost
 
 if TYPE_CHECKING:  # it makes its metrics

@@ -16,8 +16,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from transientcam_driver import AppliedSequence, CalibrationMismatch, RawFrame
 
+from transientcam_driver import AppliedSequence, CalibrationMismatch, RawFrame
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.calibration import Calibration, calibration_id
 from transientcam_server.cameras import Camera

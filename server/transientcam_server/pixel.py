@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
+
 import transientcam_moments as tm
 from transientcam_driver import Truth
-
 from transientcam_server.products import Recipe
 
 _TRUE_RETURNS: Final = 16

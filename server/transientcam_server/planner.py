@@ -14,7 +14,6 @@ from functools import partial
 from typing import Any, Final, Literal
 
 from transientcam_driver import AppliedSequence, Capabilities, Sequence, SequenceError
-
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import Problem
 from transientcam_server.prediction import Deviation, Predictor

@@ -12,10 +12,10 @@ from statistics import NormalDist
 from typing import Any, Final
 
 import numpy as np
-import transientcam_moments as tm
 from numpy.typing import NDArray
-from transientcam_driver import Sequence
 
+import transientcam_moments as tm
+from transientcam_driver import Sequence
 from transientcam_server.settings import ReconstructionSettings
 from transientcam_server.statistic import SceneStatistic
 from transientcam_server.tradeoff.capture import MEDIAN_OF_NORMAL

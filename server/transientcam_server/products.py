@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import transientcam_moments as tm
 from numpy.typing import NDArray
+
+import transientcam_moments as tm
 from transientcam import wire
 from transientcam_driver import AppliedSequence, RawFrame
-
 from transientcam_server.calibration import Calibration, nominal_gains
 from transientcam_server.settings import ReconstructionSettings
 

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
-import transientcam_moments as tm
 from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
+import transientcam_moments as tm
 from transientcam_server.errors import InputError
 from transientcam_server.settings import ReconstructionSettings
 

@@ -10,8 +10,8 @@ from typing import Final
 
 import uvicorn
 from fastapi import FastAPI
-from transientcam.wire import MAX_CLIENT_MESSAGE_BYTES
 
+from transientcam.wire import MAX_CLIENT_MESSAGE_BYTES
 from transientcam_server import logs
 from transientcam_server.connections import BoundedConnection
 from transientcam_server.errors import AddressUnavailable

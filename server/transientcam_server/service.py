@@ -9,10 +9,10 @@ from importlib.metadata import version
 from typing import Annotated, Any, Final
 
 from fastapi import Depends, Request
+
 from transientcam import wire
 from transientcam_driver import AppliedSequence
 from transientcam_driver.calibration import DEVICE_FIELDS
-
 from transientcam_server.accuracy import Accuracy
 from transientcam_server.acquisition import (
     Acquisition,

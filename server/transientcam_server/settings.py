@@ -13,7 +13,6 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-import transientcam_moments as tm
 from platformdirs import user_config_path, user_data_path
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_settings import (
@@ -24,8 +23,9 @@ from pydantic_settings import (
     SettingsConfigDict,
 )
 from pydantic_settings import SettingsError as UnreadableVariable
-from transientcam.wire import FIRST_MESSAGE_WITHIN_S
 
+import transientcam_moments as tm
+from transientcam.wire import FIRST_MESSAGE_WITHIN_S
 from transientcam_server.errors import SettingsError, SettingsMistake, TokenFileError
 from transientcam_server.tokens import TokenFile
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import transientcam_moments as tm
 from numpy.typing import NDArray
+
+import transientcam_moments as tm
 
 _Array = NDArray[Any]
 PIXELS: Final = 256

@@ -7,9 +7,9 @@ import time
 from typing import Any
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+
 from transientcam import wire
 from transientcam.errors import ProtocolError
-
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.auth import log_refusal
 from transientcam_server.encoding import MSGPACK

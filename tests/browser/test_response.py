@@ -5,10 +5,10 @@ from pathlib import Path
 import httpx
 import numpy as np
 import pytest
-import transientcam_moments as tm
 from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
+import transientcam_moments as tm
 from tests.browser.dashboard import choose, open_page, point_at, shows_frame, text
 from tests.browser.test_transient import stop
 from tests.serving import Served

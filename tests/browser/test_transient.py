@@ -5,12 +5,11 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
-import transientcam_moments as tm
 from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Page, expect
-from transientcam.wire.codec import pack_with_array
 
+import transientcam_moments as tm
 from tests.browser.conftest import Watch
 from tests.browser.dashboard import (
     choose,
@@ -25,6 +24,7 @@ from tests.browser.dashboard import (
     transient_pixels,
 )
 from tests.serving import Served
+from transientcam.wire.codec import pack_with_array
 
 F_HZ = 23e6
 LEAST_VALIDITY = 4e-3

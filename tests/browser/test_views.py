@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
-from transientcam.wire.codec import pack_with_array
 
 from tests.browser.dashboard import canvas_pixels, choose, colours, open_page, point_at, shows_frame
 from tests.browser.test_map import product, stop
 from tests.serving import Served
+from transientcam.wire.codec import pack_with_array
 
 F_HZ = 23e6
 BINS = 256

@@ -1,6 +1,7 @@
 """Addresses of a daemon."""
 
 import pytest
+
 from transientcam.address import parse_address
 from transientcam.errors import ParameterError
 

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from numpy.typing import NDArray
+
 from transientcam.errors import ParameterError, ProtocolError
 from transientcam.wire import DTYPES, array_document, parse_array
 

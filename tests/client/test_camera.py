@@ -8,11 +8,11 @@ from typing import Any
 
 import httpx
 import pytest
+
 import transientcam
+from tests.client.conftest import Recording
 from transientcam import AsyncCamera, AsyncStream, Camera, Stream
 from transientcam.errors import ParameterError, ProblemError, ServerUnreachable
-
-from tests.client.conftest import Recording
 
 _URL = "http://lidar.example:8000"
 _SEQUENCE = {"harmonics": 3, "takes": 1, "sequence_id": 4, "images": 12}

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from transientcam.errors import ProtocolError
 from transientcam.wire import ALIGNMENT, pack, unpack
 from transientcam.wire.codec import pack_with_array

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import transientcam
 from PIL import Image
+
+import transientcam
+from tests.serving import Served, serving
 from transientcam import AsyncCamera, Camera, Frame, Notice, wire
 from transientcam.errors import ProblemError, StreamClosed
-
-from tests.serving import Served, serving
 
 _VIDEO: dict[str, Any] = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}
 _STILL: dict[str, Any] = {"harmonics": 3, "zeroth": "low-frequency", "exposure_s": 0.0005}

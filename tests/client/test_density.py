@@ -4,10 +4,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import transientcam
 from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 from scipy.linalg import toeplitz
+
+import transientcam
 from transientcam.errors import ParameterError
 
 _FREQUENCY_HZ = 23e6

@@ -4,6 +4,7 @@ import inspect
 import pickle
 
 import pytest
+
 from transientcam import errors
 from transientcam.errors import (
     CommandUnavailable,

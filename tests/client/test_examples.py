@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from transientcam import wire
 
 from tests.serving import Served, serving
+from transientcam import wire
 
 _EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+
 import transientcam
+from tests.serving import Served, serving
 from transientcam import AsyncCamera, Camera, rest
 from transientcam.errors import ProblemError, ProtocolError, ServerUnreachable
-
-from tests.serving import Served, serving
 
 OTHER = {"harmonics": 4}
 

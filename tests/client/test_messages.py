@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from transientcam import wire
-from transientcam.errors import ProtocolError
 
 from tests.client.conftest import SPECIFICATION, Recording
+from transientcam import wire
+from transientcam.errors import ProtocolError
 
 _MESSAGES: dict[str, Any] = {
     "subscribe": wire.Subscribe(

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import h5py
 import pytest
-import transientcam
-from transientcam.cli import run
 
+import transientcam
 from tests.serving import Served, serving
+from transientcam.cli import run
 
 
 @pytest.fixture

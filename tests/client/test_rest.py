@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from tests.client.conftest import Recording
 from transientcam import rest, wire
 from transientcam.errors import ParameterError, ProblemError, ProtocolError
 from transientcam.rest import Answer, Newest
-
-from tests.client.conftest import Recording
 
 _PROBLEM = {
     "type": "/problems/invalid-sequence",

@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from websockets.sync.server import ServerConnection
+
+from tests.client.conftest import Recording, ReplayServer
 from transientcam import AsyncCamera, Camera, Frame, Notice, Reconnect, wire
 from transientcam.errors import (
     FrameTimeout,
@@ -16,9 +19,6 @@ from transientcam.errors import (
     ServerUnreachable,
     StreamClosed,
 )
-from websockets.sync.server import ServerConnection
-
-from tests.client.conftest import Recording, ReplayServer
 
 _Start = Callable[..., ReplayServer]
 _QUICK = Reconnect(first_wait_s=0.01, longest_wait_s=0.05)

@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from tests.client.conftest import Recording
 from transientcam import wire
 from transientcam.errors import (
     FrameTimeout,
@@ -14,8 +16,6 @@ from transientcam.errors import (
     TransientcamError,
 )
 from transientcam.subscription import Reconnect, StreamState, reconnect_policy, subscribe_message
-
-from tests.client.conftest import Recording
 
 _LOST = StreamClosed(1006, "the connection broke")
 

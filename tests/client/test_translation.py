@@ -9,6 +9,10 @@ from typing import Any
 import httpx
 import pytest
 import websockets.exceptions as ws
+from websockets.datastructures import Headers
+from websockets.frames import Close
+from websockets.http11 import Response
+
 from transientcam.errors import (
     ParameterError,
     ProblemError,
@@ -18,9 +22,6 @@ from transientcam.errors import (
     TransientcamError,
 )
 from transientcam.translation import translate, translated
-from websockets.datastructures import Headers
-from websockets.frames import Close
-from websockets.http11 import Response
 
 _URL = "http://127.0.0.1:8000"
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from transientcam_driver import Camera, Capabilities, ImageLabel, RawFrame, Sequence
 from transientcam_driver.protocol import Request, Status, pack_capabilities
 from transientcam_driver.simulation.backend import SimulatedBus

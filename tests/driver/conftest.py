@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 
 import pytest
+
 from transientcam_driver import Camera, Simulation, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
 

@@ -6,6 +6,7 @@ from contextlib import ExitStack
 from typing import Any, Protocol
 
 import usb.core
+
 from transientcam_driver import Camera, CameraLost, CameraNotFound, Sequence, open_camera
 from transientcam_driver.protocol import Request, Status
 from transientcam_driver.simulation.backend import SimulatedBus

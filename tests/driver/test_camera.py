@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from transientcam_driver import (
     Camera,
     CameraClosed,

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 from hypothesis.strategies import floats, integers, sampled_from
+
 from transientcam_driver import (
     CameraFault,
     CameraLost,

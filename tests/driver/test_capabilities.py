@@ -4,6 +4,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from transientcam_driver import Capabilities, Sequence, SequenceError, SubPhases
 from transientcam_driver.simulation.profile import prototype
 

@@ -3,9 +3,10 @@ from collections.abc import Callable
 
 import pytest
 import typer
+from typer.testing import CliRunner
+
 from transientcam_driver import LibusbMissing, commands, list_scenes
 from transientcam_driver.usb import UsbCamera
-from typer.testing import CliRunner
 
 FREE = UsbCamera("/dev/bus/usb/001/004", "A-17", "AMCW lidar")
 FORBIDDEN = UsbCamera("/dev/bus/usb/001/005", problem="no permission to open it")

@@ -3,8 +3,9 @@ from pathlib import Path
 
 import pytest
 import typer
-from transientcam_driver.commands_explain import explain
 from typer.testing import CliRunner, Result
+
+from transientcam_driver.commands_explain import explain
 
 
 def run(*arguments: str) -> Result:

@@ -1,6 +1,7 @@
 import pickle
 
 import pytest
+
 import transientcam_driver
 from transientcam_driver import DriverError, errors
 

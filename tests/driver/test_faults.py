@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 import usb.core
+
 from transientcam_driver import (
     Camera,
     CameraBusy,

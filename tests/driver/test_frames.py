@@ -3,6 +3,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from transientcam_driver import Counters, RawFrame, Sequence
 from transientcam_driver.frames import FrameAssembler
 from transientcam_driver.framing import ImagePacket

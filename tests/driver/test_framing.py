@@ -3,6 +3,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from transientcam_driver.framing import ImagePacket, PacketDecoder
 from transientcam_driver.protocol import ImageFlag, ImageHeader, payload_checksum
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from transientcam_driver import (
     Camera,
     CameraBusy,

@@ -2,6 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from transientcam_driver import CameraNotFound, SceneError, SpecError
 from transientcam_driver.opening import CameraSpec, open_camera, parse_spec
 from transientcam_driver.simulation.backend import SimulatedBus

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from transientcam_driver import FirmwareTooOld, ProtocolError, Sequence, SubPhases
 from transientcam_driver.protocol import (
     CAPS_BYTES,

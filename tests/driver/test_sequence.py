@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from transientcam_driver import ImageLabel, Sequence, SequenceError, SubPhases
 from transientcam_driver.sequence import DERIVED_FIELDS
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 import usb.core
+
 from transientcam_driver import (
     CameraBusy,
     CameraError,

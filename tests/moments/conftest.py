@@ -1,6 +1,7 @@
 """The planar statements are tested as they stand, whatever lanes another test has compiled."""
 
 import pytest
+
 from transientcam_moments._kernels.registry import REGISTRY
 
 

@@ -4,10 +4,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from transientcam_moments._arrays import below_one, by_blocks, in_turn
-from transientcam_moments._loops import repeat
 
 from tests.moments import oracles
+from transientcam_moments._arrays import below_one, by_blocks, in_turn
+from transientcam_moments._loops import repeat
 
 
 @pytest.mark.parametrize("pixels", [0, 1, 7, 8, 9, 100])

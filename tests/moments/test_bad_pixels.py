@@ -4,10 +4,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import transientcam_moments as tm
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+
+import transientcam_moments as tm
 
 _Array = NDArray[Any]
 SHAPE = (9, 11)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-import transientcam_moments as tm
 from scipy.optimize import linprog
 
+import transientcam_moments as tm
 from tests.moments import oracles
 
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-import transientcam_moments as tm
 from scipy.integrate import quad
-from transientcam_moments.cumulative import _TOLERANCE, _closed_form, _quadrature
 
+import transientcam_moments as tm
 from tests.moments import oracles
+from transientcam_moments.cumulative import _TOLERANCE, _closed_form, _quadrature
 
 
 @pytest.mark.parametrize("m", [1, 2, 3, 4, 8, 16, 32])

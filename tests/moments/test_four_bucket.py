@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 import transientcam_moments as tm
 
 SHAPE = (3, 5)

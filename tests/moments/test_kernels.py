@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 import transientcam_moments as tm
+from tests.moments.kernel_lanes import lanes, without_lanes
 from transientcam_moments import _kernels
 from transientcam_moments._kernels import registry
 from transientcam_moments._kernels.cache import cache_directory
 from transientcam_moments._kernels.registry import REGISTRY, Key, Registry
-
-from tests.moments.kernel_lanes import lanes, without_lanes
 
 
 @pytest.fixture(autouse=True)

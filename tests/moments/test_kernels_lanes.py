@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-import transientcam_moments as tm
 from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from tests.moments import oracles
+from tests.moments.kernel_lanes import lanes, without_lanes
 from transientcam_moments import _kernels
 from transientcam_moments._kernels import density as density_module
 from transientcam_moments._kernels.spread import blocks
 from transientcam_moments.levinson import _levinson
 from transientcam_moments.polishing import residual, size
-
-from tests.moments import oracles
-from tests.moments.kernel_lanes import lanes, without_lanes
 
 ORDERS = [3, 4, 8]
 TYPES = [np.complex64, np.complex128]

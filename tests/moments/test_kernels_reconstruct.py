@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import transientcam_moments as tm
 from numpy.typing import NDArray
 
+import transientcam_moments as tm
 from tests.moments.kernel_lanes import lanes, without_lanes
 
 M = 3

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numba import njit
 from numpy.typing import NDArray
+
 from transientcam_moments._kernels import simd
 
 TYPES = [np.float32, np.float64]

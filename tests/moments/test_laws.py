@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import transientcam_moments as tm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as st_numpy
 
+import transientcam_moments as tm
 from tests.moments import oracles
 
 PHASE = np.linspace(0.0, 6.0, 9)

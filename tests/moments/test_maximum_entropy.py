@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import transientcam_moments as tm
 from scipy.optimize import minimize
 
+import transientcam_moments as tm
 from tests.moments import oracles
 
 PHASE = np.linspace(0, 2 * np.pi, 4096, endpoint=False)

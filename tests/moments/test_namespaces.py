@@ -6,8 +6,8 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
-import transientcam_moments as tm
 
+import transientcam_moments as tm
 from tests.moments import oracles
 
 PHASE = np.linspace(0.1, 6.0, 7)

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import transientcam_moments as tm
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+
+import transientcam_moments as tm
 from transientcam_driver import RawFrame, Sequence, SubPhases, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
 from transientcam_moments import noise

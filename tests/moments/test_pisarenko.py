@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+
 import transientcam_moments as tm
+from tests.moments import oracles
 from transientcam_moments.levinson import recursion
 from transientcam_moments.pisarenko import _christoffel
-
-from tests.moments import oracles
 
 ORDERS = [1, 2, 3, 4, 8, 16, 32]
 

@@ -1,9 +1,9 @@
 """Newton's method on returns."""
 
 import numpy as np
-from transientcam_moments.polishing import polish, residual, size
 
 from tests.moments import oracles
+from transientcam_moments.polishing import polish, residual, size
 
 
 def test_residual_is_what_returns_leave_of_the_moments() -> None:

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-import transientcam_moments as tm
 
+import transientcam_moments as tm
 from tests.moments import oracles
 
 SHAPE = (6, 7)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from transientcam_moments.roots import circle_roots, disc_roots
 
 from tests.moments import oracles
+from transientcam_moments.roots import circle_roots, disc_roots
 
 
 def coefficients(roots: np.ndarray) -> np.ndarray:

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-import transientcam_moments as tm
 from scipy.ndimage import gaussian_filter
+
+import transientcam_moments as tm
 
 
 def image(seed: int = 0) -> np.ndarray:

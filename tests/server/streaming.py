@@ -4,9 +4,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from transientcam import wire
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
+
+from transientcam import wire
 
 PATIENCE_S = 60.0
 VIDEO = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}

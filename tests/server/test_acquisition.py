@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
+
 from transientcam_driver import (
     AppliedSequence,
     Camera,

@@ -9,16 +9,16 @@ from typing import Any
 import httpx
 import pytest
 from starlette.datastructures import Headers
+
+from tests.server.contract import hold_to_contract
+from tests.server.streaming import streaming
+from tests.serving import Served, serving
 from transientcam import Camera, wire
 from transientcam.errors import ProblemError
 from transientcam_server.auth import ANYBODY, Guard
 from transientcam_server.errors import Problem
 from transientcam_server.settings import Settings
 from transientcam_server.tokens import Role, TokenFile
-
-from tests.server.contract import hold_to_contract
-from tests.server.streaming import streaming
-from tests.serving import Served, serving
 
 NOW = datetime(2030, 1, 1, tzinfo=UTC)
 

@@ -10,8 +10,10 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
-import transientcam_moments as tm
 from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from tests.serving import serving
 from transientcam import Camera as RemoteCamera
 from transientcam_driver import (
     CalibrationCapture,
@@ -27,8 +29,6 @@ from transientcam_server.calibration import NOMINAL_ID, evaluate, load_calibrati
 from transientcam_server.pipeline import Pipeline
 from transientcam_server.products import STAGES, Recipe
 from transientcam_server.settings import ReconstructionSettings
-
-from tests.serving import serving
 
 _Array = NDArray[Any]
 SHAPE = (10, 12)

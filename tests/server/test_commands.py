@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from transientcam.cli import run
 from transientcam_moments import kernels
 from transientcam_server.reconstruct import Reconstruction

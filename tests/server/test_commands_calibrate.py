@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
+
 from transientcam.cli import run
 from transientcam_driver import CalibrationCapture
 

@@ -8,11 +8,11 @@ import h5py
 import httpx
 import numpy as np
 import pytest
-from transientcam.cli import run
-from transientcam_server.recording import Recording
 
 from tests.server.recording.made import frame, record
 from tests.server.recording.test_recovery import abandoned
+from transientcam.cli import run
+from transientcam_server.recording import Recording
 
 
 def test_recover_takes_a_file_or_a_directory(

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from transientcam.cli import run
 from transientcam_server.tokens import TokenFile, utc_now
 

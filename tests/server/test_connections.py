@@ -9,11 +9,11 @@ from urllib.parse import urlsplit
 
 import httpx
 import pytest
-from transientcam_server.settings import LimitSettings
 from websockets.exceptions import WebSocketException
 
 from tests.server.streaming import streaming
 from tests.serving import Served, serving
+from transientcam_server.settings import LimitSettings
 
 PATIENCE_S = 60.0
 

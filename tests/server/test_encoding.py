@@ -3,6 +3,7 @@ import io
 import numpy as np
 import pytest
 from PIL import Image
+
 from transientcam import wire
 from transientcam_server.encoding import COLOUR_PNG, MSGPACK, NPY, PNG, Encoding, negotiate
 from transientcam_server.errors import Problem

@@ -4,11 +4,11 @@ from collections.abc import Callable
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
+from tests.server.fakes import NOTICE, channel, fake_frame
 from transientcam import wire
 from transientcam_server.errors import Problem
 from transientcam_server.hub import MAX_WAITING_MESSAGES, Delivery, Goodbye, Hub, Item, Outbox
-
-from tests.server.fakes import NOTICE, channel, fake_frame
 
 
 def run(test: Callable[[], object]) -> None:

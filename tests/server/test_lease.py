@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import pytest
+
 from transientcam_server.errors import Problem
 from transientcam_server.lease import Change, Lease, LeaseDesk, OnLapse
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import httpx
 import numpy as np
 import pytest
-from transientcam import wire
 
 from tests.server.test_reconstruct import composite
 from tests.serving import serving
+from transientcam import wire
 
 LATEST = "/api/v1/frames/latest"
 BINS = 4096

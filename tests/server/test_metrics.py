@@ -6,13 +6,13 @@ from typing import cast
 import httpx
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
+
+from tests.server.streaming import streaming
+from tests.serving import Served
 from transientcam import wire
 from transientcam_driver import RawFrame
 from transientcam_server.acquisition import Captured, Lost
 from transientcam_server.metrics import Metrics
-
-from tests.server.streaming import streaming
-from tests.serving import Served
 
 Samples = dict[str, float]
 

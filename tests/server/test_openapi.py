@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from transientcam_server.problem_kinds import KINDS
 
 from tests.server.contract import find_operation, validate
 from tests.serving import Served
+from transientcam_server.problem_kinds import KINDS
 
 PROBLEM = "application/problem+json"
 

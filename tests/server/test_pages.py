@@ -5,10 +5,10 @@ from pathlib import Path
 import httpx
 import pytest
 from fastapi import FastAPI
-from transientcam_server import pages, problems
-from transientcam_server.problem_kinds import KINDS
 
 from tests.server.contract import check_answer
+from transientcam_server import pages, problems
+from transientcam_server.problem_kinds import KINDS
 
 
 @pytest.mark.parametrize("slug", sorted(KINDS))

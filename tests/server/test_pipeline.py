@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from transientcam import wire
 from transientcam_driver import Camera, RawFrame, open_camera
 from transientcam_server import pipeline as module

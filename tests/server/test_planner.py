@@ -7,9 +7,10 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-import transientcam_moments as tm
 import typer
 from numpy.typing import NDArray
+
+import transientcam_moments as tm
 from transientcam_driver import Camera, Capabilities, Sequence, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
 from transientcam_server import commands_accuracy, planner, statistic

@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+
 from transientcam_server import plot
 from transientcam_server.errors import MissingExtra
 from transientcam_server.reconstruct import Measurement, reconstruct

@@ -3,6 +3,7 @@ import re
 
 import pytest
 from fastapi.exceptions import RequestValidationError
+
 from transientcam.errors import ProtocolError
 from transientcam_driver import CameraFault, CameraLost, CameraNotFound, FrameTimeout, SequenceError
 from transientcam_server import problem_kinds as kinds

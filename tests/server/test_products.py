@@ -7,11 +7,11 @@ import httpx
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
+from tests.serving import Served, serving
 from transientcam import wire
 from transientcam_driver import Truth
 from transientcam_server.products import PRODUCTS
-
-from tests.serving import Served, serving
 
 LATEST = "/api/v1/frames/latest"
 F_HZ = 23e6

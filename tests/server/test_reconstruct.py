@@ -4,6 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from transientcam_server.errors import InputError
 from transientcam_server.reconstruct import (
     Measurement,

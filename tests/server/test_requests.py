@@ -2,10 +2,10 @@ import logging
 
 import httpx
 import pytest
-from transientcam_server.requests import REQUEST_ID_HEADER
-from transientcam_server.security import SECURITY_HEADERS
 
 from tests.serving import Served
+from transientcam_server.requests import REQUEST_ID_HEADER
+from transientcam_server.security import SECURITY_HEADERS
 
 
 def test_a_request_keeps_the_id_it_comes_with(http: httpx.Client) -> None:

@@ -9,14 +9,14 @@ from typing import Any, NoReturn
 
 import httpx
 import pytest
-from transientcam import wire
-from transientcam_server.hub import Delivery
-from transientcam_server.products import STAGES
 from websockets.client import ClientProtocol
 from websockets.uri import parse_uri
 
 from tests.server.streaming import streaming
 from tests.serving import Served
+from transientcam import wire
+from transientcam_server.hub import Delivery
+from transientcam_server.products import STAGES
 
 LATEST = "/api/v1/frames/latest"
 PATIENCE_S = 60.0

@@ -1,11 +1,11 @@
 import httpx
 import pytest
-from transientcam_server.security import MAX_BODY_BYTES, SECURITY_HEADERS, SameSite
-from transientcam_server.settings import Settings
 from websockets.exceptions import InvalidStatus
 
 from tests.server.streaming import streaming
 from tests.serving import Served
+from transientcam_server.security import MAX_BODY_BYTES, SECURITY_HEADERS, SameSite
+from transientcam_server.settings import Settings
 
 CHANGE = ("PUT", "/api/v1/acquisition")
 

@@ -1,10 +1,10 @@
 from typing import Any
 
 import pytest
-from transientcam_server.acquisition import AcquisitionStatus
-from transientcam_server.hub import Channel
 
 from tests.serving import Served
+from transientcam_server.acquisition import AcquisitionStatus
+from transientcam_server.hub import Channel
 
 HEALTHY: dict[str, Any] = {
     "state": "streaming",

@@ -1,6 +1,7 @@
 from pathlib import Path
 
 import pytest
+
 from transientcam_server.errors import SettingsError
 from transientcam_server.settings import ENVIRONMENT_PREFIX, Settings, load_settings
 from transientcam_server.tokens import Role, TokenFile, utc_now

@@ -3,12 +3,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from transientcam import wire
-from transientcam_driver import Sequence
 from websockets.exceptions import InvalidStatus
 
 from tests.server.streaming import VIDEO, streaming
 from tests.serving import Served, serving
+from transientcam import wire
+from transientcam_driver import Sequence
 
 
 def test_hello_describes_the_channels_and_frames_follow_it(served: Served) -> None:

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 import trustme
+
+from tests.serving import serving
 from transientcam import Camera
 from transientcam.errors import ServerUnreachable
 from transientcam_server.errors import SettingsError
 from transientcam_server.settings import load_settings
-
-from tests.serving import serving
 
 
 @pytest.fixture(scope="module")

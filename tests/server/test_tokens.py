@@ -8,6 +8,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
+
 from transientcam_server.errors import TokenFileError, UnknownToken
 from transientcam_server.tokens import Role, TokenFile
 

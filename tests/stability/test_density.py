@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator
 import mpmath as mp
 import numpy as np
 import pytest
-import transientcam_moments as tm
 from _pytest.mark import ParameterSet
 
+import transientcam_moments as tm
 from tests.stability import exact
 from tests.stability.cases import ORDERS, PRECISIONS, Signal, dense_signals, sparse_signals
 

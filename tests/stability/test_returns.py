@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-import transientcam_moments as tm
 
+import transientcam_moments as tm
 from tests.moments import oracles
 from tests.stability import exact
 from tests.stability.cases import ORDERS, PRECISIONS, Signal, sparse_signals

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-import transientcam_moments as tm
 
+import transientcam_moments as tm
 from tests.moments import oracles
 
 # ten million in all; m and double precision cost time, not other ways to fail

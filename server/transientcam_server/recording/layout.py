@@ -13,8 +13,8 @@ from typing import Any, Final, get_type_hints
 import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
-from transientcam_driver import AppliedSequence, Capabilities, ImageLabel, RawFrame, Sequence
 
+from transientcam_driver import AppliedSequence, Capabilities, ImageLabel, RawFrame, Sequence
 from transientcam_server.recording import hdf5, swmr
 
 FORMAT: Final = "transientcam recording"

@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from transientcam_driver import AppliedSequence, RawFrame
-
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import NotARecording, Problem
 from transientcam_server.recording import layout, recovery

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from transientcam_driver import RawFrame
 
+from transientcam_driver import RawFrame
 from transientcam_server.errors import InputError
 from transientcam_server.products import PRODUCTS, STAGES, Product, Recipe
 from transientcam_server.recording import hdf5, swmr

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from transientcam_driver import DriverError, RawFrame
 
+from transientcam_driver import DriverError, RawFrame
 from transientcam_server.errors import DamagedFrame, NotARecording
 from transientcam_server.recording import hdf5, layout, swmr
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from transientcam_driver import AppliedSequence, RawFrame
-
 from transientcam_server.recording.layout import Header
 from transientcam_server.recording.swmr import in_words
 from transientcam_server.recording.writer import RecordingWriter

@@ -26,7 +26,6 @@ from transientcam_driver import (
 from transientcam_driver.protocol import DeviceState
 from transientcam_driver.protocol.status import StatusFlag
 from transientcam_driver.simulation.clock import Clock, RealClock
-
 from transientcam_server.recording.reader import Recording
 
 PREFIX: Final = "recording:"

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from transientcam_driver import RawFrame
-
 from transientcam_server.recording import hdf5, layout, swmr
 from transientcam_server.recording.layout import Header
 

@@ -6,8 +6,8 @@ from dataclasses import asdict
 from typing import Any
 
 from fastapi import APIRouter
-from transientcam_driver import CameraError, Status
 
+from transientcam_driver import CameraError, Status
 from transientcam_server.routes.models import CameraDocument
 from transientcam_server.service import ServiceOf
 

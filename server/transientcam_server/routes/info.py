@@ -1,9 +1,9 @@
 """What answers here, and which versions of the interface it serves."""
 
-import transientcam_moments as tm
 from fastapi import APIRouter
-from transientcam import wire
 
+import transientcam_moments as tm
+from transientcam import wire
 from transientcam_server.encoding import ENCODINGS
 from transientcam_server.products import Product
 from transientcam_server.routes.models import InfoDocument, VersionsDocument

@@ -3,8 +3,8 @@
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Header, Response
-from transientcam.wire import LEASE_HEADER
 
+from transientcam.wire import LEASE_HEADER
 from transientcam_server import lease as leases
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.access import PrincipalOf, needs

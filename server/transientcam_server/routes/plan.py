@@ -3,8 +3,8 @@
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query
-from transientcam_driver import Sequence
 
+from transientcam_driver import Sequence
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.access import needs
 from transientcam_server.planner import Goal

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Header, Response
 from pydantic import WithJsonSchema
-from transientcam_driver import AppliedSequence, Sequence
 
+from transientcam_driver import AppliedSequence, Sequence
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.access import needs
 from transientcam_server.errors import Problem

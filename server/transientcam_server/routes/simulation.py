@@ -5,8 +5,8 @@ from collections.abc import Callable
 from typing import Final
 
 from fastapi import APIRouter
-from transientcam_driver import Simulation
 
+from transientcam_driver import Simulation
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import Problem
 from transientcam_server.problems import documented

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import transientcam_moments as tm
 from numpy.typing import NDArray
-from transientcam_driver import AppliedSequence, Camera, RawFrame, Truth
 
+import transientcam_moments as tm
+from transientcam_driver import AppliedSequence, Camera, RawFrame, Truth
 from transientcam_server.products import STAGES, Recipe
 from transientcam_server.settings import ReconstructionSettings
 from transientcam_server.tradeoff.truth import Sample, count_returns, cumulative

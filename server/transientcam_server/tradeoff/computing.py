@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import transientcam_moments as tm
 from numpy.typing import NDArray
 
+import transientcam_moments as tm
 from transientcam_server.tradeoff.grid import Grid
 
 _Array = NDArray[Any]

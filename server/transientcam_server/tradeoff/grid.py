@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from transientcam_driver import Sequence, SubPhases
-
 from transientcam_server.errors import InputError
 
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
+
 import transientcam_moments as tm
 from transientcam_driver import Camera, Sequence, Truth, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
-
 from transientcam_server.products import STAGES, Recipe
 from transientcam_server.settings import ReconstructionSettings
 from transientcam_server.tradeoff import capture, computing, transport

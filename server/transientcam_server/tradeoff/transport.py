@@ -9,9 +9,10 @@ from functools import partial
 from typing import Any, Final
 
 import numpy as np
-import transientcam_moments as tm
 from numpy.typing import NDArray
 from PIL import Image
+
+import transientcam_moments as tm
 
 _Array = NDArray[Any]
 _Clock = Callable[[], float]

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from transientcam_driver import Truth
 
 _Array = NDArray[Any]

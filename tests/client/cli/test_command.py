@@ -7,6 +7,7 @@ from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 
 import pytest
+
 import transientcam
 from transientcam.cli import run, verbs
 from transientcam.errors import CommandUnavailable

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from transientcam import Frame, wire
 from transientcam.cli.formats import Format, frame_bytes
 

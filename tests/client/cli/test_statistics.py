@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from transientcam import Frame, Notice
 from transientcam.cli.statistics import Statistics
 

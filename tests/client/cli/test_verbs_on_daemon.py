@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from PIL import Image
 from rich.console import Console
+
+from tests.serving import Served, serving
 from transientcam import Notice, wire
 from transientcam.cli import run
 from transientcam.cli.statistics import Sample
 from transientcam.cli.watch import Screen
-
-from tests.serving import Served, serving
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 import usb.core
 import usb.util
+
 from transientcam_driver.protocol import PRODUCT_ID, VENDOR_ID, Request
 from transientcam_driver.simulation.backend import SimulatedBus
 from transientcam_driver.simulation.build import build, find_scene

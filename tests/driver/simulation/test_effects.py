@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from transientcam_driver import SceneError, Sequence, SubPhases
 from transientcam_driver.simulation import effects as package
 from transientcam_driver.simulation.build import find_scene, world_of

@@ -1,6 +1,7 @@
 """What happens to packets on a bad cable, byte by byte."""
 
 import pytest
+
 from transientcam_driver.simulation.faults import Fault, FaultyCable
 
 PACKETS = [bytes([number]) * 200 for number in range(4)]

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from transientcam_driver import ImageLabel, Sequence
 from transientcam_driver.framing import ImagePacket, PacketDecoder
 from transientcam_driver.protocol import (

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from transientcam_driver.simulation.geometry import Ellipsoid, Rectangle
 
 

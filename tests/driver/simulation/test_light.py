@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from transientcam_driver.simulation.build import find_scene
 from transientcam_driver.simulation.geometry import Rectangle
 from transientcam_driver.simulation.light import trace

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from transientcam_driver import SceneError, Sequence, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
 from transientcam_driver.simulation.measured import area_weights, load_responses

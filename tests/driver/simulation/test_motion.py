@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from transientcam_driver.simulation.motion import Motion, Repeat
 
 PATH = np.array([[0.0, 0, 0], [1.0, 0, 0], [1.0, 2.0, 0]])

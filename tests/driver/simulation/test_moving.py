@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from transientcam_driver.simulation.build import find_scene
 from transientcam_driver.simulation.geometry import Rectangle
 from transientcam_driver.simulation.light import camera_rays, trace

@@ -2,6 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from transientcam_driver import SceneError, list_scenes
 from transientcam_driver.simulation.build import find_scene
 from transientcam_driver.simulation.scene_file import load_scene

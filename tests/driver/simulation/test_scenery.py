@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from transientcam_driver import SceneError, Sequence, list_scenes, open_camera
 from transientcam_driver.simulation.build import find_scene, scenery_of, world_of
 from transientcam_driver.simulation.clock import VirtualClock

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from transientcam_driver import Sequence, SubPhases
 from transientcam_driver.simulation.effects import EFFECTS, Call, Effect, ShotNoise
 from transientcam_driver.simulation.effects.shot_noise import FEW_E

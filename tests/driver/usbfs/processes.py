@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
+
 from transientcam_driver import Camera, Sequence
 
 PRELOAD = "libumockdev-preload.so.0"

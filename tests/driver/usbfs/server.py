@@ -8,11 +8,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from usbfs import UsbfsMount  # type: ignore[import-not-found]  # beside this script, no package
+
 from transientcam_driver.protocol import Request, Status
 from transientcam_driver.simulation.build import build, find_scene, without_noise
 from transientcam_driver.simulation.clock import RealClock
 from transientcam_driver.simulation.faults import Fault
-from usbfs import UsbfsMount  # type: ignore[import-not-found]  # beside this script, no package
 
 
 def main() -> None:

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+
 import transientcam
 
 from .processes import EmulatedCamera, Program, emulated_camera, skip_or_fail

@@ -4,9 +4,8 @@ import os
 import sys
 from pathlib import Path
 
-from transientcam_server.recording import RecordingWriter
-
 from tests.server.recording.made import frame, header
+from transientcam_server.recording import RecordingWriter
 
 
 def main() -> None:

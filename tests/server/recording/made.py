@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from transientcam_driver import Capabilities, RawFrame, Sequence, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
 from transientcam_server.recording import Header, RecordingWriter

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import xarray
 import zarr
-from transientcam_server.errors import DamagedFrame, MissingExtra, NotConvertible
-from transientcam_server.recording import Recording
-from transientcam_server.recording.convert import convert
 from zarr.core.sync import cleanup_resources
 
 from tests.server.recording.made import APPLIED, frame, record
+from transientcam_server.errors import DamagedFrame, MissingExtra, NotConvertible
+from transientcam_server.recording import Recording
+from transientcam_server.recording.convert import convert
 
 FRAMES = 3
 

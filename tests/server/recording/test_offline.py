@@ -3,6 +3,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+
 import transientcam_moments as tm
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.simulation.clock import VirtualClock

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as of_numpy
 from isal import isal_zlib
+
+from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, assert_same, frame, header, record
 from transientcam_driver import RawFrame
 from transientcam_server.errors import DamagedFrame, NotARecording
 from transientcam_server.recording import Recording, RecordingWriter, swmr
-
-from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, assert_same, frame, header, record
 
 SHAPE = (APPLIED.images, HEIGHT, WIDTH)
 

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from transientcam_driver import Sequence
-from transientcam_server.recording import Recording, RecordingWriter, recover
-from transientcam_server.recording.recorder import Limits, Recorder
 
 from tests.server.recording.made import APPLIED, CAPABILITIES, assert_same, frame, header
 from tests.server.recording.test_recovery import limited_files
+from transientcam_driver import Sequence
+from transientcam_server.recording import Recording, RecordingWriter, recover
+from transientcam_server.recording.recorder import Limits, Recorder
 
 PATIENCE_S = 30.0
 PLENTY = 10**15

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import h5py
 import pytest
-from transientcam_server.errors import NotARecording
-from transientcam_server.recording import Recording, RecordingWriter, recover
-from transientcam_server.recording.recovery import recover_all, unfinished
 
 from tests.conftest import ROOT
 from tests.server.recording.made import assert_same, frame, header, record
+from transientcam_server.errors import NotARecording
+from transientcam_server.recording import Recording, RecordingWriter, recover
+from transientcam_server.recording.recovery import recover_all, unfinished
 
 KILLS = 20
 

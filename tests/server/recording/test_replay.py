@@ -3,6 +3,8 @@ from pathlib import Path
 
 import h5py
 import pytest
+
+from tests.server.recording.made import APPLIED, CAPABILITIES, SEQUENCE, assert_same, frame, record
 from transientcam_driver import (
     CameraClosed,
     CameraLost,
@@ -17,8 +19,6 @@ from transientcam_driver.simulation.clock import VirtualClock
 from transientcam_server import cameras
 from transientcam_server.errors import DamagedFrame, NotARecording
 from transientcam_server.recording.replay import ReplayCamera, ReplaySpec, parse_replay
-
-from tests.server.recording.made import APPLIED, CAPABILITIES, SEQUENCE, assert_same, frame, record
 
 
 @pytest.fixture(scope="module")

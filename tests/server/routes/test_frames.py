@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
-from transientcam import wire
-from transientcam_server import pipeline
 
 from tests.serving import Served
+from transientcam import wire
+from transientcam_server import pipeline
 
 LATEST = "/api/v1/frames/latest"
 

@@ -1,4 +1,5 @@
 import httpx
+
 from transientcam import wire
 
 

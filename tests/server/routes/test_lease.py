@@ -2,10 +2,10 @@ from typing import Any
 
 import httpx
 import pytest
-from transientcam.wire import LEASE_HEADER
 
 from tests.server.streaming import streaming
 from tests.serving import Served
+from transientcam.wire import LEASE_HEADER
 
 PATH = "/api/v1/lease"
 ANNA: dict[str, Any] = {"holder": "anna", "duration_s": 300.0}

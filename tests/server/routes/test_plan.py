@@ -5,10 +5,10 @@ from typing import Any
 
 import httpx
 import pytest
-from transientcam_server import planner
 
 from tests.server.contract import hold_to_contract
 from tests.serving import Served, serving
+from transientcam_server import planner
 
 FIXED = {"base_frequency_hz": 23e6, "harmonics": 3}
 SCENE = {"brightness_dn_per_s": 8e5, "returns": [{"range_m": 1.5}, {"range_m": 3.0, "weight": 0.5}]}

@@ -9,15 +9,15 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
-from transientcam import wire
-from transientcam_driver import RawFrame
-from transientcam_server.acquisition import Captured
-from transientcam_server.recording import Recording
 
 from tests.server.contract import hold_to_contract
 from tests.server.recording.made import assert_same, record
 from tests.server.recording.test_recovery import abandoned
 from tests.serving import Served, serving
+from transientcam import wire
+from transientcam_driver import RawFrame
+from transientcam_server.acquisition import Captured
+from transientcam_server.recording import Recording
 
 RECORDINGS = "/api/v1/recordings"
 PATIENCE_S = 30.0

@@ -1,8 +1,8 @@
 import httpx
 import pytest
-from transientcam import wire
 
 from tests.serving import Served
+from transientcam import wire
 
 
 def test_the_simulated_scene_is_told(http: httpx.Client) -> None:
