@@ -152,7 +152,8 @@ def report(cold: list[Start], warm: list[Start], streamed: Streamed) -> str:
         "",
         "Time from starting the daemon's process, median (and range) of "
         f"{len(cold)} cold and {len(warm)} warm starts;",
-        "cold: nothing compiled yet; on screen: the range map is drawn in a browser that already ran.",
+        "cold: nothing compiled yet; on screen: the range map is drawn,",
+        "in a browser that already ran.",
         "",
         "| | prints its address | first range map over HTTP | on screen |",
         "|---|---|---|---|",

@@ -12,11 +12,11 @@ from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 from starlette.routing import compile_path
+
 from transientcam.errors import ProtocolError
 from transientcam.wire import PROBLEM_MEDIA_TYPE
 from transientcam_driver import CameraError, CameraLost, CameraNotFound, DriverError, SequenceError
 from transientcam_moments import ParameterError
-
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import Problem
 from transientcam_server.logs import request_id
@@ -278,6 +278,5 @@ def _shown(value: object) -> str:
 
 
 def _shortened(text: str) -> str:
-    text = text.encode("utf-8", "replace").decode()  # JSON may bring half a character
     text = text.encode("utf-8", "replace").decode()  # JSON may bring half a character
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
