@@ -143,9 +143,10 @@ BIN_S = 5e-11
 
 def bin_edges(delay_s: NDArray[np.float64], *, tail_s: float) -> NDArray[np.float64]:
     """Edges of equal bins around returns, one of which is centred at the first return."""
-    first, last = (delay_s.min(), delay_s.max()) if delay_s.size else (0.0, 0.0)
+    first = float(delay_s.min()) if delay_s.size else 0.0
+    last = float(delay_s.max()) if delay_s.size else 0.0
     before, after = math.ceil(tail_s / BIN_S), math.ceil((last - first + tail_s) / BIN_S)
-    return first + BIN_S * (np.arange(-before, after + 2) - 0.5)
+    return np.asarray(first + BIN_S * (np.arange(-before, after + 2) - 0.5), dtype=np.float64)
 
 
 @dataclass(frozen=True)
