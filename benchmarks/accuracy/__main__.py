@@ -7,7 +7,6 @@ keeps the page and its figures in docs/. The measured composite needs TRANSIENTC
 import argparse
 import os
 import tempfile
-import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -61,13 +60,14 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         folder = arguments.output or Path(temporary, "results")
         scenes = {name: name for name in SCENES if name in known_scenes()}
-        composite = composite_scene(Path(temporary))
+        folder.mkdir(parents=True, exist_ok=True)
+        composite = composite_scene(folder)
         if composite is not None:
             scenes["composite"] = composite
-        records, took_s = measured(scenes, folder, "quick" if arguments.quick else "paper")
+        records = measured(scenes, folder, "quick" if arguments.quick else "paper")
         noise = predicted_and_observed()
         plans = [each for name in ("wall", "mirrors", "corner") for each in planned(name)]
-        page = report(scenes, records, noise, plans, took_s)
+        page = report(scenes, records, noise, plans)
         print(page)
         if arguments.write:
             (DOCS / "figures").mkdir(exist_ok=True)
@@ -96,20 +96,16 @@ def _advance(progress: Progress, task: TaskID, kind: str) -> None:
     progress.advance(task)
 
 
-def measured(
-    scenes: dict[str, str], folder: Path, grid: str
-) -> tuple[tradeoff.Records, dict[str, float]]:
-    """Run the whole tradeoff; return its results, and how long each scene took."""
+def measured(scenes: dict[str, str], folder: Path, grid: str) -> tradeoff.Records:
+    """Run the whole tradeoff and report it."""
     tm.kernels.compile()
-    records, took_s = tradeoff.Records(folder), {}
-    chosen = tradeoff.load_grid(grid)
+    records, chosen = tradeoff.Records(folder), tradeoff.load_grid(grid)
     with Progress() as progress:
         for name, spec in scenes.items():
             # what computing and sending cost is hardly the scene's
             own = chosen if name == "mirrors" else replace(chosen, harmonics=())
             points = tradeoff.points_of(own, scene=spec, repetitions=5, seed=SEED)
             task = progress.add_task(name, total=len(points))
-            begin_s = time.perf_counter()
             tradeoff.measure(
                 points,
                 records,
@@ -117,9 +113,8 @@ def measured(
                 seed=SEED,
                 progress=partial(_advance, progress, task),
             )
-            took_s[name] = time.perf_counter() - begin_s
     tradeoff.report(folder, records)
-    return records, took_s
+    return records
 
 
 if __name__ == "__main__":

@@ -16,7 +16,6 @@ def report(
     records: tradeoff.Records,
     noise: list[Compared],
     plans: list[Planned],
-    took_s: dict[str, float],
 ) -> str:
     """Return the page."""
     lines = [
@@ -35,7 +34,7 @@ def report(
     ]
     for name, spec in scenes.items():
         lines += _scene(name, spec, records)
-    lines += [*_computing(records), *_noise(noise), *_plans(plans), *_time(took_s, records)]
+    lines += [*_computing(records), *_noise(noise), *_plans(plans), *_time(scenes, records)]
     return "\n".join(lines) + "\n"
 
 
@@ -103,12 +102,22 @@ def _number(record: tradeoff.Record, name: str, factor: float, form: str = "{:.3
     return "–" if value is None else form.format(value * factor)
 
 
+_KIND = {
+    "wall": "One return a pixel.",
+    "corner": "Diffuse light comes back close behind the direct return.",
+    "mirrors": "Three sharp returns in most pixels.",
+    "visitor": "Somebody moves before a bright wall while the images are taken.",
+    "composite": "Three returns of different sharpness, measured with single photons.",
+}
+
+
 def advice(name: str, captures: list[tradeoff.Record]) -> list[str]:
     """Say plainly what the figures of a scene mean, from the figures."""
     by = {_key(record): record for record in captures}
     video, still = by.get((3, "estimated", 0.0005, 1)), by.get((3, "low-frequency", 0.00192, 1))
     four, eight = by.get((4, "low-frequency", 0.00192, 1)), by.get((8, "low-frequency", 0.00192, 1))
-    sentences = []
+    sentences = [_KIND[name]] if name in _KIND else []
+    sentences += _quickest(captures)
     if video is not None:
         sentences.append(
             "m = 3 without a zeroth moment at 0.5 ms runs at "
@@ -131,10 +140,41 @@ def advice(name: str, captures: list[tradeoff.Record]) -> list[str]:
             f"{_times(eight, four, 'cumulative_mean')} its error of the light, "
             f"{_times(eight, four, 'bound_width')} the distance of its bounds."
         )
-    best = _best_estimator(four)
-    if best:
-        sentences.append(best)
-    return [" ".join(sentences)] if sentences else []
+    sentences.append(_best_estimator(four))
+    sentences.append("" if four is None else _saturating(four))
+    return [" ".join(filter(None, sentences))]
+
+
+def _quickest(captures: list[tradeoff.Record]) -> list[str]:
+    """Say how soon the error is within a factor of ten and of three of the least there is."""
+    errors = {
+        index: record.values["range_median_m"]
+        for index, record in enumerate(captures)
+        if record.values.get("range_median_m")
+    }
+    if not errors:
+        return []
+    least_m = min(error for error in errors.values() if error is not None)
+    said = []
+    for factor in (10, 3):
+        first = next(index for index, error in errors.items() if (error or 0) <= factor * least_m)
+        record = captures[first]
+        said.append(
+            f"{short(Sequence.from_document(record.point))} takes "
+            f"{_number(record, 'capture_s', 1e3, '{:.0f}')} ms for a median error of "
+            f"{_number(record, 'range_median_m', 1e3)} mm"
+        )
+    return [
+        f"The least median error of all is {least_m * 1e3:.2g} mm; the quickest within ten times "
+        f"that, {said[0]}; within three times, {said[1]}."
+    ]
+
+
+def _saturating(record: tradeoff.Record) -> str:
+    share = record.values.get("saturated") or 0.0
+    if share < 0.01:
+        return ""
+    return f"At 1.92 ms {share:.0%} of the pixels saturate, and their range is not to be trusted."
 
 
 def _key(record: tradeoff.Record) -> tuple[int, str, float, int]:
@@ -268,10 +308,15 @@ def _plans(plans: list[Planned]) -> list[str]:
     ]
 
 
-def _time(took_s: dict[str, float], records: tradeoff.Records) -> list[str]:
+def _time(scenes: dict[str, str], records: tradeoff.Records) -> list[str]:
+    took_s = {
+        name: sum(record.took_s for record in records if record.scene == spec)
+        for name, spec in scenes.items()
+    }
     each = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in took_s.items())
     return [
         "## How long this takes",
         "",
-        f"{len(list(records))} points; measured in this run: {each}.",
+        f"{len(records)} points in {sum(took_s.values()) / 60:.0f} minutes: {each}. Every point is "
+        "on the disk before the next one begins: a run that is stopped loses the one it was at.",
     ]

@@ -40,6 +40,7 @@ QUANTITIES: Final[dict[str, str]] = {
     "times, over the mean density",
     "valid": "share of pixels without any flag",
     "biased": "share of pixels that had to be biased",
+    "saturated": "share of pixels at the end of the scale",
 }
 """What is measured, in words."""
 
@@ -128,8 +129,10 @@ def _of_shot(shot: Shot, sample: Sample, recipe: Recipe) -> tuple[_Array, dict[s
         values[f"{name}_rmse_m"] = _rmse(tm.range_m(phase_rad, f_hz), truth.range_m, seen)
     values["returns_right"] = _returns_right(found.returns, truth, seen, recipe)
     values |= _density_errors(found.moments[:, sample.y, sample.x], sample, truth, f_hz)
-    values["valid"] = float((found.flags[lit] == 0).mean())
-    values["biased"] = float(((found.flags[lit] & np.uint8(tm.Flags.BIASED)) != 0).mean())
+    flags = np.asarray(found.flags)[lit]
+    values["valid"] = float((flags == 0).mean())
+    for flag in (tm.Flags.BIASED, tm.Flags.SATURATED):
+        values[str(flag.name).lower()] = float(((flags & np.uint8(flag)) != 0).mean())
     return range_m, values
 
 

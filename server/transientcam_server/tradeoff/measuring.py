@@ -1,5 +1,6 @@
 """All points of a grid on a scene, one after the other, each kept before the next begins."""
 
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -80,7 +81,13 @@ def points_of(grid: Grid, *, scene: str, repetitions: int, seed: int) -> list[Po
 
 
 def measure(
-    points: list[Point], records: Records, *, scene: str, seed: int, progress: Callable[[str], None]
+    points: list[Point],
+    records: Records,
+    *,
+    scene: str,
+    seed: int,
+    progress: Callable[[str], None],
+    clock: Callable[[], float] = time.perf_counter,
 ) -> None:
     """Measure what is not in the records yet.
 
@@ -94,6 +101,8 @@ def measure(
         Which world, and its chance.
     progress
         Is told the kind of each point when it is done, also of those that were there already.
+    clock
+        Of the machine, for how long each point takes.
 
     Raises
     ------
@@ -110,8 +119,12 @@ def measure(
         return
     bench = _Bench(spec_of(scene, seed=seed), seed=seed)
     for point in left:
+        begin_s = clock()
         values, spread = point.run(bench)
-        records.append(Record(point.kind, scene, point.point, point.conditions, values, spread))
+        took_s = clock() - begin_s
+        records.append(
+            Record(point.kind, scene, point.point, point.conditions, values, spread, took_s)
+        )
         progress(point.kind)
 
 

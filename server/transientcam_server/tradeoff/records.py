@@ -4,7 +4,7 @@ import csv
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,6 +27,8 @@ class Record:
         Seed, repetitions and the like: what else a repetition would need.
     values, spread
         Mean and standard deviation over the repetitions, by quantity; None where it has none.
+    took_s
+        Time that the measurement took.
     """
 
     kind: str
@@ -35,6 +37,7 @@ class Record:
     conditions: Mapping[str, Any]
     values: Mapping[str, float | None]
     spread: Mapping[str, float | None]
+    took_s: float = field(default=0.0, compare=False)
 
     @property
     def key(self) -> str:
