@@ -28,7 +28,7 @@ body { max-width: 78rem; margin: 2rem auto; padding: 0 1rem; }
 .plots g[id^="p"] { cursor: pointer; }
 .table { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
-th, td { padding: .2rem .6rem; text-align: right; border-bottom: 1px solid #8884; }
+th, td { padding: .2rem .6rem; text-align: right; white-space: nowrap; border-bottom: 1px solid #8884; }
 th:first-child, td:first-child { text-align: left; white-space: nowrap; }
 tr.chosen { background: #fd04; }
 small { opacity: .7; }
@@ -174,7 +174,7 @@ def _table(records: list[Record], quantities: Mapping[str, str]) -> str:
         data = f' data-sequence="{body}"' if copyable else ""
         button = "<td><button class=copy>Copy</button>" if copyable else ""
         rows.append(
-            f'<tr id="row-{point_id(record)}"{data}><td>{html.escape(_what(record))}{cells}{button}'
+            f'<tr id="row-{point_id(record)}"{data}><td>{html.escape(_what(record))}{button}{cells}'
         )
     return "\n".join([*rows, "</table></div>"])
 
