@@ -1,6 +1,7 @@
 """Density evaluation against NumPy, this machine's ceiling and the paper's graphics card."""
 
-from collections.abc import Iterator, Sequence
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
@@ -8,14 +9,18 @@ import numpy as np
 
 import transientcam_moments as tm
 from benchmarks.ceiling import Ceiling, measured
-from benchmarks.data import CORES, PAPER, lane, moments, numpy_alone
+from benchmarks.data import CORES, PAPER, Array, lane, moments, numpy_alone
 from benchmarks.tables import Table, verdict
 from benchmarks.timing import measure
 
 ORDERS = (3, 4, 8)
 # Sec. 6.3: density frames a second of 163 x 120 pixels on a GTX 780
 PAPER_FRAMES_S = {3: 2.9e5, 4: 2.2e5, 8: 1.1e5}
-_CACHED, _STREAMED = 64, 1024  # frames: 5 MB and 80 MB
+_CACHED, _STREAMED = 192, 1024  # frames: 15 MB and 80 MB
+_PHASES: dict[str, Callable[[int], Array]] = {
+    "any": lambda count: np.random.default_rng(count).uniform(0, 2 * np.pi, count),
+    "equidistant": lambda count: np.linspace(0, 2 * np.pi, count, endpoint=False),
+}
 
 
 def tables() -> Iterator[Table]:
@@ -24,12 +29,13 @@ def tables() -> Iterator[Table]:
     yield _ceiling_table(ceilings)
     table = Table(
         "Density, 163 x 120, float32, modulus: frames a second",
-        ("m, cores, frames", "lane", "NumPy", "gain", "roofline", "share", "paper"),
+        ("m, phases, cores, frames", "lane", "NumPy", "gain", "roofline", "share", "paper"),
         notes=[
             "NumPy: two matrix products (BLAS, all cores) and a reciprocal. Paper: a GTX 780.",
-            "A value is 4 m + 2 fused multiply-adds and 4 bytes written (the division and the "
-            "floor of the denominator aren't counted); the roofline is the smaller of both rates.",
-            f"{_CACHED} frames (5 MB) stay in the last cache, {_STREAMED} (80 MB) don't.",
+            "Any phases need 4 m + 2 fused multiply-adds a value; equidistant ones, in pairs about "
+            "their middle, 2 m + 4. The roofline is the smaller of that rate (division and floor "
+            "of the denominator not counted) and of 4 bytes written.",
+            f"{_CACHED} frames (15 MB) stay in the last cache, {_STREAMED} (80 MB) don't.",
         ],
     )
     for m in ORDERS:
@@ -44,25 +50,28 @@ def _rows(m: int, ceilings: dict[int, Ceiling]) -> tuple[list[Sequence[str]], li
     rows: list[Sequence[str]] = []
     notes: list[str] = []
     numpy_s = _numpy_frames_s(c)
-    for cores, ceiling in ceilings.items():
-        for kind, frames in (("cached", _CACHED), ("streamed", _STREAMED)):
-            rate = _frames_s(c, frames, cores)
-            writes = ceiling.cached_bytes_s if kind == "cached" else ceiling.stream_bytes_s
-            roof = min(ceiling.fused_s / (4 * m + 2), writes / 4) / c.error.size
-            label = f"m = {m}, {kind}, {cores} cores"
-            notes.append(verdict(rate / roof, 0.6, f"{label}, share of the roofline"))
-            against_numpy = ("", "")
-            if cores == CORES:
-                against_numpy = (f"{numpy_s:.3g}", f"{rate / numpy_s:.1f}")
-                notes.append(verdict(rate / numpy_s, 12, f"{label}, times NumPy"))
-                notes.append(verdict(rate, PAPER_FRAMES_S[m], f"{label}, paper's GPU"))
-            shares = (f"{roof:.3g}", f"{100 * rate / roof:.0f} %", f"{PAPER_FRAMES_S[m]:.3g}")
-            rows.append((f"{m}, {cores}, {kind}", f"{rate:.3g}", *against_numpy, *shares))
+    cases = itertools.product(_PHASES, ceilings, (("cached", _CACHED), ("streamed", _STREAMED)))
+    for phases, cores, (kind, frames) in cases:
+        ceiling = ceilings[cores]
+        rate = _frames_s(c, _PHASES[phases](frames), cores)
+        fused = 4 * m + 2 if phases == "any" else 2 * m + 4
+        writes = ceiling.cached_bytes_s if kind == "cached" else ceiling.stream_bytes_s
+        roof = min(ceiling.fused_s / fused, writes / 4) / c.error.size
+        label = f"m = {m}, {phases} phases, {kind}, {cores} cores"
+        notes.append(verdict(rate / roof, 0.6, f"{label}, share of the roofline"))
+        against_numpy = ("", "")
+        if cores == CORES:
+            against_numpy = (f"{numpy_s:.3g}", f"{rate / numpy_s:.1f}")
+            notes.append(verdict(rate / numpy_s, 12, f"{label}, times NumPy"))
+            notes.append(verdict(rate, PAPER_FRAMES_S[m], f"{label}, paper's GPU"))
+        shares = (f"{roof:.3g}", f"{100 * rate / roof:.0f} %", f"{PAPER_FRAMES_S[m]:.3g}")
+        name = f"{m}, {phases}, {cores}, {kind}"
+        rows.append((name, f"{rate:.3g}", *against_numpy, *shares))
     return rows, notes
 
 
-def _frames_s(c: tm.Coefficients, frames: int, cores: int) -> float:
-    phase_rad = np.linspace(0, 2 * np.pi, frames, endpoint=False)
+def _frames_s(c: tm.Coefficients, phase_rad: Array, cores: int) -> float:
+    frames = phase_rad.size
     out = np.empty((frames, *PAPER), np.float32)
     evaluate = lane("density", c.polynomial)
     with ThreadPoolExecutor(max(1, cores - 1)) as executor:

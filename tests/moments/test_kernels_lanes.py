@@ -163,13 +163,18 @@ def test_indefinite_moments_are_projected_as_by_the_planar_statement(m: int, dty
     assert np.abs(reflection - planar[2])[:, inside].max() < 1e5 * eps(b)
 
 
-@pytest.mark.parametrize("phases", [1, 2, 7, 64])
+@pytest.mark.parametrize("equidistant", [False, True])
+@pytest.mark.parametrize("phases", [1, 2, 7, 8, 9, 64])
 @pytest.mark.parametrize("dtype", TYPES)
 @pytest.mark.parametrize("m", ORDERS)
-def test_densities_follow_the_planar_statement(m: int, dtype: type, phases: int) -> None:
+def test_densities_follow_the_planar_statement(
+    m: int, dtype: type, phases: int, equidistant: bool
+) -> None:
     b = tm.bias(varied_moments(m, dtype)).moments
     coefficients = tm.levinson(b)
     phase_rad = np.random.default_rng(phases).uniform(-10, 10, phases)
+    if equidistant:
+        phase_rad = np.linspace(-3, 10, phases)
 
     found = tm.density(coefficients, phase_rad)
 
@@ -184,20 +189,21 @@ def test_densities_follow_the_planar_statement(m: int, dtype: type, phases: int)
     assert (np.abs(found / planar - 1) < 64 * m * eps(b) * depth).all()
 
 
-@pytest.mark.parametrize("pixels", [64, 65, 79, 250, 19560 // 8 + 3])
+@pytest.mark.parametrize("phases", [1, 5, 9, 12, 19])
+@pytest.mark.parametrize("pixels", [64, 65, 72, 250, 2448, 2449])
 @pytest.mark.parametrize("past_caches", [False, True])
 def test_densities_are_written_to_every_pixel_and_no_other_place(
-    pixels: int, past_caches: bool, monkeypatch: pytest.MonkeyPatch
+    pixels: int, phases: int, past_caches: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if past_caches:
         monkeypatch.setattr(density_module, "_PAST_CACHES_BYTES", -1)
     b = oracles.random_moments(np.random.default_rng(pixels), 3, pixels).astype(np.complex64)
     c = tm.levinson(b)
-    phase_rad = np.linspace(0, 6, 5)
-    room = np.full(5 * pixels + 128, -1, np.float32)
+    phase_rad = np.linspace(0, 6, phases)
+    room = np.full(phases * pixels + 128, -1, np.float32)
 
     for offset in (3, 16, 31):  # wherever memory begins
-        out = room[offset : offset + 5 * pixels].reshape(5, pixels)
+        out = room[offset : offset + phases * pixels].reshape(phases, pixels)
         out[:] = np.nan
         lane("density", c.polynomial)(c.polynomial, c.reflection, c.error, phase_rad, out)
 
@@ -205,6 +211,32 @@ def test_densities_are_written_to_every_pixel_and_no_other_place(
             assert np.allclose(out, tm.density(c, phase_rad), rtol=1e-3)
         out[:] = -1
         assert (room == -1).all(), "something was written outside"
+
+
+@pytest.mark.parametrize("alike", [1, 2, 4, 16])
+@pytest.mark.parametrize("phases", [1, 2, 3, 7, 8, 9, 31, 64])
+@pytest.mark.parametrize("equidistant", [False, True])
+def test_every_phase_is_in_one_pair_of_rows_that_begin_alike(
+    phases: int, alike: int, equidistant: bool
+) -> None:
+    phase_rad = np.linspace(-1, 9, phases) ** (1 if equidistant else 3)
+
+    pairs = density_module.paired(phase_rad, 3, "d", alike)
+
+    first, second = pairs.rows.reshape(2, -1)
+    assert sorted(np.unique(pairs.rows)) == list(range(phases))
+    assert len(first) <= phases // 2 + alike
+    assert ((second - first) % alike == 0).all()
+    assert pairs.mirrored == (equidistant and alike <= 2 and phases >= 8)
+    centre = np.angle(np.exp(1j * np.arctan2(pairs.centre[3], pairs.centre[0])))
+    angle = np.arctan2(pairs.waves[:, 3], pairs.waves[:, 0]) + centre
+    assert np.allclose(np.exp(1j * angle), np.exp(1j * phase_rad[first]))
+
+
+def test_no_phases_give_an_empty_density() -> None:
+    c = tm.levinson(varied_moments(3, np.complex64))
+
+    assert tm.density(c, np.zeros(0)).shape == (0, 1003)
 
 
 @pytest.mark.parametrize("m", ORDERS)

@@ -29,6 +29,7 @@ def complex_arrays(precision: str) -> dict[int, Any]:
 
 PIXELS = _types.int64
 REAL = _types.float64
+FLAG = _types.boolean
 COUNTS = _types.Array(_types.int32, 1, "C")
 PLACES = _types.Array(_types.int64, 1, "C")
 BYTES = _types.Array(_types.uint8, 1, "C")
