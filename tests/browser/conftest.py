@@ -31,7 +31,9 @@ def built() -> None:
         pytest.fail("The built dashboard is missing or older than its sources: make dashboard")
 
 
-@pytest.fixture(scope="session")
+# not for the session: while playwright runs, this thread has a running event loop, and no test that
+# comes after those of the browser could run one of its own
+@pytest.fixture(scope="module")
 def browser(built: None) -> Iterator[Browser]:
     """Chromium without a window; needed in CI, and elsewhere skipped where it is not installed."""
     executable = shutil.which("chromium")
