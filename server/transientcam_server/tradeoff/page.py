@@ -28,7 +28,8 @@ body { max-width: 78rem; margin: 2rem auto; padding: 0 1rem; }
 .plots g[id^="p"] { cursor: pointer; }
 .table { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
-th, td { padding: .2rem .6rem; text-align: right; border-bottom: 1px solid #8884; white-space: nowrap }
+th, td { padding: .2rem .6rem; text-align: right; white-space: nowrap; }
+th, td { border-bottom: 1px solid #8884; }
 th:first-child, td:first-child { text-align: left; }
 tr.chosen { background: #fd04; }
 small { opacity: .7; }
