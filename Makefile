@@ -35,9 +35,13 @@ check: .venv/test.stamp client/dashboard/node_modules/.package-lock.json  ## Lin
 bench: .venv/test.stamp  ## Measure speed, everything in one run on the same data
 	$(BIN)/python -m benchmarks
 
-docs: .venv/test.stamp  ## Write the generated pages of docs/ anew
+docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (half an hour on a quiet machine)
 	$(BIN)/python -m benchmarks --write
 	$(BIN)/python -m benchmarks.stability
+	$(BIN)/python -m benchmarks.accuracy --write
+	$(BIN)/python -m benchmarks.simulation --write
+	$(BIN)/python -m benchmarks.recording --write
+	$(BIN)/python -m benchmarks.first_light --write
 
 clean:  ## Remove everything that was built or installed here
 	rm -rf .venv build dist client/dashboard/node_modules $(dir $(PAGE))
