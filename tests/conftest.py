@@ -21,8 +21,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
-# Threads that libraries keep for the life of the process, by the start of their name.
-_LIBRARY_THREADS = ("pydev", "OpenBLAS", "transientcam-compile")
+# Threads that libraries keep for the life of the process, or of the loop of a daemon that several
+# tests share, by the start of their name.
+_LIBRARY_THREADS = ("pydev", "OpenBLAS", "transientcam-compile", "AnyIO worker thread")
 
 
 @pytest.fixture(scope="session")
