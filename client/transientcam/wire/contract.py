@@ -19,6 +19,8 @@ MAX_SERVER_MESSAGE_BYTES: Final = 512 * 1024 * 1024
 """The client reads no message longer than this: 640 x 480 at 32 harmonics is 80 MB."""
 MAX_SUBSCRIPTIONS: Final = 16
 MAX_CREDITS: Final = 64
+MAX_DECIMATION: Final = 64
+"""Of every so many pixels one is sent, both ways."""
 FIRST_MESSAGE_WITHIN_S: Final = 10.0
 
 
