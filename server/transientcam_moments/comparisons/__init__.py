@@ -1,0 +1,46 @@
+"""The techniques that the paper is compared with, and its own, in one form.
+
+Each takes moments (m + 1, ...) and gives an `Estimate`: returns or a density, with the cumulative
+response and the phase of the first return. All compute in double precision with NumPy. ::
+
+    from transientcam_moments import comparisons
+
+    for technique in comparisons.TECHNIQUES.values():
+        print(technique.label, technique.estimate(b).cumulative(phase_rad))
+
+"After ..." in a label says that the technique follows what is known of a publication whose text
+was not at hand; no label claims to be the authors' implementation.
+"""
+
+from transientcam_moments.comparisons import (
+    own,
+    single_frequency,
+)
+from transientcam_moments.comparisons.estimate import (
+    Estimate,
+    GridEstimate,
+    MaximumEntropyEstimate,
+    SparseEstimate,
+    grid_rad,
+)
+from transientcam_moments.comparisons.technique import Technique
+
+TECHNIQUES: dict[str, Technique] = {
+    technique.name: technique
+    for technique in (
+        own.MAXIMUM_ENTROPY,
+        own.PISARENKO,
+        single_frequency.TECHNIQUE,
+    )
+}
+"""Every technique by its name; the paper's first."""
+
+__all__ = [
+    "TECHNIQUES",
+    "Estimate",
+    "GridEstimate",
+    "MaximumEntropyEstimate",
+    "SparseEstimate",
+    "Technique",
+    "grid_rad",
+]

@@ -1,0 +1,52 @@
+"""The paper's own estimates in the form of the others (Sec. 3.2 and 5.1)."""
+
+from transientcam_moments._arrays import Array
+from transientcam_moments.comparisons.estimate import MaximumEntropyEstimate, SparseEstimate
+from transientcam_moments.comparisons.technique import Technique, from_first, from_zeroth
+from transientcam_moments.levinson import levinson
+from transientcam_moments.pisarenko import pisarenko
+
+
+def maximum_entropy_estimate(b: Array) -> MaximumEntropyEstimate:
+    """Estimate the density of least Burg entropy with the moments (m + 1, ...), b_0 included.
+
+    Noisy moments have to be biased before: see `transientcam_moments.bias`.
+    """
+    return MaximumEntropyEstimate(levinson(b))
+
+
+def pisarenko_estimate(b: Array) -> SparseEstimate:
+    """Estimate at most m returns and a uniform part from moments (m + 1, ...).
+
+    The returns do not depend on b_0, which only says how strong the uniform part is.
+    """
+    found = pisarenko(b)
+    return SparseEstimate(found.phase_rad, found.weight, found.uniform)
+
+
+MAXIMUM_ENTROPY = Technique(
+    name="maximum-entropy",
+    label="Peters et al. 2015, maximum entropy",
+    returns="density",
+    frequencies="0, f .. m f",
+    harmonics=from_zeroth,
+    least_harmonics=1,
+    assumptions="A positive density; nothing else.",
+    cost="Closed form: O(m^2) once, O(m) a phase.",
+    failure="Peaks broaden and merge where m moments leave the response open; contradictory "
+    "moments have to be biased before.",
+    estimate=maximum_entropy_estimate,
+)
+
+PISARENKO = Technique(
+    name="pisarenko",
+    label="Peters et al. 2015, Pisarenko",
+    returns="m",
+    frequencies="f .. m f; 0 for the uniform part",
+    harmonics=from_first,
+    least_harmonics=1,
+    assumptions="At most m sharp returns and a uniform part.",
+    cost="Closed form: a smallest eigenvalue and the roots of a polynomial of degree m.",
+    failure="A continuous response is made sparse: outliers in range under diffuse light.",
+    estimate=pisarenko_estimate,
+)
