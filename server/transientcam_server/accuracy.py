@@ -66,8 +66,7 @@ class Accuracy:
         self, camera: Camera, settings: ReconstructionSettings, sensor: SensorSettings
     ) -> None:
         self._capabilities = camera.capabilities
-        self._settings = settings
-        self._computing = ComputingTime(camera.capabilities, settings)
+        self.reconstruct_with(settings)
         model = sensor if camera.simulation is None else camera.simulation.sensor
         self.sensor = tm.noise.Sensor(
             gain_e_per_dn=model.gain_e_per_dn,
@@ -76,6 +75,11 @@ class Accuracy:
             dark_dn=model.dark_dn,
             bits=camera.capabilities.bits,
         )
+
+    def reconstruct_with(self, settings: ReconstructionSettings) -> None:
+        """Predict from now on what images become with other settings."""
+        self._settings = settings
+        self._computing = ComputingTime(self._capabilities, settings)
 
     def noise(self, recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoise:
         """Return the noise of a frame's smoothed moments (m + 1, H, W)."""

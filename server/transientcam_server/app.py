@@ -19,6 +19,7 @@ from transientcam_server.routes import (
     lease,
     metrics,
     plan,
+    reconstruction,
     recordings,
     sequence,
     simulation,
@@ -28,7 +29,18 @@ from transientcam_server.service import VERSION, Service
 from transientcam_server.settings import Settings
 
 API: Final = "/api/v1"
-_RESOURCES = (info, camera, lease, sequence, acquisition, frames, recordings, simulation, plan)
+_RESOURCES = (
+    info,
+    camera,
+    lease,
+    sequence,
+    reconstruction,
+    acquisition,
+    frames,
+    recordings,
+    simulation,
+    plan,
+)
 
 
 def build_app(camera: Camera, settings: Settings) -> FastAPI:

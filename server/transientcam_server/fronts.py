@@ -17,7 +17,7 @@ _WIDE_BOUNDS: Final = 1e9  # a target that anything reaches: it only has the bou
 
 @dataclass(frozen=True, slots=True)
 class _Known:
-    epoch: int
+    made_with: tuple[int, int]
     frame: int
     until_s: float
     choices: list[Choice]
@@ -45,9 +45,10 @@ class Fronts:
         """Return the front and the frame's own place, as JSON has them."""
         async with self._asking:
             known = self._known.get(by)
-            if known is None or known.epoch != frame.raw.epoch or self._clock() > known.until_s:
+            made_with = frame.raw.epoch, frame.recipe.reconstruction_id
+            if known is None or known.made_with != made_with or self._clock() > known.until_s:
                 choices = await self._predicted(frame, by)
-                known = _Known(frame.raw.epoch, frame.number, self._clock() + REMEMBERED_S, choices)
+                known = _Known(made_with, frame.number, self._clock() + REMEMBERED_S, choices)
                 self._known[by] = known
         return {
             "compared_by": by,

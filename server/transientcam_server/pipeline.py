@@ -24,6 +24,7 @@ from transientcam_server.cameras import Camera
 from transientcam_server.encoding import Encoding
 from transientcam_server.errors import Problem
 from transientcam_server.products import PRODUCTS, STAGES, Product, Recipe, pixel_counts
+from transientcam_server.reconstruction import Reconstruction
 from transientcam_server.settings import ReconstructionSettings
 
 _log = logging.getLogger(__name__)
@@ -39,6 +40,13 @@ class Pipeline:
     """Makes frames of captures and computes on ``executor`` what is asked of them.
 
     ``judge`` predicts the deviation of the range of each frame whose returns are computed.
+
+    Attributes
+    ----------
+    reconstruction
+        How frames are computed from the next one on.
+    calibration
+        Used for those whose sequence it is good for, from the next one on.
     """
 
     def __init__(
@@ -52,9 +60,9 @@ class Pipeline:
         calibration: Calibration | None = None,
     ) -> None:
         self.judge = judge
-        self._calibration = calibration
+        self.calibration = calibration
         self._capabilities = camera.capabilities
-        self._settings = settings
+        self.reconstruction = Reconstruction(1, settings)
         self._executor = executor
         self._tasks: set[asyncio.Task[Any]] = set()
         self._frames = 0
@@ -73,18 +81,24 @@ class Pipeline:
         """Return the next frame, counted from 1."""
         self._frames += 1
         calibration = self.calibration_for(applied)
-        recipe = Recipe(applied, self._settings, self._full_scale, calibration)
+        recipe = Recipe(
+            applied,
+            self.reconstruction.settings,
+            self._full_scale,
+            calibration,
+            self.reconstruction.id,
+        )
         return Frame(self, self._frames, raw, recipe)
 
     def calibration_for(self, applied: AppliedSequence) -> Calibration | None:
         """Return the calibration given, if it is good for this sequence."""
-        return self._calibration if self.misfit(applied) is None else None
+        return self.calibration if self.misfit(applied) is None else None
 
     def misfit(self, applied: AppliedSequence) -> CalibrationMismatch | None:
         """Say why the calibration given is not good for a sequence; None if it is, or is none."""
-        if self._calibration is None:
+        if self.calibration is None:
             return None
-        return self._calibration.capture.misfit(applied, self._capabilities)
+        return self.calibration.capture.misfit(applied, self._capabilities)
 
     def product(self, name: str) -> Product:
         """Return a product this camera has.
@@ -189,6 +203,7 @@ class Frame:
             "frame": self.number,
             "sequence_id": self.raw.epoch,
             "calibration_id": calibration_id(self.recipe.calibration),
+            "reconstruction_id": self.recipe.reconstruction_id,
             "device_time_s": self.raw.device_time_s,
             "host_time_s": self.raw.host_time_s,
             "capture_s": self.raw.capture_s,

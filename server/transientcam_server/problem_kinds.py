@@ -134,6 +134,13 @@ SEQUENCE_CHANGED: Final = ProblemKind(
     "The request was about the sequence that If-Match names, which is not the running one any "
     "more. `value` repeats the tag, `current` is that of the running one. Nothing was changed.",
 )
+RECONSTRUCTION_CHANGED: Final = ProblemKind(
+    "reconstruction-changed",
+    412,
+    "Somebody else has changed the reconstruction",
+    "The request was about the settings that If-Match names, which are not in use any more. "
+    "`value` repeats the tag, `current` is that of those in use. Nothing was changed.",
+)
 HEAD_TOO_LARGE: Final = ProblemKind(
     "head-too-large",
     431,

@@ -26,13 +26,14 @@ class Recipe:
     """What a computation may know beside the results it needs.
 
     ``full_scale`` is the largest value that the sensor gives, in DN. Without a ``calibration``,
-    gains are the nominal ones.
+    gains are the nominal ones. ``reconstruction_id`` counts the settings there were.
     """
 
     applied: AppliedSequence
     settings: ReconstructionSettings
     full_scale: float
     calibration: Calibration | None = None
+    reconstruction_id: int = 1
 
     @property
     def base_frequency_hz(self) -> float:

@@ -30,9 +30,10 @@ from transientcam_server.hub import Channel, Goodbye, Hub
 from transientcam_server.lease import Alarm, Change, Lease, LeaseDesk
 from transientcam_server.metrics import Metrics
 from transientcam_server.pipeline import Pipeline
+from transientcam_server.reconstruction import Reconstruction
 from transientcam_server.recording import Header
 from transientcam_server.recording.library import Library
-from transientcam_server.settings import Settings
+from transientcam_server.settings import ReconstructionSettings, Settings
 
 _log = logging.getLogger(__name__)
 VERSION: Final = version("transientcam")
@@ -167,8 +168,17 @@ class Service:
             calibration={"id": calibration_id(calibration)},
             calibration_planes=None if calibration is None else calibration.gains,
             calibration_bad=None if calibration is None else calibration.bad,
-            reconstruction=self.settings.reconstruction.model_dump(),
+            reconstruction=self.pipeline.reconstruction.settings.model_dump(),
         )
+
+    def reconstruct_with(self, settings: ReconstructionSettings) -> Reconstruction:
+        """Compute frames from the next one on with other settings."""
+        before = self.pipeline.reconstruction
+        now = self.pipeline.reconstruction = before.followed_by(settings)
+        if now is not before:
+            self.accuracy.reconstruct_with(settings)
+            self.hub.tell("reconstruction-changed", {"reconstruction": now.to_document()})
+        return now
 
     def _happened(self, event: Event) -> None:
         self.metrics.happened(event)

@@ -32,6 +32,8 @@ def test_every_resource_of_the_interface_is_described(document: dict[str, Any]) 
         "GET /api/v1/sequence",
         "PUT /api/v1/sequence",
         "POST /api/v1/sequence/validate",
+        "GET /api/v1/reconstruction",
+        "PUT /api/v1/reconstruction",
         "GET /api/v1/acquisition",
         "PUT /api/v1/acquisition",
         "GET /api/v1/frames/latest",

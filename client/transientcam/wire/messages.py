@@ -41,6 +41,8 @@ class FrameMeta(TypedDict):
     """Counted by the server from 1; never resets while it runs."""
     sequence_id: int
     calibration_id: str
+    reconstruction_id: int
+    """Counts the settings of the reconstruction that the server has had."""
     device_time_s: float
     """Start of the first exposure, by the camera's clock."""
     host_time_s: float
@@ -166,7 +168,8 @@ class Notice:
     """Something a client should know: ``kind``, and what more there is to it in ``details``.
 
     Known kinds: ``dropped``, ``lost-images``, ``camera-lost``, ``camera-back``,
-    ``sequence-changed``, ``calibration-changed``. A client passes over kinds it does not know.
+    ``sequence-changed``, ``calibration-changed``, ``reconstruction-changed``, ``lease-changed``,
+    ``recording-started``, ``recording-dropped``, ``recording-stopped``, ``job-changed``. A client passes over kinds it does not know.
     """
 
     kind: str

@@ -31,7 +31,7 @@ async def read_info(service: ServiceOf) -> InfoDocument:
         products=[_product(product) for product in service.pipeline.products.values()],
         clients=service.hub.clients,
         kernels=dict(tm.kernels.state()),
-        reconstruction=service.settings.reconstruction.model_dump(),
+        reconstruction=service.pipeline.reconstruction.settings.model_dump(),
     )
 
 

@@ -25,6 +25,7 @@ _META_EXAMPLE: dict[str, JsonValue] = {
     "frame": 1204,
     "sequence_id": 1,
     "calibration_id": "nominal",
+    "reconstruction_id": 1,
     "device_time_s": 113.52,
     "host_time_s": 1795161600.25,
     "capture_s": 0.0944,
@@ -275,6 +276,8 @@ class FrameDocument(Document):
     """Counted from 1; never resets while the service runs."""
     sequence_id: int
     calibration_id: str
+    reconstruction_id: int
+    """Counts the settings of the reconstruction; those that it was computed with."""
     device_time_s: float
     """Start of the first exposure, by the camera's clock."""
     host_time_s: float

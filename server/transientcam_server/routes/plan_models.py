@@ -35,6 +35,7 @@ _FRAME: JsonValue = {
     "frame": 1204,
     "sequence_id": 1,
     "calibration_id": "nominal",
+    "reconstruction_id": 1,
     "device_time_s": 113.52,
     "host_time_s": 1795161600.25,
     "capture_s": 0.0944,

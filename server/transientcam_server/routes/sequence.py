@@ -1,18 +1,16 @@
 """The sequence: what the camera captures for one transient image."""
 
 import asyncio
-import hashlib
-import json
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Header, Response
+from fastapi import APIRouter, Body, Response
 from pydantic import WithJsonSchema
 
 from transientcam_driver import AppliedSequence, Sequence
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.access import needs
-from transientcam_server.errors import Problem
 from transientcam_server.problems import documented
+from transientcam_server.routes import etags
 from transientcam_server.routes.models import AppliedDocument, SequenceDocument
 from transientcam_server.service import ServiceOf
 from transientcam_server.tokens import Role
@@ -47,31 +45,20 @@ _Sequence = Annotated[
 ]
 
 
-_ETAG: dict[str, Any] = {
-    "ETag": {"description": "names this very sequence", "schema": {"type": "string"}}
-}
-_NOT_MODIFIED: dict[int | str, dict[str, Any]] = {
-    200: {"headers": _ETAG},
-    304: {"description": "It is still the one that If-None-Match names", "content": {}},
-}
-
-
 @router.get(
     "/sequence",
     summary="The running sequence",
     response_model=AppliedDocument,
-    responses=_NOT_MODIFIED | documented(kinds.INVALID_REQUEST),
+    responses=etags.READING | documented(kinds.INVALID_REQUEST),
 )
 async def read_sequence(
     service: ServiceOf,
     response: Response,
-    if_none_match: Annotated[
-        str | None, Header(description="the `ETag` of a sequence that need not be told again")
-    ] = None,
+    if_none_match: etags.IfNoneMatch = None,
 ) -> Any:
     """Return the sequence as the camera really set it, and what follows from it."""
-    tag = etag(service.applied)
-    if if_none_match is not None and _names(if_none_match, tag):
+    tag = _tag(service.applied)
+    if etags.names(if_none_match, tag):
         return Response(status_code=304, headers={"ETag": tag})
     response.headers["ETag"] = tag
     return AppliedDocument.model_validate(service.applied.to_document())
@@ -88,15 +75,13 @@ async def read_sequence(
         kinds.CAMERA_FAILED,
         kinds.CAMERA_LOST,
     )
-    | {200: {"headers": _ETAG}},
+    | etags.CHANGING,
 )
 async def change_sequence(
     service: ServiceOf,
     response: Response,
     sequence: _Sequence,
-    if_match: Annotated[
-        str | None, Header(description="change it only if the running one has this `ETag`")
-    ] = None,
+    if_match: etags.IfMatch = None,
 ) -> AppliedDocument:
     """Set the camera to a sequence, between two frames; what is absent takes its default.
 
@@ -106,18 +91,10 @@ async def change_sequence(
     wanted = Sequence.from_document(sequence)
 
     def check(running: AppliedSequence) -> None:
-        tag = etag(running)
-        if if_match is not None and not _names(if_match, tag):
-            raise Problem(
-                kinds.SEQUENCE_CHANGED,
-                "The running sequence is another one by now.",
-                field="If-Match",
-                value=if_match,
-                current=tag,
-            )
+        etags.require(if_match, _tag(running), otherwise=kinds.SEQUENCE_CHANGED)
 
     applied = await asyncio.wrap_future(service.acquisition.configure(wanted, check=check))
-    response.headers["ETag"] = etag(applied)
+    response.headers["ETag"] = _tag(applied)
     return AppliedDocument.model_validate(applied.to_document())
 
 
@@ -133,13 +110,5 @@ async def validate_sequence(service: ServiceOf, sequence: _Sequence) -> AppliedD
     return AppliedDocument.model_validate(applied.to_document())
 
 
-def etag(applied: AppliedSequence) -> str:
-    """Return what names a sequence as it was set, also after the camera has counted anew."""
-    document = json.dumps(applied.to_document(), sort_keys=True).encode()
-    return f'"{hashlib.sha256(document).hexdigest()[:16]}"'
-
-
-def _names(header: str, tag: str) -> bool:
-    """Return whether an If-Match or If-None-Match header is about this tag."""
-    given = {each.strip().removeprefix("W/") for each in header.split(",")}
-    return "*" in given or tag in given
+def _tag(applied: AppliedSequence) -> str:
+    return etags.etag(applied.to_document())
