@@ -20,12 +20,16 @@ _Encode = Callable[[Product, _Array, Mapping[str, Any], Mapping[str, Any], int |
 
 @dataclass(frozen=True, slots=True)
 class Encoding:
-    """A way to write a product: its name (also the suffix of a path) and media type."""
+    """A way to write a product: its name (also the suffix of a path) and media type.
+
+    ``beside`` names products of the same frame that the writer finds in ``extra``.
+    """
 
     name: str
     media_type: str
     encode: _Encode
     images_only: bool = False
+    beside: tuple[str, ...] = ()
 
     def fits(self, product: Product) -> bool:
         """Whether the product can be written so."""

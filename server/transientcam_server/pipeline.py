@@ -6,6 +6,7 @@ others wait for the same one. Everything here lives on the event loop and comput
 
 import asyncio
 import logging
+import math
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Coroutine, Hashable, Iterator
@@ -14,7 +15,6 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from typing import Any, TypeVar
 
-import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import AppliedSequence, CalibrationMismatch, RawFrame
@@ -23,7 +23,16 @@ from transientcam_server.calibration import Calibration, calibration_id
 from transientcam_server.cameras import Camera
 from transientcam_server.encoding import Encoding
 from transientcam_server.errors import Problem
-from transientcam_server.products import PRODUCTS, STAGES, Product, Recipe, pixel_counts
+from transientcam_server.products import (
+    BOUNDS_RADIUS,
+    EVERYTHING,
+    PRODUCTS,
+    STAGES,
+    Product,
+    Recipe,
+    View,
+    pixel_counts,
+)
 from transientcam_server.reconstruction import Reconstruction
 from transientcam_server.settings import ReconstructionSettings
 
@@ -33,6 +42,7 @@ _Array = NDArray[Any]
 MAX_ANSWER_BYTES = 512 * 1024 * 1024
 """A product over time with more than this is not computed."""
 _REMEMBERED_TIME_AXES = 2
+_REMEMBERED_CROPS = 32
 Judge = Callable[[Recipe, Any], dict[str, float] | None]
 
 
@@ -98,7 +108,7 @@ class Pipeline:
         """Say why the calibration given is not good for a sequence; None if it is, or is none."""
         if self.calibration is None:
             return None
-        return self.calibration.capture.misfit(applied, self._capabilities)
+        return self.calibration.subject.misfit(applied, self._capabilities)
 
     def product(self, name: str) -> Product:
         """Return a product this camera has.
@@ -188,6 +198,11 @@ class Frame:
         self._deviation: dict[str, float] | None = None
         self._known: dict[Hashable, asyncio.Task[Any]] = {}
         self._over_time: OrderedDict[Hashable, asyncio.Task[Any]] = OrderedDict()
+        self._crops: OrderedDict[Hashable, asyncio.Task[Any]] = OrderedDict()
+
+    def bare(self) -> "Frame":
+        """Return the same frame with nothing computed: what is kept of one that is history."""
+        return Frame(self._pipeline, self.number, self.raw, self.recipe)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -224,10 +239,10 @@ class Frame:
 
     async def stage(self, name: str) -> Any:
         """Return an intermediate result."""
-        return await self._once(("stage", name), lambda: self._compute_stage(name))
+        return await self._once(("stage", name), lambda: self._compute_stage(name), self._known)
 
-    async def product(self, product: Product, time_s: tuple[float, ...] = ()) -> _Array:
-        """Return a product; ``time_s`` only for one over time.
+    async def product(self, product: Product, view: View = EVERYTHING) -> _Array:
+        """Return a product, whole unless it is one over time; times only for those.
 
         Raises
         ------
@@ -235,9 +250,11 @@ class Frame:
             ``product-failed`` if its computation raised, ``answer-too-large`` if nobody would
             want to wait for it.
         """
-        key = ("product", product.name, time_s)
+        view = view if product.over_time else EVERYTHING
         array: _Array = await self._once(
-            key, lambda: self._compute_product(product, time_s), over_time=product.over_time
+            ("product", product.name, view),
+            lambda: self._compute_product(product, view),
+            self._over_time if product.over_time else self._known,
         )
         return array
 
@@ -245,16 +262,16 @@ class Frame:
         self,
         product: Product,
         encoding: Encoding,
-        time_s: tuple[float, ...] = (),
+        view: View = EVERYTHING,
         *,
         channel: int | None = None,
     ) -> bytes:
         """Return a product as bytes, encoded once for all who ask for the same ones."""
-        key = ("encoded", product.name, time_s, encoding.name, channel)
+        whole = self._known if view.crop.is_whole else self._crops
         data: bytes = await self._once(
-            key,
-            lambda: self._encode(product, encoding, time_s, channel),
-            over_time=product.over_time,
+            ("encoded", product.name, view, encoding.name, channel),
+            lambda: self._encode(product, encoding, view, channel),
+            self._over_time if product.over_time else whole,
         )
         return data
 
@@ -274,15 +291,19 @@ class Frame:
         return value
 
     async def _once(
-        self, key: Hashable, work: Callable[[], Coroutine[Any, Any, _T]], *, over_time: bool = False
+        self,
+        key: Hashable,
+        work: Callable[[], Coroutine[Any, Any, _T]],
+        known: dict[Hashable, asyncio.Task[Any]],
     ) -> _T:
-        known = self._over_time if over_time else self._known
         task = known.get(key)
         if task is None:
             task = known[key] = self._pipeline.start(work())
-            # the last frame may stay for long, and times of flight are endless
+            # a frame may stay for long; times of flight and regions are endless
             while len(self._over_time) > 2 * _REMEMBERED_TIME_AXES:
                 self._over_time.popitem(last=False)
+            while len(self._crops) > _REMEMBERED_CROPS:
+                self._crops.popitem(last=False)
         # one who stops waiting must not stop it for the others
         result: _T = await asyncio.shield(task)
         return result
@@ -315,28 +336,28 @@ class Frame:
             return None
         return deviation
 
-    async def _compute_product(self, product: Product, time_s: tuple[float, ...]) -> _Array:
+    async def _compute_product(self, product: Product, view: View) -> _Array:
         if product.over_time:
-            self._refuse_too_large(len(time_s))
+            self._refuse_too_large(product, view)
         with self._failure_of(product.name):
             needs = await asyncio.gather(*map(self.stage, product.needs))
             if product.over_time:
-                work = self._pipeline.run_long(
-                    product.compute, self.recipe, np.asarray(time_s), *needs
-                )
+                work = self._pipeline.run_long(product.compute, self.recipe, view, *needs)
             else:
                 work = self._pipeline.run(product.compute, self.recipe, *needs)
             array, _ = await work
         return array
 
     async def _encode(
-        self, product: Product, encoding: Encoding, time_s: tuple[float, ...], channel: int | None
+        self, product: Product, encoding: Encoding, view: View, channel: int | None
     ) -> bytes:
-        array = await self.product(product, time_s)
+        beside = (self.product(self._pipeline.product(name)) for name in encoding.beside)
+        array, *others = await asyncio.gather(self.product(product, view), *beside)
         run = self._pipeline.run_long if product.over_time else self._pipeline.run
-        extra = self._extra(product, time_s)
+        meta = self.meta() | view.crop.to_meta(*self.shape)
+        extra = self._extra(product, view) | dict(zip(encoding.beside, others, strict=True))
         with self._failure_of(product.name):
-            data, _ = await run(encoding.encode, product, array, self.meta(), extra, channel)
+            data, _ = await run(_written, encoding, product, view, array, meta, extra, channel)
         self._pipeline.note_success(product.name)
         return data
 
@@ -356,16 +377,25 @@ class Frame:
                 frame=self.number,
             ) from error
 
-    def _extra(self, product: Product, time_s: tuple[float, ...]) -> dict[str, Any]:
-        if product.over_time:
-            return {"time_s": list(time_s)}
-        if product.name == "raw":
-            return {"labels": [asdict(label) for label in self.raw.labels]}
-        return {}
+    def _extra(self, product: Product, view: View) -> dict[str, Any]:
+        """Return what only this product's messages hold."""
+        extra: dict[str, Any] = {"time_s": list(view.time_s)} if product.over_time else {}
+        match product.name:
+            case "raw":
+                extra["labels"] = [asdict(label) for label in self.raw.labels]
+            case "streak":
+                extra["y"] = view.y
+            case "bounds":
+                extra["radius"] = BOUNDS_RADIUS
+            case "pointcloud":
+                extra["intrinsics"] = asdict(self.recipe.lens(*self.shape))
+        return extra
 
-    def _refuse_too_large(self, times: int) -> None:
-        height, width = self.shape
-        limit = MAX_ANSWER_BYTES // (4 * height * width)
+    def _refuse_too_large(self, product: Product, view: View) -> None:
+        rows, columns = view.crop.shape(*self.shape)
+        values = math.prod(product.shape(self.recipe.applied, rows, columns, times=1))
+        limit = MAX_ANSWER_BYTES // (4 * values)
+        times = len(view.time_s)
         if times > limit:
             raise Problem(
                 kinds.ANSWER_TOO_LARGE,
@@ -374,6 +404,22 @@ class Frame:
                 value=times,
                 limit=f"at most {limit}",
             )
+
+
+def _written(
+    encoding: Encoding,
+    product: Product,
+    view: View,
+    array: _Array,
+    meta: dict[str, Any],
+    extra: dict[str, Any],
+    channel: int | None,
+) -> bytes:
+    """Cut a product, and those beside it, to what is wanted of them, and encode it."""
+    if not product.over_time:  # those were computed for no more than that
+        array = view.crop.apply(array, product.description.axes)
+        extra |= {name: view.crop.apply(extra[name]) for name in encoding.beside}
+    return encoding.encode(product, array, meta, extra, channel)
 
 
 def _timed(compute: Callable[..., _T], *arguments: Any) -> tuple[_T, float]:

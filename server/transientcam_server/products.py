@@ -16,9 +16,13 @@ import transientcam_moments as tm
 from transientcam import wire
 from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_server.calibration import Calibration, nominal_gains
+from transientcam_server.cropping import WHOLE, Crop
+from transientcam_server.lens import ASSUMED_FIELD_OF_VIEW_DEG, Intrinsics
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
+BOUNDS_RADIUS: Final = 0.93
+"""Of the Poisson kernel that densities between `bounds` are smoothed with: the paper's (Fig. 7)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +30,8 @@ class Recipe:
     """What a computation may know beside the results it needs.
 
     ``full_scale`` is the largest value that the sensor gives, in DN. Without a ``calibration``,
-    gains are the nominal ones. ``reconstruction_id`` counts the settings there were.
+    gains are the nominal ones. ``reconstruction_id`` counts the settings there were. Without
+    ``intrinsics`` a usual field of view is assumed.
     """
 
     applied: AppliedSequence
@@ -34,11 +39,41 @@ class Recipe:
     full_scale: float
     calibration: Calibration | None = None
     reconstruction_id: int = 1
+    intrinsics: Intrinsics | None = None
+
+    def lens(self, height: int, width: int) -> Intrinsics:
+        """Return where the pixels look, as it is known or else assumed."""
+        if self.intrinsics is not None:
+            return self.intrinsics
+        return Intrinsics.of_field(ASSUMED_FIELD_OF_VIEW_DEG, width=width, height=height)
 
     @property
     def base_frequency_hz(self) -> float:
         """The frequency whose period is the unambiguous time of flight."""
         return self.applied.sequence.base_frequency_hz
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Which part of a product is wanted; equal views of one frame are the same bytes.
+
+    Attributes
+    ----------
+    time_s
+        Times of flight of a product over time.
+    crop
+        Region and decimation.
+    y
+        Row of a streak, in pixels of the whole frame.
+    """
+
+    time_s: tuple[float, ...] = ()
+    crop: Crop = WHOLE
+    y: int | None = None
+
+
+EVERYTHING: Final = View()
+"""All of a product that has no times of flight."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +93,8 @@ class Product:
     description
         Name, unit and axes, as the wire contract has them.
     needs, compute
-        As for a stage; a product over time takes ``time_s`` after the recipe.
+        As for a stage; a product over time takes a `View` after the recipe, and is computed for
+        its crop alone.
     over_time
         Whether it is evaluated at times of flight that the request names.
     png_scale, png_unit
@@ -78,12 +114,15 @@ class Product:
         """The name clients ask by."""
         return self.description.name
 
-    def shape(self, applied: AppliedSequence, height: int, width: int) -> tuple[int, ...]:
-        """Shape of the array for a sequence; empty for a product over time, which has none yet."""
+    def shape(
+        self, applied: AppliedSequence, height: int, width: int, *, times: int = 0
+    ) -> tuple[int, ...]:
+        """Shape of the array for a sequence; empty for a product over time without times."""
         m = applied.sequence.harmonics
         lengths = {"y": height, "x": width, "moment": m + 1, "coefficient": 2 * m + 1}
-        lengths["image"] = applied.images
-        if self.over_time:
+        lengths |= {"image": applied.images, "coordinate": 3, "return": 2 * m}
+        lengths |= {"bound": 2, "time": times}
+        if self.over_time and not times:
             return ()
         return tuple(lengths[axis] for axis in self.description.axes)
 
@@ -154,17 +193,54 @@ def _coefficient_planes(recipe: Recipe, coefficients: tm.Coefficients) -> _Array
     return planes
 
 
-def _transient(recipe: Recipe, time_s: _Array, coefficients: tm.Coefficients) -> _Array:
+def _transient(recipe: Recipe, view: View, coefficients: tm.Coefficients) -> _Array:
     rad_s = 2.0 * np.pi * recipe.base_frequency_hz
     # h is per radian: g(tau) = 2 pi f h(2 pi f tau)
-    density: _Array = tm.density(coefficients, rad_s * time_s)
+    density: _Array = tm.density(_cropped(coefficients, view.crop), rad_s * np.array(view.time_s))
     return np.float32(rad_s) * density
 
 
-def _cumulative(recipe: Recipe, time_s: _Array, coefficients: tm.Coefficients) -> _Array:
-    phase_rad = 2.0 * np.pi * recipe.base_frequency_hz * time_s
-    cumulative: _Array = tm.cumulative(coefficients, phase_rad)
+def _cumulative(recipe: Recipe, view: View, coefficients: tm.Coefficients) -> _Array:
+    phase_rad = 2.0 * np.pi * recipe.base_frequency_hz * np.array(view.time_s)
+    cumulative: _Array = tm.cumulative(_cropped(coefficients, view.crop), phase_rad)
     return cumulative
+
+
+def _cropped(coefficients: tm.Coefficients, crop: Crop) -> tm.Coefficients:
+    return tm.Coefficients(*map(crop.apply, coefficients))
+
+
+def _streak(recipe: Recipe, view: View, coefficients: tm.Coefficients) -> _Array:
+    """Return the density (T, W) of one row, of the columns that the crop leaves."""
+    height, width = coefficients.error.shape
+    y = height // 2 if view.y is None else view.y
+    x, _, columns, _ = view.crop.region or (0, 0, width, height)
+    line = Crop((x, y, columns, 1), view.crop.decimation)
+    return _transient(recipe, View(view.time_s, line), coefficients)[:, 0]
+
+
+def _bounds(recipe: Recipe, view: View, reconstruction: tm.Reconstruction) -> _Array:
+    """Return what every smoothed density with these moments lies between (2, T, H, W)."""
+    rad_s = 2.0 * np.pi * recipe.base_frequency_hz
+    moments = view.crop.apply(reconstruction.moments)
+    between = tm.bounds(moments, rad_s * np.array(view.time_s), radius=BOUNDS_RADIUS)
+    return np.float32(rad_s) * np.stack(between)
+
+
+def _pointcloud(recipe: Recipe, found: tm.Reconstruction) -> _Array:
+    range_m = found.range_m
+    return recipe.lens(*range_m.shape).points(range_m)
+
+
+def _return_planes(recipe: Recipe, found: tm.Reconstruction) -> _Array:
+    """Return time of flight and weight (2 m, H, W) of each return, the strongest first."""
+    phase_rad, weight = found.returns.phase_rad, found.returns.weight
+    order = np.argsort(-weight, axis=0, kind="stable")
+    planes = np.empty((2 * len(weight), *weight.shape[1:]), dtype=np.float32)
+    rad_s = 2.0 * np.pi * recipe.base_frequency_hz
+    planes[0::2] = np.take_along_axis(phase_rad, order, axis=0) / rad_s
+    planes[1::2] = np.take_along_axis(weight, order, axis=0)
+    return planes
 
 
 def _product(
@@ -172,12 +248,17 @@ def _product(
 ) -> Product:
     description = wire.PRODUCTS[name]
     png_scale, png_unit = None, ""
-    if description.axes == ("y", "x"):
+    if len(description.axes) == 2:
         png_scale, png_unit = _PNG_STEPS.get(name, (1.0, description.unit))
     return Product(description, needs, compute, over_time, png_scale, png_unit)
 
 
-_PNG_STEPS = {"range": (1e3, "mm"), "truth": (1e3, "mm"), "validity": (1e4, "1e-4")}
+_PNG_STEPS = {
+    "range": (1e3, "mm"),
+    "truth": (1e3, "mm"),
+    "validity": (1e4, "1e-4"),
+    "streak": (1e-7, "1e7 DN/s"),
+}
 
 PRODUCTS: Final[dict[str, Product]] = {
     product.name: product
@@ -194,6 +275,10 @@ PRODUCTS: Final[dict[str, Product]] = {
         _product("raw", ("raw",), lambda _, raw: raw.images),
         _product("transient", ("coefficients",), _transient, over_time=True),
         _product("cumulative", ("coefficients",), _cumulative, over_time=True),
+        _product("streak", ("coefficients",), _streak, over_time=True),
+        _product("bounds", ("moments",), _bounds, over_time=True),
+        _product("returns", ("returns",), _return_planes),
+        _product("pointcloud", ("returns",), _pointcloud),
         _product("truth", ("truth",), lambda _, truth: truth.range_m),
     )
 }

@@ -17,6 +17,7 @@ from transientcam_server import products
 from transientcam_server.encoding import MSGPACK, NPY
 from transientcam_server.errors import Problem
 from transientcam_server.pipeline import Frame, Pipeline
+from transientcam_server.products import View
 from transientcam_server.settings import ReconstructionSettings
 
 
@@ -162,7 +163,7 @@ def test_what_was_asked_at_some_times_of_flight_is_not_kept_forever(
     async def test(pipeline: Pipeline, frame: Frame) -> None:
         product = pipeline.product("transient")
         for index in range(20):
-            await frame.encoded(product, NPY, (index * 1e-9,))
+            await frame.encoded(product, NPY, View((index * 1e-9,)))
 
         assert len(frame._over_time) <= 4
 
@@ -179,7 +180,8 @@ def test_long_answers_leave_a_worker_to_everything_else(camera: Camera, raw: Raw
     async def test(pipeline: Pipeline, frame: Frame) -> None:
         endless = replace(pipeline.product("transient"), compute=wait_at_the_gate)
         long = [
-            asyncio.ensure_future(frame.product(endless, (index * 1e-9,))) for index in range(5)
+            asyncio.ensure_future(frame.product(endless, View((index * 1e-9,))))
+            for index in range(5)
         ]
         # with both workers at the gate this would never end
         assert (await frame.product(pipeline.product("range"))).shape == (120, 163)
@@ -196,7 +198,7 @@ def test_too_many_times_of_flight_are_refused_before_anything_is_computed(
 
     async def test(pipeline: Pipeline, frame: Frame) -> None:
         with pytest.raises(Problem, match="at most 1"):
-            await frame.product(pipeline.product("transient"), (0.0, 1e-9))
+            await frame.product(pipeline.product("transient"), View((0.0, 1e-9)))
         assert calls == []
 
     with_frame(camera, raw, test)

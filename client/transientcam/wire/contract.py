@@ -87,6 +87,28 @@ PRODUCTS: Final[dict[str, Product]] = {
         Product("raw", "DN", ("image", *_IMAGE), "<u2", "images of the sensor, each labelled"),
         Product("transient", "DN/s", ("time", *_IMAGE), "<f4", "density over time of flight"),
         Product("cumulative", "DN", ("time", *_IMAGE), "<f4", "light up to a time of flight"),
+        Product("streak", "DN/s", ("time", "x"), "<f4", "density over time of flight of one row"),
+        Product(
+            "bounds",
+            "DN/s",
+            ("bound", "time", *_IMAGE),
+            "<f4",
+            "least and greatest density, smoothed, that the moments allow",
+        ),
+        Product(
+            "returns",
+            "s,DN",
+            ("return", *_IMAGE),
+            "<f4",
+            "time of flight and weight of each return, the strongest first; NaN and 0 for none",
+        ),
+        Product(
+            "pointcloud",
+            "m",
+            ("coordinate", *_IMAGE),
+            "<f4",
+            "x (right), y (down), z (forward) of the first return; NaN without one",
+        ),
         Product("truth", "m", _IMAGE, "<f4", "the simulated scene's range; NaN without light"),
     )
 }

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver import RawFrame
 from transientcam_server.errors import InputError
-from transientcam_server.products import PRODUCTS, STAGES, Product, Recipe
+from transientcam_server.products import PRODUCTS, STAGES, Product, Recipe, View
 from transientcam_server.recording import hdf5, swmr
 from transientcam_server.recording.reader import Recording
 from transientcam_server.recording.writer import synchronise_directory
@@ -69,9 +69,7 @@ class Reconstructor:
 
     def shape(self, product: Product) -> tuple[int, ...]:
         """Shape of a product of one frame."""
-        if product.over_time:
-            return (len(self.time_s), *self._size)
-        return product.shape(self._recipe.applied, *self._size)
+        return product.shape(self._recipe.applied, *self._size, times=len(self.time_s))
 
     def compute(self, raw: RawFrame) -> dict[str, NDArray[Any]]:
         """Return the products of a frame by name."""
@@ -85,9 +83,9 @@ class Reconstructor:
 
         results = {}
         for product in self.products:
-            time_s = (self.time_s,) if product.over_time else ()
+            view = (View(tuple(self.time_s)),) if product.over_time else ()
             needs = [stage(each) for each in product.needs]
-            results[product.name] = product.compute(self._recipe, *time_s, *needs)
+            results[product.name] = product.compute(self._recipe, *view, *needs)
         return results
 
 
@@ -175,8 +173,8 @@ def _lay_out(
             file, product.name, shape, description.dtype, units=description.unit
         )
         blocks.attrs["long_name"] = description.summary
-        axes = ("time", "y", "x") if product.over_time else description.axes
-        for axis, (name, size) in enumerate(zip(("frame", *axes), (0, *shape), strict=True)):
+        axes = ("frame", *description.axes)
+        for axis, (name, size) in enumerate(zip(axes, (0, *shape), strict=True)):
             if name not in file:
                 values = reconstructor.time_s if name == "time" else np.arange(size)
                 file.create_dataset(name, data=values).make_scale(name)

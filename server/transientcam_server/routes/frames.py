@@ -12,7 +12,7 @@ from transientcam_server.errors import Problem
 from transientcam_server.pipeline import Frame
 from transientcam_server.pixel import pixel_json
 from transientcam_server.problems import documented
-from transientcam_server.products import Product
+from transientcam_server.products import Product, View
 from transientcam_server.routes.models import FrameDocument, PixelDocument
 from transientcam_server.service import ServiceOf
 
@@ -158,7 +158,7 @@ async def read_product(
         raise _invalid("bins", bins, "left out where time_s is given")
     frame = await service.hub.newest(after=after, wait_s=wait_s)
     times_s = _times_s(frame, time_s, bins) if wanted.over_time else ()
-    data = await frame.encoded(wanted, encoding, times_s)
+    data = await frame.encoded(wanted, encoding, View(times_s))
     return Response(data, media_type=encoding.media_type, headers=_headers(frame, wanted, encoding))
 
 

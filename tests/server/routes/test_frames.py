@@ -68,6 +68,7 @@ def test_every_product_comes_as_the_contract_describes_it(steady: httpx.Client, 
     assert response.headers["content-type"] == wire.MEDIA_TYPE
     message = wire.parse_frame(response.content)
     lengths = {"y": 120, "x": 163, "coefficient": 7, "moment": 4, "image": 16, "time": 64}
+    lengths |= {"bound": 2, "return": 6, "coordinate": 3}
     assert (message.product, message.unit, message.axes) == (name, product.unit, product.axes)
     assert message.array.dtype.str == product.dtype
     assert message.array.shape == tuple(lengths[axis] for axis in product.axes)

@@ -1,0 +1,74 @@
+"""Where the rays of the pixels go: a pinhole camera's intrinsics, and whence they are known."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+ASSUMED_FIELD_OF_VIEW_DEG: Final = 45.0
+"""Of a camera that nobody has said anything of."""
+Source = Literal["settings", "scene", "recording", "assumed"]
+
+
+@dataclass(frozen=True, slots=True)
+class Intrinsics:
+    """A pinhole camera: pixel (column, row) looks along ((c - cx) / fx, (r - cy) / fy, 1).
+
+    Whole numbers are the centres of pixels. x points right, y down, z where the camera looks.
+
+    Attributes
+    ----------
+    fx, fy, cx, cy
+        Focal lengths and principal point, in pixels.
+    width, height
+        Of the frame they belong to.
+    source
+        Who says so: the ``settings`` of the service, the simulated ``scene``, the ``recording``,
+        or nobody (``assumed``).
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+    source: Source = "assumed"
+
+    @classmethod
+    def of_field(
+        cls, field_of_view_deg: float, *, width: int, height: int, source: Source = "assumed"
+    ) -> Self:
+        """Return those of square pixels around the axis; the field of view is horizontal."""
+        focal_px = 0.5 * width / math.tan(math.radians(field_of_view_deg) / 2)
+        centre = (width - 1) / 2, (height - 1) / 2
+        return cls(focal_px, focal_px, *centre, width, height, source)
+
+    @classmethod
+    def of_document(cls, document: Mapping[str, Any]) -> Self:
+        """Return what a recording says of itself.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError
+            If it says something else.
+        """
+        lengths = [float(document[name]) for name in ("fx", "fy", "cx", "cy")]
+        if not (all(map(math.isfinite, lengths)) and min(lengths[:2]) > 0.0):
+            raise ValueError("focal lengths must be greater than 0")
+        return cls(*lengths, int(document["width"]), int(document["height"]), "recording")
+
+    def points(self, range_m: NDArray[Any]) -> NDArray[np.float32]:
+        """Return the points (3, H, W) in m at distances (H, W) along the pixels' rays."""
+        rows, columns = range_m.shape
+        x = (np.arange(columns) - self.cx) / self.fx
+        y = (np.arange(rows) - self.cy) / self.fy
+        z = 1.0 / np.sqrt(x * x + (y * y)[:, None] + 1.0)  # of the unit vector
+        points = np.empty((3, rows, columns), dtype=np.float32)
+        np.multiply(range_m, z, out=points[2], casting="same_kind")
+        np.multiply(points[2], x, out=points[0], casting="same_kind")
+        np.multiply(points[2], y[:, None], out=points[1], casting="same_kind")
+        return points
