@@ -79,6 +79,32 @@ UNKNOWN_RECORDING: Final = ProblemKind(
     "There is no such recording",
     "No recording has this id; the list of recordings has those there are.",
 )
+UNKNOWN_CALIBRATION: Final = ProblemKind(
+    "unknown-calibration",
+    404,
+    "There is no such calibration",
+    "No calibration has this id; the list of calibrations has those there are.",
+)
+UNKNOWN_JOB: Final = ProblemKind(
+    "unknown-job",
+    404,
+    "There is no such job",
+    "No job has this id. Jobs that have ended are forgotten after a while.",
+)
+UNKNOWN_FRAME: Final = ProblemKind(
+    "unknown-frame",
+    404,
+    "There is no such frame yet",
+    "No frame has this number; `first` and `last` say which can be had. `wait_s` lets the request "
+    "wait for one that is still to come.",
+)
+FRAME_GONE: Final = ProblemKind(
+    "frame-gone",
+    410,
+    "The frame is not kept any more",
+    "Raw frames are kept for the settings history.seconds and history.max_bytes; `first` and "
+    "`last` say which can still be had. What is to stay longer has to be recorded.",
+)
 METHOD_NOT_ALLOWED: Final = ProblemKind(
     "method-not-allowed",
     405,
@@ -120,6 +146,28 @@ RECORDING_UNFINISHED: Final = ProblemKind(
     "It is still being written, or its writer died and it was not recovered yet; the service "
     "recovers such ones when it starts.",
 )
+CALIBRATION_MISFIT: Final = ProblemKind(
+    "calibration-misfit",
+    409,
+    "The calibration is not good for this",
+    "A calibration is good for the camera, the sequence and the exposure that it was measured "
+    "with. `field` names what differs, `value` what is there and `limit` what it is good for. "
+    "Frames go on as they were.",
+)
+CALIBRATION_IN_USE: Final = ProblemKind(
+    "calibration-in-use",
+    409,
+    "The calibration is in use",
+    "It is the active one, or the one that the service was started with. Activate another one, or "
+    "`nominal`, before deleting it.",
+)
+CAMERA_BUSY: Final = ProblemKind(
+    "camera-busy",
+    409,
+    "The camera is being calibrated",
+    "A job has the camera for itself until it has ended; `job` is its id. Cancel it, or wait for "
+    "it. Switching the light off is possible meanwhile, and ends it.",
+)
 REQUEST_LATE: Final = ProblemKind(
     "request-late",
     408,
@@ -146,6 +194,12 @@ HEAD_TOO_LARGE: Final = ProblemKind(
     431,
     "The head of the request is too large",
     "Request line and headers together are longer than `limit` bytes; see limits.head_bytes.",
+)
+TOO_MANY_JOBS: Final = ProblemKind(
+    "too-many-jobs",
+    429,
+    "Too many jobs",
+    "`limit` jobs run or wait already. Cancel one, or try again when one has ended.",
 )
 TOO_MANY_FROM_ONE_ADDRESS: Final = ProblemKind(
     "too-many-from-one-address",
@@ -182,6 +236,13 @@ INVALID_SEQUENCE: Final = ProblemKind(
     "`field` of the sequence is out of the range of this camera, which `limit` states. The "
     "sequence that was running before is still running.",
 )
+INVALID_CALIBRATION: Final = ProblemKind(
+    "invalid-calibration",
+    422,
+    "This is no calibration",
+    "The file cannot be read as one that this service or `transientcam calibrate` has written. "
+    "`field` names the part that is wrong, `value` what it is and `limit` what it should be.",
+)
 ANSWER_TOO_LARGE: Final = ProblemKind(
     "answer-too-large",
     422,
@@ -207,6 +268,13 @@ RECORDING_NOT_STORED: Final = ProblemKind(
     507,
     "The recording cannot be stored",
     "The disk is full, read-only, or not allowed to the service. The camera goes on capturing.",
+)
+CALIBRATION_NOT_STORED: Final = ProblemKind(
+    "calibration-not-stored",
+    507,
+    "The calibration cannot be stored",
+    "The disk is full, read-only or not allowed to the service, or as many calibrations are "
+    "stored as calibrations.max_count allows.",
 )
 PRODUCT_FAILED: Final = ProblemKind(
     "product-failed",

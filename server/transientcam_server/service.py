@@ -26,6 +26,7 @@ from transientcam_server.auth import Guard
 from transientcam_server.calibration import Calibration, calibration_id, load_calibration
 from transientcam_server.cameras import Camera
 from transientcam_server.fronts import Fronts
+from transientcam_server.history import History
 from transientcam_server.hub import Channel, Goodbye, Hub
 from transientcam_server.lease import Alarm, Change, Lease, LeaseDesk
 from transientcam_server.metrics import Metrics
@@ -55,6 +56,7 @@ class Service:
         self.camera = camera
         self.settings = settings
         self.hub = Hub()
+        self.history = History(settings.history)
         self.guard = Guard(settings)
         self._executor = ThreadPoolExecutor(settings.workers, thread_name_prefix="worker")
         self.accuracy = Accuracy(camera, settings.reconstruction, settings.sensor)
@@ -186,7 +188,9 @@ class Service:
             case Captured(raw, applied):
                 if self.hub.latest is not None:
                     self.metrics.superseded(self.hub.latest.meta())
-                self.hub.publish(self.pipeline.frame(raw, applied))
+                frame = self.pipeline.frame(raw, applied)
+                self.history.append(frame)
+                self.hub.publish(frame)
             case Lost(reason):
                 self.hub.tell("camera-lost", {"reason": reason})
             case Back():

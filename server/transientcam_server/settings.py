@@ -94,6 +94,15 @@ class StreamSettings(_Group):
     """Time a client has to subscribe."""
 
 
+class HistorySettings(_Group):
+    """How much of what was captured can still be had; the least of both limits counts."""
+
+    seconds: _Finite = Field(default=10.0, ge=0.0, le=3600.0)
+    """Raw frames are kept for so long; 0 keeps the latest alone."""
+    max_bytes: int = Field(default=256 * 1024**2, ge=0)
+    """Their images take no more memory than this."""
+
+
 def default_recordings_directory() -> Path:
     """Return where recordings are kept: the service manager's place for state, or the user's."""
     state = os.environ.get("STATE_DIRECTORY", "").partition(":")[0]  # systemd
@@ -167,6 +176,7 @@ class Settings(_Group):
     reconstruction: ReconstructionSettings = ReconstructionSettings()
     sensor: SensorSettings = SensorSettings()
     stream: StreamSettings = StreamSettings()
+    history: HistorySettings = HistorySettings()
     limits: LimitSettings = LimitSettings()
     recordings: RecordingSettings = Field(default_factory=RecordingSettings)
 
