@@ -13,8 +13,16 @@ was not at hand; no label claims to be the authors' implementation.
 """
 
 from transientcam_moments.comparisons import (
+    dorrington,
+    frequency_domain,
+    godbaz,
+    high_frequency,
+    inverse_fourier,
+    matching_pursuit,
+    matrix_pencil,
     own,
     single_frequency,
+    spumic,
 )
 from transientcam_moments.comparisons.estimate import (
     Estimate,
@@ -31,6 +39,14 @@ TECHNIQUES: dict[str, Technique] = {
         own.MAXIMUM_ENTROPY,
         own.PISARENKO,
         single_frequency.TECHNIQUE,
+        inverse_fourier.TECHNIQUE,
+        godbaz.TECHNIQUE,
+        spumic.TECHNIQUE,
+        matrix_pencil.TECHNIQUE,
+        matching_pursuit.TECHNIQUE,
+        dorrington.TECHNIQUE,
+        frequency_domain.TECHNIQUE,
+        high_frequency.TECHNIQUE,
     )
 }
 """Every technique by its name; the paper's first."""

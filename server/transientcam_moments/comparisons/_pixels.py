@@ -34,15 +34,16 @@ class Pixels:
     @property
     def m(self) -> int:
         """The order of the moments."""
-        return self.b.shape[0] - 1
+        return int(self.b.shape[0]) - 1
 
     def sparse(self, phase_rad: Real, weight: Real, uniform: Real | None = None) -> SparseEstimate:
         """Return found returns (K, P) of these pixels, sorted and in the unit of the moments.
 
-        Those without a positive weight, or without a phase, are none.
+        Those without a phase, or without a weight above the rounding of the moments, are none.
         """
+        floor = 4 * self.b.shape[0] * float(np.finfo(self._dtype).eps)
         with np.errstate(invalid="ignore"):
-            used = self.usable & np.isfinite(phase_rad) & (weight > 0) & (weight < np.inf)
+            used = self.usable & np.isfinite(phase_rad) & (weight > floor) & (weight < np.inf)
         phase = np.where(used, np.remainder(np.where(used, phase_rad, 0), 2 * np.pi), np.nan)
         scaled = np.where(used, weight, 0) * self._scale
         order = np.argsort(phase, axis=0)
@@ -66,7 +67,9 @@ class Pixels:
         return GridEstimate(cast.reshape((cast.shape[0], *self._trailing)))
 
 
-def pixels_of(b: Array, *, least: int, name: str, zeroth: bool = False) -> Pixels:
+def pixels_of(
+    b: Array, *, least: int, name: str, first: int = 1, last: int | None = None
+) -> Pixels:
     """Prepare moments (m + 1, ...) for a technique.
 
     Parameters
@@ -75,8 +78,8 @@ def pixels_of(b: Array, *, least: int, name: str, zeroth: bool = False) -> Pixel
         The smallest m it works with.
     name
         The technique, for the error.
-    zeroth
-        Whether it looks at b_0; else b_0 may be anything.
+    first, last
+        The moments that it looks at, as a slice; the others may be anything.
 
     Raises
     ------
@@ -88,7 +91,7 @@ def pixels_of(b: Array, *, least: int, name: str, zeroth: bool = False) -> Pixel
     planes, trailing = moment_planes(b)
     check_order(planes.shape[0] - 1, least=least, name=name)
     wide = np.array(planes, dtype=np.complex128)
-    seen = wide[0 if zeroth else 1 :]
+    seen = wide[first : None if last is None else last + 1]
     with np.errstate(over="ignore", invalid="ignore"):
         scale = np.maximum(np.abs(seen.real), np.abs(seen.imag)).max(axis=0)
     usable = np.isfinite(seen).all(axis=0) & (scale > 0)

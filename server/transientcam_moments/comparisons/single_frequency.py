@@ -16,14 +16,9 @@ def single_frequency(b: Array) -> SparseEstimate:
     b : array, shape (m + 1, ...)
         Moments; only b_1 is looked at.
     """
-    pixels = pixels_of(as_first(b), least=1, name="single-frequency")
+    pixels = pixels_of(b, least=1, name="single-frequency", last=1)
     first = pixels.b[1:2]
     return pixels.sparse(np.angle(first), np.abs(first))
-
-
-def as_first(b: Array) -> Array:
-    """Return the moments b_0 and b_1, or what there is of them."""
-    return b[:2]
 
 
 TECHNIQUE = Technique(
