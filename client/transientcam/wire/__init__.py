@@ -4,6 +4,8 @@ from transientcam.frame import Frame
 from transientcam.wire.arrays import DTYPES, array_document, parse_array
 from transientcam.wire.codec import ALIGNMENT, pack, unpack
 from transientcam.wire.contract import (
+    ENCODINGS,
+    F32,
     FIRST_MESSAGE_WITHIN_S,
     LEASE_HEADER,
     MAX_CLIENT_MESSAGE_BYTES,
@@ -15,10 +17,19 @@ from transientcam.wire.contract import (
     MEDIA_TYPE_ALIASES,
     PROBLEM_MEDIA_TYPE,
     PRODUCTS,
+    REFLECTION16,
     SUBPROTOCOL,
+    U16,
     VERSION,
     CloseCode,
     Product,
+)
+from transientcam.wire.encodings import (
+    Coded,
+    decode_reflection16,
+    decode_u16,
+    encode_reflection16,
+    encode_u16,
 )
 from transientcam.wire.messages import (
     Ack,
@@ -46,6 +57,8 @@ from transientcam.wire.parsing import (
 __all__ = [
     "ALIGNMENT",
     "DTYPES",
+    "ENCODINGS",
+    "F32",
     "FIRST_MESSAGE_WITHIN_S",
     "LEASE_HEADER",
     "MAX_CLIENT_MESSAGE_BYTES",
@@ -57,12 +70,15 @@ __all__ = [
     "MEDIA_TYPE_ALIASES",
     "PROBLEM_MEDIA_TYPE",
     "PRODUCTS",
+    "REFLECTION16",
     "SUBPROTOCOL",
+    "U16",
     "VERSION",
     "Ack",
     "Channel",
     "ClientMessage",
     "CloseCode",
+    "Coded",
     "ErrorMessage",
     "Frame",
     "FrameMeta",
@@ -75,8 +91,12 @@ __all__ = [
     "Subscribe",
     "Subscription",
     "array_document",
+    "decode_reflection16",
+    "decode_u16",
     "encode",
     "encode_frame",
+    "encode_reflection16",
+    "encode_u16",
     "pack",
     "parse_array",
     "parse_channels",

@@ -18,10 +18,20 @@ MAX_CLIENT_MESSAGE_BYTES: Final = 64 * 1024
 MAX_SERVER_MESSAGE_BYTES: Final = 512 * 1024 * 1024
 """The client reads no message longer than this: 640 x 480 at 32 harmonics is 80 MB."""
 MAX_SUBSCRIPTIONS: Final = 16
+F32: Final = "f32"
+"""Values as they are, whatever their dtype."""
+U16: Final = "u16"
+"""Images of float in steps: ``offset + scale * code``."""
+REFLECTION16: Final = "reflection16"
+"""Coefficients as reflection coefficients of 16 bits a part; approximate."""
+ENCODINGS: Final = (F32, U16, REFLECTION16)
 MAX_CREDITS: Final = 64
 MAX_DECIMATION: Final = 64
 """Of every so many pixels one is sent, both ways."""
 FIRST_MESSAGE_WITHIN_S: Final = 10.0
+
+
+_IMAGE = ("y", "x")
 
 
 class CloseCode(IntEnum):
@@ -37,10 +47,12 @@ class CloseCode(IntEnum):
     TOO_BIG = 1009
     INTERNAL_ERROR = 1011
     TRY_AGAIN_LATER = 1013
-    """Too many clients."""
+    """Too many clients, or too many messages wait for this one."""
     BAD_FIRST_MESSAGE = 4001
     """The first message was none, late, or no valid ``subscribe``."""
     AUTHENTICATION_FAILED = 4003
+    TOO_MANY_MESSAGES = 4008
+    """The client sent more messages a second than the server reads."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +75,13 @@ class Product:
     dtype: str
     summary: str
 
+    @property
+    def encodings(self) -> tuple[str, ...]:
+        """Names of the encodings that it can travel in."""
+        if self.axes == _IMAGE and self.dtype == "<f4":
+            return F32, U16
+        return (F32, REFLECTION16) if self.name == "coefficients" else (F32,)
 
-_IMAGE = ("y", "x")
 
 PRODUCTS: Final[dict[str, Product]] = {
     product.name: product

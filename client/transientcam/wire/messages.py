@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from transientcam.frame import Frame
 from transientcam.wire.codec import pack, pack_with_array
-from transientcam.wire.contract import VERSION
+from transientcam.wire.contract import F32, VERSION
 
 
 class PixelCounts(TypedDict):
@@ -69,14 +69,32 @@ class FrameMeta(TypedDict):
 
 @dataclass(frozen=True, slots=True)
 class Subscription:
-    """One product to be streamed; ``max_rate_hz`` None is every frame."""
+    """One product to be streamed.
+
+    Attributes
+    ----------
+    max_rate_hz
+        No more frames a second than this; None for all.
+    encoding
+        One of `ENCODINGS`; frames arrive decoded.
+    region
+        Column and row of the first pixel, width and height; None for the whole frame.
+    decimation
+        Only every so many pixels of the region, both ways.
+    """
 
     product: str
     max_rate_hz: float | None = None
+    encoding: str = F32
+    region: tuple[int, int, int, int] | None = None
+    decimation: int = 1
 
     def to_document(self) -> dict[str, Any]:
-        """Return the map that travels."""
-        return {"product": self.product, "max_rate_hz": self.max_rate_hz}
+        """Return the map that travels; what says no more than the default is left out."""
+        document: dict[str, Any] = {"product": self.product, "max_rate_hz": self.max_rate_hz}
+        if self.encoding != F32:
+            document["encoding"] = self.encoding
+        return document | _cut(self.region, self.decimation)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +135,10 @@ class Ack:
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """What the frames of one subscription look like."""
+    """What the messages of one subscription look like: ``dtype`` and ``shape`` are of its arrays.
+
+    An array that travels as codes is decoded before a `Frame` holds it.
+    """
 
     channel: int
     product: str
@@ -125,7 +146,9 @@ class Channel:
     axes: tuple[str, ...]
     dtype: str
     shape: tuple[int, ...]
-    encoding: str = "f32"
+    encoding: str = F32
+    region: tuple[int, ...] | None = None
+    decimation: int = 1
 
     def to_document(self) -> dict[str, Any]:
         """Return the map that travels."""
@@ -137,6 +160,7 @@ class Channel:
             "dtype": self.dtype,
             "shape": list(self.shape),
             "encoding": self.encoding,
+            **_cut(self.region, self.decimation),
         }
 
 
@@ -169,7 +193,8 @@ class Notice:
 
     Known kinds: ``dropped``, ``lost-images``, ``camera-lost``, ``camera-back``,
     ``sequence-changed``, ``calibration-changed``, ``reconstruction-changed``, ``lease-changed``,
-    ``recording-started``, ``recording-dropped``, ``recording-stopped``, ``job-changed``. A client passes over kinds it does not know.
+    ``recording-started``, ``recording-dropped``, ``recording-stopped``, ``job-changed``. A client
+    passes over kinds it does not know.
     """
 
     kind: str
@@ -189,6 +214,12 @@ class ErrorMessage:
     def to_document(self) -> dict[str, Any]:
         """Return the map that travels."""
         return {"type": "error", "problem": dict(self.problem)}
+
+
+def _cut(region: tuple[int, ...] | None, decimation: int) -> dict[str, Any]:
+    """Return which pixels are meant, as far as it is not all of them."""
+    cut: dict[str, Any] = {} if region is None else {"region": list(region)}
+    return cut if decimation == 1 else cut | {"decimation": decimation}
 
 
 ClientMessage = Subscribe | Ack

@@ -9,12 +9,16 @@ from transientcam.wire import fields
 from transientcam.wire.arrays import DTYPES, MAX_DIMENSIONS, MAX_LENGTH, parse_array
 from transientcam.wire.codec import unpack
 from transientcam.wire.contract import (
+    ENCODINGS,
+    F32,
     MAX_CLIENT_MESSAGE_BYTES,
     MAX_CREDITS,
+    MAX_DECIMATION,
     MAX_SERVER_MESSAGE_BYTES,
     MAX_SUBSCRIPTIONS,
     VERSION,
 )
+from transientcam.wire.encodings import decoded
 from transientcam.wire.messages import (
     Ack,
     Channel,
@@ -31,7 +35,19 @@ MAX_INTEGER: Final = 2**53 - 1
 """Frame numbers and counts stay exact in the browser's numbers."""
 _MAX_CHANNELS = 64
 _FRAME_KEYS = frozenset(
-    ("v", "type", "channel", "product", "unit", "axes", "meta", "encode_s", "pad", "array")
+    (
+        "v",
+        "type",
+        "channel",
+        "product",
+        "unit",
+        "axes",
+        "meta",
+        "encode_s",
+        "pad",
+        "array",
+        "brightness",
+    )
 )
 
 
@@ -134,7 +150,29 @@ def _subscription(item: object, path: str) -> Subscription:
         rate = fields.number(item, "max_rate_hz", path=path)
         if rate <= 0.0:
             raise ProtocolError(f"{path}.max_rate_hz", rate, "greater than 0")
-    return Subscription(fields.text(item, "product", path=path, max_length=64), rate)
+    product = fields.text(item, "product", path=path, max_length=64)
+    encoding = _encoding(item, path)
+    decimation = _optional_integer(item, "decimation", minimum=1, maximum=MAX_DECIMATION, path=path)
+    return Subscription(product, rate, encoding, _region(item, path), decimation or 1)
+
+
+def _encoding(item: Mapping[str, Any], path: str) -> str:
+    if not _given(item, "encoding"):
+        return F32
+    encoding = fields.text(item, "encoding", path=path)
+    if encoding not in ENCODINGS:
+        raise ProtocolError(f"{path}.encoding", encoding, f"one of {', '.join(ENCODINGS)}")
+    return encoding
+
+
+def _region(item: Mapping[str, Any], path: str) -> tuple[int, int, int, int] | None:
+    if not _given(item, "region"):
+        return None
+    numbers = fields.integers(item, "region", maximum=MAX_LENGTH, max_length=4, path=path)
+    if len(numbers) != 4:
+        raise ProtocolError(f"{path}.region", list(numbers), "x, y, width and height")
+    x, y, width, height = numbers
+    return x, y, width, height
 
 
 def _channel(item: object, path: str) -> Channel:
@@ -153,6 +191,11 @@ def _channel(item: object, path: str) -> Channel:
             item, "shape", maximum=MAX_LENGTH, max_length=MAX_DIMENSIONS, path=path
         ),
         encoding=fields.text(item, "encoding", path=path),
+        region=_region(item, path),
+        decimation=_optional_integer(
+            item, "decimation", minimum=1, maximum=MAX_DECIMATION, path=path
+        )
+        or 1,
     )
 
 
@@ -173,6 +216,8 @@ def _frame(document: Mapping[str, Any]) -> Frame:
     fields.integer(meta, "frame", minimum=0, maximum=MAX_INTEGER, path="meta")
     axes = fields.strings(document, "axes", max_length=MAX_DIMENSIONS)
     array = parse_array(fields.mapping(document, "array"))
+    if _given(document, "encoding"):
+        array = decoded(fields.text(document, "encoding"), array, document)
     if array.ndim != len(axes):
         raise ProtocolError("array.shape", list(array.shape), f"as long as axes {list(axes)}")
     return Frame(
@@ -192,8 +237,8 @@ def _given(document: Mapping[str, Any], key: str) -> bool:
 
 
 def _optional_integer(
-    document: Mapping[str, Any], key: str, *, minimum: int, maximum: int
+    document: Mapping[str, Any], key: str, *, minimum: int, maximum: int, path: str = ""
 ) -> int | None:
     if not _given(document, key):
         return None
-    return fields.integer(document, key, minimum=minimum, maximum=maximum)
+    return fields.integer(document, key, minimum=minimum, maximum=maximum, path=path)
