@@ -1,0 +1,166 @@
+"""What ``transientcam doctor URL`` looks at: a daemon, as a client sees it."""
+
+import time
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from email.utils import parsedate_to_datetime
+from importlib.metadata import version
+from statistics import median
+from typing import Any, Final
+
+import httpx
+
+from transientcam.address import parse_address
+from transientcam.camera import Camera
+from transientcam.cli.findings import Finding
+from transientcam.connection import http_options
+from transientcam.errors import FrameTimeout, ProblemError, TransientcamError
+from transientcam.translation import translated
+
+CLOCKS_WITHIN_S: Final = 1.5
+"""The daemon's ``Date`` has whole seconds, so that nothing finer can be said."""
+KEEPS_UP: Final = 0.9
+"""Share of the camera's frames that should arrive."""
+_PRODUCT = "range"
+_FIRST_FRAME_S = 10.0
+
+
+def of_daemon(
+    url: str, *, token: str | None, seconds: float, timeout_s: float
+) -> Iterator[Finding]:
+    """Look at a daemon, and watch its stream for some seconds."""
+    base = parse_address(url).url
+    with httpx.Client(**http_options(token=token, timeout_s=timeout_s)) as http:
+        try:
+            with translated(base):
+                asked_s = time.time()
+                response = http.get(f"{base}/api/versions")
+                answered_s = time.time()
+            found = response.json() if response.status_code == httpx.codes.OK else None
+        except (TransientcamError, ValueError) as error:
+            remedy = "is `transientcam serve` running there, and does a firewall let you through?"
+            yield Finding("fault", "reachable", str(error), remedy)
+            return
+        if not isinstance(found, dict) or found.get("name") != "transientcam":
+            message = f"what answers at {base} is no transientcam (status {response.status_code})"
+            yield Finding("fault", "reachable", message, "check the address and its port")
+            return
+        took_ms = (answered_s - asked_s) * 1e3
+        yield Finding("ok", "reachable", f"{base} answered within {took_ms:.0f} ms")
+        yield _versions(found)
+        yield _ready(http, base)
+        yield _clock(response.headers.get("date"), asked_s, answered_s)
+    try:
+        with Camera(base, token=token, timeout_s=timeout_s) as camera:
+            yield from _camera(camera, seconds)
+    except ProblemError as error:
+        yield Finding("fault", "access", str(error), _remedy_of(error))
+    except TransientcamError as error:
+        yield Finding("fault", "stream", str(error), "look into the daemon's log")
+
+
+def _versions(found: dict[str, Any]) -> Finding:
+    here, there = version("transientcam"), found.get("version")
+    served = [each.get("name") for each in found.get("api", ())]
+    if "v1" not in served:
+        message = f"it serves the interfaces {served}, this client speaks v1"
+        return Finding("fault", "versions", message, "install the same version on both sides")
+    if here != there:
+        message = f"the daemon is {there}, this client {here}"
+        return Finding("warning", "versions", message, "install the same version on both sides")
+    return Finding("ok", "versions", f"both are {here}")
+
+
+def _ready(http: httpx.Client, base: str) -> Finding:
+    try:
+        with translated(base):
+            response = http.get(f"{base}/readyz")
+    except TransientcamError as error:
+        return Finding("fault", "ready", str(error), "look into the daemon's log")
+    if response.status_code == httpx.codes.OK:
+        return Finding("ok", "ready", "frames can be had")
+    try:
+        why = str(response.json()["detail"])
+    except (ValueError, KeyError, TypeError):
+        why = f"status {response.status_code}"
+    return Finding("fault", "ready", why, "is the camera plugged in? Its daemon's log says more")
+
+
+def _clock(date: str | None, asked_s: float, answered_s: float) -> Finding:
+    """Compare the daemon's clock, which tells whole seconds, with this one."""
+    try:
+        there_s = parsedate_to_datetime(date or "").replace(tzinfo=UTC).timestamp()
+    except ValueError:
+        return Finding("warning", "clock", "the daemon does not say what time it is")
+    # it was somewhere in the second that the header names, between question and answer
+    behind_s = max(0.0, asked_s - (there_s + 1.0))
+    ahead_s = max(0.0, there_s - answered_s)
+    apart_s = ahead_s or -behind_s
+    if abs(apart_s) > CLOCKS_WITHIN_S:
+        ahead = "ahead of" if apart_s > 0.0 else "behind"
+        now = datetime.fromtimestamp(there_s, UTC)
+        message = f"the daemon's is {abs(apart_s):.0f} s {ahead} this one ({now:%H:%M:%S} UTC)"
+        return Finding("warning", "clock", message, "let NTP set both; until then latencies lie")
+    return Finding("ok", "clock", "the daemon's agrees with this one within a second")
+
+
+def _camera(camera: Camera, seconds: float) -> Iterator[Finding]:
+    about = camera.camera
+    capabilities = about["capabilities"]
+    name = f"{capabilities['model']}, serial number {capabilities['serial']}, {about['state']}"
+    if about["state"] == "lost":
+        yield Finding("fault", "camera", f"{name}: {about['reason']}", "plug it in again")
+        return
+    yield Finding("ok", "camera", name)
+    if not camera.acquisition["running"]:
+        message = "the capture is stopped, so nothing can be measured"
+        remedy = 'PUT /api/v1/acquisition {"running": true} starts it'
+        yield Finding("warning", "stream", message, remedy)
+        return
+    yield _stream(camera, seconds)
+
+
+def _stream(camera: Camera, seconds: float) -> Finding:
+    latencies_s: list[float] = []
+    numbers: list[int] = []
+    size = 0
+    with camera.stream(_PRODUCT, reconnect=False) as stream:
+        try:
+            stream.receive(timeout_s=_FIRST_FRAME_S)
+        except FrameTimeout as error:
+            return Finding("fault", "stream", str(error), "look at /readyz and the daemon's log")
+        started_s = time.monotonic()
+        while (left_s := started_s + seconds - time.monotonic()) > 0.0:
+            try:
+                frame = stream.receive(timeout_s=left_s)
+            except FrameTimeout:
+                break
+            latencies_s.append(time.time() - float(frame.meta["host_time_s"]))
+            numbers.append(frame.frame)
+            size += frame.array.nbytes
+        took_s = time.monotonic() - started_s
+        wanted_hz = float(stream.sequence["frame_rate_hz"])
+    if not numbers:
+        message = f"no second frame within {seconds:g} s, at {wanted_hz:.3g} Hz"
+        return Finding("warning", "stream", message, "watch for longer: --seconds")
+    missed = numbers[-1] - numbers[0] + 1 - len(numbers)
+    message = (
+        f"{_PRODUCT} at {len(numbers) / took_s:.1f} Hz of the camera's {wanted_hz:.1f}, "
+        f"{size / took_s / 1e6:.1f} MB/s, {median(latencies_s) * 1e3:.0f} ms old on arrival, "
+        f"{missed} frames missed"
+    )
+    if len(numbers) < KEEPS_UP * wanted_hz * took_s - 1.0:
+        remedy = (
+            "is the network fast enough, or the daemon's machine? A lower max_rate_hz, a region or "
+            "a decimation asks for less"
+        )
+        return Finding("warning", "stream", message, remedy)
+    return Finding("ok", "stream", message)
+
+
+def _remedy_of(error: ProblemError) -> str:
+    if error.status in (httpx.codes.UNAUTHORIZED, httpx.codes.FORBIDDEN):
+        return (
+            "give a token: --token, or TRANSIENTCAM_TOKEN (`transientcam token create` makes one)"
+        )
+    return "look into the daemon's log"

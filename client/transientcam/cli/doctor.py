@@ -1,0 +1,88 @@
+"""``transientcam doctor``: what is right, what is wrong, and what to do about it."""
+
+import json
+import platform
+from collections.abc import Iterable, Iterator
+from importlib.metadata import version
+from itertools import chain
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+from transientcam.cli import daemon_checks, findings
+from transientcam.cli.findings import Finding, Level
+from transientcam.cli.options import JsonOption, TokenOption
+
+_STYLES: Final[dict[Level, str]] = {"ok": "green", "warning": "yellow", "fault": "bold red"}
+_WIDTH = 12
+
+
+def doctor(
+    url: Annotated[
+        str | None,
+        typer.Argument(metavar="[URL]", help="A daemon to look at; without it, this machine."),
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option(help="Settings in TOML.  [default: as `transientcam serve`]")
+    ] = None,
+    seconds: Annotated[
+        float, typer.Option(min=0.1, max=600.0, help="How long to watch the daemon's stream.")
+    ] = 2.0,
+    timeout_s: Annotated[
+        float, typer.Option(min=0.1, help="How long to wait for each of its answers.")
+    ] = 10.0,
+    token: TokenOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Check this machine, or a daemon, and say what to do about each fault.
+
+    Exits with 0 where nothing is at fault (warnings are none), with 1 otherwise.
+    """
+    if url is None:
+        found = chain(_of_client(), findings.of_this_machine(config))
+    else:
+        found = chain(
+            _of_client(),
+            daemon_checks.of_daemon(url, token=token, seconds=seconds, timeout_s=timeout_s),
+        )
+    seen = _tell_as_json(found) if as_json else _tell(found)
+    if any(each.level == "fault" for each in seen):
+        raise typer.Exit(code=1)
+
+
+def _of_client() -> Iterator[Finding]:
+    yield Finding("ok", "Python", f"{platform.python_version()} on {platform.platform()}")
+    libraries = ("transientcam", "numpy", "httpx", "websockets", "msgpack")
+    yield Finding("ok", "packages", ", ".join(f"{each} {version(each)}" for each in libraries))
+
+
+def _tell_as_json(found: Iterable[Finding]) -> list[Finding]:
+    seen = list(found)
+    levels = [each.level for each in seen]
+    worst = next(level for level in ("fault", "warning", "ok") if level in levels)
+    document = {"verdict": worst, "findings": [each.to_document() for each in seen]}
+    typer.echo(json.dumps(document, indent=2))
+    return seen
+
+
+def _tell(found: Iterable[Finding]) -> list[Finding]:
+    """Print findings as they come: some take a while."""
+    console = Console(highlight=False)
+    seen = []
+    for each in found:
+        seen.append(each)
+        line = Text.assemble((f"{each.level:<8}", _STYLES[each.level]), f"{each.check:<{_WIDTH}} ")
+        console.print(line + Text(each.message), soft_wrap=True)
+        if each.remedy is not None:
+            indent = " " * (8 + _WIDTH + 1)
+            for remedy in each.remedy.splitlines():
+                console.print(Text(f"{indent}{remedy}", style="dim"), soft_wrap=True)
+    console.print(f"Faults: {_count(seen, 'fault')}, warnings: {_count(seen, 'warning')}.")
+    return seen
+
+
+def _count(seen: Iterable[Finding], level: Level) -> int:
+    return sum(each.level == level for each in seen)

@@ -1,0 +1,75 @@
+"""What ``transientcam doctor`` finds, and who looks.
+
+Each package offers its own checks as an entry point of the group ``transientcam.checks``: a
+function that takes ``config`` (the file of settings, or None) and yields tuples ``(level, check,
+message, remedy)``. Only what is installed is asked.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict, dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, Final, Literal
+
+GROUP: Final = "transientcam.checks"
+
+Level = Literal["ok", "warning", "fault"]
+Reported = tuple[str, str, str, str | None]
+"""A finding as it crosses from one package to another."""
+Checks = Callable[[Path | None], Iterable[Reported]]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What one check found.
+
+    Attributes
+    ----------
+    level
+        ``fault``: something will not work; ``warning``: it will, but not all or not as well.
+    check
+        What was looked at.
+    message
+        What was seen.
+    remedy
+        What to do about it; None where there is nothing to do.
+    """
+
+    level: Level
+    check: str
+    message: str
+    remedy: str | None = None
+
+    def to_document(self) -> dict[str, Any]:
+        """Return what ``--json`` prints."""
+        return asdict(self)
+
+
+def of_this_machine(config: Path | None) -> Iterator[Finding]:
+    """Run the checks of every installed package."""
+    for point in sorted(entry_points(group=GROUP), key=lambda each: each.name):
+        try:
+            checks: Checks = point.load()
+        except ModuleNotFoundError as error:
+            message = f"not installed ({error.name} is missing)"
+            yield Finding("ok", point.name, message, f"pip install 'transientcam[{point.name}]'")
+            continue
+        yield from guarded(point.name, checks, config)
+
+
+def guarded(name: str, checks: Checks, config: Path | None) -> Iterator[Finding]:
+    """Run some checks; one that fails is a finding itself and ends only these."""
+    try:
+        for level, check, message, remedy in checks(config):
+            yield Finding(_level(level), check, message, remedy)
+    except Exception as error:
+        message = f"could not be checked: {type(error).__name__}: {error}"
+        yield Finding("fault", name, message, "this is a mistake in transientcam: please report it")
+
+
+def _level(text: str) -> Level:
+    match text:
+        case "ok" | "warning" | "fault":
+            return text
+        case _:
+            raise ValueError(text)
