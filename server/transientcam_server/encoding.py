@@ -1,4 +1,7 @@
-"""Products as bytes: msgpack, npy and PNG. Runs on workers."""
+"""The formats that products are answered in, and which of them a request wants.
+
+Their writers run on workers.
+"""
 
 import io
 import time
@@ -9,7 +12,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam import wire
+from transientcam import Frame, wire
+from transientcam.npz import npz_bytes
+from transientcam_server import files, pictures
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import Problem
 from transientcam_server.products import Product
@@ -22,18 +27,15 @@ _Encode = Callable[[Product, _Array, Mapping[str, Any], Mapping[str, Any], int |
 class Encoding:
     """A way to write a product: its name (also the suffix of a path) and media type.
 
-    ``beside`` names products of the same frame that the writer finds in ``extra``.
+    ``fits`` says whether a product can be written so. ``beside`` names products of the same frame
+    that the writer finds in ``extra``.
     """
 
     name: str
     media_type: str
     encode: _Encode
-    images_only: bool = False
+    fits: Callable[[Product], bool] = lambda product: True
     beside: tuple[str, ...] = ()
-
-    def fits(self, product: Product) -> bool:
-        """Whether the product can be written so."""
-        return product.png_scale is not None or not self.images_only
 
 
 def _msgpack(
@@ -65,60 +67,40 @@ def _npy(product: Product, array: _Array, *_: Any) -> bytes:
     return file.getvalue()
 
 
-def _png(product: Product, array: _Array, *_: Any) -> bytes:
-    """16 bits a pixel: steps of `Product.png_unit`; 0 where there is no value."""
-    from PIL import Image  # 60 ms that the first frame need not wait for
-
-    assert product.png_scale is not None  # noqa: S101 - `Encoding.fits` was asked
-    steps = np.nan_to_num(np.asarray(array, dtype=np.float64) * product.png_scale, posinf=65535.0)
-    image = Image.fromarray(np.clip(np.rint(steps), 0, 65535).astype(np.uint16))
-    file = io.BytesIO()
-    image.save(file, format="PNG", compress_level=1)
-    return file.getvalue()
-
-
-def _colour_png(
-    product: Product,
-    array: _Array,
-    meta: Mapping[str, Any],
-    *_: Any,
+def _npz(
+    product: Product, array: _Array, meta: Mapping[str, Any], extra: Mapping[str, Any], *_: Any
 ) -> bytes:
-    """8 bits a pixel through a palette: for eyes, not for measuring."""
-    from PIL import Image  # as above
-
-    low, high = _colour_range(product, array, meta)
-    with np.errstate(invalid="ignore"):  # NaN becomes index 0 below
-        index = 1.0 + 254.0 * np.clip((array - low) / max(high - low, 1e-30), 0.0, 1.0)
-    image = Image.fromarray(np.nan_to_num(index, nan=0.0).astype(np.uint8), mode="P")
-    image.putpalette(_palette())
-    file = io.BytesIO()
-    image.save(file, format="PNG", compress_level=1)
-    return file.getvalue()
+    description = product.description
+    array = np.asarray(array, dtype=description.dtype)
+    return npz_bytes(
+        Frame(product.name, description.unit, description.axes, meta, array, extra=extra)
+    )
 
 
-def _colour_range(product: Product, array: _Array, meta: Mapping[str, Any]) -> tuple[float, float]:
-    if product.description.unit == "m":
-        # the same colours in every frame: the unambiguous range
-        return 0.0, 299_792_458.0 / (2.0 * meta["base_frequency_hz"])
-    finite = array[np.isfinite(array)]
-    return (0.0, float(np.percentile(finite, 99.5))) if finite.size else (0.0, 1.0)
+def _is_image(product: Product) -> bool:
+    return product.png_scale is not None
 
 
-def _palette() -> bytes:
-    """Index 0 (no value) dark grey; then dark blue over green and orange to near white."""
-    stops = np.array([0.0, 0.25, 0.5, 0.75, 1.0]) * 254.0
-    channels = ((30, 30, 40, 235, 255), (20, 90, 170, 160, 250), (90, 200, 130, 50, 220))
-    index = np.arange(255.0)
-    colours = np.stack([np.interp(index, stops, channel) for channel in channels], axis=-1)
-    ramp: bytes = np.rint(colours).astype(np.uint8).tobytes()
-    return bytes((48, 48, 48)) + ramp
+def _is_real(product: Product) -> bool:
+    return np.dtype(product.description.dtype).kind != "c"
+
+
+def _is_cloud(product: Product) -> bool:
+    return product.name == "pointcloud"
 
 
 MSGPACK: Final = Encoding("msgpack", wire.MEDIA_TYPE, _msgpack)
 NPY: Final = Encoding("npy", "application/x-npy", _npy)
-PNG: Final = Encoding("png", "image/png", _png, images_only=True)
-COLOUR_PNG: Final = Encoding("colour-png", "image/png", _colour_png, images_only=True)
-ENCODINGS: Final = {encoding.name: encoding for encoding in (MSGPACK, NPY, PNG)}
+NPZ: Final = Encoding("npz", "application/x-npz", _npz)
+PNG: Final = Encoding("png", "image/png", pictures.png, _is_image)
+COLOUR_PNG: Final = Encoding("colour-png", "image/png", pictures.colour_png, _is_image)
+COLOUR_JPEG: Final = Encoding("colour-jpeg", "image/jpeg", pictures.colour_jpeg, _is_image)
+TIFF: Final = Encoding("tiff", "image/tiff", files.tiff, _is_real)
+PLY: Final = Encoding(
+    "ply", "application/x-ply", files.ply, _is_cloud, ("range", "direct", "flags")
+)
+CSV: Final = Encoding("csv", "text/csv", files.csv, _is_image)
+ENCODINGS: Final = {each.name: each for each in (MSGPACK, NPY, NPZ, PNG, TIFF, PLY, CSV)}
 """What a path may end in."""
 
 _BY_MEDIA_TYPE = {encoding.media_type: encoding for encoding in ENCODINGS.values()} | dict.fromkeys(
@@ -151,7 +133,7 @@ def _matching(media_type: str, supported: list[Encoding]) -> Encoding | None:
     if media_type in ("*/*", "application/*"):
         return MSGPACK
     if media_type == "image/*":
-        return PNG if PNG in supported else None
+        return next((each for each in (PNG, TIFF) if each in supported), None)
     encoding = _BY_MEDIA_TYPE.get(media_type)
     return encoding if encoding in supported else None
 

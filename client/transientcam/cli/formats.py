@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam.frame import Frame
+from transientcam.npz import npz_bytes
 from transientcam.wire import encode_frame
 
 
@@ -36,23 +37,6 @@ def frame_bytes(frame: Frame, form: Format) -> bytes:
 def _npy(frame: Frame) -> bytes:
     file = io.BytesIO()
     np.save(file, frame.array, allow_pickle=False)
-    return file.getvalue()
-
-
-def _npz(frame: Frame) -> bytes:
-    parts: dict[str, Any] = {
-        "array": frame.array,
-        "product": frame.product,
-        "unit": frame.unit,
-        "axes": np.array(frame.axes),
-        "meta": json.dumps(dict(frame.meta)),
-    }
-    if frame.time_s is not None:
-        parts["time_s"] = frame.time_s
-    if frame.labels:
-        parts["labels"] = json.dumps([dict(label) for label in frame.labels])
-    file = io.BytesIO()
-    np.savez(file, allow_pickle=False, **parts)
     return file.getvalue()
 
 
@@ -90,7 +74,7 @@ def _nested(array: NDArray[Any]) -> Any:
 
 _WRITERS: dict[Format, Callable[[Frame], bytes]] = {
     Format.NPY: _npy,
-    Format.NPZ: _npz,
+    Format.NPZ: npz_bytes,
     Format.MSGPACK: _msgpack,
     Format.JSON: _json,
 }

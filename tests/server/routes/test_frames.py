@@ -162,7 +162,7 @@ def test_a_pixel_tells_everything_about_itself(steady: httpx.Client) -> None:
     [
         ("/nothing", 404, "unknown-product", "product"),
         ("/nothing.npy", 404, "unknown-product", "product"),
-        ("/range.tiff", 406, "not-acceptable", "suffix"),
+        ("/range.bmp", 406, "not-acceptable", "suffix"),
         ("/range.", 406, "not-acceptable", "suffix"),
         ("/range.npy.png", 406, "not-acceptable", "suffix"),
         ("/moments.png", 406, "not-acceptable", "suffix"),
@@ -208,7 +208,7 @@ def test_an_unsupported_format_is_answered_with_the_supported_ones(steady: httpx
     problem = steady.get(f"{LATEST}/moments", headers={"Accept": "image/png"}).json()
 
     assert problem["status"] == 406
-    assert problem["supported"] == ["msgpack", "npy"]
+    assert problem["supported"] == ["msgpack", "npy", "npz"]
 
 
 def test_an_answer_too_large_for_memory_is_refused_before_it_is_computed(
