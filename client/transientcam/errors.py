@@ -9,7 +9,9 @@
     ├── StreamClosed          the stream ended, by the server or by the network
     ├── FrameTimeout          the stream stands, but no frame came in the time allowed
     ├── ParameterError        an argument given here that cannot be used
-    └── CommandUnavailable    a verb of the command line whose packages are not installed
+    ├── CommandUnavailable    a verb of the command line whose packages are not installed
+    ├── PromiseBroken         a camera does not do what is documented (transientcam conformance)
+    └── CheckSkipped          a promise that cannot be tried on this camera (the same)
 
 Each carries its data in fields and builds its own sentence from them.
 """
@@ -165,3 +167,25 @@ class CommandUnavailable(TransientcamError):  # noqa: N818 - the same
     def __str__(self) -> str:
         remedy = f": pip install 'transientcam[{self.extra}]'" if self.extra else ""
         return f"'transientcam {self.verb}' needs {self.module}, which is not installed{remedy}"
+
+
+class PromiseBroken(TransientcamError):  # noqa: N818 - the same
+    """A camera does not do what is documented; ``what`` says what it does instead."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__(what)
+        self.what = what
+
+    def __str__(self) -> str:
+        return self.what
+
+
+class CheckSkipped(TransientcamError):  # noqa: N818 - the same
+    """A promise cannot be tried on this camera; ``why`` says why not."""
+
+    def __init__(self, why: str) -> None:
+        super().__init__(why)
+        self.why = why
+
+    def __str__(self) -> str:
+        return self.why

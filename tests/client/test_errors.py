@@ -7,10 +7,12 @@ import pytest
 
 from transientcam import errors
 from transientcam.errors import (
+    CheckSkipped,
     CommandUnavailable,
     FrameTimeout,
     ParameterError,
     ProblemError,
+    PromiseBroken,
     ProtocolError,
     ServerUnreachable,
     StreamClosed,
@@ -25,6 +27,8 @@ _TREE = [
     FrameTimeout(0.5),
     ParameterError("f", 1, "2"),
     CommandUnavailable("serve", "fastapi", "server"),
+    PromiseBroken("PUT /sequence is answered with 500"),
+    CheckSkipped("the camera is a real one"),
 ]
 
 
@@ -55,6 +59,8 @@ def test_every_error_is_in_the_tree_drawn_at_the_top() -> None:
                 "f is 1, but must be 2",
                 "'transientcam serve' needs fastapi, which is not installed: "
                 "pip install 'transientcam[server]'",
+                "PUT /sequence is answered with 500",
+                "the camera is a real one",
             ],
             strict=True,
         )

@@ -1,0 +1,12 @@
+"""Whether a running camera keeps what is documented: each check is one promise, tried for real.
+
+``transientcam conformance URL`` runs them. They use nothing but the documented interface, and
+leave the camera as they found it.
+"""
+
+from transientcam.conformance.check import Check
+from transientcam.conformance.device import Device
+from transientcam.conformance.report import Report, Result
+from transientcam.conformance.running import CHECKS, GROUPS, chosen, run
+
+__all__ = ["CHECKS", "GROUPS", "Check", "Device", "Report", "Result", "chosen", "run"]

@@ -1,0 +1,183 @@
+"""One connection to the stream, message by message, as docs/stream.md has them."""
+
+import socket
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
+from urllib.parse import urlsplit
+
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+from transientcam.conformance.check import expect
+from transientcam.connection import stream_options
+from transientcam.errors import PromiseBroken, ProtocolError
+from transientcam.translation import translated
+from transientcam.wire import (
+    Ack,
+    Channel,
+    CloseCode,
+    ErrorMessage,
+    Frame,
+    Hello,
+    Notice,
+    ServerMessage,
+    Subscribe,
+    Subscription,
+    encode,
+    pack,
+    parse_channels,
+    parse_server_message,
+)
+
+_M = TypeVar("_M", Hello, Frame, Notice, ErrorMessage)
+_SMALL_BUFFER_BYTES = 4096
+
+
+class Conversation:
+    """A connection that was subscribed; what it receives is kept in the order it came."""
+
+    def __init__(self, connection: ClientConnection, url: str, *, patience_s: float) -> None:
+        self._connection = connection
+        self._url = url
+        self._patience_s = patience_s
+        self.hello: Hello | None = None
+        self.channels: tuple[Channel, ...] = ()
+        self.notices: list[Notice] = []
+
+    def say(self, document: dict[str, Any]) -> None:
+        """Send any map."""
+        with translated(self._url):
+            self._connection.send(pack(document))
+
+    def say_text(self, text: str) -> None:
+        """Send a text message, which the protocol does not have."""
+        with translated(self._url):
+            self._connection.send(text)
+
+    def acknowledge(self, frame: int) -> None:
+        """Say that a frame and all before it are done with."""
+        with translated(self._url):
+            self._connection.send(encode(Ack(frame)))
+
+    def subscribe(self, message: Subscribe) -> Hello:
+        """Subscribe and return the greeting."""
+        with translated(self._url):
+            self._connection.send(encode(message))
+        return self.greeting()
+
+    def greeting(self) -> Hello:
+        """Return the next hello; what comes before is passed over."""
+        return self._next(Hello, lambda hello: True, "no hello")
+
+    def frame(self, wanted: Callable[[Frame], bool] = lambda frame: True) -> Frame:
+        """Return the next frame, or the next that is wanted; what comes before is passed over."""
+        return self._next(Frame, wanted, "no such frame")
+
+    def notice(self, *kinds: str) -> Notice:
+        """Return the next notice of these kinds; what comes before is passed over."""
+        what = f"no notice {' or '.join(kinds)}"
+        return self._next(Notice, lambda notice: notice.kind in kinds, what)
+
+    def problem(self) -> dict[str, Any]:
+        """Return the next problem; what comes before is passed over."""
+        what = "no problem that answers a message which cannot be used"
+        return dict(self._next(ErrorMessage, lambda error: True, what).problem)
+
+    def receive(self) -> ServerMessage:
+        """Return the next message."""
+        message = self._receive(self._patience_s)
+        match message:
+            case Hello():
+                self.hello, self.channels = message, message.channels
+            case Notice():
+                self.notices.append(message)
+                if message.kind == "sequence-changed":
+                    self.channels = parse_channels(message.details)
+        return message
+
+    def close_code(self) -> int:
+        """Receive until the other end closes, and return the code it gives."""
+        end_s = time.monotonic() + self._patience_s
+        while time.monotonic() < end_s:
+            try:
+                self._connection.recv(timeout=self._patience_s)
+            except ConnectionClosed as error:
+                return CloseCode.ABNORMAL if error.rcvd is None else error.rcvd.code
+            except TimeoutError:
+                break
+        raise PromiseBroken("the stream is not closed")
+
+    def dropped(self, channel: int) -> int:
+        """Return how many frames of a channel the notices so far say were dropped."""
+        told = [each.details for each in self.notices if each.kind == "dropped"]
+        return sum(int(each["count"]) for each in told if each.get("channel") == channel)
+
+    def _next(self, kind: type[_M], wanted: Callable[[_M], bool], missing: str) -> _M:
+        end_s = time.monotonic() + self._patience_s
+        while time.monotonic() < end_s:
+            message = self.receive()
+            if isinstance(message, kind) and wanted(message):
+                return message
+            if isinstance(message, ErrorMessage):
+                detail = message.problem.get("detail")
+                raise PromiseBroken(f"the stream tells of a problem: {detail}")
+        raise PromiseBroken(f"{missing} within {self._patience_s:g} s")
+
+    def _receive(self, timeout_s: float) -> ServerMessage:
+        try:
+            with translated(self._url):
+                try:
+                    data = self._connection.recv(timeout=timeout_s)
+                except TimeoutError:
+                    what = f"the stream says nothing for {timeout_s:g} s"
+                    raise PromiseBroken(what) from None
+            return parse_server_message(data)
+        except ProtocolError as error:
+            raise PromiseBroken(f"the stream sends what is not documented: {error}") from error
+
+
+@contextmanager
+def connected(
+    url: str,
+    *products: str,
+    token: str | None = None,
+    patience_s: float,
+    credit: int | None = None,
+    start: int | None = None,
+    silent: bool = False,
+    unread: bool = False,
+) -> Iterator[Conversation]:
+    """Connect to a stream, and subscribe to ``products`` unless there are none.
+
+    ``silent`` sends no subscription, ``unread`` keeps the buffers of this end so small that what
+    is not read stays with the camera.
+    """
+    options = stream_options(timeout_s=patience_s)
+    if unread:
+        options |= {"max_queue": 1, "sock": _small_socket(url, patience_s)}
+    with translated(url), connect(url, **options) as connection:
+        conversation = Conversation(connection, url, patience_s=patience_s)
+        if not silent:
+            wanted = tuple(Subscription(each) for each in products)
+            message = Subscribe(wanted, token=token, credits=credit, start=start)
+            hello = conversation.subscribe(message)
+            expect(len(hello.channels) == len(products), "not every subscription has a channel")
+        yield conversation
+
+
+def _small_socket(url: str, timeout_s: float) -> socket.socket:
+    parts = urlsplit(url)
+    port = parts.port or (443 if parts.scheme == "wss" else 80)
+    place = socket.getaddrinfo(parts.hostname, port, type=socket.SOCK_STREAM)[0]
+    small = socket.socket(*place[:3])
+    try:
+        # before it connects, or the window is as large as the system likes it
+        small.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _SMALL_BUFFER_BYTES)
+        small.settimeout(timeout_s)
+        small.connect(place[4])
+    except OSError:
+        small.close()
+        raise
+    return small

@@ -1,0 +1,280 @@
+"""The camera that is checked: requests, streams, and its state before anything was touched."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cached_property
+from types import TracebackType
+from typing import Any, Final
+
+import httpx
+
+from transientcam import rest
+from transientcam.address import parse_address
+from transientcam.conformance.check import equal, expect, skip_unless
+from transientcam.conformance.conversation import Conversation, connected
+from transientcam.connection import answer, http_options
+from transientcam.errors import PromiseBroken, ProtocolError
+from transientcam.translation import media_type, translated
+from transientcam.wire import LEASE_HEADER, MEDIA_TYPE, PROBLEM_MEDIA_TYPE, Frame, parse_frame
+
+API: Final = "/api/v1"
+HOLDER: Final = "transientcam conformance"
+_STATE: Final = ("sequence", "reconstruction")
+_OF_THE_CAMERA: Final = rest.APPLIED_FIELDS | {"reconstruction_id"}
+_LEASE_S: Final = 600.0
+_SHOWN = 120
+
+
+class Device:
+    """A running camera, its answers as they are, and what it was set to at first.
+
+    Parameters
+    ----------
+    url, token
+        As of `Camera`.
+    patience_s
+        How long what should happen by itself may take.
+    """
+
+    def __init__(self, url: str, *, token: str | None = None, patience_s: float = 30.0) -> None:
+        self.address = parse_address(url)
+        self.token = token
+        self.patience_s = patience_s
+        self._http = httpx.Client(
+            base_url=self.address.url, **http_options(token=token, timeout_s=patience_s)
+        )
+        self._lease_id: str | None = None
+
+    # -- requests ------------------------------------------------------------------------------
+
+    def send(self, method: str, path: str, **options: Any) -> httpx.Response:
+        """Return the answer to a request, whatever it is."""
+        with translated(self.address.url):
+            return self._http.request(method, path, **options)
+
+    def peek(self, path: str, *, most_bytes: int = 2**26, **options: Any) -> httpx.Response:
+        """Return an answer that may have no end: its head, and no more than so much of its body."""
+        with translated(self.address.url), self._http.stream("GET", path, **options) as response:
+            if not media_type(response.headers.get("content-type", "")).startswith("multipart/"):
+                response.read()
+                expect(len(response.content) <= most_bytes, f"{path} is without end")
+            return response
+
+    def read(self, path: str, **options: Any) -> dict[str, Any]:
+        """Return the JSON document at a path.
+
+        Raises
+        ------
+        PromiseBroken
+            If there is none.
+        """
+        return self.document(self.send("GET", path, **options))
+
+    def document(self, response: httpx.Response, *, status: int = 200) -> dict[str, Any]:
+        """Return the JSON document that a request is answered with."""
+        what = _named(response)
+        if response.status_code != status:
+            said = rest.problem(answer(response))
+            raise PromiseBroken(f"{what} is answered with {response.status_code}: {said}")
+        equal(_media_type(response), "application/json", f"the media type of {what}")
+        return _object(response)
+
+    def refusal(
+        self, response: httpx.Response, status: int, *slugs: str, field: str | None = None
+    ) -> dict[str, Any]:
+        """Return the problem that a request is refused with, which is one of ``slugs``."""
+        what = _named(response)
+        equal(response.status_code, status, f"the status of {what}")
+        equal(_media_type(response), PROBLEM_MEDIA_TYPE, f"the media type of the refusal of {what}")
+        document = _object(response)
+        equal(document.get("status"), status, f"`status` in the problem of {what}")
+        for key in ("type", "title", "detail"):
+            expect(document.get(key), f"the problem of {what} has no `{key}`")
+        if slugs:
+            expect(
+                document["type"] in [f"/problems/{slug}" for slug in slugs],
+                f"{what} is refused with the problem {document['type']}, not {' or '.join(slugs)}",
+            )
+        if field is not None:
+            equal(document.get("field"), field, f"`field` in the problem of {what}")
+            expect("limit" in document, f"the problem of {what} does not say what would do")
+        return document
+
+    def frame(self, path: str, **options: Any) -> Frame:
+        """Return the product of a frame at a path, as msgpack."""
+        response = self.send("GET", path, headers={"accept": MEDIA_TYPE}, **options)
+        if response.status_code != httpx.codes.OK:
+            said = rest.problem(answer(response))
+            raise PromiseBroken(f"{_named(response)} is refused: {said}")
+        equal(_media_type(response), MEDIA_TYPE, f"the media type of {_named(response)}")
+        try:
+            return parse_frame(response.content)
+        except ProtocolError as error:
+            raise PromiseBroken(f"{_named(response)} is no frame: {error}") from error
+
+    @contextmanager
+    def stream(self, *products: str, **options: Any) -> Iterator[Conversation]:
+        """Subscribe for the length of a block; options as of `connected`."""
+        chosen = {"token": self.token, "patience_s": self.patience_s} | options
+        with connected(self.address.stream, *products, **chosen) as conversation:
+            yield conversation
+
+    # -- what it is ----------------------------------------------------------------------------
+
+    @cached_property
+    def openapi(self) -> dict[str, Any]:
+        """The interface as the camera describes it."""
+        return self.read("/openapi.json")
+
+    def offers(self, method: str, path: str) -> bool:
+        """Return whether an operation is described."""
+        return method.lower() in self.openapi.get("paths", {}).get(API + path, {})
+
+    @property
+    def camera(self) -> dict[str, Any]:
+        """What the camera can do and how it is."""
+        return self.read(f"{API}/camera")
+
+    @property
+    def sequence(self) -> dict[str, Any]:
+        """What is captured."""
+        return self.read(f"{API}/sequence")
+
+    def require_simulation(self) -> None:
+        """Skip the check where the camera is a real one."""
+        skip_unless(self.camera["simulated"], "the camera is a real one: nothing can be broken")
+
+    def wait_until(self, happened: Callable[[], bool], what: str) -> None:
+        """Wait for something; it is a broken promise if it does not come in time."""
+        end_s = time.monotonic() + self.patience_s
+        while not happened():
+            if time.monotonic() >= end_s:
+                raise PromiseBroken(f"{what} within {self.patience_s:g} s")
+            time.sleep(0.05)
+
+    # -- changing it ---------------------------------------------------------------------------
+
+    @contextmanager
+    def control(self) -> Iterator[None]:
+        """Be alone in changing things for a block, and undo at its end what it has changed.
+
+        Raises
+        ------
+        CheckSkipped
+            If somebody else controls the camera, or the token may only look.
+        """
+        if self._lease_id is not None:
+            yield
+            return
+        terms = {"holder": HOLDER, "duration_s": _LEASE_S, "on_lapse": "keep"}
+        response = self.send("POST", f"{API}/lease", json=terms)
+        if response.status_code in (401, 403, 409):
+            skip_unless(False, f"nothing may be changed: {rest.problem(answer(response))}")
+        granted = self.document(response, status=201)
+        before = self.state()
+        self.hold(granted["lease_id"])
+        try:
+            yield
+        finally:
+            # the check may have lost it, as a part of what it checks
+            if not self.send("PUT", f"{API}/lease").is_success:
+                self.hold(None)
+            self._restore(before)
+            if self._lease_id is not None:
+                self.send("DELETE", f"{API}/lease")
+            self.hold(None)
+
+    @contextmanager
+    def as_another(self) -> Iterator[dict[str, str]]:
+        """Be somebody without the lease for a block; yields the header that shows it."""
+        lease_id = self._lease_id
+        assert lease_id is not None  # noqa: S101 - it is used within `control`
+        del self._http.headers[LEASE_HEADER]
+        try:
+            yield {LEASE_HEADER: lease_id}
+        finally:
+            self.hold(self._lease_id)
+
+    def hold(self, lease_id: str | None) -> None:
+        """Show this lease with every change from now on."""
+        self._lease_id = lease_id
+        if lease_id is None:
+            self._http.headers.pop(LEASE_HEADER, None)
+        else:
+            self._http.headers[LEASE_HEADER] = lease_id
+
+    @contextmanager
+    def capturing(self) -> Iterator[None]:
+        """Let the camera capture for the length of a block, if it does not anyway."""
+        if self.read(f"{API}/acquisition")["running"]:
+            yield
+            return
+        with self.control():
+            self.document(self.send("PUT", f"{API}/acquisition", json={"running": True}))
+            yield
+
+    def accepted(self, sequence: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a sequence that can be set; skip the check where the camera does not take it."""
+        response = self.send("POST", f"{API}/sequence/validate", json=dict(sequence))
+        if not response.is_success:
+            skip_unless(False, f"this camera does not take it: {rest.problem(answer(response))}")
+        return dict(sequence)
+
+    def state(self) -> dict[str, Any]:
+        """Return everything that checks change, without what counts changes."""
+        state = {
+            name: {
+                key: value
+                for key, value in self.read(f"{API}/{name}").items()
+                if key not in _OF_THE_CAMERA
+            }
+            for name in _STATE
+            if self.offers("PUT", f"/{name}")
+        }
+        return state | {"running": self.read(f"{API}/acquisition")["running"]}
+
+    def _restore(self, before: Mapping[str, Any]) -> None:
+        now = self.state()
+        for name in _STATE:
+            if now.get(name) != before.get(name):
+                self.document(self.send("PUT", f"{API}/{name}", json=before[name]))
+        if now["running"] != before["running"]:
+            wanted = {"running": before["running"]}
+            self.document(self.send("PUT", f"{API}/acquisition", json=wanted))
+
+    # -- life ----------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Close all connections."""
+        self._http.close()
+
+    def __enter__(self) -> "Device":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _named(response: httpx.Response) -> str:
+    request = response.request
+    path = request.url.raw_path.decode("ascii", "replace")
+    return f"{request.method} {path if len(path) <= _SHOWN else path[: _SHOWN - 1] + '…'}"
+
+
+def _media_type(response: httpx.Response) -> str:
+    return media_type(response.headers.get("content-type", ""))
+
+
+def _object(response: httpx.Response) -> dict[str, Any]:
+    try:
+        document = response.json()
+    except (ValueError, RecursionError) as error:
+        raise PromiseBroken(f"{_named(response)} is answered with no JSON") from error
+    expect(isinstance(document, dict), f"{_named(response)} is answered with no JSON object")
+    return dict(document)

@@ -1,0 +1,54 @@
+"""Coming back: what was missed is sent, or it is said what is missing."""
+
+from transientcam.conformance.check import checks, equal, expect
+from transientcam.conformance.device import Device
+from transientcam.wire import Frame, Notice, ServerMessage
+
+_AFTER = 3
+
+
+def a_stream_goes_on_where_it_stopped(device: Device) -> None:
+    """A stream with `start` begins with that frame, or says with a gap which are missing."""
+    with device.capturing():
+        with device.stream("flags") as stream:
+            last = stream.frame().frame
+        with device.stream("flags") as watcher:
+            watcher.frame(lambda each: each.frame >= last + _AFTER)
+        _expect_from(device, last + 1)
+
+
+def a_gap_is_stated(device: Device) -> None:
+    """What is not kept any more is told as a gap from the frame asked for to the one missing last.
+
+    The first frame follows the gap without a hole.
+    """
+    with device.capturing():
+        with device.stream("flags") as stream:
+            stream.frame()
+        _expect_from(device, 1)
+
+
+def _expect_from(device: Device, start: int) -> None:
+    with device.stream("flags", start=start) as stream:
+        due = start
+        seen: list[int] = []
+        while len(seen) < _AFTER:
+            message: ServerMessage = stream.receive()
+            if isinstance(message, Notice) and message.kind in ("gap", "dropped"):
+                due = _after(message, due)
+            if isinstance(message, Frame):
+                equal(message.frame, due, f"after frames {seen or 'none'}, the next of {start} on")
+                seen.append(message.frame)
+                due = message.frame + 1
+
+
+def _after(notice: Notice, due: int) -> int:
+    """Return which frame is next after some are said to be missing."""
+    if notice.kind == "dropped":
+        return due + int(notice.details["count"])
+    equal(notice.details.get("from"), due, "`from` of a gap")
+    expect(notice.details.get("reason"), "a gap has no reason")
+    return int(notice.details["to"]) + 1
+
+
+CHECKS = checks("resume", a_stream_goes_on_where_it_stopped, a_gap_is_stated)

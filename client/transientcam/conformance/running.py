@@ -1,0 +1,137 @@
+"""All checks, and the running of them against one camera."""
+
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any, Final
+
+from transientcam.conformance import (
+    authentication,
+    leasing,
+    parameters,
+    problems,
+    recording,
+    resuming,
+    routes,
+    sizes,
+    slow_readers,
+    streaming,
+    tags,
+    unplugging,
+)
+from transientcam.conformance.check import Check
+from transientcam.conformance.device import API, Device
+from transientcam.conformance.report import Outcome, Report, Result
+from transientcam.errors import CheckSkipped, ParameterError, TransientcamError
+
+CHECKS: Final[tuple[Check, ...]] = (
+    *routes.CHECKS,
+    *problems.CHECKS,
+    *parameters.CHECKS,
+    *tags.CHECKS,
+    *leasing.CHECKS,
+    *streaming.CHECKS,
+    *slow_readers.CHECKS,
+    *resuming.CHECKS,
+    *sizes.CHECKS,
+    *recording.CHECKS,
+    *unplugging.CHECKS,
+    *authentication.CHECKS,
+)
+"""Every check, in the order they are run."""
+GROUPS: Final = tuple(dict.fromkeys(each.group for each in CHECKS))
+_LEFT: Final = Check(
+    "afterwards",
+    "the-camera-is-left-as-it-was",
+    "What was checked is set as it was before: sequence, reconstruction, and whether it captures.",
+    lambda device: None,
+)
+_MALFORMED: Final = (KeyError, IndexError, TypeError, ValueError, AttributeError)
+"""What reading an answer raises that is not the document it should be."""
+
+
+def chosen(groups: Collection[str]) -> tuple[Check, ...]:
+    """Return the checks of some groups; of all, where none is named.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such group.
+    """
+    for each in groups:
+        if each not in GROUPS:
+            raise ParameterError("only", each, f"one of {', '.join(GROUPS)}")
+    return tuple(each for each in CHECKS if not groups or each.group in groups)
+
+
+def run(
+    device: Device,
+    checks: Sequence[Check] = CHECKS,
+    *,
+    begin: Callable[[Check], object] = lambda check: None,
+    end: Callable[[Result], object] = lambda result: None,
+    clock: Callable[[], float] = time.monotonic,
+    unix_s: Callable[[], float] = time.time,
+) -> Report:
+    """Try every check in turn, and report.
+
+    ``begin`` and ``end`` are told of each.
+
+    Raises
+    ------
+    ServerUnreachable, ProblemError, ProtocolError
+        If nothing that could be checked answers at the address.
+    """
+    began_s, start_s = unix_s(), clock()
+    camera = _identity(device)
+    before = _settings(device)
+    results = []
+    for check in checks:
+        begin(check)
+        results.append(_try(check, device, clock))
+        end(results[-1])
+    begin(_LEFT)
+    results.append(_left_as(before, device))
+    end(results[-1])
+    return Report(device.address.url, camera, began_s, clock() - start_s, results)
+
+
+def _try(check: Check, device: Device, clock: Callable[[], float]) -> Result:
+    start_s = clock()
+    outcome: Outcome = "passed"
+    reason = None
+    try:
+        check.run(device)
+    except CheckSkipped as skipped:
+        outcome, reason = "skipped", str(skipped)
+    except TransientcamError as error:
+        outcome, reason = "failed", str(error)
+    except _MALFORMED as error:
+        outcome, reason = "failed", f"an answer is not as documented: {error!r}"
+    return Result(check, outcome, reason, clock() - start_s)
+
+
+def _identity(device: Device) -> dict[str, Any]:
+    """Return what names the camera; the first request, which an address that is wrong fails."""
+    device.send("GET", "/livez")
+    try:
+        info, camera = device.read(f"{API}/info"), device.camera["capabilities"]
+        names = {key: camera[key] for key in ("model", "serial", "firmware")}
+        return {"service": info["name"], "version": info["version"], **names}
+    except (TransientcamError, *_MALFORMED):
+        return {}  # which the checks will say better
+
+
+def _settings(device: Device) -> Mapping[str, Any] | None:
+    try:
+        return device.state()
+    except (TransientcamError, *_MALFORMED):
+        return None
+
+
+def _left_as(before: Mapping[str, Any] | None, device: Device) -> Result:
+    if before is None:
+        return Result(_LEFT, "skipped", "it did not say how it was set", 0.0)
+    after = _settings(device)
+    if after == before:
+        return Result(_LEFT, "passed", None, 0.0)
+    return Result(_LEFT, "failed", f"it was {before} and is {after}", 0.0)

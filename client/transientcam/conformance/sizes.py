@@ -1,0 +1,104 @@
+"""Answers and messages beyond 1 MiB and 16 MiB, where many a library stops."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Final
+
+from transientcam.conformance.check import checks, equal, expect, skip_unless
+from transientcam.conformance.conversation import Conversation
+from transientcam.conformance.device import API, Device
+
+MIB: Final = 1024 * 1024
+_LONGEST_CAPTURE_S = 10.0
+
+
+def an_answer_over_1_mib_arrives_whole(device: Device) -> None:
+    """A product over time of more than 1 MiB is answered whole."""
+    _expect_transient(device, MIB)
+
+
+def an_answer_over_16_mib_arrives_whole(device: Device) -> None:
+    """A product over time of more than 16 MiB is answered whole."""
+    _expect_transient(device, 16 * MIB)
+
+
+def a_message_over_1_mib_arrives_whole(device: Device) -> None:
+    """A streamed frame of more than 1 MiB arrives whole."""
+    with _large(device, MIB) as stream:
+        _expect_message(stream, MIB)
+
+
+def a_message_over_16_mib_arrives_whole(device: Device) -> None:
+    """A streamed frame of more than 16 MiB arrives whole."""
+    with _large(device, 16 * MIB) as stream:
+        _expect_message(stream, 16 * MIB)
+
+
+def an_answer_without_measure_is_refused(device: Device) -> None:
+    """More times of flight than may be asked for are refused with 422, naming the limit."""
+    with device.capturing():
+        params = {"bins": 10**9, "wait_s": 10.0}
+        response = device.send("GET", f"{API}/frames/latest/transient", params=params)
+        device.refusal(response, 422, "invalid-request", "answer-too-large")
+
+
+def _expect_transient(device: Device, size_bytes: int) -> None:
+    capabilities = device.camera["capabilities"]
+    pixels = capabilities["width"] * capabilities["height"]
+    bins = math.ceil(size_bytes / (4 * pixels)) + 1
+    with device.capturing():
+        params = {"bins": bins, "wait_s": 10.0}
+        frame = device.frame(f"{API}/frames/latest/transient", params=params)
+        wanted = (bins, capabilities["height"], capabilities["width"])
+        equal(frame.array.shape, wanted, "the shape of the answer")
+        expect(frame.array.nbytes > size_bytes, f"the answer has {frame.array.nbytes} bytes")
+        expect(frame.time_s is not None and len(frame.time_s) == bins, "not every time is told")
+
+
+@contextmanager
+def _large(device: Device, size_bytes: int) -> Iterator[Conversation]:
+    """Stream raw images at a sequence with so many that a frame is large."""
+    with device.control(), device.capturing(), device.stream("flags") as stream:
+        wanted = device.accepted(_sequence(device.camera["capabilities"], size_bytes))
+        applied = device.document(device.send("PUT", f"{API}/sequence", json=wanted))
+        skip_unless(
+            applied["capture_s"] < _LONGEST_CAPTURE_S,
+            f"a frame of that size takes {applied['capture_s']:.0f} s to capture",
+        )
+        stream.say({"type": "subscribe", "v": 1, "subscriptions": [{"product": "raw"}]})
+        stream.greeting()
+        yield stream
+
+
+def _sequence(capabilities: dict[str, Any], size_bytes: int) -> dict[str, Any]:
+    images = math.ceil(size_bytes / (2 * capabilities["width"] * capabilities["height"])) + 1
+    harmonics = min(capabilities["max_harmonics"], 8)
+    takes = math.ceil(images / (4 * (harmonics + 1)))
+    skip_unless(
+        takes <= capabilities["max_takes"],
+        f"this camera makes no frame of {size_bytes // MIB} MiB",
+    )
+    return {
+        "harmonics": harmonics,
+        "takes": takes,
+        "zeroth": "low-frequency",
+        "exposure_s": capabilities["min_exposure_s"],
+        "base_frequency_hz": capabilities["max_frequency_hz"] / harmonics / 2.0,
+    }
+
+
+def _expect_message(stream: Conversation, size_bytes: int) -> None:
+    frame = stream.frame(lambda each: each.product == "raw" and each.array.nbytes > size_bytes)
+    equal(frame.array.shape, stream.channels[0].shape, "the shape of the frame")
+    equal(len(frame.labels), frame.array.shape[0], "the number of labels")
+
+
+CHECKS = checks(
+    "sizes",
+    an_answer_over_1_mib_arrives_whole,
+    an_answer_over_16_mib_arrives_whole,
+    a_message_over_1_mib_arrives_whole,
+    a_message_over_16_mib_arrives_whole,
+    an_answer_without_measure_is_refused,
+)

@@ -1,0 +1,115 @@
+"""Slow readers lose frames and are told so; nobody else notices."""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from transientcam.conformance.check import checks, equal, expect, skip_unless
+from transientcam.conformance.conversation import Conversation
+from transientcam.conformance.device import Device
+from transientcam.wire import Channel
+
+_FRAMES: Final = 10
+_ATTEMPTS: Final = 3
+"""A machine that is busy for a moment breaks no promise."""
+_MORE_THAN_BUFFERS_BYTES: Final = 24 * 1024 * 1024
+_MOST_FRAMES: Final = 60
+_LARGE: Final = ("raw", "coefficients", "moments", "brightness", "direct", "indirect", "range")
+
+
+def drops_are_told(device: Device) -> None:
+    """Who acknowledges late gets the newest frame, and is told how many were dropped before."""
+    with (
+        device.capturing(),
+        device.stream("flags") as steady,
+        device.stream("range", credit=1) as slow,
+    ):
+        first = slow.frame()
+        steady.frame(lambda each: each.frame >= first.frame + 5)
+        slow.acknowledge(first.frame)
+        second = slow.frame()
+        missed = second.frame - first.frame - 1
+        expect(missed >= 3, f"{missed} frames are missing between two, 5 after the first were due")
+        equal(slow.dropped(_channel(slow)), missed, "the number of frames told as dropped")
+
+
+def who_does_not_acknowledge_gets_no_more_than_its_credits(device: Device) -> None:
+    """No more frames than the credits are on their way unacknowledged."""
+    with (
+        device.capturing(),
+        device.stream("flags") as steady,
+        device.stream("range", credit=2) as slow,
+    ):
+        first, second = slow.frame(), slow.frame()
+        steady.frame(lambda each: each.frame >= second.frame + 4)
+        slow.acknowledge(second.frame)
+        expect(slow.frame().frame > second.frame + 1, "frames were sent beyond the credits")
+        expect(first.frame < second.frame, "frames come twice")
+
+
+def who_never_reads_delays_nobody(device: Device) -> None:
+    """While one client reads nothing at all, another gets every single frame."""
+    with device.capturing():
+        for _ in range(_ATTEMPTS):
+            missed = _missed_beside_a_stuck_one(device)
+            if not missed:
+                return
+        expect(False, f"a healthy client misses {missed} frames while another one does not read")
+
+
+def who_never_reads_loses_frames(device: Device) -> None:
+    """What a client does not read is not kept for it: it loses frames, and is told how many."""
+    with (
+        device.capturing(),
+        device.stream(*_LARGE, unread=True) as stuck,
+        device.stream("flags") as healthy,
+    ):
+        frame_bytes = sum(_bytes(each) for each in stuck.channels)
+        frames = math.ceil(_MORE_THAN_BUFFERS_BYTES / frame_bytes)
+        skip_unless(frames <= _MOST_FRAMES, "frames are too small to fall behind with")
+        last = healthy.frame().frame + frames
+        healthy.frame(lambda each: each.frame >= last)
+        _expect_loss(stuck, last)
+
+
+def _missed_beside_a_stuck_one(device: Device) -> int:
+    with (
+        device.stream(*_LARGE, unread=True),
+        device.stream("flags") as healthy,
+    ):
+        numbers = [healthy.frame().frame for _ in range(_FRAMES)]
+        missed = numbers[-1] - numbers[0] + 1 - len(numbers)
+        equal(healthy.dropped(_channel(healthy)), missed, "what a healthy client is told it lost")
+        return missed
+
+
+def _expect_loss(stuck: Conversation, last: int) -> None:
+    """Read what has waited: every gap between frames of a channel was told as dropped."""
+    channel = _channel(stuck)
+    newest = stuck.frame(lambda each: each.channel == channel).frame
+    while newest < last:
+        number = stuck.frame(lambda each: each.channel == channel).frame
+        missed = number - newest - 1
+        if missed:
+            equal(stuck.dropped(channel), missed, "the frames told as dropped")
+            return
+        newest = number
+    expect(False, "everything was kept for a client that does not read")
+
+
+def _bytes(channel: Channel) -> int:
+    return math.prod(channel.shape) * np.dtype(channel.dtype).itemsize
+
+
+def _channel(conversation: Conversation) -> int:
+    return conversation.channels[0].channel
+
+
+CHECKS = checks(
+    "slow-readers",
+    drops_are_told,
+    who_does_not_acknowledge_gets_no_more_than_its_credits,
+    who_never_reads_delays_nobody,
+    who_never_reads_loses_frames,
+)

@@ -1,0 +1,149 @@
+"""The stream: its handshake, its greeting, its messages and how it closes."""
+
+import numpy as np
+
+from transientcam.conformance.check import checks, equal, expect
+from transientcam.conformance.device import API, Device
+from transientcam.wire import PRODUCTS, SUBPROTOCOL, CloseCode
+
+_META = ("frame", "sequence_id", "calibration_id", "device_time_s", "host_time_s", "capture_s")
+
+
+def a_handshake_without_the_subprotocol_is_refused(device: Device) -> None:
+    """A handshake that does not offer the subprotocol is refused with 400 and a problem."""
+    headers = {
+        "connection": "Upgrade",
+        "upgrade": "websocket",
+        "sec-websocket-version": "13",
+        "sec-websocket-key": "dGhlIHNhbXBsZSBub25jZQ==",
+        "sec-websocket-protocol": "somebody.elses.v7",
+    }
+    response = device.send("GET", f"{API}/stream", headers=headers)
+    problem = device.refusal(response, 400, "subprotocol-required")
+    expect(SUBPROTOCOL in problem.get("supported", ()), "`supported` does not name it")
+
+
+def the_greeting_says_what_frames_look_like(device: Device) -> None:
+    """Every channel of the hello says product, unit, axes, dtype and shape, and frames agree."""
+    products = ("range", "flags", "coefficients", "raw")
+    with device.capturing(), device.stream(*products) as stream:
+        channels = {each.channel: each for each in stream.channels}
+        equal([each.product for each in stream.channels], list(products), "the channels' products")
+        for _ in products:
+            frame = stream.frame()
+            channel = channels[-1 if frame.channel is None else frame.channel]
+            known = PRODUCTS[frame.product]
+            found = frame.product, frame.unit, frame.axes, frame.array.dtype, frame.array.shape
+            told = channel.product, channel.unit, channel.axes, channel.dtype, channel.shape
+            equal(found, (*told[:3], np.dtype(told[3]), told[4]), f"a frame of {channel.product}")
+            equal(frame.axes, known.axes, f"the axes of {known.name}")
+
+
+def the_products_of_a_frame_come_together(device: Device) -> None:
+    """The products of one frame are separate messages, in the order of the channels."""
+    products = ("flags", "range", "brightness")
+    with device.capturing(), device.stream(*products) as stream:
+        frames = [stream.frame() for _ in range(2 * len(products))]
+        equal([each.product for each in frames], [*products, *products], "the order of products")
+        for first in (frames[: len(products)], frames[len(products) :]):
+            equal(len({each.frame for each in first}), 1, "the number of frames in one frame")
+
+
+def frames_are_counted_and_told_of(device: Device) -> None:
+    """Every frame says its number, sequence, times and lost images; numbers only grow."""
+    with device.capturing(), device.stream("flags") as stream:
+        frames = [stream.frame() for _ in range(4)]
+        numbers = [each.frame for each in frames]
+        expect(numbers == sorted(set(numbers)), f"frames are counted {numbers}")
+        times = [each.meta["device_time_s"] for each in frames]
+        expect(times == sorted(set(times)), f"frames begin at {times} s")
+        for frame in frames:
+            missing = [key for key in _META if frame.meta.get(key) is None]
+            expect(not missing, f"frame {frame.frame} does not say {', '.join(missing)}")
+
+
+def a_streamed_frame_is_the_one_that_is_asked_for(device: Device) -> None:
+    """A product of a frame is the same array in the stream as over HTTP."""
+    with device.control(), device.capturing():
+        with device.stream("range") as stream:
+            streamed = {each.frame: each for each in (stream.frame() for _ in range(2))}
+            device.document(device.send("PUT", f"{API}/acquisition", json={"running": False}))
+            latest = device.frame(f"{API}/frames/latest/range")
+            while latest.frame not in streamed:
+                frame = stream.frame()
+                streamed[frame.frame] = frame
+        same = np.array_equal(latest.array, streamed[latest.frame].array, equal_nan=True)
+        expect(same, f"range of frame {latest.frame} differs between stream and HTTP")
+
+
+def a_bad_first_message_ends_the_stream(device: Device) -> None:
+    """A first message that is no subscription is answered with a problem, then closed with 4001."""
+    with device.stream(silent=True) as stream:
+        stream.say({"type": "ack", "frame": 1})
+        equal(stream.problem().get("type"), "/problems/bad-message", "the problem")
+        equal(stream.close_code(), CloseCode.BAD_FIRST_MESSAGE, "the close code")
+
+
+def a_bad_later_message_disturbs_nothing(device: Device) -> None:
+    """A later message that cannot be used is answered with a problem; the stream goes on."""
+    with device.capturing(), device.stream("flags") as stream:
+        stream.frame()
+        stream.say({"type": "subscribe", "v": 1, "subscriptions": [{"product": "no-such"}]})
+        expect(stream.problem().get("type"), "the problem has no type")
+        stream.say_text("not binary")
+        equal(stream.problem().get("type"), "/problems/bad-message", "the problem of a text")
+        equal(stream.frame().product, "flags", "the product streamed afterwards")
+
+
+def a_subscription_can_be_replaced(device: Device) -> None:
+    """A later subscribe replaces the subscription, and is answered with a new hello."""
+    with device.capturing(), device.stream("flags") as stream:
+        stream.frame()
+        stream.say({"type": "subscribe", "v": 1, "subscriptions": [{"product": "range"}]})
+        greeted = stream.greeting()
+        equal([each.product for each in greeted.channels], ["range"], "the channels told")
+        equal(stream.frame().product, "range", "the product streamed afterwards")
+
+
+def a_change_of_the_sequence_is_told(device: Device) -> None:
+    """A changed sequence is told to every stream, with what frames look like from then on."""
+    with device.control(), device.capturing(), device.stream("moments") as stream:
+        present = device.sequence
+        other = 2 if present["harmonics"] != 2 else 3
+        wanted = device.accepted(present | {"harmonics": other, "zeroth": "on-off"})
+        applied = device.document(device.send("PUT", f"{API}/sequence", json=wanted))
+        stream.notice("sequence-changed")
+        equal(stream.channels[0].shape[0], other + 1, "the moments told")
+        new = applied["sequence_id"]  # some frames of the former may still be on their way
+        frame = stream.frame(lambda each: each.meta["sequence_id"] == new)
+        equal(frame.array.shape[0], other + 1, "the moments of the first new frame")
+
+
+def a_rate_limit_is_kept(device: Device) -> None:
+    """max_rate_hz bounds how many frames of a product come, without losing any of another."""
+    with device.capturing(), device.stream("flags", "range") as stream:
+        rate_hz = device.sequence["frame_rate_hz"]
+        slow = {"product": "range", "max_rate_hz": rate_hz / 4.0}
+        message = {"type": "subscribe", "v": 1, "subscriptions": [{"product": "flags"}, slow]}
+        stream.say(message)
+        stream.greeting()
+        names = [stream.frame().product for _ in range(15)]
+        expect(
+            1 <= names.count("range") <= 5,
+            f"{names.count('range')} of 15 messages are of the product limited to a quarter",
+        )
+
+
+CHECKS = checks(
+    "stream",
+    a_handshake_without_the_subprotocol_is_refused,
+    the_greeting_says_what_frames_look_like,
+    the_products_of_a_frame_come_together,
+    frames_are_counted_and_told_of,
+    a_streamed_frame_is_the_one_that_is_asked_for,
+    a_bad_first_message_ends_the_stream,
+    a_bad_later_message_disturbs_nothing,
+    a_subscription_can_be_replaced,
+    a_change_of_the_sequence_is_told,
+    a_rate_limit_is_kept,
+)

@@ -1,0 +1,85 @@
+"""A camera that is unplugged: it is told, answered for, and found again. Simulated cameras only."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from transientcam.conformance.check import checks, equal, expect
+from transientcam.conformance.conversation import Conversation
+from transientcam.conformance.device import API, Device
+
+
+def an_unplugged_camera_is_told(device: Device) -> None:
+    """Streams hear camera-lost with a reason; /readyz gives 503 with it, /livez goes on."""
+    with _simulated(device) as stream, _unplugged(device):
+        lost = stream.notice("camera-lost")
+        expect(lost.details.get("reason"), "camera-lost has no reason")
+        problem = device.refusal(device.send("GET", "/readyz"), 503, "not-ready")
+        expect(problem.get("reasons"), "/readyz does not say why")
+        device.read("/livez")
+        equal(device.camera["state"], "lost", "the state of the camera")
+
+
+def a_lost_camera_refuses_and_remembers(device: Device) -> None:
+    """What needs the camera is refused with camera-lost; what was captured can still be read."""
+    with _simulated(device) as stream, _unplugged(device):
+        stream.notice("camera-lost")
+        wanted = {"harmonics": 2}
+        device.refusal(device.send("PUT", f"{API}/sequence", json=wanted), 503, "camera-lost")
+        device.read(f"{API}/frames/latest")
+
+
+def a_camera_that_is_back_goes_on(device: Device) -> None:
+    """After camera-back frames come with the same sequence, and their numbers go on."""
+    with _simulated(device) as stream:
+        before, sequence = stream.frame().frame, device.state()["sequence"]
+        with _unplugged(device):
+            stream.notice("camera-lost")
+        stream.notice("camera-back")
+        expect(stream.frame().frame > before, "frames are counted anew")
+        equal(device.state()["sequence"], sequence, "the sequence after the camera came back")
+        device.wait_until(
+            lambda: device.send("GET", "/readyz").is_success, "/readyz is not ready again"
+        )
+
+
+def spoilt_images_are_counted(device: Device) -> None:
+    """Images that are lost or corrupt cost their frame; the next one and a notice say how many."""
+    for fault in ("corrupt-image", "drop-image"):
+        with _simulated(device) as stream:
+            _cause(device, fault)
+            told = stream.notice("lost-images")
+            expect(told.details.get("count", 0) >= 1, f"{fault}: no lost image is told")
+            stream.frame()
+    counters = device.camera["counters"]
+    expect(counters["lost"] + counters["corrupt"] >= 2, "/camera counts no lost or corrupt image")
+
+
+@contextmanager
+def _simulated(device: Device) -> Iterator[Conversation]:
+    device.require_simulation()
+    with device.control(), device.capturing(), device.stream("flags") as stream:
+        stream.frame()
+        yield stream
+
+
+@contextmanager
+def _unplugged(device: Device) -> Iterator[None]:
+    _cause(device, "unplug")
+    try:
+        yield
+    finally:
+        _cause(device, "replug")
+        device.wait_until(lambda: device.camera["state"] != "lost", "the camera is not found again")
+
+
+def _cause(device: Device, fault: str) -> None:
+    device.document(device.send("POST", f"{API}/simulation/faults", json={"fault": fault}))
+
+
+CHECKS = checks(
+    "unplug",
+    an_unplugged_camera_is_told,
+    a_lost_camera_refuses_and_remembers,
+    a_camera_that_is_back_goes_on,
+    spoilt_images_are_counted,
+)
