@@ -9,7 +9,8 @@
 (12, 120, 163)
 """
 
-from transientcam_driver.calibration import CalibrationCapture, capture_calibration
+from transientcam_driver.calibrating import capture_calibration
+from transientcam_driver.calibration import CalibrationCapture, CalibrationSubject
 from transientcam_driver.camera import Camera, CameraState
 from transientcam_driver.capabilities import AppliedSequence, Capabilities
 from transientcam_driver.errors import (
@@ -46,6 +47,7 @@ __all__ = [
     "CalibrationError",
     "CalibrationFileError",
     "CalibrationMismatch",
+    "CalibrationSubject",
     "Camera",
     "CameraBusy",
     "CameraClosed",

@@ -1,49 +1,72 @@
-"""Calibration measurements: captured with a camera, kept in a file, good for one sequence.
+"""Calibration measurements: kept in a file, good for one camera and sequence.
 
-The images are taken while the light shines at the sensor through a filter and a diffusor, so that
-every pixel should measure the same at every frequency (Peters et al. 2015, Sec. 4.2). What
-follows from them is arithmetic, and left to others.
+What follows from them is arithmetic, and left to others.
 """
 
 import hashlib
 import io
 import json
+import re
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.camera import Camera
 from transientcam_driver.capabilities import AppliedSequence, Capabilities
 from transientcam_driver.errors import (
     CalibrationFileError,
     CalibrationMismatch,
-    CameraError,
     DriverError,
-    SequenceError,
 )
-from transientcam_driver.frames import RawFrame
 from transientcam_driver.sequence import Sequence
 
-DEFAULT_TAKES = 40
-"""Of the paper's calibration measurements."""
 DEVICE_FIELDS = ("serial", "width", "height")
 """Fields of a mismatch that no other sequence makes good."""
 FORMAT = 1
-_FRAME_PATIENCE = 5.0  # times as long as a frame takes, and at least:
-_LEAST_PATIENCE_S = 10.0
+MAX_BYTES = 1024**3
+"""Of the content of a file, unpacked."""
 
-Averaging = Callable[[NDArray[np.uint16]], tuple[NDArray[Any], NDArray[np.bool_]]]
-"""From takes of one image (takes, 1, H, W) to their mean (1, H, W), and which were kept
-(takes, 1)."""
-Progress = Callable[[int, int], None]
-"""Told how many frames are captured, of how many."""
+
+@dataclass(frozen=True, slots=True)
+class CalibrationSubject:
+    """What a calibration measurement is good for: a camera, and what it captures."""
+
+    serial: str
+    width: int
+    height: int
+    sequence: Sequence
+    low_frequency_hz: float
+
+    def misfit(
+        self, applied: AppliedSequence, capabilities: Capabilities
+    ) -> CalibrationMismatch | None:
+        """Say why the measurement is not good for what a camera captures; None where it is.
+
+        The number and order of takes do not matter: each image is the same in all of them.
+        """
+        sequence, mine = applied.sequence, self.sequence
+        compared: list[tuple[str, object, object]] = [
+            ("serial", capabilities.serial, self.serial),
+            ("width", capabilities.width, self.width),
+            ("height", capabilities.height, self.height),
+            ("base_frequency_hz", sequence.base_frequency_hz, mine.base_frequency_hz),
+            ("harmonics", sequence.harmonics, mine.harmonics),
+            ("zeroth", sequence.zeroth, mine.zeroth),
+            ("exposure_s", sequence.exposure_s, mine.exposure_s),
+            ("sub_phases.scheme", sequence.sub_phases.scheme, mine.sub_phases.scheme),
+            ("sub_phases.n", sequence.sub_phases.n, mine.sub_phases.n),
+        ]
+        if sequence.zeroth == "low-frequency":
+            compared.append(("low_frequency_hz", applied.low_frequency_hz, self.low_frequency_hz))
+        for name, value, needed in compared:
+            if value != needed:
+                return CalibrationMismatch(name, value, needed)
+        return None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,6 +92,8 @@ class CalibrationCapture:
     dark, dark_deviation
         float32 (H, W) in DN: mean and standard deviation of images without light at the same
         exposure; None where the camera cannot take any.
+    notes
+        What others keep with it, as JSON has it; its id does not depend on them.
     """
 
     images: NDArray[np.float32]
@@ -82,6 +107,7 @@ class CalibrationCapture:
     captured_unix_s: float
     dark: NDArray[np.float32] | None = None
     dark_deviation: NDArray[np.float32] | None = None
+    notes: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def id(self) -> str:
@@ -89,38 +115,26 @@ class CalibrationCapture:
         digest = hashlib.sha256(json.dumps(self._document(), sort_keys=True).encode())
         for array in self._arrays().values():
             digest.update(np.ascontiguousarray(array).tobytes())
-        return f"{self.serial}-{digest.hexdigest()[:12]}"
+        # it stands in addresses and names files
+        serial = re.sub(r"[^A-Za-z0-9-]+", "-", self.serial).strip("-")
+        return f"{serial or 'camera'}-{digest.hexdigest()[:12]}"
 
     @property
     def rejected_images(self) -> int:
         """How many images were left out of the averages."""
         return int(np.count_nonzero(~self.kept))
 
+    @property
+    def subject(self) -> CalibrationSubject:
+        """What this measurement is good for."""
+        height, width = self.images.shape[1:]
+        return CalibrationSubject(self.serial, width, height, self.sequence, self.low_frequency_hz)
+
     def misfit(
         self, applied: AppliedSequence, capabilities: Capabilities
     ) -> CalibrationMismatch | None:
-        """Say why this measurement is not good for what a camera captures; None where it is.
-
-        The number and order of takes do not matter: each image is the same in all of them.
-        """
-        sequence, mine = applied.sequence, self.sequence
-        compared: list[tuple[str, object, object]] = [
-            ("serial", capabilities.serial, self.serial),
-            ("width", capabilities.width, self.images.shape[2]),
-            ("height", capabilities.height, self.images.shape[1]),
-            ("base_frequency_hz", sequence.base_frequency_hz, mine.base_frequency_hz),
-            ("harmonics", sequence.harmonics, mine.harmonics),
-            ("zeroth", sequence.zeroth, mine.zeroth),
-            ("exposure_s", sequence.exposure_s, mine.exposure_s),
-            ("sub_phases.scheme", sequence.sub_phases.scheme, mine.sub_phases.scheme),
-            ("sub_phases.n", sequence.sub_phases.n, mine.sub_phases.n),
-        ]
-        if sequence.zeroth == "low-frequency":
-            compared.append(("low_frequency_hz", applied.low_frequency_hz, self.low_frequency_hz))
-        for field, value, needed in compared:
-            if value != needed:
-                return CalibrationMismatch(field, value, needed)
-        return None
+        """Say why it is not good for what a camera captures; see `CalibrationSubject.misfit`."""
+        return self.subject.misfit(applied, capabilities)
 
     def require_fit(self, applied: AppliedSequence, capabilities: Capabilities) -> None:
         """Refuse what this measurement is not good for.
@@ -135,13 +149,14 @@ class CalibrationCapture:
 
     def save(self, path: Path) -> None:
         """Write an .npz: arrays, and a JSON document beside them."""
-        document = np.array(json.dumps({"format": FORMAT} | self._document()))
+        content = {"format": FORMAT} | self._document() | {"notes": dict(self.notes)}
+        document = np.array(json.dumps(content))
         with path.open("wb") as file:  # a path without .npz would be given one
             np.savez_compressed(file, document=document, **self._arrays())  # type: ignore[arg-type]  # numpy types its keywords as flags
 
     @classmethod
-    def load(cls, path: Path) -> "CalibrationCapture":
-        """Read an .npz that ``save`` has written.
+    def load(cls, path: Path, *, max_bytes: int = MAX_BYTES) -> "CalibrationCapture":
+        """Read an .npz that ``save`` has written, and that holds no more than ``max_bytes``.
 
         Raises
         ------
@@ -151,6 +166,11 @@ class CalibrationCapture:
         try:
             # numpy leaves a file open that it cannot make sense of
             with path.open("rb") as file, zipfile.ZipFile(file) as archive:
+                size = sum(member.file_size for member in archive.infolist())
+                if size > max_bytes:  # said before any of it is unpacked
+                    raise CalibrationFileError(
+                        path, "the file", f"{size} bytes unpacked", f"at most {max_bytes}"
+                    )
                 content = {
                     name.removesuffix(".npy"): np.load(
                         io.BytesIO(archive.read(name)), allow_pickle=False
@@ -179,101 +199,6 @@ class CalibrationCapture:
         }
 
 
-def mean_of_takes(takes: NDArray[np.uint16]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Average takes (takes, N, H, W), keeping every image."""
-    return takes.mean(axis=0), np.ones(takes.shape[:2], dtype=bool)
-
-
-def capture_calibration(
-    camera: Camera,
-    *,
-    takes: int = DEFAULT_TAKES,
-    average: Averaging = mean_of_takes,
-    progress: Progress | None = None,
-) -> CalibrationCapture:
-    """Measure with the camera's present sequence while its light shines at the sensor (Sec. 4.2).
-
-    Dark images come first, with the same exposure. The sequence is then restored, and the light
-    is off.
-
-    Parameters
-    ----------
-    camera
-        Idle; nobody else reads from it meanwhile.
-    takes
-        How often each image is captured, from 2.
-    average
-        How takes become one image; their mean without a better idea.
-    progress
-        Told after each frame.
-
-    Raises
-    ------
-    SequenceError
-        For less than two takes.
-    CameraError
-        The camera was lost, or gives no frames.
-    """
-    if takes < 2:
-        raise SequenceError("takes", takes, "at least 2 for a calibration")
-    before = camera.applied.sequence
-    single = replace(before, takes=1, take_order="sequential")
-    in_the_dark = replace(single, harmonics=1, zeroth="on-off")
-    with_dark = "on-off" in camera.capabilities.zeroths
-    total = takes * (1 + with_dark)
-
-    def tell(done: int) -> None:
-        if progress is not None:
-            progress(done, total)
-
-    try:
-        dark = _dark(_frames(camera, in_the_dark, takes, tell)) if with_dark else None
-        frames = _frames(camera, single, takes, lambda done: tell(total - takes + done))
-        applied = camera.applied
-        camera.configure(before)
-    finally:
-        with suppress(CameraError):  # a lost camera's light is its own watchdog's
-            camera.stop()
-    # image by image, so that the takes of a large sensor never stand in memory twice
-    averaged = [
-        average(np.stack([frame.images[k : k + 1] for frame in frames]))
-        for k in range(applied.images)
-    ]
-    return CalibrationCapture(
-        images=np.concatenate([images for images, _ in averaged]).astype(np.float32),
-        kept=np.concatenate([kept for _, kept in averaged], axis=1),
-        sequence=applied.sequence,
-        low_frequency_hz=applied.low_frequency_hz,
-        serial=camera.capabilities.serial,
-        model=camera.capabilities.model,
-        firmware=camera.capabilities.firmware,
-        temperature_c=float(np.mean([frame.temperature_c for frame in frames])),
-        captured_unix_s=frames[-1].host_time_s,
-        dark=None if dark is None else dark.mean(axis=0),
-        dark_deviation=None if dark is None else dark.std(axis=0, ddof=1),
-    )
-
-
-def _frames(
-    camera: Camera, sequence: Sequence, takes: int, tell: Callable[[int], None]
-) -> list[RawFrame]:
-    applied = camera.configure(sequence)
-    timeout_s = max(_LEAST_PATIENCE_S, _FRAME_PATIENCE / applied.frame_rate_hz)
-    frames = []
-    camera.start()
-    for taken in range(takes):
-        frames.append(camera.read_frame(timeout_s=timeout_s))
-        tell(taken + 1)
-    camera.stop()
-    return frames
-
-
-def _dark(frames: list[RawFrame]) -> NDArray[np.float32]:
-    """Return the images without light, one of each frame."""
-    (dark,) = (label.index for label in frames[0].labels if not label.illumination)
-    return np.stack([frame.images[dark] for frame in frames]).astype(np.float32)
-
-
 def _checked(path: Path, content: Mapping[str, NDArray[Any]]) -> CalibrationCapture:
     document = _document_in(path, content)
     try:
@@ -283,6 +208,7 @@ def _checked(path: Path, content: Mapping[str, NDArray[Any]]) -> CalibrationCapt
         }
         for name in ("low_frequency_hz", "temperature_c", "captured_unix_s"):
             fields[name] = float(document[name])
+        fields["notes"] = dict(document.get("notes", {}))
     except KeyError as error:
         raise CalibrationFileError(path, "document", f"without {error}", "complete") from error
     except (DriverError, TypeError, ValueError) as error:

@@ -15,6 +15,8 @@ from transientcam_driver import (
     CalibrationMismatch,
     Camera,
     CameraLost,
+    FrameTimeout,
+    RawFrame,
     Sequence,
     SequenceError,
     SubPhases,
@@ -96,6 +98,7 @@ def test_the_light_is_off_also_when_it_is_broken_off(bench: Bench, camera: Camer
     with pytest.raises(Enough):
         capture_calibration(camera, takes=TAKES, progress=stop)
     assert not bench.lit
+    assert camera.applied.sequence == SEQUENCE
 
 
 def test_a_lost_camera_is_told(bench: Bench, camera: Camera) -> None:
@@ -258,3 +261,58 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, content: bytes | No
 
     with pytest.raises(CalibrationFileError, match=r"c\.npz: the file is"):
         CalibrationCapture.load(path)
+
+
+def test_notes_are_kept_with_it_and_do_not_change_its_id(
+    capture: CalibrationCapture, tmp_path: Path
+) -> None:
+    noted = replace(capture, notes={"name": "after warm-up", "invalid_share": 0.002})
+
+    noted.save(tmp_path / "noted.npz")
+
+    again = CalibrationCapture.load(tmp_path / "noted.npz")
+    assert again.notes == {"name": "after warm-up", "invalid_share": 0.002}
+    assert again.id == capture.id
+
+
+def test_an_id_may_stand_in_an_address_whatever_the_serial_number(
+    capture: CalibrationCapture,
+) -> None:
+    odd = replace(capture, serial="../Kamera 7/ü")
+
+    assert odd.id.startswith("Kamera-7-")
+    assert odd.id.replace("-", "").isalnum()
+    assert replace(capture, serial="..").id.startswith("camera-")
+
+
+def test_what_unpacks_to_too_much_is_not_unpacked(
+    capture: CalibrationCapture, tmp_path: Path
+) -> None:
+    path = tmp_path / "large.npz"
+    capture.save(path)
+
+    with pytest.raises(CalibrationFileError, match="unpacked, but must be at most 1000"):
+        CalibrationCapture.load(path, max_bytes=1000)
+
+
+def test_one_who_ends_it_is_heard_while_no_frame_comes(
+    camera: Camera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Enough(Exception):  # noqa: N818 - nothing has failed
+        pass
+
+    told: list[tuple[int, int]] = []
+
+    def silent(camera: Camera, *, timeout_s: float) -> RawFrame:
+        raise FrameTimeout(timeout_s)
+
+    def lose_patience(*each: int) -> None:
+        told.append((each[0], each[1]))
+        if len(told) == 3:
+            raise Enough
+
+    monkeypatch.setattr(Camera, "read_frame", silent)
+    with pytest.raises(Enough):
+        capture_calibration(camera, takes=TAKES, progress=lose_patience)
+    assert told == [(0, 2 * TAKES)] * 3
+    assert camera.applied.sequence == SEQUENCE
