@@ -5,6 +5,7 @@ from importlib.metadata import version
 from transientcam.aio import AsyncCamera, AsyncStream
 from transientcam.camera import Camera
 from transientcam.density import density, transient
+from transientcam.discovery import FoundCamera, discover
 from transientcam.errors import (
     FrameTimeout,
     ParameterError,
@@ -27,6 +28,7 @@ __all__ = [
     "AsyncLease",
     "AsyncStream",
     "Camera",
+    "FoundCamera",
     "Frame",
     "FrameTimeout",
     "Lease",
@@ -42,5 +44,6 @@ __all__ = [
     "TransientcamError",
     "__version__",
     "density",
+    "discover",
     "transient",
 ]

@@ -42,6 +42,10 @@ def serve(
     config: Annotated[
         Path | None, typer.Option(help="Settings in TOML.  [default: ./transientcam.toml]")
     ] = None,
+    announce: Annotated[
+        bool | None,
+        typer.Option(help="Tell the local network where it is.  [default: if others may come in]"),
+    ] = None,
     insecure: Annotated[
         bool,
         typer.Option("--insecure", help="Let anybody who reaches the port control the camera."),
@@ -62,6 +66,7 @@ def serve(
         "calibration": calibration,
         "host": host,
         "port": port,
+        "announce": None if announce is None else ("off", "on")[announce],
         "insecure": insecure or None,
         "tls_certificate": tls_certificate,
         "tls_key": tls_key,

@@ -4,7 +4,7 @@ import signal
 import socket
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AsyncExitStack, contextmanager
 from functools import partial
 from typing import Final
 
@@ -13,6 +13,7 @@ from fastapi import FastAPI
 
 from transientcam.wire import MAX_CLIENT_MESSAGE_BYTES
 from transientcam_server import logs
+from transientcam_server.announcement import announced
 from transientcam_server.connections import BoundedConnection
 from transientcam_server.errors import AddressUnavailable
 from transientcam_server.service import Service
@@ -100,17 +101,25 @@ class Server(uvicorn.Server):
                 timeout_graceful_shutdown=SHUTDOWN_S,
             )
         )
+        self._settings = settings
         self._service: Service = app.state.service
+        self._around = AsyncExitStack()
         self._on_listening = on_listening
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Start, then say so."""
         await super().startup(sockets)
+        if self.started and sockets:
+            port = sockets[0].getsockname()[1]
+            capabilities = self._service.camera.capabilities
+            announcement = announced(self._settings, capabilities, port=port)
+            await self._around.enter_async_context(announcement)
         if self.started:
             self._on_listening()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Let every stream be told that it ends, then stop."""
+        await self._around.aclose()
         await self._service.say_goodbye()
         await super().shutdown(sockets)
 

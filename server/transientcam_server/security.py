@@ -3,6 +3,7 @@
 All three are plain ASGI, so the stream passes through them like any request.
 """
 
+import socket
 from ipaddress import ip_address
 from typing import Final
 from urllib.parse import urlsplit
@@ -56,6 +57,13 @@ class SecurityHeaders:
         await self._app(scope, receive, with_headers)
 
 
+def own_names() -> tuple[str, ...]:
+    """Return what this machine is called: its name, in full, for short, and on the local link."""
+    name = socket.gethostname().lower()
+    short = name.partition(".")[0]
+    return name, short, f"{short}.local"
+
+
 class SameSite:
     """Refuses names this service is not called by, and pages of other sites that change things.
 
@@ -68,8 +76,10 @@ class SameSite:
         self._names = {name.lower() for name in settings.allowed_hosts}
         self._names |= _LOOPBACK_NAMES | {settings.host.lower(), f"[{settings.host.lower()}]"}
         self._origins = {origin.lower().rstrip("/") for origin in settings.allowed_origins}
-        # whoever opened the service to other machines reaches it by its addresses
+        # whoever opened the service to other machines reaches it by its addresses and its names
         self._any_address = not settings.on_loopback
+        if self._any_address:
+            self._names |= set(own_names())
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse, or pass on."""

@@ -149,6 +149,9 @@ class Settings(_Group):
     """Address to listen on."""
     port: int = Field(default=8000, ge=0, le=65535)
     """TCP port to listen on; 0 takes any free one."""
+    announce: Literal["auto", "on", "off"] = "auto"
+    """Tell the local network where the service is (mDNS); ``auto``: where others may come in, and
+    not from a container."""
     insecure: bool = False
     """Serve other machines although anybody who reaches the port controls the camera."""
     allowed_hosts: tuple[str, ...] = ()

@@ -15,6 +15,7 @@ def test_the_public_names_are_these() -> None:
         "AsyncLease",
         "AsyncStream",
         "Camera",
+        "FoundCamera",
         "Frame",
         "FrameTimeout",
         "Lease",
@@ -30,6 +31,7 @@ def test_the_public_names_are_these() -> None:
         "TransientcamError",
         "__version__",
         "density",
+        "discover",
         "transient",
     ]
 
@@ -46,7 +48,11 @@ def test_public_names_are_sorted_and_exist(module: object) -> None:
 
 
 @pytest.mark.parametrize(
-    "heavy", ["fastapi", "numba", "pydantic", "scipy", "typer", "usb", "uvicorn", "matplotlib"]
+    "heavy",
+    [
+        *("fastapi", "numba", "pydantic", "scipy", "typer", "usb", "uvicorn", "matplotlib"),
+        "zeroconf",
+    ],
 )
 def test_importing_the_client_does_not_import(heavy: str) -> None:
     program = f"import sys, transientcam, transientcam.wire; sys.exit({heavy!r} in sys.modules)"

@@ -8,9 +8,6 @@ from typer.testing import CliRunner
 from transientcam_driver import LibusbMissing, commands, list_scenes
 from transientcam_driver.usb import UsbCamera
 
-FREE = UsbCamera("/dev/bus/usb/001/004", "A-17", "AMCW lidar")
-FORBIDDEN = UsbCamera("/dev/bus/usb/001/005", problem="no permission to open it")
-
 
 def run(*arguments: str, verb: Callable[..., None] = commands.scenes) -> str:
     app = typer.Typer()
@@ -34,36 +31,24 @@ def test_scenes_are_printed_as_json() -> None:
     assert all(entry["description"] and entry["path"].endswith(".toml") for entry in listed)
 
 
-def plug(monkeypatch: pytest.MonkeyPatch, *cameras: UsbCamera) -> None:
-    monkeypatch.setattr(commands, "list_cameras", lambda: cameras)
+def test_what_is_plugged_in_is_told_with_the_name_that_opens_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(commands, "list_cameras", lambda: (UsbCamera("/dev/x", "A-17", "lidar"),))
 
-
-def test_cameras_are_listed_by_the_name_that_opens_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    plug(monkeypatch, FREE, FORBIDDEN)
-
-    output = run(verb=commands.devices)
-
-    words = " ".join(output.split())
-    assert "usb:A-17 A-17 AMCW lidar /dev/bus/usb/001/004" in words
-    assert "/dev/bus/usb/001/005: no permission to open it" in words
-    assert "sim:mirrors" in words
-
-
-def test_cameras_are_printed_as_json(monkeypatch: pytest.MonkeyPatch) -> None:
-    plug(monkeypatch, FREE, FORBIDDEN)
-
-    listed = json.loads(run("--json", verb=commands.devices))
-
-    assert [camera["spec"] for camera in listed["cameras"]] == ["usb:A-17", "usb"]
-    assert listed["cameras"][1]["problem"] == "no permission to open it"
-    assert listed["problem"] is None
-    assert "sim:mirrors" in listed["simulated"]
-
-
-def test_an_empty_bus_is_no_failure(monkeypatch: pytest.MonkeyPatch) -> None:
-    plug(monkeypatch)
-
-    assert "No camera is plugged in." in run(verb=commands.devices)
+    assert commands.plugged_in() == {
+        "cameras": [
+            {
+                "node": "/dev/x",
+                "serial": "A-17",
+                "product": "lidar",
+                "problem": None,
+                "spec": "usb:A-17",
+            }
+        ],
+        "problem": None,
+        "simulated": [f"sim:{info.name}" for info in list_scenes()],
+    }
 
 
 def test_a_missing_libusb_is_told_beside_the_simulated_cameras(
@@ -74,6 +59,7 @@ def test_a_missing_libusb_is_told_beside_the_simulated_cameras(
 
     monkeypatch.setattr(commands, "list_cameras", missing)
 
-    assert "libusb-1.0 was not found" in run(verb=commands.devices)
-    listed = json.loads(run("--json", verb=commands.devices))
-    assert "apt install" in listed["problem"]
+    told = commands.plugged_in()
+
+    assert (told["cameras"], told["simulated"][0]) == ([], f"sim:{list_scenes()[0].name}")
+    assert "apt install" in told["problem"]

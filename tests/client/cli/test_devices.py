@@ -1,0 +1,158 @@
+"""`transientcam devices`: cameras on USB and on the network."""
+
+import json
+from collections.abc import Callable
+from importlib.metadata import EntryPoint
+from typing import Any
+
+import pytest
+
+from transientcam.cli import devices, run
+from transientcam.discovery import FoundCamera
+from transientcam.errors import ServerUnreachable
+from transientcam_driver import LibusbMissing, commands
+from transientcam_driver.usb import UsbCamera
+
+FREE = UsbCamera("/dev/bus/usb/001/004", "A-17", "AMCW lidar")
+FORBIDDEN = UsbCamera("/dev/bus/usb/001/005", problem="no permission to open it")
+ANNOUNCED = FoundCamera("lidar B-3", "http://192.168.7.5:8000", "B-3", "1.2", "v1", tls=False)
+
+
+@pytest.fixture(autouse=True)
+def nothing_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Start from empty buses and silent networks."""
+    monkeypatch.setattr(commands, "list_cameras", lambda: ())
+    monkeypatch.setattr(devices, "discover", lambda **_: ())
+
+
+def plug(monkeypatch: pytest.MonkeyPatch, *cameras: UsbCamera) -> None:
+    monkeypatch.setattr(commands, "list_cameras", lambda: cameras)
+
+
+def failing(error: Exception) -> Callable[..., Any]:
+    def fail(**_: object) -> None:
+        raise error
+
+    return fail
+
+
+def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    assert run(["devices", *arguments]) == 0
+    return " ".join(capsys.readouterr().out.split())
+
+
+def listed(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads(told(capsys, "--json", *arguments))
+    return document
+
+
+def test_cameras_are_listed_by_the_name_that_opens_them(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plug(monkeypatch, FREE, FORBIDDEN)
+    monkeypatch.setattr(devices, "discover", lambda **_: (ANNOUNCED,))
+
+    words = told(capsys)
+
+    assert "usb:A-17 A-17 AMCW lidar /dev/bus/usb/001/004" in words
+    assert "/dev/bus/usb/001/005: no permission to open it" in words
+    assert "http://192.168.7.5:8000 B-3 1.2 lidar B-3" in words
+    assert "sim:mirrors" in words
+
+
+def test_cameras_are_printed_as_json(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plug(monkeypatch, FREE, FORBIDDEN)
+    monkeypatch.setattr(devices, "discover", lambda **_: (ANNOUNCED,))
+
+    document = listed(capsys)
+
+    assert [camera["spec"] for camera in document["cameras"]] == ["usb:A-17", "usb"]
+    assert document["cameras"][1]["problem"] == "no permission to open it"
+    assert document["network"] == [
+        {
+            "name": "lidar B-3",
+            "url": "http://192.168.7.5:8000",
+            "serial": "B-3",
+            "firmware": "1.2",
+            "api": "v1",
+            "tls": False,
+        }
+    ]
+    assert (document["problem"], document["network_problem"]) == (None, None)
+    assert "sim:mirrors" in document["simulated"]
+
+
+def test_an_empty_bus_and_a_silent_network_are_no_failure(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    words = told(capsys)
+
+    assert "No camera is plugged in." in words
+    assert "No camera announces itself on the network." in words
+
+
+def test_the_network_is_asked_as_told_or_not_at_all(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked: list[dict[str, Any]] = []
+    monkeypatch.setattr(devices, "discover", lambda **how: asked.append(how) or ())
+
+    listed(capsys, "--timeout-s", "0.5", "--interface", "127.0.0.1")
+    words = told(capsys, "--no-network")
+
+    assert asked == [{"timeout_s": 0.5, "interfaces": ["127.0.0.1"]}]
+    assert "network" not in words
+
+
+def test_a_missing_libusb_is_told_beside_the_others(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def missing() -> None:
+        raise LibusbMissing
+
+    monkeypatch.setattr(commands, "list_cameras", missing)
+    monkeypatch.setattr(devices, "discover", lambda **_: (ANNOUNCED,))
+
+    assert "libusb-1.0 was not found" in told(capsys)
+    document = listed(capsys)
+    assert "apt install" in document["problem"]
+    assert len(document["network"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (ServerUnreachable("the local network", "unreachable"), "cannot be asked: unreachable"),
+        (ModuleNotFoundError("no", name="zeroconf"), "pip install 'transientcam[discovery]'"),
+    ],
+)
+def test_a_network_that_cannot_be_asked_is_told_beside_usb(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    error: Exception,
+    words: str,
+) -> None:
+    plug(monkeypatch, FREE)
+    monkeypatch.setattr(devices, "discover", failing(error))
+
+    printed = told(capsys)
+
+    assert words in printed
+    assert "usb:A-17" in printed
+
+
+@pytest.mark.parametrize(
+    "points", [[], [EntryPoint("usb", "package_that_is_not_there:plugged_in", devices.GROUP)]]
+)
+def test_without_the_driver_the_network_is_asked_all_the_same(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], points: list[EntryPoint]
+) -> None:
+    monkeypatch.setattr(devices, "entry_points", lambda **_: points)
+    monkeypatch.setattr(devices, "discover", lambda **_: (ANNOUNCED,))
+
+    document = listed(capsys)
+
+    assert "transientcam[driver]" in document["problem"]
+    assert len(document["network"]) == 1
