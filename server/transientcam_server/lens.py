@@ -1,5 +1,6 @@
 """Where the rays of the pixels go: a pinhole camera's intrinsics, and whence they are known."""
 
+import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,6 +8,8 @@ from typing import Any, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
+
+from transientcam_server.settings import LensSettings
 
 ASSUMED_FIELD_OF_VIEW_DEG: Final = 45.0
 """Of a camera that nobody has said anything of."""
@@ -48,6 +51,19 @@ class Intrinsics:
         return cls(focal_px, focal_px, *centre, width, height, source)
 
     @classmethod
+    def of_settings(cls, settings: LensSettings, *, width: int, height: int) -> Self | None:
+        """Return what the settings say, None where they say nothing."""
+        if settings.fx_px is not None:
+            fy_px = settings.fx_px if settings.fy_px is None else settings.fy_px
+            cx_px = (width - 1) / 2 if settings.cx_px is None else settings.cx_px
+            cy_px = (height - 1) / 2 if settings.cy_px is None else settings.cy_px
+            return cls(settings.fx_px, fy_px, cx_px, cy_px, width, height, "settings")
+        if settings.field_of_view_deg is None:
+            return None
+        field_deg = settings.field_of_view_deg
+        return cls.of_field(field_deg, width=width, height=height, source="settings")
+
+    @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> Self:
         """Return what a recording says of itself.
 
@@ -72,3 +88,23 @@ class Intrinsics:
         np.multiply(points[2], x, out=points[0], casting="same_kind")
         np.multiply(points[2], y[:, None], out=points[1], casting="same_kind")
         return points
+
+
+def known_intrinsics(
+    settings: LensSettings,
+    *,
+    width: int,
+    height: int,
+    scene_field_deg: float | None = None,
+    recorded: Mapping[str, Any] | None = None,
+) -> Intrinsics:
+    """Return the best that is known: settings before scene before recording before a guess."""
+    given = Intrinsics.of_settings(settings, width=width, height=height)
+    if given is not None:
+        return given
+    if scene_field_deg is not None:
+        return Intrinsics.of_field(scene_field_deg, width=width, height=height, source="scene")
+    if recorded is not None:
+        with contextlib.suppress(KeyError, TypeError, ValueError):
+            return Intrinsics.of_document(recorded)
+    return Intrinsics.of_field(ASSUMED_FIELD_OF_VIEW_DEG, width=width, height=height)

@@ -23,6 +23,7 @@ from transientcam_server.calibration import Calibration, calibration_id
 from transientcam_server.cameras import Camera
 from transientcam_server.encoding import Encoding
 from transientcam_server.errors import Problem
+from transientcam_server.lens import Intrinsics
 from transientcam_server.products import (
     BOUNDS_RADIUS,
     EVERYTHING,
@@ -57,6 +58,8 @@ class Pipeline:
         How frames are computed from the next one on.
     calibration
         Used for those whose sequence it is good for, from the next one on.
+    intrinsics
+        Where the pixels look; a usual field of view without them.
     """
 
     def __init__(
@@ -68,8 +71,10 @@ class Pipeline:
         workers: int,
         judge: Judge | None = None,
         calibration: Calibration | None = None,
+        intrinsics: Intrinsics | None = None,
     ) -> None:
         self.judge = judge
+        self.intrinsics = intrinsics
         self.calibration = calibration
         self._capabilities = camera.capabilities
         self.reconstruction = Reconstruction(1, settings)
@@ -97,6 +102,7 @@ class Pipeline:
             self._full_scale,
             calibration,
             self.reconstruction.id,
+            self.intrinsics,
         )
         return Frame(self, self._frames, raw, recipe)
 
@@ -108,7 +114,7 @@ class Pipeline:
         """Say why the calibration given is not good for a sequence; None if it is, or is none."""
         if self.calibration is None:
             return None
-        return self.calibration.subject.misfit(applied, self._capabilities)
+        return self.calibration.capture.misfit(applied, self._capabilities)
 
     def product(self, name: str) -> Product:
         """Return a product this camera has.

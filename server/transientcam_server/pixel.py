@@ -10,7 +10,7 @@ import numpy as np
 
 import transientcam_moments as tm
 from transientcam_driver import Truth
-from transientcam_server.products import Recipe
+from transientcam_server.products import BOUNDS_RADIUS, Recipe
 
 _TRUE_RETURNS: Final = 16
 
@@ -27,6 +27,25 @@ def pixel_json(
     """Return what `describe_pixel` says, with the frame's meta, as JSON."""
     document = {"meta": meta} | describe_pixel(recipe, image, truth, x, y, bins)
     return json.dumps(document, allow_nan=False, separators=(",", ":")).encode()
+
+
+def pixel_csv(
+    recipe: Recipe,
+    image: tm.Reconstruction,
+    meta: Mapping[str, Any],
+    truth: Truth | None,
+    x: int,
+    y: int,
+    bins: int,
+) -> bytes:
+    """Return what of a pixel is over time of flight, as CSV under a line of names."""
+    document = describe_pixel(recipe, image, truth, x, y, bins)
+    columns = {name: document[name] for name in ("time_s", "density_per_s", "cumulative")}
+    columns |= {name: document["bounds"][name] for name in ("lower_per_s", "upper_per_s")}
+    lines = [",".join(columns)]
+    for row in zip(*columns.values(), strict=True):
+        lines.append(",".join("nan" if each is None else f"{each:.9g}" for each in row))
+    return ("\n".join(lines) + "\n").encode("ascii")
 
 
 def describe_pixel(
@@ -46,6 +65,9 @@ def describe_pixel(
     phase_rad = 2.0 * np.pi * np.arange(bins) / bins
     density = rad_s * tm.density(found.coefficients, phase_rad)[:, 0]
     cumulative = tm.cumulative(found.coefficients, phase_rad)[:, 0]
+    lower, upper = (
+        rad_s * bound[:, 0] for bound in tm.bounds(found.moments, phase_rad, BOUNDS_RADIUS)
+    )
     return {
         "x": x,
         "y": y,
@@ -70,6 +92,11 @@ def describe_pixel(
         "time_s": [float(phase) / rad_s for phase in phase_rad],
         "density_per_s": [_number(each) for each in density],
         "cumulative": [_number(each) for each in cumulative],
+        "bounds": {
+            "radius": BOUNDS_RADIUS,
+            "lower_per_s": [_number(each) for each in lower],
+            "upper_per_s": [_number(each) for each in upper],
+        },
         "truth": None if truth is None else _describe_truth(truth, x, y),
     }
 

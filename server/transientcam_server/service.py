@@ -5,6 +5,7 @@ import contextlib
 import logging
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict
 from importlib.metadata import version
 from typing import Annotated, Any, Final
 
@@ -29,11 +30,13 @@ from transientcam_server.fronts import Fronts
 from transientcam_server.history import History
 from transientcam_server.hub import Channel, Goodbye, Hub
 from transientcam_server.lease import Alarm, Change, Lease, LeaseDesk
+from transientcam_server.lens import Intrinsics, known_intrinsics
 from transientcam_server.metrics import Metrics
 from transientcam_server.pipeline import Pipeline
 from transientcam_server.reconstruction import Reconstruction
 from transientcam_server.recording import Header
 from transientcam_server.recording.library import Library
+from transientcam_server.recording.replay import ReplayCamera
 from transientcam_server.settings import ReconstructionSettings, Settings
 
 _log = logging.getLogger(__name__)
@@ -68,6 +71,7 @@ class Service:
             workers=settings.workers,
             judge=self.accuracy.judge,
             calibration=self.calibration,
+            intrinsics=_intrinsics(camera, settings),
         )
         self.fronts = Fronts(self.accuracy, self.pipeline, simulated=camera.simulation is not None)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -129,6 +133,12 @@ class Service:
             for channel in channels
         )
 
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """Where the pixels look."""
+        assert self.pipeline.intrinsics is not None  # noqa: S101 - given above
+        return self.pipeline.intrinsics
+
     def not_ready(self) -> list[str]:
         """Return why no frames can be had; empty where they can."""
         status = self.acquisition.status()
@@ -166,6 +176,7 @@ class Service:
             camera={
                 "spec": self.settings.camera,
                 "scene": None if simulation is None else simulation.scene,
+                "intrinsics": asdict(self.intrinsics),
             },
             calibration={"id": calibration_id(calibration)},
             calibration_planes=None if calibration is None else calibration.gains,
@@ -263,6 +274,17 @@ def _calibration(camera: Camera, settings: Settings) -> Calibration | None:
     if misfit is not None:
         _log.warning("%s; using nominal gains", misfit)
     return loaded
+
+
+def _intrinsics(camera: Camera, settings: Settings) -> Intrinsics:
+    simulation = camera.simulation
+    return known_intrinsics(
+        settings.lens,
+        width=camera.capabilities.width,
+        height=camera.capabilities.height,
+        scene_field_deg=None if simulation is None else simulation.field_of_view_deg,
+        recorded=camera.intrinsics if isinstance(camera, ReplayCamera) else None,
+    )
 
 
 # async, or FastAPI takes a thread for it

@@ -83,6 +83,21 @@ class SensorSettings(_Group):
     """What the converter gives for an empty pixel."""
 
 
+class LensSettings(_Group):
+    """Where the pixels look, where the camera does not say it itself; point clouds rest on it."""
+
+    field_of_view_deg: _Finite | None = Field(default=None, gt=0.0, lt=180.0)
+    """Horizontal, for square pixels around the axis."""
+    fx_px: _Finite | None = Field(default=None, gt=0.0)
+    """Focal length in pixels instead, as a calibration of the lens gives it."""
+    fy_px: _Finite | None = Field(default=None, gt=0.0)
+    """The same in the other direction, where it differs."""
+    cx_px: _Finite | None = None
+    """Column that the axis goes through; the middle of the frame without it."""
+    cy_px: _Finite | None = None
+    """Row that the axis goes through."""
+
+
 class StreamSettings(_Group):
     """How many clients may look, and how far one may fall behind."""
 
@@ -178,6 +193,7 @@ class Settings(_Group):
     """Threads that reconstruct and encode; at least 2, so that one long answer delays nobody."""
     reconstruction: ReconstructionSettings = ReconstructionSettings()
     sensor: SensorSettings = SensorSettings()
+    lens: LensSettings = LensSettings()
     stream: StreamSettings = StreamSettings()
     history: HistorySettings = HistorySettings()
     limits: LimitSettings = LimitSettings()

@@ -36,9 +36,11 @@ def test_every_resource_of_the_interface_is_described(document: dict[str, Any]) 
         "PUT /api/v1/reconstruction",
         "GET /api/v1/acquisition",
         "PUT /api/v1/acquisition",
-        "GET /api/v1/frames/latest",
-        "GET /api/v1/frames/latest/pixel",
-        "GET /api/v1/frames/latest/{product}",
+        "GET /api/v1/frames",
+        "GET /api/v1/frames/{frame}",
+        "GET /api/v1/frames/{frame}/pixel",
+        "GET /api/v1/frames/{frame}/pixel.csv",
+        "GET /api/v1/frames/{frame}/{product}",
         "GET /api/v1/recordings",
         "POST /api/v1/recordings",
         "GET /api/v1/recordings/{recording}",
@@ -136,7 +138,7 @@ def test_the_contract_finds_operations_by_path(document: dict[str, Any]) -> None
         operation = find_operation(document, path, "GET")
         return None if operation is None else operation["summary"]
 
-    assert summary("/api/v1/frames/latest/range.npy") == "A product of the latest frame"
+    assert summary("/api/v1/frames/latest/range.npy") == "A product of a frame"
     assert summary("/api/v1/frames/latest/pixel") == "Everything about one pixel"
     assert summary("/api/v1/nothing") is None
 

@@ -1,10 +1,11 @@
 """A recording as a camera: every frame again, bit for bit, in the same order, at a chosen speed."""
 
 import threading
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Final
+from typing import Any, Final
 from urllib.parse import parse_qsl
 
 from transientcam_driver import (
@@ -110,6 +111,11 @@ class ReplayCamera:
     def capabilities(self) -> Capabilities:
         """Those of the camera that was recorded."""
         return self._recording.header.capabilities
+
+    @property
+    def intrinsics(self) -> Mapping[str, Any] | None:
+        """Where the pixels of that camera look, if the recording says so."""
+        return self._recording.header.camera.get("intrinsics")
 
     @property
     def state(self) -> CameraState:

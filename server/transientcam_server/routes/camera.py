@@ -28,6 +28,7 @@ async def read_camera(service: ServiceOf) -> CameraDocument:
         reason=acquisition.reason,
         simulated=camera.simulation is not None,
         capabilities=asdict(camera.capabilities),
+        intrinsics=CameraDocument.IntrinsicsDocument(**asdict(service.intrinsics)),
         status=status,
         counters=asdict(camera.counters),
     )

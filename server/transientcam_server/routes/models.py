@@ -185,6 +185,15 @@ class CameraDocument(Document):
                     "reason": None,
                     "simulated": True,
                     "capabilities": {"model": "simulated", "width": 163, "height": 120},
+                    "intrinsics": {
+                        "fx": 223.92,
+                        "fy": 223.92,
+                        "cx": 81.0,
+                        "cy": 59.5,
+                        "width": 163,
+                        "height": 120,
+                        "source": "scene",
+                    },
                     "status": {"temperature_c": 31.5},
                     "counters": {"images": 4096, "lost": 0, "corrupt": 0, "resyncs": 0},
                 }
@@ -192,12 +201,26 @@ class CameraDocument(Document):
         }
     )
 
+    class IntrinsicsDocument(Document):
+        """A pinhole camera, in pixels; whole numbers are the centres of pixels."""
+
+        fx: float
+        fy: float
+        cx: float
+        cy: float
+        width: int
+        height: int
+        source: Literal["settings", "scene", "recording", "assumed"]
+        """Who says so: the settings `[lens]`, the simulated scene, the recording, or nobody."""
+
     state: Literal["starting", "streaming", "stopped", "lost"]
     reason: str | None = None
     """Why it is lost."""
     simulated: bool
     capabilities: dict[str, Any]
     """As the camera itself states them; units are in the names."""
+    intrinsics: IntrinsicsDocument
+    """Where the pixels look: (column, row) along ((c - cx) / fx, (r - cy) / fy, 1)."""
     status: dict[str, Any] | None = None
     """As the camera itself states it now; null while it is lost."""
     counters: dict[str, int]
@@ -304,6 +327,38 @@ class FrameDocument(Document):
     """Null until the range was computed."""
 
 
+class HistoryDocument(Document):
+    """Which frames can be had, and how many may be kept."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "first": 1099,
+                    "last": 1204,
+                    "count": 106,
+                    "bytes": 66347520,
+                    "seconds": 9.94,
+                    "limit_bytes": 268435456,
+                    "limit_seconds": 10.0,
+                }
+            ]
+        }
+    )
+
+    first: int | None = None
+    """Null before there is any."""
+    last: int | None = None
+    """Number of the latest frame."""
+    count: int
+    bytes: int
+    """That their raw images take."""
+    seconds: float
+    """From the arrival of the first to that of the last."""
+    limit_bytes: int
+    limit_seconds: float
+
+
 class ComplexDocument(Document):
     """A complex number."""
 
@@ -330,6 +385,16 @@ class TruthDocument(Document):
     """At most the 16 strongest."""
 
 
+class BoundsDocument(Document):
+    """What every density with these moments lies between, smoothed (Sec. 5.2)."""
+
+    radius: float
+    """Of the Poisson kernel that it is smoothed with."""
+    lower_per_s: list[float | None]
+    """In DN/s, at `time_s` of the pixel."""
+    upper_per_s: list[float | None]
+
+
 class PixelDocument(Document):
     """Everything about one pixel of one frame."""
 
@@ -352,6 +417,11 @@ class PixelDocument(Document):
                     "time_s": [0.0, 2.1739e-08],
                     "density_per_s": [1.1e9, 2.3e10],
                     "cumulative": [0.0, 640.2],
+                    "bounds": {
+                        "radius": 0.93,
+                        "lower_per_s": [4.1e8, 2.7e9],
+                        "upper_per_s": [8.9e9, 6.0e10],
+                    },
                     "truth": None,
                 }
             ]
@@ -380,6 +450,7 @@ class PixelDocument(Document):
     """The maximum entropy estimate (Theorem 1) in DN/s; null where the pixel has none."""
     cumulative: list[float | None]
     """Light up to each time of flight in DN."""
+    bounds: BoundsDocument
     truth: TruthDocument | None = None
     """Null where the camera is a real one."""
 
