@@ -5,6 +5,7 @@
     DriverError
     ├── SequenceError          a field of a sequence is out of range
     ├── SceneError             a scene file says something that cannot be
+    ├── EffectError            there is no such effect, or no such choice of one
     ├── SpecError              open_camera() was given a name it cannot read
     ├── CalibrationError
     │   ├── CalibrationMismatch   a calibration belongs to something else
@@ -63,6 +64,19 @@ class SceneError(DriverError):
 
     def __str__(self) -> str:
         return f"{self.file}: {self.key} = {self.value!r}: must be {self.allowed}"
+
+
+class EffectError(DriverError):
+    """An effect of the simulation, or a choice for one, that does not exist."""
+
+    def __init__(self, field: str, value: object, limit: str) -> None:
+        super().__init__(field, value, limit)
+        self.field = field
+        self.value = value
+        self.limit = limit
+
+    def __str__(self) -> str:
+        return f"{self.field} = {self.value!r}: must be {self.limit}"
 
 
 class SpecError(DriverError):

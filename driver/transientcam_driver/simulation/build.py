@@ -1,20 +1,22 @@
 """From a scene to a simulated camera on a simulated bus."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from transientcam_driver.errors import SceneError
+from transientcam_driver.errors import EffectError, SceneError
 from transientcam_driver.simulation.clock import Clock
 from transientcam_driver.simulation.device import EmulatedDevice
 from transientcam_driver.simulation.device_profile import DeviceProfile
-from transientcam_driver.simulation.effects import NOISE
+from transientcam_driver.simulation.effects import CHOICES, EFFECTS, NOISE
 from transientcam_driver.simulation.effects.modulation_harmonics import measured_harmonics
 from transientcam_driver.simulation.effects.pixel_pattern import read_offsets_rad
 from transientcam_driver.simulation.firmware import Firmware
 from transientcam_driver.simulation.handle import Simulation
 from transientcam_driver.simulation.measured import load_responses
+from transientcam_driver.simulation.outlook import Outlook
 from transientcam_driver.simulation.profile import prototype
 from transientcam_driver.simulation.responses import SparseResponses
 from transientcam_driver.simulation.scene import Background, Diffusor, Scene, TimeZero
@@ -121,13 +123,42 @@ def build(
         height=height,
         bits=scene.sensor.bits,
     )
-    world = world_of(
-        scene, width=width, height=height, seed=seed, readout_s=capabilities.streaming_readout_s
-    )
+
+    def world_before(scene: Scene) -> World:
+        return world_of(
+            scene, width=width, height=height, seed=seed, readout_s=capabilities.streaming_readout_s
+        )
+
+    outlook = Outlook(world_before(scene))
 
     def power_on(now_s: float) -> Firmware:
-        return Firmware(capabilities, world, power_on_s=now_s)
+        return Firmware(capabilities, outlook, power_on_s=now_s)
 
     device = EmulatedDevice(capabilities, power_on, clock=clock)
-    field_of_view_deg = None if scene.camera is None else scene.camera.field_of_view_deg
-    return device, Simulation(scene.name, world, device, field_of_view_deg=field_of_view_deg)
+
+    quiet = {each.name: "off" for each in NOISE if scene.effects.get(each.name) == "off"}
+
+    def staged(name: str, effects: Mapping[str, str]) -> tuple[Scene, World]:
+        found = scene if name == scene.name else find_scene(name)
+        choices = found.effects | quiet | checked_effects(effects)
+        found = replace(found, sensor=scene.sensor, device=scene.device, effects=choices)
+        return found, world_before(found)
+
+    return device, Simulation(scene, outlook, device, staged=staged)
+
+
+def checked_effects(effects: Mapping[str, str]) -> dict[str, str]:
+    """Return choices of effects by name, if there are such effects and choices.
+
+    Raises
+    ------
+    EffectError
+        Naming the first that is not.
+    """
+    optional = [effect.name for effect in EFFECTS if effect.optional]
+    for name, choice in effects.items():
+        if name not in optional:
+            raise EffectError("effects", name, f"one of {', '.join(optional)}")
+        if choice not in CHOICES:
+            raise EffectError(f"effects.{name}", choice, f"one of {', '.join(CHOICES)}")
+    return dict(effects)
