@@ -50,7 +50,8 @@ Judge = Callable[[Recipe, Any], dict[str, float] | None]
 class Pipeline:
     """Makes frames of captures and computes on ``executor`` what is asked of them.
 
-    ``judge`` predicts the deviation of the range of each frame whose returns are computed.
+    ``judge`` predicts the deviation of the range of each frame whose returns are computed;
+    ``intrinsics`` says where the pixels of the next frame look.
 
     Attributes
     ----------
@@ -58,8 +59,6 @@ class Pipeline:
         How frames are computed from the next one on.
     calibration
         Used for those whose sequence it is good for, from the next one on.
-    intrinsics
-        Where the pixels look; a usual field of view without them.
     """
 
     def __init__(
@@ -71,10 +70,10 @@ class Pipeline:
         workers: int,
         judge: Judge | None = None,
         calibration: Calibration | None = None,
-        intrinsics: Intrinsics | None = None,
+        intrinsics: Callable[[], Intrinsics] | None = None,
     ) -> None:
         self.judge = judge
-        self.intrinsics = intrinsics
+        self._intrinsics = intrinsics
         self.calibration = calibration
         self._capabilities = camera.capabilities
         self.reconstruction = Reconstruction(1, settings)
@@ -102,7 +101,7 @@ class Pipeline:
             self._full_scale,
             calibration,
             self.reconstruction.id,
-            self.intrinsics,
+            None if self._intrinsics is None else self._intrinsics(),
         )
         return Frame(self, self._frames, raw, recipe)
 

@@ -71,7 +71,7 @@ class Service:
             workers=settings.workers,
             judge=self.accuracy.judge,
             calibration=self.calibration,
-            intrinsics=_intrinsics(camera, settings),
+            intrinsics=lambda: self.intrinsics,
         )
         self.fronts = Fronts(self.accuracy, self.pipeline, simulated=camera.simulation is not None)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -135,9 +135,15 @@ class Service:
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """Where the pixels look."""
-        assert self.pipeline.intrinsics is not None  # noqa: S101 - given above
-        return self.pipeline.intrinsics
+        """Where the pixels look; another simulated scene may have another lens."""
+        camera, simulation = self.camera, self.camera.simulation
+        return known_intrinsics(
+            self.settings.lens,
+            width=camera.capabilities.width,
+            height=camera.capabilities.height,
+            scene_field_deg=None if simulation is None else simulation.field_of_view_deg,
+            recorded=camera.intrinsics if isinstance(camera, ReplayCamera) else None,
+        )
 
     def not_ready(self) -> list[str]:
         """Return why no frames can be had; empty where they can."""
@@ -274,17 +280,6 @@ def _calibration(camera: Camera, settings: Settings) -> Calibration | None:
     if misfit is not None:
         _log.warning("%s; using nominal gains", misfit)
     return loaded
-
-
-def _intrinsics(camera: Camera, settings: Settings) -> Intrinsics:
-    simulation = camera.simulation
-    return known_intrinsics(
-        settings.lens,
-        width=camera.capabilities.width,
-        height=camera.capabilities.height,
-        scene_field_deg=None if simulation is None else simulation.field_of_view_deg,
-        recorded=camera.intrinsics if isinstance(camera, ReplayCamera) else None,
-    )
 
 
 # async, or FastAPI takes a thread for it
