@@ -1,0 +1,18 @@
+"""The paper's figures, made by this software, each with what the paper says about it.
+
+One file a figure; all have the shape of `PaperFigure`.
+"""
+
+from typing import Final
+
+from transientcam_server.paper import figure02, figure03, figure05, figure06, figure07, figure08
+from transientcam_server.paper.bench import Bench
+from transientcam_server.paper.figure import Made, PaperFigure, Statement, Table
+
+FIGURES: Final[dict[int, PaperFigure]] = {
+    module.FIGURE.number: module.FIGURE
+    for module in (figure02, figure03, figure05, figure06, figure07, figure08)
+}
+"""Every figure by its number."""
+
+__all__ = ["FIGURES", "Bench", "Made", "PaperFigure", "Statement", "Table"]

@@ -1,0 +1,177 @@
+"""The simulated camera in front of a scene, calibrated as the paper does it (Sec. 4.2, 6)."""
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam_driver import (
+    AppliedSequence,
+    Camera,
+    Sequence,
+    Truth,
+    capture_calibration,
+    open_camera,
+)
+from transientcam_driver.simulation.clock import VirtualClock
+from transientcam_server.calibration import Calibration, evaluate
+from transientcam_server.products import STAGES, Recipe
+from transientcam_server.settings import ReconstructionSettings
+
+_Array = NDArray[Any]
+DEVICE: Final = "prototype"
+"""The make of camera: the paper's, as far as its figures are known."""
+WARM_UP_S: Final = 1800.0
+""""After some warm-up time" (Sec. 6.4): thermal drift has ended, and moving scenes begin anew."""
+_QUICK_TAKES = 3  # the fewest in which an outlier is found
+_QUICK_CALIBRATION_TAKES = 6
+_CALIBRATION_TAKES = 40
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shot:
+    """One reconstructed capture, and the truth when its last image was taken.
+
+    ``time_s`` is the device's time of the first exposure since its warm-up.
+    """
+
+    found: tm.Reconstruction
+    truth: Truth
+    applied: AppliedSequence
+    time_s: float
+
+    @property
+    def base_frequency_hz(self) -> float:
+        """Of the sequence that was really set."""
+        return self.applied.sequence.base_frequency_hz
+
+    @property
+    def lit(self) -> _Array:
+        """Pixels (H, W) that light comes back to."""
+        return np.isfinite(self.truth.range_m) & (self.truth.brightness > 0)
+
+
+class Bench:
+    """Captures on demand, each at most once.
+
+    Parameters
+    ----------
+    seed
+        Of all chance.
+    quick
+        Average fewer takes, and look at fewer points: for a first look, and for tests.
+    waveform
+        A measured correlation function for Figure 3: a .npy (rows, samples) over one period,
+        opposite rows in pairs.
+    """
+
+    def __init__(self, *, seed: int = 1, quick: bool = False, waveform: Path | None = None) -> None:
+        self.seed = seed
+        self.quick = quick
+        self.waveform = waveform
+        self._calibrations: dict[Sequence, Calibration] = {}
+        self._shots: dict[tuple[Any, ...], list[Shot]] = {}
+
+    def few(self, full: int, quick: int) -> int:
+        """Return how many of something to look at."""
+        return quick if self.quick else full
+
+    def shot(self, scene: str, sequence: Sequence, **options: str) -> Shot:
+        """Capture once; see `shots`."""
+        return self.shots(scene, sequence, **options)[0]
+
+    def shots(
+        self,
+        scene: str,
+        sequence: Sequence,
+        *,
+        frames: int = 1,
+        at_s: float = 0.0,
+        **options: str,
+    ) -> list[Shot]:
+        """Capture frames one after the other, and reconstruct them as the daemon would.
+
+        Parameters
+        ----------
+        scene
+            A name, or the path of a .toml.
+        sequence
+            What to capture; fewer takes of it where it has to be quick.
+        frames
+            How many.
+        at_s
+            When to begin, after the warm-up.
+        options
+            Further options of the camera's name, as in ``outliers="off"``.
+        """
+        if self.quick:
+            sequence = replace(sequence, takes=min(sequence.takes, _QUICK_TAKES))
+        key = (scene, sequence, frames, at_s, *sorted(options.items()))
+        if key not in self._shots:
+            self._shots[key] = self._captured(scene, sequence, frames, at_s, options)
+        return self._shots[key]
+
+    def raw(self, scene: str, sequence: Sequence) -> tuple[_Array, AppliedSequence]:
+        """Return uncalibrated images (N, H, W) of a scene with a device of its own."""
+        with ExitStack() as stack:
+            camera = stack.enter_context(open_camera(f"sim:{scene}", clock=VirtualClock()))
+            applied = camera.configure(sequence)
+            camera.start()
+            images = camera.read_frame().images
+            camera.stop()
+        return images, applied
+
+    def calibration(self, sequence: Sequence) -> Calibration:
+        """Return the calibration of a sequence: filter and diffusor before the lens (Fig. 4)."""
+        single = replace(sequence, takes=1)
+        if single not in self._calibrations:
+            with ExitStack() as stack:
+                camera = self._camera(stack, "calibration", {}, 0.0)
+                camera.configure(single)
+                takes = self.few(_CALIBRATION_TAKES, _QUICK_CALIBRATION_TAKES)
+                capture = capture_calibration(camera, takes=takes, average=tm.average_takes)
+            self._calibrations[single] = evaluate(capture)
+        return self._calibrations[single]
+
+    def _captured(
+        self,
+        scene: str,
+        sequence: Sequence,
+        frames: int,
+        at_s: float,
+        options: Mapping[str, str],
+    ) -> list[Shot]:
+        calibration = self.calibration(sequence)
+        shots = []
+        with ExitStack() as stack:
+            camera = self._camera(stack, scene, options, at_s)
+            applied = camera.configure(sequence)
+            calibration.capture.require_fit(applied, camera.capabilities)
+            full_scale = 2.0**camera.capabilities.bits - 1.0
+            recipe = Recipe(applied, ReconstructionSettings(), full_scale, calibration)
+            assert camera.simulation is not None  # noqa: S101 - only simulated ones are opened
+            camera.start()
+            for _ in range(frames):
+                frame = camera.read_frame()
+                truth = camera.simulation.truth()
+                found: tm.Reconstruction = STAGES["moments"].compute(recipe, frame)
+                shots.append(Shot(found, truth, applied, frame.device_time_s - WARM_UP_S))
+            camera.stop()
+        return shots
+
+    def _camera(
+        self, stack: ExitStack, scene: str, options: Mapping[str, str], at_s: float
+    ) -> Camera:
+        query = {"device": DEVICE, "seed": str(self.seed)} | {
+            name.replace("_", "-"): value for name, value in options.items()
+        }
+        spec = f"sim:{scene}?" + "&".join(f"{name}={value}" for name, value in query.items())
+        clock = VirtualClock()
+        camera = stack.enter_context(open_camera(spec, clock=clock))
+        clock.sleep(WARM_UP_S + at_s)
+        return camera

@@ -1,0 +1,102 @@
+"""How all pictures of the paper's figures look: one set of sizes, colours and labels."""
+
+from collections.abc import Sequence
+from io import BytesIO
+from typing import Any, Final
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure, SubFigure
+from numpy.typing import NDArray
+
+_Array = NDArray[Any]
+TRUTH: Final = "#0072B2"
+"""Of what is really there; colours are Okabe and Ito's, which colour-blind people tell apart."""
+OURS: Final = "#D55E00"
+OTHER: Final = "#009E73"
+FOURTH: Final = "#CC79A7"
+NOISY: Final = "0.65"
+CYCLE: Final = (TRUTH, OURS, OTHER, FOURTH, "#E69F00", "#56B4E9", "#000000", "#F0E442")
+LIGHT: Final = "inferno"
+"""Of brightness."""
+DEPTH: Final = "viridis"
+"""Of ranges and times."""
+SIGNED: Final = "PuOr"
+"""Of what may be negative."""
+_RC: Final[dict[str, Any]] = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.labelsize": 9.0,
+    "legend.fontsize": 8.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.alpha": 0.25,
+    "lines.linewidth": 1.6,
+    "image.interpolation": "nearest",
+    "svg.hashsalt": "transientcam",
+}
+_DPI = 110
+
+
+def style() -> Any:
+    """Return a context in which pictures get their looks."""
+    return rc_context(_RC)
+
+
+def new(width_in: float, height_in: float) -> Figure:
+    """Return an empty picture that needs no display."""
+    picture = Figure(figsize=(width_in, height_in), layout="constrained")
+    FigureCanvasAgg(picture)
+    return picture
+
+
+def png(picture: Figure) -> bytes:
+    """Return a picture as bytes; the same picture gives the same."""
+    file = BytesIO()
+    picture.savefig(file, format="png", dpi=_DPI, metadata={"Software": None})
+    return file.getvalue()
+
+
+def show(
+    axes: Axes,
+    image: _Array,
+    title: str,
+    *,
+    colours: str = LIGHT,
+    least: float | None = 0.0,
+    most: float | None = None,
+) -> Any:
+    """Draw an image without ticks; ``most`` is its 99th percentile when left out."""
+    finite = image[np.isfinite(image)]
+    if most is None:
+        most = max(float(np.percentile(finite, 99)), 1e-30) if finite.size else 1.0
+    drawn = axes.imshow(image, cmap=colours, vmin=least, vmax=most)
+    axes.set_title(title)
+    bare(axes)
+    return drawn
+
+
+def bare(axes: Axes) -> None:
+    """Take ticks, grid and frame away."""
+    axes.set(xticks=[], yticks=[])
+    axes.grid(visible=False)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+
+
+def scale(picture: Figure | SubFigure, drawn: Any, axes: Axes | Sequence[Axes], label: str) -> None:
+    """Put a colour bar beside panels."""
+    bar = picture.colorbar(drawn, ax=axes, shrink=0.85, pad=0.02)
+    bar.set_label(label)
+    bar.outline.set_visible(False)  # type: ignore[operator]  # matplotlib types it as a callable
+
+
+def steps(phases: _Array, weights: _Array, end: float) -> tuple[_Array, _Array]:
+    """Return the corners of the cumulative sum of returns, from 0 to ``end``."""
+    order = np.argsort(phases)
+    x = np.concatenate([[0.0], np.repeat(phases[order], 2), [end]])
+    summed = np.concatenate([[0.0], np.cumsum(weights[order])])
+    return x, np.repeat(summed, 2)
