@@ -59,7 +59,7 @@ def serve(
     log_level: Annotated[str | None, typer.Option(help="debug, info, warning or error.")] = None,
 ) -> None:
     """Run the daemon: a camera on the network, with its dashboard."""
-    from transientcam_server.settings import load_settings
+    from transientcam_server.configuration import load_settings
 
     command_line = {
         "camera": camera,

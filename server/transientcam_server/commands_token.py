@@ -95,7 +95,7 @@ def revoke(
 
 
 def _path(config: Path | None, tokens_file: Path | None) -> Path:
-    from transientcam_server.settings import tokens_file_of
+    from transientcam_server.configuration import tokens_file_of
 
     return tokens_file or tokens_file_of(config, environment=os.environ)
 

@@ -20,9 +20,10 @@ import transientcam_moments as tm
 from transientcam.errors import TransientcamError
 from transientcam.translation import translated
 from transientcam_moments._kernels.cache import cache_directory, digest_of_sources
+from transientcam_server.configuration import load_settings
 from transientcam_server.errors import AddressUnavailable, SettingsError
 from transientcam_server.run import listen
-from transientcam_server.settings import Settings, load_settings
+from transientcam_server.settings import Settings
 
 Reported = tuple[str, str, str, str | None]
 

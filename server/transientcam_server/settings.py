@@ -1,43 +1,18 @@
-"""What can be set, and where: command line over environment over file over default.
-
-``TRANSIENTCAM_PORT=8765`` sets ``port``, ``TRANSIENTCAM_STREAM__MAX_CLIENTS=8`` the value
-``max_clients`` of the table ``[stream]``. The file is the one given with ``--config``, else
-``./transientcam.toml``, else ``/etc/transientcam/transientcam.toml``.
-"""
+"""What can be set; `transientcam_server.configuration` reads it."""
 
 import os
-import ssl
-import tomllib
-from collections.abc import Mapping
 from ipaddress import ip_address
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Literal
 
 from platformdirs import user_config_path, user_data_path
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from pydantic_settings import (
-    BaseSettings,
-    EnvSettingsSource,
-    InitSettingsSource,
-    PydanticBaseSettingsSource,
-    SettingsConfigDict,
-)
-from pydantic_settings import SettingsError as UnreadableVariable
+from pydantic import BaseModel, ConfigDict, Field
 
 import transientcam_moments as tm
 from transientcam.wire import FIRST_MESSAGE_WITHIN_S
-from transientcam_server.errors import SettingsError, SettingsMistake, TokenFileError
-from transientcam_server.tokens import TokenFile
-
-ENVIRONMENT_PREFIX: Final = "TRANSIENTCAM_"
-DEFAULT_FILES: Final = (Path("transientcam.toml"), Path("/etc/transientcam/transientcam.toml"))
 
 _DEFAULTS = tm.Settings()  # the paper's
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
-
-
-def _default_tokens_file() -> Path:
-    return user_config_path("transientcam") / "tokens.json"
 
 
 class _Group(BaseModel):
@@ -213,165 +188,3 @@ class Settings(_Group):
             return ip_address(self.host).is_loopback
         except ValueError:
             return False
-
-
-def load_settings(
-    command_line: Mapping[str, Any], *, file: Path | None = None, environment: Mapping[str, str]
-) -> Settings:
-    """Return the settings of this process.
-
-    ``command_line`` holds what was given there (None: not given), ``file`` the file named there.
-
-    Raises
-    ------
-    SettingsError
-        Naming every value that cannot be used and where it was given.
-    """
-    settings, places = _load(command_line, file=file, environment=environment)
-    _require_safety(settings, places)
-    _require_certificate(settings, places)
-    return settings
-
-
-def tokens_file_of(file: Path | None, *, environment: Mapping[str, str]) -> Path:
-    """Return where a service with these settings looks for its tokens.
-
-    Raises
-    ------
-    SettingsError
-        As `load_settings`, but it does not matter whether there are tokens yet.
-    """
-    settings, _ = _load({}, file=file, environment=environment)
-    return settings.tokens_file
-
-
-def _load(
-    command_line: Mapping[str, Any], *, file: Path | None, environment: Mapping[str, str]
-) -> "tuple[Settings, _Places]":
-    given = {name: value for name, value in command_line.items() if value is not None}
-    path = file if file is not None else next((p for p in DEFAULT_FILES if p.is_file()), None)
-    from_file = _read(path) if path is not None else {}
-    layers = _layers(given, from_file)
-    places = _Places(given, environment, from_file, path)
-    try:
-        settings = Settings.model_validate(layers().model_dump())
-    except UnreadableVariable as error:
-        raise SettingsError([SettingsMistake("environment", None, str(error))]) from error
-    except ValidationError as error:
-        raise SettingsError([_mistake(each, places) for each in error.errors()]) from error
-    return settings, places
-
-
-def _require_safety(settings: Settings, places: "_Places") -> None:
-    """Refuse settings under which everybody or nobody would get in by mistake."""
-    if settings.insecure and settings.require_token:
-        reason = "contradicts require_token"
-        raise SettingsError([SettingsMistake(places.of(("insecure",)), True, reason)])
-    try:
-        locked_out = settings.needs_token and not TokenFile(settings.tokens_file)
-    except TokenFileError as error:
-        place = places.of(("tokens_file",))
-        raise SettingsError(
-            [SettingsMistake(place, str(settings.tokens_file), error.reason)]
-        ) from error
-    if locked_out:
-        place, value = ("require_token", True) if settings.on_loopback else ("host", settings.host)
-        raise SettingsError(
-            [
-                SettingsMistake(
-                    places.of((place,)),
-                    value,
-                    "whoever asks will need a token, and there is none: make one with "
-                    "`transientcam token create`; or listen on 127.0.0.1, or add --insecure to "
-                    "let anybody who reaches the port control the camera",
-                )
-            ]
-        )
-
-
-def _require_certificate(settings: Settings, places: "_Places") -> None:
-    """Refuse a certificate that cannot be served."""
-    if settings.tls_certificate is None:
-        if settings.tls_key is None:
-            return
-        mistake = SettingsMistake(
-            places.of(("tls_key",)), str(settings.tls_key), "needs a certificate beside it"
-        )
-        raise SettingsError([mistake])
-    try:
-        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        context.load_cert_chain(settings.tls_certificate, settings.tls_key, password=_no_password)
-    except OSError as error:  # what ssl raises is one, too
-        reason = f"cannot be served: {error.strerror or error}"
-        place = places.of(("tls_certificate",))
-        raise SettingsError(
-            [SettingsMistake(place, str(settings.tls_certificate), reason)]
-        ) from error
-
-
-def _no_password() -> str:
-    """Keep ssl from asking a terminal that may not be there."""
-    return ""
-
-
-def _layers(given: Mapping[str, Any], from_file: Mapping[str, Any]) -> type[BaseSettings]:
-    class Layers(Settings, BaseSettings):
-        model_config = SettingsConfigDict(
-            env_prefix=ENVIRONMENT_PREFIX, env_nested_delimiter="__", frozen=True, extra="forbid"
-        )
-
-        @classmethod
-        def settings_customise_sources(
-            cls, settings_cls: type[BaseSettings], *_: Any, **__: Any
-        ) -> tuple[PydanticBaseSettingsSource, ...]:
-            return (
-                InitSettingsSource(settings_cls, init_kwargs=dict(given)),
-                EnvSettingsSource(settings_cls),
-                InitSettingsSource(settings_cls, init_kwargs=dict(from_file)),
-            )
-
-    return Layers
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        reason = f"cannot be read: {error.strerror}"
-        raise SettingsError([SettingsMistake(str(path), None, reason)]) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SettingsError([SettingsMistake(str(path), None, f"is no TOML: {error}")]) from error
-
-
-class _Places:
-    """Where a setting came from: the layer that wins, in the order they are asked."""
-
-    def __init__(
-        self,
-        given: Mapping[str, Any],
-        environment: Mapping[str, str],
-        from_file: Mapping[str, Any],
-        path: Path | None,
-    ) -> None:
-        self._given = given
-        self._environment = {name.upper() for name in environment}
-        self._from_file = from_file
-        self._path = path
-
-    def of(self, location: tuple[str, ...]) -> str:
-        if location[0] in self._given:
-            return f"--{location[0].replace('_', '-')}"
-        for length in range(len(location), 0, -1):
-            variable = ENVIRONMENT_PREFIX + "__".join(location[:length]).upper()
-            if variable in self._environment:
-                return variable
-        if location[0] in self._from_file:
-            return f"{self._path}: {'.'.join(location)}"
-        return ".".join(location)
-
-
-def _mistake(each: Any, places: _Places) -> SettingsMistake:
-    location = tuple(str(part) for part in each["loc"])
-    unknown = each["type"] == "extra_forbidden"
-    reason = "there is no such setting" if unknown else str(each["msg"])
-    return SettingsMistake(places.of(location), each["input"], reason)

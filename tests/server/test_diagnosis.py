@@ -11,8 +11,8 @@ import pytest
 import transientcam_moments as tm
 from tests.serving import serving
 from transientcam_server import diagnosis
+from transientcam_server.configuration import ENVIRONMENT_PREFIX
 from transientcam_server.diagnosis import Reported, checks
-from transientcam_server.settings import ENVIRONMENT_PREFIX
 
 
 @pytest.fixture(autouse=True)

@@ -15,9 +15,9 @@ import pytest
 
 from tests.server.streaming import streaming
 from transientcam import wire
+from transientcam_server.configuration import ENVIRONMENT_PREFIX
 from transientcam_server.errors import AddressUnavailable
 from transientcam_server.run import NOTSENT_LOWAT_BYTES, USER_TIMEOUT_MS, address, listen
-from transientcam_server.settings import ENVIRONMENT_PREFIX
 
 PATIENCE_S = 60.0
 

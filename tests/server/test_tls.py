@@ -8,8 +8,8 @@ import trustme
 from tests.serving import serving
 from transientcam import Camera
 from transientcam.errors import ServerUnreachable
+from transientcam_server.configuration import load_settings
 from transientcam_server.errors import SettingsError
-from transientcam_server.settings import load_settings
 
 
 @pytest.fixture(scope="module")
