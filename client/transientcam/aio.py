@@ -189,6 +189,15 @@ class AsyncCamera:
         """Return what is simulated; a problem where the camera is real."""
         return await self._ask(rest.document("simulation"))
 
+    async def simulate(
+        self, scene: str | None = None, *, effects: Mapping[str, str] | None = None
+    ) -> dict[str, Any]:
+        """Put a simulated camera before a built-in scene; capturing goes on meanwhile.
+
+        ``effects`` takes the place of all earlier choices: "auto", "on" or "off" by name.
+        """
+        return await self._ask(rest.simulation(scene, effects))
+
     async def cause(self, fault: str) -> dict[str, Any]:
         """Let something go wrong in the simulation: unplug, replug, corrupt-image, drop-image."""
         return await self._ask(rest.fault(fault))

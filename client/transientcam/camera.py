@@ -216,6 +216,15 @@ class Camera:
         """The simulated world; a problem where the camera is real."""
         return self._ask(rest.document("simulation"))
 
+    def simulate(
+        self, scene: str | None = None, *, effects: Mapping[str, str] | None = None
+    ) -> dict[str, Any]:
+        """Put a simulated camera before a built-in scene; capturing goes on meanwhile.
+
+        ``effects`` takes the place of all earlier choices: "auto", "on" or "off" by name.
+        """
+        return self._ask(rest.simulation(scene, effects))
+
     def cause(self, fault: str) -> dict[str, Any]:
         """Let something go wrong in the simulation: unplug, replug, corrupt-image, drop-image."""
         return self._ask(rest.fault(fault))

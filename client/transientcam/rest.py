@@ -108,6 +108,13 @@ def acquire(*, running: bool) -> Request[dict[str, Any]]:
     return document("acquisition", method="PUT", body={"running": running})
 
 
+def simulation(scene: str | None, effects: Mapping[str, str] | None) -> Request[dict[str, Any]]:
+    """Build the request that changes the simulated world; None lets it be as it is."""
+    wanted = {"scene": scene, "effects": None if effects is None else dict(effects)}
+    body = {key: value for key, value in wanted.items() if value is not None}
+    return document("simulation", method="PUT", body=body, patience_s=60.0)
+
+
 def fault(name: str) -> Request[dict[str, Any]]:
     """Build the request that lets something go wrong in the simulation."""
     return document("simulation/faults", method="POST", body={"fault": name})

@@ -57,6 +57,10 @@ class Fronts:
             "front": [choice.to_document() for choice in known.choices],
         }
 
+    def forget(self) -> None:
+        """Predict anew when asked next: the scene is another one."""
+        self._known.clear()
+
     async def _predicted(self, frame: Frame, by: str) -> list[Choice]:
         found = await frame.stage("returns")
         scene, _ = await self._pipeline.run(self._accuracy.statistic, frame.recipe, found, 0.0)

@@ -15,7 +15,15 @@ from starlette.routing import compile_path
 
 from transientcam.errors import ProtocolError
 from transientcam.wire import PROBLEM_MEDIA_TYPE
-from transientcam_driver import CameraError, CameraLost, CameraNotFound, DriverError, SequenceError
+from transientcam_driver import (
+    CalibrationMismatch,
+    CameraError,
+    CameraLost,
+    CameraNotFound,
+    DriverError,
+    EffectError,
+    SequenceError,
+)
 from transientcam_moments import ParameterError
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import Problem
@@ -78,11 +86,17 @@ def problem_of(error: Exception) -> Problem:
                 value=error.value,
                 limit=error.limit,
             )
+        case CalibrationMismatch():
+            return Problem(
+                kinds.CALIBRATION_MISFIT,
+                f"{str(error)[0].upper()}{str(error)[1:]}.",
+                field=error.field,
+                value=error.value,
+                limit=error.needed,
+            )
         case CameraLost() | CameraNotFound():
             return Problem(kinds.CAMERA_LOST, str(error))
-        case CameraError() | DriverError():
-            return Problem(kinds.CAMERA_FAILED, str(error))
-        case ParameterError():
+        case ParameterError() | EffectError():
             return Problem(
                 kinds.INVALID_REQUEST,
                 str(error),
@@ -90,6 +104,8 @@ def problem_of(error: Exception) -> Problem:
                 value=error.value,
                 limit=error.limit,
             )
+        case CameraError() | DriverError():
+            return Problem(kinds.CAMERA_FAILED, str(error))
         case ProtocolError():
             return Problem(
                 kinds.BAD_MESSAGE,

@@ -455,35 +455,6 @@ class PixelDocument(Document):
     """Null where the camera is a real one."""
 
 
-class SimulationDocument(Document):
-    """The simulated world behind the camera."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "scene": "mirrors",
-                    "faults": ["unplug", "replug", "corrupt-image", "drop-image"],
-                }
-            ]
-        }
-    )
-
-    scene: str
-    faults: list[str]
-    """What can be made to go wrong."""
-
-
-class FaultRequest(Document):
-    """What should go wrong."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"fault": "corrupt-image"}]}
-    )
-
-    fault: Literal["unplug", "replug", "corrupt-image", "drop-image"]
-
-
 class LivenessDocument(Document):
     """The process answers."""
 

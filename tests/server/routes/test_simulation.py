@@ -1,14 +1,23 @@
+from typing import Any
+
 import httpx
+import numpy as np
 import pytest
 
+import transientcam
 from tests.serving import Served
 from transientcam import wire
+from transientcam_driver import open_camera
 
 
 def test_the_simulated_scene_is_told(http: httpx.Client) -> None:
     document = http.get("/api/v1/simulation").json()
 
     assert document["scene"] == "mirrors"
+    assert document["effects"] == {}
+    assert document["plugged"]
+    assert {"corner", "wall", "visitor"} <= {each["name"] for each in document["scenes"]}
+    assert "measured" not in {each["name"] for each in document["scenes"]}
     assert set(document["faults"]) == {"unplug", "replug", "corrupt-image", "drop-image"}
 
 
@@ -41,8 +50,66 @@ def test_a_real_camera_has_no_simulation_no_faults_and_no_truth(
         http.get("/api/v1/simulation"),
         http.get("/api/v1/simulation/explain"),
         http.post("/api/v1/simulation/faults", json={"fault": "unplug"}),
+        http.put("/api/v1/simulation", json={"scene": "wall"}),
     ):
         assert response.json()["type"] == "/problems/not-simulated"
     problem = http.get("/api/v1/frames/latest/truth").json()
     assert problem["type"] == "/problems/unknown-product"
     assert problem["known"] == sorted(set(wire.PRODUCTS) - {"truth"})
+
+
+def test_the_camera_is_put_before_another_scene_while_it_captures(
+    served: Served, http: httpx.Client
+) -> None:
+    with transientcam.Camera(served.url) as camera, open_camera("sim:wall?noise=off") as wall:
+        first = camera.frame("range").frame
+        assert camera.simulate("wall", effects={"ambient": "on"})["scene"] == "wall"
+        try:
+            both = camera.frame("range", after=camera.frame("range").frame, wait_s=10)
+            seen = camera.frame("range", after=both.frame, wait_s=10)
+            true_m = wall.simulation.truth().range_m if wall.simulation else None
+
+            assert seen.frame > first
+            np.testing.assert_allclose(camera.frame("truth").array, true_m, atol=1e-6)
+            np.testing.assert_allclose(seen.array, true_m, atol=0.05)
+            explained = http.get("/api/v1/simulation/explain").json()
+            effects = {each["effect"]: each for each in explained["effects"]}
+            assert (explained["scene"], effects["ambient"]["choice"]) == ("wall", "on")
+        finally:
+            assert camera.simulate("mirrors", effects={})["effects"] == {}
+
+
+@pytest.mark.parametrize(
+    ("body", "field", "value"),
+    [
+        ({"scene": "moon"}, "scene", "moon"),
+        ({"scene": "measured"}, "scene", "measured"),
+        ({"scene": "/etc/passwd.toml"}, "scene", "/etc/passwd.toml"),
+        ({"effects": {"rain": "on"}}, "effects", "rain"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused_by_name_and_the_scene_stays(
+    http: httpx.Client, body: object, field: str, value: str
+) -> None:
+    refused = http.put("/api/v1/simulation", json=body)
+
+    problem = refused.json()
+    assert (refused.status_code, problem["type"]) == (422, "/problems/invalid-request")
+    assert (problem["field"], problem["value"]) == (field, value)
+    assert "wall" in problem["limit"] or "ambient" in problem["limit"]
+    assert http.get("/api/v1/simulation").json()["scene"] == "mirrors"
+
+
+def test_streams_are_told_of_another_scene(served: Served) -> None:
+    told: list[Any] = []
+    with transientcam.Camera(served.url) as camera:
+        with camera.stream("range", on_notice=told.append) as stream:
+            frames = iter(stream)
+            next(frames)
+            camera.simulate(effects={"lens-scatter": "off"})
+            while not told:
+                next(frames)
+        camera.simulate(effects={})
+
+    assert told[0].kind == "simulation-changed"
+    assert told[0].details == {"scene": "mirrors", "effects": {"lens-scatter": "off"}}
