@@ -16,7 +16,7 @@ from benchmarks.timing import measure
 ORDERS = (3, 4, 8)
 # Sec. 6.3: density frames a second of 163 x 120 pixels on a GTX 780
 PAPER_FRAMES_S = {3: 2.9e5, 4: 2.2e5, 8: 1.1e5}
-_CACHED, _STREAMED = 192, 1024  # frames: 15 MB and 80 MB
+_CACHED, _STREAMED = 96, 1024  # frames: 7.5 MB and 80 MB
 _PHASES: dict[str, Callable[[int], Array]] = {
     "any": lambda count: np.random.default_rng(count).uniform(0, 2 * np.pi, count),
     "equidistant": lambda count: np.linspace(0, 2 * np.pi, count, endpoint=False),
@@ -35,7 +35,7 @@ def tables() -> Iterator[Table]:
             "Any phases need 4 m + 2 fused multiply-adds a value; equidistant ones, in pairs about "
             "their middle, 2 m + 4. The roofline is the smaller of that rate (division and floor "
             "of the denominator not counted) and of 4 bytes written.",
-            f"{_CACHED} frames (15 MB) stay in the last cache, {_STREAMED} (80 MB) don't.",
+            f"{_CACHED} frames (7.5 MB) stay in the last cache, {_STREAMED} (80 MB) don't.",
         ],
     )
     for m in ORDERS:
