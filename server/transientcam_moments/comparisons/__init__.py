@@ -1,6 +1,6 @@
 """The techniques that the paper is compared with, and its own, in one form.
 
-Each takes moments (m + 1, ...) and gives an `Estimate`: returns or a density, with the cumulative
+Each takes moments (m + 1, ...), or one of them samples of a code, and gives an `Estimate`: returns or a density, with the cumulative
 response and the phase of the first return. All compute in double precision with NumPy. ::
 
     from transientcam_moments import comparisons
@@ -13,16 +13,21 @@ was not at hand; no label claims to be the authors' implementation.
 """
 
 from transientcam_moments.comparisons import (
+    coded,
     dorrington,
     frequency_domain,
     godbaz,
     high_frequency,
     inverse_fourier,
+    logarithmic,
     matching_pursuit,
     matrix_pencil,
     own,
+    regularised,
     single_frequency,
     spumic,
+    sra,
+    sra_table,
 )
 from transientcam_moments.comparisons.estimate import (
     Estimate,
@@ -42,10 +47,15 @@ TECHNIQUES: dict[str, Technique] = {
         inverse_fourier.TECHNIQUE,
         godbaz.TECHNIQUE,
         spumic.TECHNIQUE,
+        sra.TECHNIQUE,
+        sra_table.TECHNIQUE,
         matrix_pencil.TECHNIQUE,
         matching_pursuit.TECHNIQUE,
         dorrington.TECHNIQUE,
+        regularised.TECHNIQUE,
+        coded.TECHNIQUE,
         frequency_domain.TECHNIQUE,
+        logarithmic.TECHNIQUE,
         high_frequency.TECHNIQUE,
     )
 }

@@ -23,12 +23,16 @@ class Pixels:
         The largest of the moments that are looked at is 1; all 0 where a pixel cannot be used.
     usable : boolean array, shape (P)
         Where those moments are finite and not all zero.
+    scale : array, shape (P)
+        What b was divided by, in the unit of the moments; 0 where a pixel cannot be used.
+    trailing : tuple of int
+        The shape of the pixels.
     """
 
     b: Complex
     usable: NDArray[np.bool_]
-    _scale: Real
-    _trailing: tuple[int, ...]
+    scale: Real
+    trailing: tuple[int, ...]
     _dtype: Any
 
     @property
@@ -45,26 +49,26 @@ class Pixels:
         with np.errstate(invalid="ignore"):
             used = self.usable & np.isfinite(phase_rad) & (weight > floor) & (weight < np.inf)
         phase = np.where(used, np.remainder(np.where(used, phase_rad, 0), 2 * np.pi), np.nan)
-        scaled = np.where(used, weight, 0) * self._scale
+        scaled = np.where(used, weight, 0) * self.scale
         order = np.argsort(phase, axis=0)
         phase = in_turn(np.take_along_axis(phase, order, axis=0).astype(self._dtype))
         with np.errstate(over="ignore", under="ignore"):
             light = np.take_along_axis(scaled, order, axis=0).astype(self._dtype)
-            rest = np.zeros_like(self._scale) if uniform is None else uniform * self._scale
+            rest = np.zeros_like(self.scale) if uniform is None else uniform * self.scale
         phase = np.where(light > 0, phase, np.nan)  # rounding may take the faintest away
-        shape = (phase.shape[0], *self._trailing)
+        shape = (phase.shape[0], *self.trailing)
         return SparseEstimate(
             phase.reshape(shape),
             light.reshape(shape),
-            rest.astype(self._dtype).reshape(self._trailing),
+            rest.astype(self._dtype).reshape(self.trailing),
         )
 
     def grid(self, density: Real) -> GridEstimate:
         """Return a density (T, P) of these pixels, in the unit of the moments per radian."""
-        scaled = np.where(self.usable, density, 0) * self._scale
+        scaled = np.where(self.usable, density, 0) * self.scale
         with np.errstate(over="ignore", under="ignore"):
             cast = scaled.astype(self._dtype)
-        return GridEstimate(cast.reshape((cast.shape[0], *self._trailing)))
+        return GridEstimate(cast.reshape((cast.shape[0], *self.trailing)))
 
 
 def pixels_of(

@@ -46,4 +46,5 @@ def _weights(b: Complex, orders: Real, phase_rad: Real) -> Real:
                 weight[pixel] = nnls(matrix[pixel], right[pixel])[0]
             except RuntimeError:  # too many iterations
                 weight[pixel] = np.maximum(weight[pixel], 0)
-    return weight.T
+    result: Real = weight.T
+    return result
