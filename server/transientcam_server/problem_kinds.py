@@ -326,6 +326,13 @@ BAD_MESSAGE: Final = ProblemKind(
     "`field` names the part of the message, `value` repeats it and `limit` says what would do. "
     "The stream closes with code 4001 if it was the first message, and carries on otherwise.",
 )
+TOO_MANY_MESSAGES: Final = ProblemKind(
+    "too-many-messages",
+    429,
+    "Too many messages",
+    "The client of a stream sent more messages a second than stream.max_messages_hz (`limit`) "
+    "allows beside one for each frame. The stream closes with code 4008.",
+)
 FIRST_MESSAGE_LATE: Final = ProblemKind(
     "first-message-late",
     408,

@@ -28,16 +28,18 @@ from transientcam_server.calibration import Calibration, calibration_id, load_ca
 from transientcam_server.cameras import Camera
 from transientcam_server.fronts import Fronts
 from transientcam_server.history import History
-from transientcam_server.hub import Channel, Goodbye, Hub
+from transientcam_server.hub import Hub
 from transientcam_server.lease import Alarm, Change, Lease, LeaseDesk
 from transientcam_server.lens import Intrinsics, known_intrinsics
 from transientcam_server.metrics import Metrics
+from transientcam_server.outbox import Channel, Goodbye
 from transientcam_server.pipeline import Pipeline
 from transientcam_server.reconstruction import Reconstruction
 from transientcam_server.recording import Header
 from transientcam_server.recording.library import Library
 from transientcam_server.recording.replay import ReplayCamera
 from transientcam_server.settings import ReconstructionSettings, Settings
+from transientcam_server.stream_encodings import encoding_name, travelling
 
 _log = logging.getLogger(__name__)
 VERSION: Final = version("transientcam")
@@ -120,17 +122,23 @@ class Service:
 
     def channel_table(self, channels: Iterable[Channel]) -> tuple[wire.Channel, ...]:
         """Return what frames of these channels look like with the present sequence."""
-        capabilities = self.camera.capabilities
-        return tuple(
-            wire.Channel(
-                channel=channel.number,
-                product=channel.product.name,
-                unit=channel.product.description.unit,
-                axes=channel.product.description.axes,
-                dtype=channel.product.description.dtype,
-                shape=channel.product.shape(self.applied, capabilities.height, capabilities.width),
-            )
-            for channel in channels
+        return tuple(map(self._described, channels))
+
+    def _described(self, channel: Channel) -> wire.Channel:
+        capabilities, product = self.camera.capabilities, channel.product
+        rows, columns = channel.crop.shape(capabilities.height, capabilities.width)
+        shape = product.shape(self.applied, rows, columns)
+        dtype, shape = travelling(product, channel.encoding, shape)
+        return wire.Channel(
+            channel=channel.number,
+            product=product.name,
+            unit=product.description.unit,
+            axes=product.description.axes,
+            dtype=dtype,
+            shape=shape,
+            encoding=encoding_name(channel.encoding),
+            region=channel.crop.region,
+            decimation=channel.crop.decimation,
         )
 
     @property

@@ -9,7 +9,7 @@ from platformdirs import user_config_path, user_data_path
 from pydantic import BaseModel, ConfigDict, Field
 
 import transientcam_moments as tm
-from transientcam.wire import FIRST_MESSAGE_WITHIN_S
+from transientcam.wire import FIRST_MESSAGE_WITHIN_S, MAX_SUBSCRIPTIONS
 
 _DEFAULTS = tm.Settings()  # the paper's
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -82,6 +82,11 @@ class StreamSettings(_Group):
     """Frames that wait for one client before the oldest is dropped."""
     first_message_s: _Finite = Field(default=FIRST_MESSAGE_WITHIN_S, gt=0.0, le=300.0)
     """Time a client has to subscribe."""
+    max_subscriptions: int = Field(default=MAX_SUBSCRIPTIONS, ge=1, le=MAX_SUBSCRIPTIONS)
+    """Products that one client may have at the same time."""
+    max_messages_hz: _Finite = Field(default=50.0, ge=1.0, le=100_000.0)
+    """Messages a second that are read of one client, beside one for each frame it was sent; those
+    of two seconds may come at once. Who sends more is sent away."""
 
 
 class HistorySettings(_Group):

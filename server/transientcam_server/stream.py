@@ -3,21 +3,21 @@
 import asyncio
 import logging
 import secrets
-import time
-from typing import Any
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from transientcam import wire
 from transientcam.errors import ProtocolError
 from transientcam_server import problem_kinds as kinds
+from transientcam_server.allowance import Allowance
 from transientcam_server.auth import log_refusal
-from transientcam_server.encoding import MSGPACK
+from transientcam_server.cropping import Crop
 from transientcam_server.errors import Problem
-from transientcam_server.hub import Channel, Delivery, Goodbye, Outbox
-from transientcam_server.metrics import Metrics
+from transientcam_server.outbox import UNNUMBERED, Channel, Goodbye, Outbox
 from transientcam_server.problems import problem_document, problem_of, problem_response
+from transientcam_server.sender import Sender
 from transientcam_server.service import Service
+from transientcam_server.stream_encodings import STREAM_ENCODINGS
 
 _log = logging.getLogger(__name__)
 router = APIRouter()
@@ -54,7 +54,10 @@ class _Client:
         self._service = service
         self._session = secrets.token_hex(8)
         self._outbox = Outbox(depth=service.settings.stream.queue_frames)
-        self._sender = _Sender(websocket, self._outbox, service.metrics)
+        self._allowance = Allowance(
+            service.settings.stream.max_messages_hz, clock=asyncio.get_running_loop().time
+        )
+        self._sender = Sender(websocket, self._outbox, service.metrics, self._allowance)
 
     async def serve(self) -> None:
         """Subscribe, then send and receive until either end has enough."""
@@ -128,6 +131,9 @@ class _Client:
     async def _receive_all(self) -> None:
         while True:
             data = await self._receive()
+            if not self._allowance.spend():
+                await self._send_away()
+                return
             try:
                 message = wire.parse_client_message(data)
                 if isinstance(message, wire.Ack):
@@ -146,44 +152,71 @@ class _Client:
 
     def _subscribe(self, message: wire.Subscribe) -> None:
         """Take a subscription, whole or not at all, and answer it with a hello."""
-        hub, pipeline = self._service.hub, self._service.pipeline
-        channels: dict[str, Channel] = {}
+        service, outbox = self._service, self._outbox
+        most = service.settings.stream.max_subscriptions
+        if len(message.subscriptions) > most:
+            raise Problem(
+                kinds.BAD_MESSAGE,
+                f"{len(message.subscriptions)} subscriptions are more than {most}.",
+                field="subscriptions",
+                value=len(message.subscriptions),
+                limit=f"at most {most}",
+            )
+        channels: list[Channel] = []
         for index, wanted in enumerate(message.subscriptions):
-            product = pipeline.product(wanted.product)
-            if product.over_time or product.name in channels:
-                limit = "another product" if product.over_time else "each product once"
-                raise Problem(
-                    kinds.BAD_MESSAGE,
-                    f"{product.name} cannot be streamed here: {limit}; a stream of coefficients "
-                    "holds all times of flight.",
-                    field=f"subscriptions[{index}].product",
-                    value=product.name,
-                    limit=limit,
+            channel = self._channel(wanted, f"subscriptions[{index}].")
+            if any(_alike(channel, each) for each in channels):
+                raise _refused(
+                    f"subscriptions[{index}].product", wanted.product, "each product and form once"
                 )
-            number = hub.channel_number(product)
-            channels[product.name] = Channel(number, product, wanted.max_rate_hz)
-        self._outbox.subscribe(tuple(channels.values()), credit=message.credits)
-        self._outbox.put(
+            channels.append(channel)
+        service.hub.subscribe(outbox, channels, credit=message.credits)
+        outbox.put(
             wire.Hello(
                 session=self._session,
-                server=self._service.identity,
-                channels=self._service.channel_table(self._outbox.channels),
-                sequence=self._service.applied.to_document(),
-                camera={"state": self._service.acquisition.status().state},
+                server=service.identity,
+                channels=service.channel_table(outbox.channels),
+                sequence=service.applied.to_document(),
+                camera={"state": service.acquisition.status().state},
             )
         )
-        self._resume(message.start)
+        if message.start is not None:
+            outbox.resume(service.history, start=message.start)
 
-    def _resume(self, start: int | None) -> None:
-        """Send the newest frame if it was asked for, and say which older ones are not here."""
-        latest = self._service.hub.latest
-        if start is None or latest is None:
-            return
-        if start < latest.number:
-            missing = {"from": start, "to": latest.number - 1, "reason": "not kept"}
-            self._outbox.put(wire.Notice("gap", missing))
-        if start <= latest.number:
-            self._outbox.put_frame(latest)
+    def _channel(self, wanted: wire.Subscription, path: str) -> Channel:
+        product = self._service.pipeline.product(wanted.product)
+        if product.over_time:
+            limit = "a product without times of flight; coefficients hold all of them"
+            raise _refused(f"{path}product", product.name, limit)
+        if wanted.encoding not in product.description.encodings:
+            limit = f"{product.name} travels as {' or '.join(product.description.encodings)}"
+            raise _refused(f"{path}encoding", wanted.encoding, limit)
+        capabilities = self._service.camera.capabilities
+        try:
+            crop = Crop.of(
+                wanted.region,
+                wanted.decimation,
+                height=capabilities.height,
+                width=capabilities.width,
+                path=path,
+            )
+        except Problem as problem:
+            raise Problem(kinds.BAD_MESSAGE, problem.detail, **problem.extensions) from None
+        encoding = STREAM_ENCODINGS[wanted.encoding]
+        return Channel(UNNUMBERED, product, wanted.max_rate_hz, encoding, crop)
+
+    async def _send_away(self) -> None:
+        """End a stream whose client sends more than is read here."""
+        limit_hz = self._service.settings.stream.max_messages_hz
+        problem = Problem(
+            kinds.TOO_MANY_MESSAGES,
+            f"More than {limit_hz:g} messages a second arrived.",
+            limit=limit_hz,
+        )
+        self._outbox.put(wire.ErrorMessage(problem_document(problem)))
+        self._outbox.put(Goodbye(wire.CloseCode.TOO_MANY_MESSAGES, problem.kind.title))
+        # read nothing more; the sender ends the stream
+        await asyncio.Event().wait()
 
     async def _dismiss(self, problem: Problem, code: wire.CloseCode) -> None:
         message = wire.ErrorMessage(problem_document(problem))
@@ -191,60 +224,15 @@ class _Client:
         await self._websocket.close(code, problem.kind.title)
 
 
-class _Sender:
-    """Empties an outbox into a WebSocket."""
+def _alike(one: Channel, other: Channel) -> bool:
+    """Whether two channels would carry the same bytes."""
+    return (
+        one.product.name == other.product.name
+        and one.encoding is other.encoding
+        and one.crop == other.crop
+    )
 
-    def __init__(self, websocket: WebSocket, outbox: Outbox, metrics: Metrics) -> None:
-        self._websocket = websocket
-        self._metrics = metrics
-        self._outbox = outbox
-        self._failing: set[str] = set()
 
-    async def send_all(self) -> None:
-        """Send until the client is gone or was told goodbye."""
-        while True:
-            item = await self._outbox.next()
-            if isinstance(item, Goodbye):
-                await self._websocket.close(item.code, item.reason)
-                return
-            if isinstance(item, Delivery):
-                await self._deliver(item)
-            else:
-                await self._websocket.send_bytes(wire.encode(item))
-
-    async def _deliver(self, delivery: Delivery) -> None:
-        # all products of the frame are under way at once; each is sent as soon as those before
-        work = [self._encoded(delivery, channel) for channel in delivery.channels]
-        tasks = [asyncio.ensure_future(each) for each in work]
-        try:
-            for channel, task in zip(delivery.channels, tasks, strict=True):
-                await self._tell_dropped(channel)
-                try:
-                    data = await task
-                except Problem as problem:
-                    await self._tell_failed(channel, problem)
-                else:
-                    self._failing.discard(channel.product.name)
-                    await self._websocket.send_bytes(data)
-                    self._metrics.sent(time.time() - delivery.frame.raw.host_time_s)
-        finally:
-            for task in tasks:
-                task.cancel()
-
-    async def _encoded(self, delivery: Delivery, channel: Channel) -> bytes:
-        return await delivery.frame.encoded(channel.product, MSGPACK, channel=channel.number)
-
-    async def _tell_dropped(self, channel: Channel) -> None:
-        if channel.dropped:
-            count, channel.dropped = channel.dropped, 0
-            channel.dropped_total += count
-            details = {"channel": channel.number, "count": count, "total": channel.dropped_total}
-            await self._websocket.send_bytes(wire.encode(wire.Notice("dropped", details)))
-
-    async def _tell_failed(self, channel: Channel, problem: Problem) -> None:
-        """Tell a failure once, not with every frame until it is mended."""
-        if channel.product.name not in self._failing:
-            self._failing.add(channel.product.name)
-            document: dict[str, Any] = problem_document(problem)
-            document["channel"] = channel.number
-            await self._websocket.send_bytes(wire.encode(wire.ErrorMessage(document)))
+def _refused(field: str, value: object, limit: str) -> Problem:
+    detail = f"{field} cannot be streamed here: {limit}."
+    return Problem(kinds.BAD_MESSAGE, detail, field=field, value=value, limit=limit)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 from typing import cast
 
 from transientcam import wire
-from transientcam_server.hub import Channel
+from transientcam_server.outbox import Channel
 from transientcam_server.pipeline import Frame
 from transientcam_server.products import PRODUCTS
 

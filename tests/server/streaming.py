@@ -23,9 +23,9 @@ class Client:
         """Send a map."""
         self.connection.send(wire.pack(document))
 
-    def subscribe(self, *products: str, **others: Any) -> wire.Hello:
+    def subscribe(self, *products: str | dict[str, Any], **others: Any) -> wire.Hello:
         """Subscribe and return the answer; what comes before it is passed over."""
-        subscriptions = [{"product": product} for product in products]
+        subscriptions = [{"product": p} if isinstance(p, str) else p for p in products]
         self.send({"type": "subscribe", "v": 1, "subscriptions": subscriptions, **others})
         message = self.receive_until(lambda each: isinstance(each, wire.Hello | wire.ErrorMessage))
         assert isinstance(message, wire.Hello), message

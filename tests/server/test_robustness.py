@@ -15,7 +15,7 @@ from websockets.uri import parse_uri
 from tests.server.streaming import streaming
 from tests.serving import Served
 from transientcam import wire
-from transientcam_server.hub import Delivery
+from transientcam_server.outbox import Delivery
 from transientcam_server.products import STAGES
 
 LATEST = "/api/v1/frames/latest"

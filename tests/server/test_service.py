@@ -4,7 +4,7 @@ import pytest
 
 from tests.serving import Served
 from transientcam_server.acquisition import AcquisitionStatus
-from transientcam_server.hub import Channel
+from transientcam_server.outbox import Channel
 
 HEALTHY: dict[str, Any] = {
     "state": "streaming",

@@ -1,13 +1,14 @@
 import time
 from typing import Any
 
+import httpx
 import numpy as np
 import pytest
 from websockets.exceptions import InvalidStatus
 
 from tests.server.streaming import VIDEO, streaming
 from tests.serving import Served, serving
-from transientcam import wire
+from transientcam import density, wire
 from transientcam_driver import Sequence
 
 
@@ -41,8 +42,6 @@ def test_the_products_of_a_frame_come_together_in_the_order_asked_for(served: Se
 
 
 def test_the_stream_sends_what_rest_answers(served: Served) -> None:
-    import httpx
-
     with streaming(served.stream_url) as client, httpx.Client(base_url=served.url) as http:
         client.subscribe("range")
         client.frame()
@@ -121,17 +120,145 @@ def test_with_credits_the_server_waits_for_the_client_and_then_sends_the_newest(
     }
 
 
-def test_a_start_in_the_past_says_what_is_missing(served: Served) -> None:
+def test_a_start_in_the_past_sends_every_frame_from_there_and_goes_on_with_the_newest(
+    served: Served,
+) -> None:
     with streaming(served.stream_url) as client:
         client.subscribe("flags")
-        while client.frame().meta["frame"] < 4:
+        while client.frame().meta["frame"] < 6:
             pass
-        client.subscribe("flags", start=1)
+        client.subscribe("flags", start=2)
+        messages = [client.receive() for _ in range(12)]
+
+    numbers = [each.meta["frame"] for each in messages if isinstance(each, wire.Frame)]
+    assert numbers == list(range(2, 14))
+
+
+def test_with_credits_frames_of_the_past_wait_for_them_too(served: Served) -> None:
+    with streaming(served.stream_url) as client:
+        client.subscribe("flags")
+        while client.frame().meta["frame"] < 6:
+            pass
+        client.subscribe("flags", start=1, credits=1)
+        numbers = []
+        for _ in range(4):
+            frame = client.frame()
+            numbers.append(frame.meta["frame"])
+            client.send({"type": "ack", "frame": frame.meta["frame"]})
+
+    assert numbers == [1, 2, 3, 4]
+
+
+def test_what_is_kept_no_more_is_told_as_a_gap() -> None:
+    with (
+        serving("sim:mirrors?noise=off", history={"seconds": 0.3}) as daemon,
+        streaming(daemon.stream_url) as client,
+    ):
+        client.subscribe("flags")
+        while client.frame().meta["frame"] < 12:
+            pass
+        client.subscribe("flags", start=2)
         gap = client.notice("gap")
         frame = client.frame()
 
-    assert gap.details["from"] == 1
+    assert gap.details["from"] == 2
     assert gap.details["to"] == frame.meta["frame"] - 1
+    assert gap.details["reason"] == "not kept any more"
+
+
+def test_nobody_waits_for_a_start_that_is_not_captured_yet(served: Served) -> None:
+    with streaming(served.stream_url) as client:
+        client.subscribe("flags")
+        latest = client.frame().meta["frame"]
+        client.subscribe("flags", start=latest + 1_000_000)
+        gap = client.notice("gap")
+        frame = client.frame()
+
+    assert gap.details["to"] == latest + 1_000_000 - 1
+    assert gap.details["from"] == frame.meta["frame"]
+    assert gap.details["reason"] == "not captured yet"
+
+
+def test_a_region_and_a_decimation_send_the_pixels_that_rest_answers(served: Served) -> None:
+    region = [40, 30, 50, 21]
+    with streaming(served.stream_url) as client, httpx.Client(base_url=served.url) as http:
+        hello = client.subscribe({"product": "moments", "region": region, "decimation": 2})
+        http.put("/api/v1/acquisition", json={"running": False})
+        whole = wire.parse_frame(http.get("/api/v1/frames/latest/moments").content)
+        frame = client.frame()
+        while frame.meta["frame"] < whole.meta["frame"]:
+            frame = client.frame()
+
+    (channel,) = hello.channels
+    assert (channel.region, channel.decimation) == (tuple(region), 2)
+    assert channel.shape == frame.array.shape == (4, 11, 25)
+    assert (frame.meta["region"], frame.meta["decimation"]) == (region, 2)
+    np.testing.assert_array_equal(frame.array, whole.array[:, 30:51:2, 40:90:2])
+
+
+def test_thin_encodings_arrive_as_the_same_arrays_within_their_error(served: Served) -> None:
+    with streaming(served.stream_url) as client:
+        hello = client.subscribe(
+            "range",
+            {"product": "range", "encoding": "u16"},
+            "coefficients",
+            {"product": "coefficients", "encoding": "reflection16"},
+        )
+        exact_m, steps_m, exact, thin = (client.frame() for _ in range(4))
+
+    assert [channel.encoding for channel in hello.channels] == ["f32", "u16", "f32", "reflection16"]
+    assert [channel.dtype for channel in hello.channels] == ["<f4", "<u2", "<f4", "<u2"]
+    assert [channel.shape[0] for channel in hello.channels] == [120, 120, 7, 6]
+    assert exact_m.frame == steps_m.frame == exact.frame == thin.frame
+    step_m = steps_m.extra["scale"]
+    np.testing.assert_array_equal(np.isnan(steps_m.array), np.isnan(exact_m.array))
+    assert np.nanmax(np.abs(steps_m.array - exact_m.array)) <= 0.51 * step_m
+    phase_rad = np.linspace(0.0, 2.0 * np.pi, 200)
+    densities = [density(each.array.astype(np.float64), phase_rad) for each in (exact, thin)]
+    error = np.abs(densities[1] - densities[0]).max(axis=0) / densities[0].max(axis=0)
+    assert thin.extra["approximate"] is True
+    # what the message says of itself was measured on some of the pixels, at some other phases
+    assert 0.5 < np.median(error) / thin.extra["median_error"] < 2.0
+    assert thin.extra["median_error"] < thin.extra["max_error"] < 2.0 * error.max()
+
+
+def test_clients_who_want_the_same_share_a_channel_number_and_others_do_not(
+    served: Served,
+) -> None:
+    with streaming(served.stream_url) as one, streaming(served.stream_url) as other:
+        first = one.subscribe("range", {"product": "range", "decimation": 2})
+        second = other.subscribe({"product": "range", "decimation": 2}, "direct", "range")
+
+    whole, coarse = (each.channel for each in first.channels)
+    assert [each.channel for each in second.channels][::2] == [coarse, whole]
+    assert len({each.channel for each in (*first.channels, *second.channels)}) == 3
+
+
+def test_a_client_that_sends_without_end_is_sent_away_and_nobody_else(served: Served) -> None:
+    with streaming(served.stream_url) as other, streaming(served.stream_url) as client:
+        other.subscribe("flags")
+        client.subscribe("flags", max_rate_hz=0.5)
+        for _ in range(300):
+            client.send({"type": "ack", "frame": 1})
+        problem = client.error()
+        code = client.close_code()
+        other.frame()
+
+    assert problem["type"] == "/problems/too-many-messages"
+    assert code == wire.CloseCode.TOO_MANY_MESSAGES
+
+
+def test_there_may_be_fewer_subscriptions_than_the_protocol_allows() -> None:
+    with (
+        serving("sim:mirrors?noise=off", stream={"max_subscriptions": 2}) as daemon,
+        streaming(daemon.stream_url) as client,
+    ):
+        client.subscribe("flags", "range")
+        client.send(GOOD | {"subscriptions": [{"product": n} for n in ("range", "flags", "raw")]})
+        problem = client.error()
+        client.frame()
+
+    assert (problem["field"], problem["value"]) == ("subscriptions", 3)
 
 
 def test_a_changed_sequence_is_told_before_its_first_frame(served: Served) -> None:
@@ -205,6 +332,26 @@ BAD_MESSAGES: list[tuple[Any, str]] = [
     (wire.pack(GOOD | {"subscriptions": [{"product": "magic"}]}), "product"),
     (wire.pack(GOOD | {"subscriptions": [{"product": "transient"}]}), "subscriptions[0].product"),
     (wire.pack(GOOD | {"subscriptions": [{"product": "range"}] * 2}), "subscriptions[1].product"),
+    (
+        wire.pack(GOOD | {"subscriptions": [{"product": "flags", "encoding": "u16"}]}),
+        "subscriptions[0].encoding",
+    ),
+    (
+        wire.pack(GOOD | {"subscriptions": [{"product": "range", "encoding": "f16"}]}),
+        "subscriptions[0].encoding",
+    ),
+    (
+        wire.pack(GOOD | {"subscriptions": [{"product": "range", "region": [0, 0, 164, 1]}]}),
+        "subscriptions[0].region",
+    ),
+    (
+        wire.pack(GOOD | {"subscriptions": [{"product": "range", "region": [0, 0, 1]}]}),
+        "subscriptions[0].region",
+    ),
+    (
+        wire.pack(GOOD | {"subscriptions": [{"product": "range", "decimation": 0}]}),
+        "subscriptions[0].decimation",
+    ),
     (wire.pack(GOOD | {"credits": 0}), "credits"),
     (wire.pack(GOOD | {"start": -1}), "start"),
 ]
