@@ -1,9 +1,10 @@
 """A real daemon for tests: uvicorn on a port of its own, on a thread, with a simulated camera."""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from fastapi import FastAPI
@@ -46,11 +47,23 @@ class Served:
 
 
 @contextmanager
-def serving(camera: str = "sim:mirrors?noise=off", **settings: Any) -> Iterator[Served]:
-    """Serve a camera on an ephemeral port until the end of the block; leave nothing behind."""
-    with open_camera(camera) as opened:
-        chosen = Settings(camera=camera, **{"port": 0, "log_level": "warning", **settings})
+def serving(
+    camera: str = "sim:mirrors?noise=off",
+    *,
+    prepare: Callable[[FastAPI], None] = lambda app: None,
+    **settings: Any,
+) -> Iterator[Served]:
+    """Serve a camera on an ephemeral port until the end of the block; leave nothing behind.
+
+    Calibrations are kept where no other service has them, unless ``settings`` say where.
+
+    ``prepare`` is given the application before it starts.
+    """
+    with open_camera(camera) as opened, TemporaryDirectory() as state:
+        usual = {"port": 0, "log_level": "warning", "calibrations": {"directory": state}}
+        chosen = Settings(camera=camera, **{**usual, **settings})
         app = build_app(opened, chosen)
+        prepare(app)
         with listen(chosen.host, chosen.port) as listener:
             listening = threading.Event()
             server = Server(app, chosen, on_listening=listening.set)

@@ -22,7 +22,9 @@ from transientcam_driver import (
     Sequence,
     Status,
 )
+from transientcam_server import problem_kinds as kinds
 from transientcam_server.cameras import Camera
+from transientcam_server.errors import JobCancelled, Problem
 
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
@@ -37,7 +39,7 @@ STALLED_PERIODS: Final = 5.0
 STALLED_MIN_S: Final = 2.0
 _RATE_FRAMES = 32
 
-State = Literal["starting", "streaming", "stopped", "lost"]
+State = Literal["starting", "streaming", "stopped", "calibrating", "lost"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +79,8 @@ class AcquisitionStatus:
     Attributes
     ----------
     state
-        ``streaming`` also before the first frame; ``stopped`` because somebody asked for it.
+        ``streaming`` also before the first frame; ``stopped`` because somebody asked for it;
+        ``calibrating`` while a calibration has the camera for itself.
     running
         Whether frames are wanted.
     rate_hz
@@ -115,6 +118,10 @@ class Acquisition:
         self._report = report
         self._clock = clock
         self._commands: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._occupied = threading.Lock()
+        self._occupant: str | None = None
+        self._interrupted = threading.Event()
+        self._restored: Sequence | None = None
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="acquisition", daemon=True)
         self._running = True
@@ -137,26 +144,75 @@ class Acquisition:
     def stop(self) -> None:
         """Stop the camera, its light and the thread; waits for it."""
         self._stopping.set()
+        self._interrupted.set()
         self._commands.put(lambda: None)
         self._thread.join()
 
     def configure(
         self, sequence: Sequence, *, check: Callable[[AppliedSequence], None] | None = None
     ) -> "Future[AppliedSequence]":
-        """Change the sequence, unless ``check`` raises for the one that is running then."""
-        return self.submit(lambda: self._configure(sequence, check))
+        """Change the sequence, unless ``check`` raises for the one that is running then.
+
+        Raises
+        ------
+        Problem
+            ``camera-busy`` while something has the camera for itself.
+        """
+        with self._occupied:
+            self.require_free()
+            return self.submit(lambda: self._configure(sequence, check))
 
     def set_running(self, running: bool) -> "Future[None]":
-        """Start or stop capturing."""
-        return self.submit(lambda: self._set_running(running))
+        """Start or stop capturing; stopping also ends what has the camera for itself.
+
+        Raises
+        ------
+        Problem
+            ``camera-busy`` where it should start while something has the camera for itself.
+        """
+        with self._occupied:
+            if running:
+                self.require_free()
+            self._interrupted.set()
+            return self.submit(lambda: self._set_running(running))
 
     def safe_off(self) -> "Future[None]":
         """Stop capturing and switch the light off, by what the camera always honours."""
+        self._interrupted.set()
         return self.submit(self._safe_off)
 
     def device_status(self) -> "Future[Status]":
         """Ask the device how it is."""
         return self.submit(self._camera.status)
+
+    def occupy(self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T]) -> "Future[_T]":
+        """Hand the camera to ``work``, which has it for itself until it returns.
+
+        No frames are reported meanwhile. It leaves the sequence as it was, and calls its second
+        argument several times a second, which raises `JobCancelled` where the light is to go off.
+
+        Raises
+        ------
+        Problem
+            ``camera-busy`` if something has it already.
+        """
+        with self._occupied:
+            self.require_free()
+            self._occupant = job_id
+            self._interrupted.clear()
+            return self.submit(lambda: self._occupy(job_id, work))
+
+    def require_free(self) -> None:
+        """Refuse what would disturb somebody who has the camera for itself.
+
+        Raises
+        ------
+        Problem
+            ``camera-busy``, with the job that has it.
+        """
+        job_id = self._occupant
+        if job_id is not None:
+            raise Problem(kinds.CAMERA_BUSY, f"The job {job_id} has the camera.", job=job_id)
 
     def submit(self, command: Callable[[], _T]) -> "Future[_T]":
         """Run a command between two reads of the camera."""
@@ -196,6 +252,8 @@ class Acquisition:
     def _state(self) -> State:
         if self._lost is not None:
             return "lost"
+        if self._occupant is not None:
+            return "calibrating"
         if not self._running:
             return "stopped"
         return "streaming" if self._started else "starting"
@@ -222,6 +280,9 @@ class Acquisition:
     def _step(self) -> None:
         if not self._connected:
             self._look_for_camera()
+        elif self._restored is not None:
+            self._configure(self._restored)
+            self._restored = None
         elif not self._running:
             self._run_commands(wait_s=IDLE_S)
             self._camera.status()  # an unplug is noticed also while nothing is read
@@ -269,6 +330,30 @@ class Acquisition:
             if not running and self._started:
                 self._started = False
                 self._camera.stop()
+
+    def _occupy(self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T]) -> _T:
+        def go_on() -> None:
+            if self._interrupted.is_set():
+                raise JobCancelled(job_id)
+            self._run_commands(wait_s=0.0)  # such as disturb nobody, or end this
+
+        before = self._camera.applied
+        try:
+            go_on()
+            if self._started:
+                self._started = False
+                self._camera.stop()
+            return work(self._camera, go_on)
+        finally:
+            self._occupant = None
+            self._arrivals_s.clear()
+            self._moved_s = self._clock()
+            applied = self._camera.applied
+            if applied.sequence != before.sequence:
+                self._restored = before.sequence  # once it can be reached
+            elif applied.epoch != before.epoch:
+                self._remember(applied)
+                self._report(SequenceChanged(applied))
 
     def _safe_off(self) -> None:
         # whatever the camera answers, nothing here starts it again

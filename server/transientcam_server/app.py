@@ -12,10 +12,12 @@ from transientcam_server.cameras import Camera
 from transientcam_server.requests import Requests
 from transientcam_server.routes import (
     acquisition,
+    calibrations,
     camera,
     frames,
     health,
     info,
+    jobs,
     lease,
     metrics,
     plan,
@@ -35,11 +37,13 @@ _RESOURCES = (
     lease,
     sequence,
     reconstruction,
+    calibrations,
     acquisition,
     frames,
     recordings,
     simulation,
     plan,
+    jobs,
 )
 
 
@@ -78,7 +82,7 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     problems.install(app)
     access.describe(app, [resource.router for resource in _RESOURCES], prefix=API)
     # the last one added is the first to see a request
-    app.add_middleware(BodyLimit)
+    app.add_middleware(BodyLimit, counted_elsewhere=frozenset((f"{API}{calibrations.IMPORT}",)))
     app.add_middleware(Authentication, guard=service.guard)
     app.add_middleware(SameSite, settings=settings)
     app.add_middleware(Requests, metrics=service.metrics)

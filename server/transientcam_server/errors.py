@@ -13,6 +13,7 @@
     │   └── NotConvertible   the format asked for is none that recordings are converted to
     ├── TokenFileError       the file of tokens cannot be read or written
     ├── UnknownToken         no token has this id
+    ├── JobCancelled         somebody wants a job to end
     └── Problem              a request cannot be answered; see `transientcam_server.problems`
 
 Errors of the driver and of the arithmetic become problems in one place,
@@ -155,6 +156,17 @@ class UnknownToken(ServerError):  # noqa: N818 - says what is wrong
 
     def __str__(self) -> str:
         return f"{self.file} has no token {self.token_id}"
+
+
+class JobCancelled(ServerError):  # noqa: N818 - says what is wrong
+    """Somebody wants a job to end."""
+
+    def __init__(self, job_id: str) -> None:
+        super().__init__(job_id)
+        self.job_id = job_id
+
+    def __str__(self) -> str:
+        return f"the job {self.job_id} was cancelled"
 
 
 class Problem(ServerError):  # noqa: N818 - RFC 9457 calls it so

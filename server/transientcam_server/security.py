@@ -131,15 +131,25 @@ class SameSite:
 
 
 class BodyLimit:
-    """Refuses bodies longer than ``limit`` bytes, announced or not."""
+    """Refuses bodies longer than ``limit`` bytes, announced or not.
 
-    def __init__(self, app: ASGIApp, *, limit: int = MAX_BODY_BYTES) -> None:
+    The routes at ``counted_elsewhere`` take files, and hold them to limits of their own.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        *,
+        limit: int = MAX_BODY_BYTES,
+        counted_elsewhere: frozenset[str] = frozenset(),
+    ) -> None:
         self._app = app
         self._limit = limit
+        self._counted_elsewhere = counted_elsewhere
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse, or pass on and count."""
-        if scope["type"] != "http":
+        if scope["type"] != "http" or scope["path"] in self._counted_elsewhere:
             await self._app(scope, receive, send)
             return
         announced = Headers(scope=scope).get("content-length", "")

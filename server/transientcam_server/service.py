@@ -6,13 +6,14 @@ import logging
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict
+from functools import partial
 from importlib.metadata import version
 from typing import Annotated, Any, Final
 
 from fastapi import Depends, Request
 
 from transientcam import wire
-from transientcam_driver import AppliedSequence
+from transientcam_driver import AppliedSequence, CalibrationError
 from transientcam_driver.calibration import DEVICE_FIELDS
 from transientcam_server.accuracy import Accuracy
 from transientcam_server.acquisition import (
@@ -24,11 +25,20 @@ from transientcam_server.acquisition import (
     SequenceChanged,
 )
 from transientcam_server.auth import Guard
-from transientcam_server.calibration import Calibration, calibration_id, load_calibration
+from transientcam_server.calibrating import CalibrationDesk
+from transientcam_server.calibration import (
+    NOMINAL_ID,
+    Calibration,
+    calibration_id,
+    load_calibration,
+)
+from transientcam_server.calibrations import Calibrations
 from transientcam_server.cameras import Camera
+from transientcam_server.errors import Problem
 from transientcam_server.fronts import Fronts
 from transientcam_server.history import History
 from transientcam_server.hub import Hub
+from transientcam_server.jobs import Job, JobDesk
 from transientcam_server.lease import Alarm, Change, Lease, LeaseDesk
 from transientcam_server.lens import Intrinsics, known_intrinsics
 from transientcam_server.metrics import Metrics
@@ -65,20 +75,31 @@ class Service:
         self.guard = Guard(settings)
         self._executor = ThreadPoolExecutor(settings.workers, thread_name_prefix="worker")
         self.accuracy = Accuracy(camera, settings.reconstruction, settings.sensor)
-        self.calibration = _calibration(camera, settings)
+        kept = Calibrations(settings.calibrations, given=settings.calibration)
         self.pipeline = Pipeline(
             camera,
             settings.reconstruction,
             self._executor,
             workers=settings.workers,
             judge=self.accuracy.judge,
-            calibration=self.calibration,
+            calibration=_calibration(camera, settings, kept),
             intrinsics=lambda: self.intrinsics,
         )
         self.fronts = Fronts(self.accuracy, self.pipeline, simulated=camera.simulation is not None)
         self._loop: asyncio.AbstractEventLoop | None = None
         self.acquisition = Acquisition(camera, report=self._from_acquisition)
         self.applied: AppliedSequence = camera.applied
+        self.jobs = JobDesk(report=self._job_changed)
+        self.calibrations = CalibrationDesk(
+            camera,
+            kept,
+            acquisition=self.acquisition,
+            pipeline=self.pipeline,
+            accuracy=self.accuracy,
+            jobs=self.jobs,
+            history=self.history,
+            tell=partial(self.hub.tell, "calibration-changed"),
+        )
         self.lease = LeaseDesk(report=self._lease_changed, alarm=self._alarm)
         self.recordings = Library(
             settings.recordings, header=self._recording_header, tell=self._tell_from_thread
@@ -100,7 +121,9 @@ class Service:
             await asyncio.gather(watching, return_exceptions=True)
             self.lease.close()
             self.hub.close()
+            self.jobs.cancel_all()
             await self._loop.run_in_executor(self._executor, self.acquisition.stop)
+            await self.jobs.close()
             await self._loop.run_in_executor(self._executor, self.recordings.close)
             await self.pipeline.close()
             self._executor.shutdown(wait=True, cancel_futures=True)
@@ -108,6 +131,7 @@ class Service:
     async def say_goodbye(self) -> None:
         """Tell every stream that it ends, and give those that listen the time to hear it."""
         self.hub.close()
+        self.jobs.cancel_all()
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(_GOODBYE_S):
                 await self.hub.deserted.wait()
@@ -246,6 +270,9 @@ class Service:
         if change == "lapsed" and lease.on_lapse == "stop":
             self.acquisition.set_running(False).add_done_callback(_log_failure)
 
+    def _job_changed(self, job: Job) -> None:
+        self.hub.tell("job-changed", {"job": job.to_document()})
+
     def _tell_sequence_changed(self) -> None:
         sequence = self.applied.to_document()
         for outbox in self.hub.subscribers:
@@ -253,19 +280,11 @@ class Service:
             notice = wire.Notice("sequence-changed", {"sequence": sequence, "channels": channels})
             outbox.put(notice)
 
-    def calibration_notice(self) -> dict[str, Any]:
-        """Return which gains are used with the present sequence, and why not those given."""
-        misfit = self.pipeline.misfit(self.applied)
-        return {
-            "calibration_id": calibration_id(self.pipeline.calibration_for(self.applied)),
-            "reason": None if misfit is None else str(misfit),
-        }
-
     def _tell_calibration(self, before: AppliedSequence) -> None:
         """Tell when frames from now on are calibrated in another way."""
         fitted, fits = (self.pipeline.misfit(each) is None for each in (before, self.applied))
         if fitted != fits:
-            notice = self.calibration_notice()
+            notice = self.calibrations.notice(self.applied)
             if not fits:
                 _log.warning("%s; using nominal gains", notice["reason"])
             self.hub.tell("calibration-changed", notice)
@@ -277,17 +296,34 @@ def _log_failure(stopped: Future[None]) -> None:
         _log.error("the capture could not be stopped: %s", stopped.exception())
 
 
-def _calibration(camera: Camera, settings: Settings) -> Calibration | None:
-    """Load the calibration that is given, and refuse one of another camera."""
-    if settings.calibration is None:
-        return None
-    loaded = load_calibration(settings.calibration)
+def _calibration(camera: Camera, settings: Settings, kept: Calibrations) -> Calibration | None:
+    """Load the calibration that is given, or was active last; refuse one of another camera."""
+    path = settings.calibration
+    if path is None:
+        return _last_active(camera, kept)
+    loaded = load_calibration(path)
     misfit = loaded.capture.misfit(camera.applied, camera.capabilities)
     if misfit is not None and misfit.field in DEVICE_FIELDS:
         raise misfit
     if misfit is not None:
         _log.warning("%s; using nominal gains", misfit)
     return loaded
+
+
+def _last_active(camera: Camera, kept: Calibrations) -> Calibration | None:
+    """Load what was active last, if it is still there and of this camera."""
+    active_id = kept.active_id
+    if active_id == NOMINAL_ID:
+        return None
+    try:
+        stored = kept.get(active_id)
+        misfit = stored.subject.misfit(camera.applied, camera.capabilities)
+        if misfit is not None and misfit.field in DEVICE_FIELDS:
+            raise misfit
+        return load_calibration(stored.path)
+    except (Problem, CalibrationError) as error:
+        _log.warning("%s was active last, but cannot be used: %s", active_id, error)
+        return None
 
 
 # async, or FastAPI takes a thread for it

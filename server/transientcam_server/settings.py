@@ -98,10 +98,26 @@ class HistorySettings(_Group):
     """Their images take no more memory than this."""
 
 
-def default_recordings_directory() -> Path:
-    """Return where recordings are kept: the service manager's place for state, or the user's."""
+def default_state_directory() -> Path:
+    """Return where things are kept: the service manager's place for state, or the user's."""
     state = os.environ.get("STATE_DIRECTORY", "").partition(":")[0]  # systemd
-    return (Path(state) if state else user_data_path("transientcam")) / "recordings"
+    return Path(state) if state else user_data_path("transientcam")
+
+
+def default_recordings_directory() -> Path:
+    """Return where recordings are kept."""
+    return default_state_directory() / "recordings"
+
+
+class CalibrationSettings(_Group):
+    """Where calibrations are kept, and how many."""
+
+    directory: Path = Field(default_factory=lambda: default_state_directory() / "calibrations")
+    """Made with the first calibration."""
+    max_count: int = Field(default=64, ge=1, le=10_000)
+    """No more are kept."""
+    max_bytes: int = Field(default=256 * 1024**2, ge=1024)
+    """None that is sent here is larger, packed or unpacked."""
 
 
 class RecordingSettings(_Group):
@@ -166,7 +182,7 @@ class Settings(_Group):
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     """The least important messages to log."""
     calibration: Path | None = None
-    """A file written by `transientcam calibrate`; nominal gains are used without one."""
+    """A file written by `transientcam calibrate`; the one that was active last without it."""
     log_format: Literal["auto", "text", "json"] = "auto"
     """``auto`` is text on a terminal and JSON elsewhere."""
     workers: int = Field(default_factory=lambda: max(2, os.cpu_count() or 2), ge=2, le=256)
@@ -178,6 +194,7 @@ class Settings(_Group):
     history: HistorySettings = HistorySettings()
     limits: LimitSettings = LimitSettings()
     recordings: RecordingSettings = Field(default_factory=RecordingSettings)
+    calibrations: CalibrationSettings = Field(default_factory=CalibrationSettings)
 
     @property
     def needs_token(self) -> bool:

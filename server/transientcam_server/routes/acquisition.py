@@ -24,11 +24,18 @@ async def read_acquisition(service: ServiceOf) -> AcquisitionDocument:
     "/acquisition",
     summary="Start or stop capturing",
     responses=documented(
-        kinds.BAD_REQUEST, kinds.INVALID_REQUEST, kinds.CAMERA_FAILED, kinds.CAMERA_LOST
+        kinds.BAD_REQUEST,
+        kinds.INVALID_REQUEST,
+        kinds.CAMERA_BUSY,
+        kinds.CAMERA_FAILED,
+        kinds.CAMERA_LOST,
     ),
 )
 async def change_acquisition(service: ServiceOf, wanted: AcquisitionRequest) -> AcquisitionDocument:
-    """Start or stop capturing; the camera's light is off while it does not."""
+    """Start or stop capturing; the camera's light is off while it does not.
+
+    A calibration that is being measured is ended by stopping.
+    """
     await asyncio.wrap_future(service.acquisition.set_running(wanted.running))
     return _document(service)
 

@@ -213,7 +213,7 @@ class CameraDocument(Document):
         source: Literal["settings", "scene", "recording", "assumed"]
         """Who says so: the settings `[lens]`, the simulated scene, the recording, or nobody."""
 
-    state: Literal["starting", "streaming", "stopped", "lost"]
+    state: Literal["starting", "streaming", "stopped", "calibrating", "lost"]
     reason: str | None = None
     """Why it is lost."""
     simulated: bool
@@ -246,7 +246,7 @@ class AcquisitionDocument(Document):
     )
 
     running: bool
-    state: Literal["starting", "streaming", "stopped", "lost"]
+    state: Literal["starting", "streaming", "stopped", "calibrating", "lost"]
     rate_hz: float | None = None
     """Measured over the last frames; null before there are two."""
     frames: int

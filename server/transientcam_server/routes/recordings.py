@@ -1,19 +1,17 @@
 """Recordings: start one, stop it, look through them, take them home."""
 
 import asyncio
-import re
-from pathlib import Path as FilePath
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Header, Path, status
+from fastapi import APIRouter, Path, status
 from fastapi.responses import FileResponse
 
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.access import needs
-from transientcam_server.errors import Problem
 from transientcam_server.problems import documented
 from transientcam_server.recording.library import Wanted
 from transientcam_server.recording.recorder import Limits
+from transientcam_server.routes import files
 from transientcam_server.routes.recording_models import (
     RecordingChange,
     RecordingDocument,
@@ -27,7 +25,6 @@ from transientcam_server.tokens import Role
 router = APIRouter(tags=["recordings"])
 
 HDF5: Final = "application/x-hdf5"
-_RANGES: Final = re.compile(r"bytes=\s*(\d+-\d*|-\d+)(\s*,\s*(\d+-\d*|-\d+))*\s*", re.ASCII)
 _Recording = Annotated[
     str,
     Path(
@@ -56,7 +53,11 @@ async def read_recordings(service: ServiceOf) -> RecordingsDocument:
     status_code=status.HTTP_201_CREATED,
     summary="Start a recording",
     responses=documented(
-        kinds.BAD_REQUEST, kinds.RECORDING_RUNS, kinds.INVALID_REQUEST, kinds.RECORDING_NOT_STORED
+        kinds.BAD_REQUEST,
+        kinds.RECORDING_RUNS,
+        kinds.CAMERA_BUSY,
+        kinds.INVALID_REQUEST,
+        kinds.RECORDING_NOT_STORED,
     ),
 )
 @needs(Role.OPERATOR, lease=False)  # it disturbs nobody who controls the camera
@@ -65,6 +66,7 @@ async def start_recording(service: ServiceOf, wanted: RecordingRequest) -> Recor
 
     One recording runs at a time. A change of the sequence ends it.
     """
+    service.acquisition.require_free()  # what a calibration captures is not recorded
     limits = Limits(duration_s=wanted.duration_s, size_bytes=wanted.max_bytes, frames=wanted.frames)
     order = Wanted(name=wanted.name, limits=limits, annotations=wanted.annotations)
     return document(await asyncio.to_thread(service.recordings.start, order))
@@ -131,66 +133,19 @@ async def delete_recording(service: ServiceOf, recording: _Recording) -> Recordi
     "/recordings/{recording}/file",
     summary="The file of a recording",
     response_class=FileResponse,
-    responses={
-        200: {"description": "the whole file", "content": {HDF5: {}}},
-        206: {"description": "the bytes asked for", "content": {HDF5: {}}},
-        **documented(
-            kinds.UNKNOWN_RECORDING,
-            kinds.RECORDING_UNFINISHED,
-            kinds.RANGE_NOT_SATISFIABLE,
-            kinds.INVALID_REQUEST,
-        ),
-    },
+    responses=files.documented_file(HDF5)
+    | documented(
+        kinds.UNKNOWN_RECORDING,
+        kinds.RECORDING_UNFINISHED,
+        kinds.RANGE_NOT_SATISFIABLE,
+        kinds.INVALID_REQUEST,
+    ),
 )
 async def read_recording_file(
     service: ServiceOf,
     recording: _Recording,
-    wanted: Annotated[
-        str | None,
-        Header(alias="range", description="which bytes, to go on with a broken download"),
-    ] = None,
+    wanted: files.Range = None,
 ) -> FileResponse:
     """Download a recording as HDF5; h5py, xarray and MATLAB open it."""
     path = await asyncio.to_thread(service.recordings.path, recording)
-    size = (await asyncio.to_thread(path.stat)).st_size
-    _check_range(wanted, size)
-    return _File(path, media_type=HDF5, filename=path.name)
-
-
-def _check_range(wanted: str | None, size: int) -> None:
-    """Refuse ranges that cannot be served, which would be answered with plain text."""
-    if wanted is None:
-        return
-    if not _RANGES.fullmatch(wanted.strip()):
-        limit = "bytes=first-last"
-        raise Problem(
-            kinds.INVALID_REQUEST,
-            "The range is no range.",
-            field="range",
-            value=wanted,
-            limit=limit,
-        )
-    for each in wanted.partition("=")[2].split(","):
-        first, _, last = each.strip().partition("-")
-        if (first and int(first) >= size) or (not first and not int(last)):
-            detail = f"The file has {size} bytes."
-            raise Problem(
-                kinds.RANGE_NOT_SATISFIABLE, detail, field="range", value=wanted, limit=size
-            )
-        if first and last and int(last) < int(first):
-            raise Problem(
-                kinds.INVALID_REQUEST,
-                "The range ends before it begins.",
-                field="range",
-                value=wanted,
-                limit="bytes=first-last",
-            )
-
-
-class _File(FileResponse):
-    """A file, in larger pieces than the framework's 64 KiB."""
-
-    chunk_size = 1024 * 1024
-
-    def __init__(self, path: FilePath, *, media_type: str, filename: str) -> None:
-        super().__init__(path, media_type=media_type, filename=filename)
+    return await files.answer(path, wanted, media_type=HDF5, filename=path.name)

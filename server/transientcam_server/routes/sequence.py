@@ -72,6 +72,7 @@ async def read_sequence(
         kinds.INVALID_REQUEST,
         kinds.INVALID_SEQUENCE,
         kinds.SEQUENCE_CHANGED,
+        kinds.CAMERA_BUSY,
         kinds.CAMERA_FAILED,
         kinds.CAMERA_LOST,
     )
