@@ -4,8 +4,12 @@ import { effect } from "@preact/signals";
 import { useStore } from "./store/store";
 import { Help } from "./ui/Help";
 import { shortcuts } from "./ui/shortcuts";
+import { ReplayBar } from "./views/replay/ReplayBar";
 import { Banner } from "./views/status/Banner";
+import { ControlDialog } from "./views/status/ControlDialog";
 import { StatusBar } from "./views/status/StatusBar";
+import { Toasts } from "./views/status/Toasts";
+import { TokenDialog } from "./views/status/TokenDialog";
 import { Arrangement } from "./views/Arrangement";
 
 /** The page: how things stand, what is wrong, and the views. */
@@ -15,7 +19,7 @@ export function App({ onRetry }: { onRetry: () => void }) {
   useEffect(
     () =>
       effect(() => {
-        document.documentElement.dataset["stale"] = String(store.status.stale.value);
+        document.documentElement.dataset["stale"] = String(store.status.stale.value && !store.replay.active.value);
       }),
     [store],
   );
@@ -24,7 +28,11 @@ export function App({ onRetry }: { onRetry: () => void }) {
       <StatusBar />
       <Banner onRetry={onRetry} />
       <Arrangement />
+      <ReplayBar />
+      <Toasts />
       <Help />
+      <ControlDialog />
+      <TokenDialog />
     </>
   );
 }

@@ -3,7 +3,7 @@ import { createRenderer } from "./gl/createRenderer";
 import type { DensityRenderer } from "./gl/renderer";
 import type { Coefficients } from "./physics/maximumEntropy";
 import { decodeMessage, type FrameMessage } from "./stream/protocol";
-import { frameOf } from "./stream/client";
+import { frameOf } from "./store/frames";
 import { coefficientsOf, summarised } from "./stream/summary";
 import type { Store } from "./store/store";
 

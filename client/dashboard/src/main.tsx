@@ -14,8 +14,9 @@ const worker = new Worker(new URL("./stream/worker.ts", import.meta.url), { type
 const stream = new StreamClient(store, worker, loop);
 
 loop.add((elapsed_s) => store.player.advance(elapsed_s));
+loop.add((elapsed_s) => store.replay.advance(elapsed_s));
 effect(() => {
-  if (store.player.playing.value) loop.wake();
+  if (store.player.playing.value || store.replay.playing.value) loop.wake();
 });
 store.player.playing.value = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
 
@@ -37,6 +38,10 @@ render(
 const address = new URL("/api/v1/stream", window.location.href);
 address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
 stream.open(address.href);
+
+window.addEventListener("pagehide", () => {
+  store.lease.abandon();
+});
 
 if (new URLSearchParams(window.location.search).has("debug")) {
   void import("./debug").then(({ expose }) => {

@@ -1,5 +1,16 @@
 /** The REST side of the service: requests, and problems in plain words. */
-import type { AppliedSequence, CameraDocument, CameraState, PixelDocument, Plan, Problem, SequenceDocument, Tradeoff } from "../stream/protocol";
+import type { AppliedSequence, CameraDocument, PixelDocument, Plan, Problem, SequenceDocument, Tradeoff } from "../stream/protocol";
+import { Credentials } from "./credentials";
+import type {
+  AcquisitionDocument,
+  GrantedLease,
+  LeaseDocument,
+  LeaseRequest,
+  RecordingDocument,
+  RecordingRequest,
+  RecordingsDocument,
+  TimelineDocument,
+} from "./documents";
 
 /** The service refused a request (RFC 9457), or could not be asked at all. */
 export class RequestError extends Error {
@@ -8,6 +19,11 @@ export class RequestError extends Error {
   constructor(readonly problem: Problem) {
     super(plainWords(problem));
   }
+
+  /** The kind of problem: "lease-held" of "/problems/lease-held"; "" where it has none. */
+  get kind(): string {
+    return kindOf(this.problem);
+  }
 }
 
 /** A problem as a sentence for the person at the screen. */
@@ -15,79 +31,186 @@ export function plainWords(problem: Problem): string {
   return problem.detail ?? problem.title ?? "The service refused without giving a reason.";
 }
 
-export interface AcquisitionDocument {
-  readonly running: boolean;
-  readonly state: CameraState;
+/** The last part of a problem's type. */
+export function kindOf(problem: Problem): string {
+  return problem.type?.split("/").pop() ?? "";
 }
 
 type Fetch = typeof fetch;
 
+interface Details {
+  readonly body?: unknown;
+  readonly signal?: AbortSignal;
+  /** Goes out even if the page is closed meanwhile. */
+  readonly keepalive?: boolean;
+  readonly headers?: Readonly<Record<string, string>>;
+}
+
+/** Where frames of a recording are, beside those of the camera. */
+export const LIVE = "/frames/latest";
+
 export class Api {
+  readonly credentials: Credentials;
+  /** Told of every refusal, before whoever asked is. */
+  onRefusal: ((problem: Problem) => void) | null = null;
   readonly #fetch: Fetch;
 
-  constructor(fetcher: Fetch = (input, init) => fetch(input, init)) {
+  constructor(fetcher: Fetch = (input, init) => fetch(input, init), credentials = new Credentials()) {
     this.#fetch = fetcher;
+    this.credentials = credentials;
   }
+
+  // -- the camera --------------------------------------------------------------------------------
 
   camera(): Promise<CameraDocument> {
     return this.#json("GET", "/camera") as Promise<CameraDocument>;
   }
 
-  /** Everything about one pixel of the latest frame but its curves, which the page computes itself. */
-  pixel(x: number, y: number): Promise<PixelDocument> {
-    return this.#json("GET", `/frames/latest/pixel?x=${x}&y=${y}&bins=1`) as Promise<PixelDocument>;
+  setAcquisition(running: boolean): Promise<AcquisitionDocument> {
+    return this.#json("PUT", "/acquisition", { body: { running } }) as Promise<AcquisitionDocument>;
   }
+
+  /** Stops the capture and switches the light off, whoever controls the camera. */
+  safeOff(): Promise<AcquisitionDocument> {
+    return this.#json("POST", "/acquisition/safe-off") as Promise<AcquisitionDocument>;
+  }
+
+  /** The number of a frame after `frame`, as soon as there is one; the service waits for it some seconds. */
+  async frameAfter(frame: number, wait_s: number, signal?: AbortSignal): Promise<number> {
+    const query = `after=${frame}&wait_s=${wait_s}`;
+    const meta = await this.#json("GET", `/frames/latest?${query}`, { ...(signal === undefined ? {} : { signal }) });
+    return (meta as { frame: number }).frame;
+  }
+
+  /** The number of the newest frame; null before the first. */
+  async newestFrame(): Promise<number | null> {
+    return ((await this.#json("GET", "/frames")) as { last?: number | null }).last ?? null;
+  }
+
+  /** Everything about one pixel of a frame but its curves, which the page computes itself. */
+  pixel(x: number, y: number, frame: string = LIVE): Promise<PixelDocument> {
+    return this.#json("GET", `${frame}/pixel?x=${x}&y=${y}&bins=1`) as Promise<PixelDocument>;
+  }
+
+  // -- the sequence ------------------------------------------------------------------------------
 
   /** What accuracy costs on the scene of the latest frame; takes the service many seconds. */
   tradeoff(signal: AbortSignal): Promise<Tradeoff> {
-    return this.#json("GET", "/tradeoff", undefined, signal) as Promise<Tradeoff>;
+    return this.#json("GET", "/tradeoff", { signal }) as Promise<Tradeoff>;
   }
 
   /** The quickest sequence that reaches the target, or the most accurate within the budget. */
   plan(goal: { target: { range_std_m?: number }; budget: { frame_rate_hz?: number } }, signal: AbortSignal): Promise<Plan> {
-    return this.#json("POST", "/plan", goal, signal) as Promise<Plan>;
+    return this.#json("POST", "/plan", { body: goal, signal }) as Promise<Plan>;
   }
 
   validate(sequence: SequenceDocument, signal?: AbortSignal): Promise<AppliedSequence> {
-    return this.#json("POST", "/sequence/validate", sequence, signal) as Promise<AppliedSequence>;
+    return this.#json("POST", "/sequence/validate", { body: sequence, ...(signal === undefined ? {} : { signal }) }) as Promise<AppliedSequence>;
   }
 
   setSequence(sequence: SequenceDocument): Promise<AppliedSequence> {
-    return this.#json("PUT", "/sequence", sequence) as Promise<AppliedSequence>;
+    return this.#json("PUT", "/sequence", { body: sequence }) as Promise<AppliedSequence>;
   }
 
-  setAcquisition(running: boolean): Promise<AcquisitionDocument> {
-    return this.#json("PUT", "/acquisition", { running }) as Promise<AcquisitionDocument>;
+  // -- control -----------------------------------------------------------------------------------
+
+  lease(): Promise<LeaseDocument> {
+    return this.#json("GET", "/lease") as Promise<LeaseDocument>;
   }
 
-  async #json(method: string, path: string, body?: unknown, signal?: AbortSignal): Promise<unknown> {
-    const answer = await this.#ask(method, path, body, signal);
-    await refuse(answer);
+  takeLease(wanted: LeaseRequest): Promise<GrantedLease> {
+    return this.#json("POST", "/lease", { body: wanted }) as Promise<GrantedLease>;
+  }
+
+  renewLease(): Promise<GrantedLease> {
+    return this.#json("PUT", "/lease", { body: {} }) as Promise<GrantedLease>;
+  }
+
+  releaseLease(keepalive = false): Promise<LeaseDocument> {
+    return this.#json("DELETE", "/lease", { keepalive }) as Promise<LeaseDocument>;
+  }
+
+  // -- recordings --------------------------------------------------------------------------------
+
+  recordings(): Promise<RecordingsDocument> {
+    return this.#json("GET", "/recordings") as Promise<RecordingsDocument>;
+  }
+
+  recording(id: string): Promise<RecordingDocument> {
+    return this.#json("GET", recordingPath(id)) as Promise<RecordingDocument>;
+  }
+
+  /** Which frames a recording holds, and when they were captured. */
+  timeline(id: string): Promise<TimelineDocument> {
+    return this.#json("GET", `${recordingPath(id)}/frames`) as Promise<TimelineDocument>;
+  }
+
+  startRecording(wanted: RecordingRequest): Promise<RecordingDocument> {
+    return this.#json("POST", "/recordings", { body: wanted }) as Promise<RecordingDocument>;
+  }
+
+  stopRecording(id: string): Promise<RecordingDocument> {
+    return this.#json("POST", `${recordingPath(id)}/stop`) as Promise<RecordingDocument>;
+  }
+
+  annotateRecording(id: string, annotations: Readonly<Record<string, unknown>>): Promise<RecordingDocument> {
+    return this.#json("PATCH", recordingPath(id), { body: { annotations } }) as Promise<RecordingDocument>;
+  }
+
+  deleteRecording(id: string): Promise<RecordingDocument> {
+    return this.#json("DELETE", recordingPath(id)) as Promise<RecordingDocument>;
+  }
+
+  // -- files -------------------------------------------------------------------------------------
+
+  /** A file of the service, as the browser keeps large ones: not in memory. */
+  async file(path: string): Promise<Blob> {
+    const answer = await this.#ask("GET", path, {});
+    await this.#refuse(answer);
+    return answer.blob();
+  }
+
+  async #json(method: string, path: string, details: Details | { body: unknown } = {}): Promise<unknown> {
+    const answer = await this.#ask(method, path, details);
+    await this.#refuse(answer);
     return answer.json();
   }
 
-  async #ask(method: string, path: string, body?: unknown, signal?: AbortSignal): Promise<Response> {
+  async #ask(method: string, path: string, { body, signal, keepalive, headers }: Details): Promise<Response> {
+    const raw = body instanceof Blob;
     try {
       return await this.#fetch(`/api/v1${path}`, {
         method,
-        ...(body === undefined ? {} : { body: JSON.stringify(body), headers: { "Content-Type": "application/json" } }),
+        headers: {
+          ...this.credentials.headers(method !== "GET"),
+          ...(body === undefined ? {} : { "Content-Type": raw ? "application/octet-stream" : "application/json" }),
+          ...headers,
+        },
+        ...(body === undefined ? {} : { body: raw ? body : JSON.stringify(body) }),
         ...(signal === undefined ? {} : { signal }),
+        ...(keepalive === true ? { keepalive } : {}),
       });
     } catch (error) {
       if (error instanceof DOMException && error.name === "AbortError") throw error;
       throw new RequestError({ title: "The service cannot be reached." });
     }
   }
+
+  /** Raises what the service answered unless it is a success. */
+  async #refuse(answer: Response): Promise<void> {
+    if (answer.ok) return;
+    let problem: Problem = { title: `The service answered ${answer.status} ${answer.statusText}.`, status: answer.status };
+    try {
+      problem = { ...problem, ...((await answer.json()) as Problem) };
+    } catch {
+      // A proxy's page instead of a problem: the status has to do.
+    }
+    if (answer.status === 401) this.credentials.refused.value = problem;
+    this.onRefusal?.(problem);
+    throw new RequestError(problem);
+  }
 }
 
-/** Raises what the service answered unless it is a success. */
-async function refuse(answer: Response): Promise<void> {
-  if (answer.ok) return;
-  let problem: Problem = { title: `The service answered ${answer.status} ${answer.statusText}.`, status: answer.status };
-  try {
-    problem = { ...problem, ...((await answer.json()) as Problem) };
-  } catch {
-    // A proxy's page instead of a problem: the status has to do.
-  }
-  throw new RequestError(problem);
+export function recordingPath(id: string): string {
+  return `/recordings/${encodeURIComponent(id)}`;
 }

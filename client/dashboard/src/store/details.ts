@@ -1,7 +1,7 @@
 import { effect, signal, untracked, type ReadonlySignal } from "@preact/signals";
 
 import type { PixelDocument } from "../stream/protocol";
-import { type Api, RequestError } from "./api";
+import { type Api, LIVE, RequestError } from "./api";
 import type { Frame } from "./frames";
 import type { Pixel } from "./store";
 
@@ -15,8 +15,13 @@ export class Details {
   readonly document = signal<PixelDocument | null>(null);
   readonly #api: Api;
   readonly #now_s: () => number;
+  #place: Pixel | null = null;
+  #newest: Frame | null = null;
+  /** Where the frame is that the document is about, or that was last asked for. */
+  #origin: string = LIVE;
   #asking = false;
   #asked_s = -Infinity;
+  #timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(api: Api, now_s: () => number = () => performance.now() / 1000) {
     this.#api = api;
@@ -25,32 +30,49 @@ export class Details {
 
   /** Keeps what is known of `pixel` as new as `frame`; the answer ends it. */
   follow(pixel: ReadonlySignal<Pixel | null>, frame: ReadonlySignal<Frame | null>): () => void {
-    return effect(() => {
-      const [place, newest] = [pixel.value, frame.value];
-      untracked(() => void this.#follow(place, newest, pixel));
+    const end = effect(() => {
+      [this.#place, this.#newest] = [pixel.value, frame.value];
+      untracked(() => void this.#look());
     });
+    return () => {
+      end();
+      clearTimeout(this.#timer);
+    };
   }
 
-  async #follow(place: Pixel | null, newest: Frame | null, pixel: ReadonlySignal<Pixel | null>): Promise<void> {
+  async #look(): Promise<void> {
+    const [place, newest] = [this.#place, this.#newest];
     const known = this.document.peek();
-    const same = known !== null && known.x === place?.x && known.y === place.y;
+    const sourceChanged = newest !== null && (newest.origin === LIVE) !== (this.#origin === LIVE);
+    const same = known !== null && known.x === place?.x && known.y === place.y && !sourceChanged;
     if (!same) this.document.value = null;
     if (place === null || newest === null || this.#asking) return;
     if (place.x >= newest.meta.width || place.y >= newest.meta.height) return;
-    if (same && (known.meta.frame >= newest.meta.frame || this.#now_s() - this.#asked_s < PAUSE_S)) return;
+    if (same) {
+      const isOld = newest.origin === LIVE ? known.meta.frame < newest.meta.frame : this.#origin !== newest.origin;
+      if (!isOld || this.#waits()) return;
+    }
     this.#asking = true;
     this.#asked_s = this.#now_s();
+    this.#origin = newest.origin;
     try {
-      const told = await this.#api.pixel(place.x, place.y);
-      const now = pixel.peek();
-      if (now?.x === told.x && now.y === told.y) this.document.value = told;
+      const told = await this.#api.pixel(place.x, place.y, newest.origin);
+      if (this.#place?.x === told.x && this.#place.y === told.y) this.document.value = told;
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;
       this.document.value = null; // asked again with the next frame
     } finally {
       this.#asking = false;
     }
-    const now = pixel.peek();
-    if (now !== null && (now.x !== place.x || now.y !== place.y)) await this.#follow(now, newest, pixel);
+    if (this.#place?.x !== place.x || this.#place.y !== place.y || this.#newest?.origin !== newest.origin) await this.#look();
+  }
+
+  /** Whether it is too soon to ask again; if so, it is asked when it is not: no other frame may come. */
+  #waits(): boolean {
+    const left_s = PAUSE_S - (this.#now_s() - this.#asked_s);
+    clearTimeout(this.#timer);
+    if (left_s <= 0) return false;
+    this.#timer = setTimeout(() => void this.#look(), 1000 * left_s);
+    return true;
   }
 }

@@ -2,10 +2,13 @@ import { signal, type Signal } from "@preact/signals";
 
 import type { Coefficients } from "../physics/maximumEntropy";
 import type { FrameMeta, Numbers } from "../stream/protocol";
-import type { LightSummary, MapSummary } from "../stream/summary";
+import { coefficientsOf, type FrameReport, type LightSummary, type MapSummary } from "../stream/summary";
+import { LIVE } from "./api";
 
 /** The newest frame of one product. */
 export interface Frame {
+  /** Where the service has the frame: as its newest, or in a recording. */
+  readonly origin: string;
   readonly product: string;
   readonly unit: string;
   readonly meta: FrameMeta;
@@ -67,4 +70,11 @@ export class Frames {
     const wanted = [...this.#claims.keys()].sort();
     if (wanted.join() !== this.wanted.peek().join()) this.wanted.value = wanted;
   }
+}
+
+/** A frame as views see it. */
+export function frameOf({ message, map, light }: FrameReport, origin: string = LIVE): Frame {
+  const { product, unit, meta, array } = message;
+  const coefficients = product === "coefficients" ? coefficientsOf(message) : null;
+  return { origin, product, unit, meta, shape: array.shape, values: array.data, map, light, coefficients };
 }

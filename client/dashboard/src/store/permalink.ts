@@ -3,6 +3,7 @@ import { effect } from "@preact/signals";
 
 import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
+import { RequestError } from "./api";
 import type { Pixel, Store } from "./store";
 
 export interface Place {
@@ -11,6 +12,9 @@ export interface Place {
   readonly time_ns?: number;
   /** The view that is shown alone. */
   readonly view?: string;
+  /** The recording that is shown, by its id, and which frame of it. */
+  readonly recording?: string;
+  readonly frame?: number;
 }
 
 /** What an address says; parts that make no sense are as if they were not there. */
@@ -20,21 +24,27 @@ export function placeOf(hash: string): Place {
   const pixel = /^(\d{1,5}),(\d{1,5})$/.exec(said.get("pixel") ?? "");
   const time_ns = said.get("time_ns");
   const view = said.get("view");
+  const recording = said.get("recording");
+  const frame = said.get("frame");
   return {
     ...(MAP_PRODUCTS.some(({ product }) => product === map) ? { map: map as string } : {}),
     ...(pixel === null ? {} : { pixel: { x: Number(pixel[1]), y: Number(pixel[2]) } }),
     ...(time_ns !== null && /^\d+(\.\d+)?$/.test(time_ns) ? { time_ns: Number(time_ns) } : {}),
     ...((VIEW_NAMES as readonly (string | null)[]).includes(view) ? { view: view as string } : {}),
+    ...(recording !== null && /^[A-Za-z0-9][\w-]{0,199}$/.test(recording) ? { recording } : {}),
+    ...(recording !== null && frame !== null && /^\d{1,12}$/.test(frame) ? { frame: Number(frame) } : {}),
   };
 }
 
 /** The address of a place; "" for nothing in particular. */
-export function hashOf({ map, pixel, time_ns, view }: Place): string {
+export function hashOf({ map, pixel, time_ns, view, recording, frame }: Place): string {
   const parts = [
     map === undefined ? "" : `map=${map}`,
     pixel === undefined ? "" : `pixel=${pixel.x},${pixel.y}`,
     time_ns === undefined ? "" : `time_ns=${Number(time_ns.toFixed(3))}`,
     view === undefined ? "" : `view=${view}`,
+    recording === undefined ? "" : `recording=${recording}`,
+    recording === undefined || frame === undefined ? "" : `frame=${frame}`,
   ].filter((part) => part !== "");
   return parts.length === 0 ? "" : `#${parts.join("&")}`;
 }
@@ -55,11 +65,14 @@ export function keepAddress(target: Window, store: Store): void {
     const playing = store.player.playing.value;
     const view = store.alone.value;
     const time_s = playing ? 0 : store.player.time_s.value;
+    const recording = store.replay.recording.value?.id;
+    const frame = store.replay.playing.value ? undefined : store.replay.frame.value;
     const hash = hashOf({
       map: store.mapProduct.value,
       ...(pixel === null ? {} : { pixel }),
       ...(time_s === 0 ? {} : { time_ns: time_s * 1e9 }),
       ...(view === null ? {} : { view }),
+      ...(recording === undefined ? {} : { recording, ...(frame === undefined ? {} : { frame }) }),
     });
     clearTimeout(timer);
     // A time that waits for its period must not be forgotten meanwhile.
@@ -72,7 +85,9 @@ export function keepAddress(target: Window, store: Store): void {
   });
 }
 
-function go(store: Store, { map, pixel, time_ns, view }: Place): void {
+function go(store: Store, { map, pixel, time_ns, view, recording, frame }: Place): void {
+  if (recording === undefined) store.replay.leave();
+  else void open(store, recording, frame);
   if (map !== undefined) store.mapProduct.value = map;
   if (pixel !== undefined) store.selected.value = pixel;
   if (view !== undefined) store.alone.value = view;
@@ -84,6 +99,37 @@ function go(store: Store, { map, pixel, time_ns, view }: Place): void {
     store.player.seek((time_ns * 1e-9) / store.period_s.peek());
     queueMicrotask(() => {
       end();
+    });
+  });
+}
+
+/** Shows a recording, or says why it cannot be shown. */
+async function open(store: Store, recording: string, frame: number | undefined): Promise<void> {
+  const { replay, status } = store;
+  try {
+    if (replay.recording.peek()?.id !== recording) await replay.open(recording, frame);
+    else if (frame !== undefined) replay.seek(frame);
+  } catch (error) {
+    if (!(error instanceof RequestError)) throw error;
+    if (error.problem.status === 401) {
+      await tokenOf(store);
+      await open(store, recording, frame);
+      return;
+    }
+    status.unreadable.value = `The recording of this link cannot be shown: ${error.message}`;
+  }
+}
+
+/** Waits until somebody shows a token, or another one. */
+function tokenOf({ api: { credentials } }: Store): Promise<void> {
+  const before = credentials.token.peek();
+  return new Promise((resolve) => {
+    const end = credentials.token.subscribe((token) => {
+      if (token === before || token === null) return;
+      queueMicrotask(() => {
+        end();
+      });
+      resolve();
     });
   });
 }

@@ -50,3 +50,12 @@ export function browserShelf(): Shelf | null {
     return null;
   }
 }
+
+/** The shelf of this tab, which is emptied when it is closed; null where it is refused. */
+export function sessionShelf(): Shelf | null {
+  try {
+    return window.sessionStorage;
+  } catch {
+    return null;
+  }
+}

@@ -6,6 +6,8 @@ import type { CameraState, FrameMeta } from "../stream/protocol";
 export type Connection =
   | { readonly kind: "connecting" }
   | { readonly kind: "open" }
+  /** The service lets this page in only with a token that it knows. */
+  | { readonly kind: "refused" }
   | { readonly kind: "waiting"; readonly retryAt_s: number; readonly reason: string };
 
 /** Frames whose arrival the rate is taken over, and how long they count; the last few count however old. */
@@ -28,6 +30,8 @@ export class Status {
   readonly newest = signal<FrameMeta | null>(null);
   readonly rate_hz = signal<number | null>(null);
   readonly latency_s = signal<number | null>(null);
+  /** Time the service took to bring the frame on screen, with all its products, into the form it was sent in. */
+  readonly encode_s = signal<number | null>(null);
   readonly lostImages = signal(0);
   readonly unreadable = signal<string | null>(null);
   readonly #drops = signal<ReadonlyMap<number, number>>(new Map());
@@ -78,6 +82,13 @@ export class Status {
     this.#arrivals = this.#arrivals.slice(-Math.min(RATE_FRAMES, Math.max(RATE_FEWEST, recent)));
     const span_s = now_s - this.#arrivals[0];
     this.rate_hz.value = span_s > 0 ? (this.#arrivals.length - 1) / span_s : null;
+  }
+
+  /** A frame of a recording is on screen: it tells nothing of how fast the camera is. */
+  frameReplayed(meta: FrameMeta, encode_s: number): void {
+    this.newest.value = meta;
+    this.encode_s.value = encode_s;
+    this.#forgetRate();
   }
 
   #forgetRate(): void {

@@ -3,13 +3,18 @@ import { createContext } from "preact";
 import { useContext } from "preact/hooks";
 
 import type { AppliedSequence, CameraDocument } from "../stream/protocol";
-import { Api } from "./api";
+import { Api, kindOf } from "./api";
+import { Credentials } from "./credentials";
+import { Events } from "./events";
 import { Frames } from "./frames";
+import { Lease } from "./lease";
 import { Player } from "./player";
-import { browserShelf, oneOf, remembered, type Shelf } from "./settings";
+import { browserShelf, oneOf, remembered, sessionShelf, type Shelf } from "./settings";
 import { isLayout, OVERVIEW, type Layout } from "../views/layout";
 import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
+import { Recordings } from "./recordings";
+import { Replay } from "./replay";
 import { Status } from "./status";
 import { Details } from "./details";
 import { Theme } from "../ui/theme";
@@ -25,6 +30,13 @@ export class Store {
   readonly frames = new Frames();
   readonly status = new Status();
   readonly api: Api;
+  /** Who controls the camera. */
+  readonly lease: Lease;
+  readonly recordings: Recordings;
+  /** A recording in the place of the camera. */
+  readonly replay: Replay;
+  /** What happened. */
+  readonly events = new Events();
   readonly shelf: Shelf | null;
   /** The sequence in use, told by the service; null before. */
   readonly sequence = signal<AppliedSequence | null>(null);
@@ -49,14 +61,25 @@ export class Store {
   readonly mapProduct: Signal<string>;
   /** Whether the list of keys is open. */
   readonly help = signal(false);
+  /** Whether it is asked who controls the camera. */
+  readonly asksForControl = signal(false);
+  /** Whether a token is asked for. */
+  readonly asksForToken = signal(false);
   /** Where the views stand. */
   readonly layout: Signal<Layout>;
   /** The one view that is shown alone; null while all are. */
   readonly alone = signal<string | null>(null);
 
-  constructor({ api = new Api(), shelf = browserShelf() }: { api?: Api; shelf?: Shelf | null } = {}) {
+  constructor({ api = new Api(undefined, new Credentials(sessionShelf())), shelf = browserShelf() }: { api?: Api; shelf?: Shelf | null } = {}) {
     this.api = api;
     this.shelf = shelf;
+    this.lease = new Lease(api);
+    this.recordings = new Recordings(api);
+    this.replay = new Replay(api, this.frames, this.status);
+    api.onRefusal = (problem) => {
+      this.lease.refused(kindOf(problem));
+      if (problem.status === 401) this.asksForToken.value = true;
+    };
     this.details = new Details(api);
     this.mapProduct = remembered(shelf, "map.product", "range", oneOf(MAP_PRODUCTS.map(({ product }) => product)));
     this.layout = remembered<Layout>(shelf, "layout", OVERVIEW, (value): value is Layout => isLayout(value, VIEW_NAMES));

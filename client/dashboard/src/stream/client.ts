@@ -1,11 +1,13 @@
 /** Between the worker and the store: takes what arrives into the store once an animation frame. */
 import { effect } from "@preact/signals";
 
-import type { Frame } from "../store/frames";
+import { kindOf, LIVE, RequestError } from "../store/api";
+import { inWords } from "../store/events";
+import { frameOf } from "../store/frames";
 import type { Store } from "../store/store";
 import type { AnimationLoop } from "../ui/animation";
-import type { AppliedSequence, CameraDocument, Hello, Notice } from "./protocol";
-import { coefficientsOf, type FrameReport } from "./summary";
+import type { AppliedSequence, CameraDocument, ErrorMessage, Hello, Notice, Problem } from "./protocol";
+import type { FrameReport } from "./summary";
 import type { Command, Report } from "./worker";
 
 /** What of a Worker is used. */
@@ -24,6 +26,11 @@ export class StreamClient {
   readonly #now_s: Clock;
   /** Newest frame a product that is not drawn yet: what comes faster than the display replaces it. */
   readonly #pending = new Map<string, FrameReport>();
+  /** Frames of recordings that are asked for, by their tickets. */
+  readonly #errands = new Map<number, Errand>();
+  readonly #brought: (() => void)[] = [];
+  #tickets = 0;
+  #filling: ReturnType<typeof setTimeout> | undefined;
   #asking = false;
 
   constructor(store: Store, worker: WorkerPort, loop: AnimationLoop, now_s: Clock = () => Date.now() / 1000) {
@@ -36,14 +43,23 @@ export class StreamClient {
     };
     loop.add(() => {
       this.#draw();
+      for (const take of this.#brought.splice(0)) take();
       return false;
     });
+    store.replay.loader = (path, products) => this.#bring(path, products);
   }
 
   /** Connects, and keeps streaming what the store's views want. */
   open(url: string): void {
-    this.#send({ type: "open", url, products: this.#store.frames.wanted.peek() });
+    const { token } = this.#store.api.credentials;
     let known = this.#store.frames.wanted.peek();
+    let shown = token.peek();
+    this.#send({ type: "open", url, products: known, token: shown });
+    effect(() => {
+      if (token.value === shown) return;
+      shown = token.value;
+      this.#send({ type: "authenticate", token: shown });
+    });
     effect(() => {
       const wanted = this.#store.frames.wanted.value;
       if (wanted === known) return;
@@ -52,6 +68,14 @@ export class StreamClient {
     });
     effect(() => {
       if (!this.#store.held.value) this.#loop.wake();
+    });
+    let replayed = false;
+    effect(() => {
+      const active = this.#store.replay.active.value;
+      // Frames that waited meanwhile are old: ask for new ones.
+      if (replayed && !active) this.#send({ type: "want", products: known });
+      replayed = active;
+      this.#loop.wake();
     });
   }
 
@@ -71,7 +95,10 @@ export class StreamClient {
         break;
       case "open":
         status.connection.value = { kind: "open" };
-        void this.#readCamera();
+        break;
+      case "refused":
+        status.connection.value = { kind: "refused" };
+        this.#store.asksForToken.value = true;
         break;
       case "waiting":
         status.connectionLost(report.reason, this.#now_s() + report.retry_s);
@@ -86,12 +113,13 @@ export class StreamClient {
         this.#pending.set(report.message.product, report);
         this.#loop.wake();
         break;
+      case "brought":
+        this.#deliver(report.ticket, report.reports, report.problem);
+        break;
       case "message":
         if (report.message.type === "hello") this.#greet(report.message);
         else if (report.message.type === "notice") this.#notice(report.message);
-        else if (report.message.type === "error") {
-          status.unreadable.value = report.message.problem.detail ?? report.message.problem.title ?? null;
-        }
+        else if (report.message.type === "error") this.#complain(report.message);
         break;
     }
   }
@@ -99,10 +127,43 @@ export class StreamClient {
   #greet(hello: Hello): void {
     this.#store.status.sessionOpened(hello.camera.state, this.#now_s());
     this.#takeSequence(hello.sequence);
+    void this.#readCamera();
+    void this.#store.lease.look();
+    void this.#store.recordings.refresh();
+    clearTimeout(this.#filling);
+    const soon = hello.camera.state === "streaming" && (hello.sequence?.capture_s ?? 0) < SOON_S;
+    this.#filling = setTimeout(() => void this.#fillIn(), soon ? 1000 * SOON_S : 0);
+  }
+
+  /** A camera that stands still, or takes seconds for a frame, is shown by the newest frame there is. */
+  async #fillIn(): Promise<void> {
+    const { api, frames, replay, status } = this.#store;
+    const missing = (): string[] => frames.wanted.peek().filter((product) => frames.of(product).peek()?.origin !== LIVE);
+    if (replay.active.peek() || missing().length === 0) return;
+    try {
+      if ((await api.newestFrame()) === null) return;
+      const reports = await this.#bring(LIVE, missing());
+      if (replay.active.peek()) return;
+      for (const report of reports) {
+        if (!missing().includes(report.message.product)) continue; // the stream was quicker
+        frames.put(frameOf(report));
+        status.frameDrawn(report.message.meta, this.#now_s());
+      }
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error; // the stream says what is wrong
+    }
+  }
+
+  #complain({ problem }: ErrorMessage): void {
+    // Who is not let in is asked for a token, and a complaint beside that says nothing more.
+    if (TOKEN_PROBLEMS.includes(kindOf(problem))) this.#store.api.credentials.refused.value = problem;
+    else this.#store.status.unreadable.value = problem.detail ?? problem.title ?? null;
   }
 
   #notice(notice: Notice): void {
     const { status } = this.#store;
+    const told = inWords(notice);
+    if (told !== null) this.#store.events.tell(told.words, told.tone);
     switch (notice.kind) {
       case "dropped":
         status.dropNotice(notice.channel, notice.total);
@@ -119,6 +180,13 @@ export class StreamClient {
         break;
       case "sequence-changed":
         this.#takeSequence(notice.sequence);
+        break;
+      case "lease-changed":
+        void this.#store.lease.look();
+        break;
+      case "recording-started":
+      case "recording-stopped":
+        void this.#store.recordings.refresh();
         break;
     }
   }
@@ -146,24 +214,53 @@ export class StreamClient {
   }
 
   #draw(): void {
-    if (this.#store.held.peek() || this.#pending.size === 0) return;
+    if (this.#store.held.peek() || this.#store.replay.active.peek() || this.#pending.size === 0) return;
     let newest = 0;
+    let encode_s = 0;
     for (const report of this.#pending.values()) {
       this.#store.frames.put(frameOf(report));
       const { meta } = report.message;
       newest = Math.max(newest, meta.frame);
+      encode_s += report.message.encode_s;
       this.#store.status.frameDrawn(meta, this.#now_s());
     }
+    this.#store.status.encode_s.value = encode_s;
     this.#pending.clear();
     // Somebody else may have started the camera; or this frame was on its way when it stopped. It knows.
     if (this.#store.status.cameraState.peek() !== "streaming") void this.#readCamera();
     this.#send({ type: "acknowledge", frame: newest });
   }
+
+  /** Has the worker bring products of a frame; they come before a refresh of the display, like all frames. */
+  #bring(path: string, products: readonly string[]): Promise<readonly FrameReport[]> {
+    const ticket = ++this.#tickets;
+    return new Promise((resolve, reject) => {
+      this.#errands.set(ticket, { resolve, reject });
+      this.#send({ type: "bring", ticket, path: `/api/v1${path}`, products });
+    });
+  }
+
+  #deliver(ticket: number, reports: readonly FrameReport[], problem: Problem | null): void {
+    const errand = this.#errands.get(ticket);
+    this.#errands.delete(ticket);
+    if (errand === undefined) return;
+    if (problem !== null && reports.length === 0) {
+      errand.reject(new RequestError(problem));
+      return;
+    }
+    this.#brought.push(() => {
+      errand.resolve(reports);
+    });
+    this.#loop.wake();
+  }
 }
 
-/** A frame as views see it. */
-export function frameOf({ message, map, light }: FrameReport): Frame {
-  const { product, unit, meta, array } = message;
-  const coefficients = product === "coefficients" ? coefficientsOf(message) : null;
-  return { product, unit, meta, shape: array.shape, values: array.data, map, light, coefficients };
+interface Errand {
+  readonly resolve: (reports: readonly FrameReport[]) => void;
+  readonly reject: (error: Error) => void;
 }
+
+/** How long the stream's next frame is waited for before the newest there is will do. */
+const SOON_S = 0.4;
+
+const TOKEN_PROBLEMS: readonly string[] = ["token-required", "token-refused"];

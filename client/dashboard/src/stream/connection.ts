@@ -37,6 +37,7 @@ export type ConnectionEvent =
   | { readonly type: "connecting" }
   | { readonly type: "open" }
   | { readonly type: "waiting"; readonly retry_s: number; readonly reason: string }
+  | { readonly type: "refused" }
   | { readonly type: "message"; readonly message: ServerMessage }
   | { readonly type: "camera"; readonly document: CameraDocument }
   | { readonly type: "unreadable"; readonly reason: string };
@@ -46,6 +47,8 @@ export const CREDITS = 2;
 
 const FIRST_RETRY_S = 0.5;
 const LONGEST_RETRY_S = 8;
+/** The service lets nobody in without a token that it knows. */
+const NOT_LET_IN = 4003;
 /** Silence after which the service is asked whether it is still there. */
 const SILENCE_S = 3;
 
@@ -54,6 +57,8 @@ export class StreamConnection {
   readonly #around: Surroundings;
   readonly #emit: (event: ConnectionEvent) => void;
   #products: readonly string[] = [];
+  #token: string | null = null;
+  #refused = false;
   #socket: Socket | null = null;
   #open = false;
   #attempts = 0;
@@ -70,7 +75,17 @@ export class StreamConnection {
   want(products: readonly string[]): void {
     this.#products = products;
     if (this.#open) this.#subscribe();
-    else if (this.#socket === null && this.#timer === null) this.#connect();
+    else if (this.#socket === null && this.#timer === null && !this.#refused) this.#connect();
+  }
+
+  /** Shows this token from now on; a service that refused the one before is asked anew. */
+  authenticate(token: string | null): void {
+    if (token === this.#token) return;
+    this.#token = token;
+    // Who is connected may stay; a token that is given up, or another one, must count at once.
+    if (this.#socket !== null) this.#drop();
+    else if (this.#timer === null && !this.#refused) return;
+    this.retryNow();
   }
 
   /** Frame `frame` and all before it were drawn: the service may send on. */
@@ -83,6 +98,7 @@ export class StreamConnection {
   retryNow(): void {
     if (this.#socket !== null) return;
     this.#clear();
+    this.#refused = false;
     this.#connect();
   }
 
@@ -107,7 +123,8 @@ export class StreamConnection {
       this.#receive(data);
     };
     socket.onclose = ({ code, reason }) => {
-      this.#lost(reason || CLOSE_REASONS[code] || "The connection was closed.");
+      if (code === NOT_LET_IN) this.#refuse();
+      else this.#lost(reason || CLOSE_REASONS[code] || "The connection was closed.");
     };
     // An attempt that neither opens nor fails (a firewall that swallows it) ends here.
     this.#rearm(() => {
@@ -116,7 +133,7 @@ export class StreamConnection {
   }
 
   #subscribe(): void {
-    this.#socket?.send(encodeSubscribe(this.#products, CREDITS));
+    this.#socket?.send(encodeSubscribe(this.#products, CREDITS, this.#token));
   }
 
   #receive(data: ArrayBuffer): void {
@@ -166,6 +183,14 @@ export class StreamConnection {
     }, retry_s);
   }
 
+  /** Waits for a token: trying again with the same one would be refused again. */
+  #refuse(): void {
+    this.#clear();
+    this.#drop();
+    this.#refused = true;
+    this.#emit({ type: "refused" });
+  }
+
   #drop(): void {
     const socket = this.#socket;
     this.#socket = null;
@@ -192,5 +217,4 @@ const CLOSE_REASONS: Record<number, string> = {
   1008: "The service refuses this page.",
   1013: "The service has as many watchers as it can serve.",
   4001: "The service does not understand this page: it may be another version.",
-  4003: "The service asks for a token.",
 };

@@ -165,7 +165,25 @@ export type Notice =
   | { readonly type: "notice"; readonly kind: "lost-images"; readonly count: number }
   | { readonly type: "notice"; readonly kind: "camera-lost"; readonly reason?: string }
   | { readonly type: "notice"; readonly kind: "camera-back" }
-  | { readonly type: "notice"; readonly kind: "sequence-changed"; readonly sequence: AppliedSequence };
+  | { readonly type: "notice"; readonly kind: "sequence-changed"; readonly sequence: AppliedSequence }
+  | {
+      readonly type: "notice";
+      readonly kind: "lease-changed";
+      readonly change: "granted" | "released" | "lapsed" | "taken-over";
+      readonly holder: string | null;
+      readonly from?: string | null;
+    }
+  | { readonly type: "notice"; readonly kind: "calibration-changed"; readonly calibration_id: string; readonly reason?: string | null }
+  | { readonly type: "notice"; readonly kind: "reconstruction-changed" }
+  | { readonly type: "notice"; readonly kind: "recording-started"; readonly recording: string }
+  | { readonly type: "notice"; readonly kind: "recording-dropped"; readonly count: number; readonly total: number }
+  | {
+      readonly type: "notice";
+      readonly kind: "recording-stopped";
+      readonly recording: string;
+      readonly reason: string | null;
+      readonly problem?: string | null;
+    };
 
 export interface ErrorMessage {
   readonly type: "error";
@@ -215,20 +233,15 @@ export function decodeMessage(buffer: ArrayBuffer): ServerMessage | null {
   }
 }
 
-/**
- * The first message of a client, and every later change of what it wants.
- *
- * Any frame there is will do to begin with: a camera that stands still, or takes seconds for a frame, is
- * shown at once.
- */
-export function encodeSubscribe(products: readonly string[], credits: number): Uint8Array<ArrayBuffer> {
+/** The first message of a client, and every later change of what it wants: frames from the next one on. */
+export function encodeSubscribe(products: readonly string[], credits: number, token: string | null = null): Uint8Array<ArrayBuffer> {
   return encode({
     type: "subscribe",
     v: 1,
-    token: null,
+    token,
     subscriptions: products.map((product) => ({ product, max_rate_hz: null })),
     credits,
-    start: 1,
+    start: null,
   }) as Uint8Array<ArrayBuffer>;
 }
 

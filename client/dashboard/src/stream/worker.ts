@@ -1,17 +1,27 @@
 /** The worker: owns the socket, decodes, summarises, and hands buffers to the page without copying. */
 import { StreamConnection, type ConnectionEvent } from "./connection";
-import type { CameraDocument } from "./protocol";
+import { type CameraDocument, decodeMessage, type Problem, ProtocolError } from "./protocol";
 import { type FrameReport, summarised } from "./summary";
 
 /** From the page to the worker. */
 export type Command =
-  | { readonly type: "open"; readonly url: string; readonly products: readonly string[] }
+  | { readonly type: "open"; readonly url: string; readonly products: readonly string[]; readonly token: string | null }
+  | { readonly type: "authenticate"; readonly token: string | null }
   | { readonly type: "want"; readonly products: readonly string[] }
   | { readonly type: "acknowledge"; readonly frame: number }
-  | { readonly type: "retry" };
+  | { readonly type: "retry" }
+  | { readonly type: "bring"; readonly ticket: number; readonly path: string; readonly products: readonly string[] };
+
+/** What was brought of a frame; the problem is that of the first product that could not be. */
+export interface Brought {
+  readonly type: "brought";
+  readonly ticket: number;
+  readonly reports: readonly FrameReport[];
+  readonly problem: Problem | null;
+}
 
 /** From the worker to the page. */
-export type Report = FrameReport | ConnectionEvent;
+export type Report = FrameReport | ConnectionEvent | Brought;
 
 /** What of a worker's global scope is used; lib.webworker and lib.dom cannot be loaded together. */
 interface WorkerScope {
@@ -21,6 +31,7 @@ interface WorkerScope {
 
 const scope = self as unknown as WorkerScope;
 let connection: StreamConnection | null = null;
+let token: string | null = null;
 
 function onEvent(event: ConnectionEvent): void {
   if (event.type === "message" && event.message.type === "frame") {
@@ -30,15 +41,43 @@ function onEvent(event: ConnectionEvent): void {
   }
 }
 
+function authorization(): Record<string, string> {
+  return token === null ? {} : { Authorization: `Bearer ${token}` };
+}
+
 async function askForCamera(): Promise<CameraDocument> {
-  const answer = await fetch("/api/v1/camera", { signal: AbortSignal.timeout(4000) });
+  const answer = await fetch("/api/v1/camera", { headers: authorization(), signal: AbortSignal.timeout(4000) });
   if (!answer.ok) throw new Error(`the service answered ${answer.status}`);
   return (await answer.json()) as CameraDocument;
+}
+
+/** One product of a frame by REST, or why it cannot be had. */
+async function fetchProduct(path: string, product: string): Promise<FrameReport | Problem> {
+  try {
+    const answer = await fetch(`${path}/${product}.msgpack`, { headers: authorization() });
+    if (!answer.ok) {
+      const problem: Problem = { title: `The service answered ${answer.status} ${answer.statusText}.`, status: answer.status };
+      return { ...problem, ...((await answer.json().catch(() => ({}))) as Problem) };
+    }
+    const message = decodeMessage(await answer.arrayBuffer());
+    return message?.type === "frame" ? summarised(message) : { title: "The service sent something else than a frame." };
+  } catch (error) {
+    return { title: error instanceof ProtocolError ? error.message : "The service cannot be reached." };
+  }
+}
+
+async function bring(ticket: number, path: string, products: readonly string[]): Promise<void> {
+  const answers = await Promise.all(products.map((product) => fetchProduct(path, product)));
+  const reports = answers.filter((answer): answer is FrameReport => "message" in answer);
+  const problem = answers.find((answer): answer is Problem => !("message" in answer)) ?? null;
+  const buffers = reports.map(({ message }) => message.array.data.buffer as ArrayBuffer);
+  scope.postMessage({ type: "brought", ticket, reports, problem }, buffers);
 }
 
 scope.onmessage = ({ data: command }) => {
   switch (command.type) {
     case "open":
+      token = command.token;
       connection ??= new StreamConnection(
         command.url,
         {
@@ -52,13 +91,21 @@ scope.onmessage = ({ data: command }) => {
         },
         onEvent,
       );
+      connection.authenticate(token);
       connection.want(command.products);
+      break;
+    case "authenticate":
+      token = command.token;
+      connection?.authenticate(token);
       break;
     case "want":
       connection?.want(command.products);
       break;
     case "acknowledge":
       connection?.acknowledge(command.frame);
+      break;
+    case "bring":
+      void bring(command.ticket, command.path, command.products);
       break;
     case "retry":
       connection?.retryNow();

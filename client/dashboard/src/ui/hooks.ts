@@ -1,4 +1,4 @@
-import { effect, type Signal } from "@preact/signals";
+import { effect, useSignal, type Signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 
 import { useStore } from "../store/store";
@@ -39,4 +39,16 @@ export function useSize(target: { readonly current: Element | null }, size: Sign
       observer.disconnect();
     };
   }, [target, size]);
+}
+
+/** The time of the page's clock in s, as often as is asked for. */
+export function useNow(every_s: number): number {
+  const now_s = useSignal(Date.now() / 1000);
+  useEffect(() => {
+    const timer = setInterval(() => (now_s.value = Date.now() / 1000), 1000 * every_s);
+    return () => {
+      clearInterval(timer);
+    };
+  }, [now_s, every_s]);
+  return now_s.value;
 }

@@ -3,6 +3,7 @@ import type { ComponentType } from "preact";
 import { AccuracyView } from "./accuracy/AccuracyView";
 import { MapView } from "./map/MapView";
 import { PointsView } from "./points/PointsView";
+import { RecordingsView } from "./recordings/RecordingsView";
 import { ResponseView } from "./response/ResponseView";
 import { SequenceView } from "./sequence/SequenceView";
 import { StreakView } from "./streak/StreakView";
@@ -23,4 +24,5 @@ export const VIEWS: readonly { readonly name: ViewName; readonly title: string; 
   { name: "validity", title: "Validity", view: ValidityView },
   { name: "sequence", title: "Sequence", view: SequenceView },
   { name: "accuracy", title: "Accuracy against time", view: AccuracyView },
+  { name: "recordings", title: "Recordings", view: RecordingsView },
 ];

@@ -1,12 +1,12 @@
 import { signal } from "@preact/signals";
 import { expect, test, vi } from "vitest";
 
-import type { Api } from "../../src/store/api";
+import { type Api, LIVE } from "../../src/store/api";
 import { Details } from "../../src/store/details";
 import type { Frame } from "../../src/store/frames";
 import type { Pixel } from "../../src/store/store";
 
-const frame = (number: number): Frame => ({ meta: { frame: number, width: 10, height: 10 } }) as Frame;
+const frame = (number: number): Frame => ({ origin: LIVE, meta: { frame: number, width: 10, height: 10 } }) as Frame;
 const settled = (): Promise<void> => new Promise((done) => setTimeout(done));
 
 function watched() {

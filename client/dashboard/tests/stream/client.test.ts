@@ -60,7 +60,7 @@ describe("between worker and store", () => {
   test("it asks for what views want, and again when that changes", () => {
     page.store.frames.claim(["coefficients"]);
     expect(page.sent).toEqual([
-      { type: "open", url: "ws://camera/", products: ["brightness", "range"] },
+      { type: "open", url: "ws://camera/", products: ["brightness", "range"], token: null },
       { type: "want", products: ["brightness", "coefficients", "range"] },
     ]);
   });

@@ -221,3 +221,40 @@ describe("silence", () => {
     expect(world.probes).toBe(0);
   });
 });
+
+describe("a service that asks for a token", () => {
+  const tokens = (): unknown[] => world.sockets.flatMap(({ sent }) => sent.map((message) => message["token"]));
+
+  beforeEach(() => {
+    world.socket.opens();
+    world.socket.closes(4003);
+  });
+
+  test("is not asked again with the same one", async () => {
+    expect(world.events.at(-1)).toEqual({ type: "refused" });
+    world.connection.want(["direct"]);
+    await world.passes(60);
+    expect(world.sockets).toHaveLength(1);
+  });
+
+  test("is asked at once with another, which goes into the first message", () => {
+    world.connection.authenticate("tc_secret");
+    world.socket.opens();
+    expect(tokens()).toEqual([null, "tc_secret"]);
+  });
+
+  test("hears at once that a token was given up", () => {
+    world.connection.authenticate("tc_secret");
+    world.socket.opens();
+    world.connection.authenticate(null);
+    expect(world.sockets[1].closed).toBe(true);
+    world.socket.opens();
+    expect(tokens()).toEqual([null, "tc_secret", null]);
+  });
+
+  test("is not asked more often because the same token is shown twice", () => {
+    world.connection.authenticate("tc_secret");
+    world.connection.authenticate("tc_secret");
+    expect(world.sockets).toHaveLength(2);
+  });
+});

@@ -7,6 +7,7 @@ import type { Choice, Tradeoff } from "../../stream/protocol";
 import { engineering, fixed } from "../../ui/format";
 import { useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
+import { Steer } from "../../ui/Steer";
 import { Fact } from "../sequence/Figures";
 import { ZEROTH_NAMES } from "../sequence/words";
 import { FrontPlot } from "./FrontPlot";
@@ -140,16 +141,15 @@ function ChoiceFacts({ choice, disabled, onApply }: { choice: Choice; disabled: 
         <Fact name="Takes" value={String(sequence.takes)} field="choice_takes" />
         <Fact name="Zeroth moment" value={ZEROTH_NAMES[sequence.zeroth]} field="choice_zeroth" />
       </dl>
-      <button
-        type="button"
-        class="primary"
+      <Steer
+        primary
         disabled={disabled}
         onClick={() => {
           onApply(choice);
         }}
       >
         Apply this sequence
-      </button>
+      </Steer>
     </div>
   );
 }

@@ -3,8 +3,9 @@ import { useEffect, useMemo } from "preact/hooks";
 
 import { RequestError } from "../../store/api";
 import { useStore } from "../../store/store";
+import { Obstacle, Steer } from "../../ui/Steer";
 import type { AppliedSequence, Problem, SequenceDocument, Zeroth } from "../../stream/protocol";
-import { fieldOf, sequenceProblem, ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
+import { fieldOf, sequenceProblem, TAKE_ORDER_NAMES, ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
 import { DRAFT_FIELD, documentOf, draftOf, type Draft } from "./draft";
 import { Figures } from "./Figures";
 
@@ -72,7 +73,7 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
           inputMode="decimal"
           autocomplete="off"
           name={name}
-          value={draft.value[name]}
+          value={draft.value[name] ?? ""}
           aria-invalid={wrong === name}
           aria-describedby="sequence-verdict"
           onInput={(event) => (draft.value = { ...draft.peek(), [name]: event.currentTarget.value })}
@@ -110,7 +111,26 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
             ))}
           </select>
         </label>
+        {draft.value.take_order !== null && (
+          <label class="field field-wide">
+            <span>Order of takes</span>
+            <select
+              name="take_order"
+              value={draft.value.take_order}
+              aria-invalid={wrong === "take_order"}
+              disabled={Number(draft.value.takes) === 1}
+              onChange={(event) => (draft.value = { ...draft.peek(), take_order: event.currentTarget.value })}
+            >
+              {Object.entries(TAKE_ORDER_NAMES).map(([order, name]) => (
+                <option key={order} value={order}>
+                  {name}
+                </option>
+              ))}
+            </select>
+          </label>
+        )}
       </div>
+      <Obstacle />
       <div id="sequence-verdict" class="verdict" role="status">
         {told.kind === "refused" && <p class="refusal">{told.words}</p>}
         {told.kind === "valid" && (
@@ -123,9 +143,9 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
         <button type="button" onClick={onDone}>
           Cancel
         </button>
-        <button type="submit" class="primary" disabled={sending.value || told.kind === "refused"}>
+        <Steer submit primary disabled={sending.value || told.kind === "refused"}>
           {sending.value ? "Applying…" : "Apply"}
-        </button>
+        </Steer>
       </div>
     </form>
   );

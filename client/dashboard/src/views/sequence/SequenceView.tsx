@@ -4,9 +4,10 @@ import { useStore } from "../../store/store";
 import type { AppliedSequence } from "../../stream/protocol";
 import { engineering, fixed } from "../../ui/format";
 import { Panel } from "../../ui/Panel";
+import { Steer } from "../../ui/Steer";
 import { Fact, Figures } from "./Figures";
 import { SequenceEditor } from "./SequenceEditor";
-import { ZEROTH_NAMES } from "./words";
+import { TAKE_ORDER_NAMES, ZEROTH_NAMES } from "./words";
 
 /** What the camera measures with, and the way to change it. */
 export function SequenceView() {
@@ -20,9 +21,9 @@ export function SequenceView() {
       tools={
         applied !== null &&
         !editing.value && (
-          <button type="button" onClick={() => (editing.value = true)}>
+          <Steer title="Change what the camera measures with" onClick={() => (editing.value = true)}>
             Edit
-          </button>
+          </Steer>
         )
       }
     >
@@ -45,7 +46,7 @@ function Summary({ applied }: { applied: AppliedSequence }) {
       <Fact name="Unambiguous range" value={fixed(applied.unambiguous_range_m, 2, "m")} field="unambiguous_range_m" strong />
       <Fact name="Zeroth moment" value={ZEROTH_NAMES[applied.zeroth]} field="zeroth" />
       <Fact name="Exposure" value={engineering(applied.exposure_s, "s")} field="exposure_s" />
-      <Fact name="Takes" value={String(applied.takes)} field="takes" />
+      <Fact name="Takes" value={applied.takes > 1 && applied.take_order !== undefined ? `${applied.takes}, ${TAKE_ORDER_NAMES[applied.take_order] ?? applied.take_order}` : String(applied.takes)} field="takes" />
       <Figures applied={applied} />
     </dl>
   );

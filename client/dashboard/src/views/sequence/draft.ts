@@ -7,6 +7,8 @@ export interface Draft {
   readonly zeroth: Zeroth;
   readonly exposure_ms: string;
   readonly takes: string;
+  /** In which order takes follow each other; null where the service does not say. */
+  readonly take_order: string | null;
 }
 
 /** Which field of the draft stands for a field of the document. */
@@ -16,6 +18,7 @@ export const DRAFT_FIELD: Readonly<Record<string, keyof Draft>> = {
   zeroth: "zeroth",
   exposure_s: "exposure_ms",
   takes: "takes",
+  take_order: "take_order",
 };
 
 export function draftOf(sequence: SequenceDocument): Draft {
@@ -25,6 +28,7 @@ export function draftOf(sequence: SequenceDocument): Draft {
     zeroth: sequence.zeroth,
     exposure_ms: tidy(sequence.exposure_s * 1e3),
     takes: String(sequence.takes),
+    take_order: sequence.take_order ?? null,
   };
 }
 
@@ -44,7 +48,7 @@ export function documentOf(draft: Draft, base: SequenceDocument): SequenceDocume
     exposure_s: exact(exposure_ms / 1e3),
     takes,
     sub_phases: base.sub_phases,
-    ...(base.take_order === undefined ? {} : { take_order: base.take_order }),
+    ...(draft.take_order === null ? {} : { take_order: draft.take_order }),
   };
 }
 

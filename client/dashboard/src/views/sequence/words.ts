@@ -9,6 +9,7 @@ const FIELD_NAMES: Readonly<Record<string, string>> = {
   zeroth: "Zeroth moment",
   exposure_s: "Exposure",
   takes: "Takes",
+  take_order: "Order of takes",
 };
 
 /** The name of the field that a problem is about, as "harmonics" or as "body.harmonics". */
@@ -49,4 +50,10 @@ export const ZEROTH_COSTS: Record<Zeroth, string> = {
   "low-frequency": "four images more a take",
   "on-off": "two images more a take",
   estimated: "no images more",
+};
+
+/** How takes follow each other, in words. */
+export const TAKE_ORDER_NAMES: Readonly<Record<string, string | undefined>> = {
+  sequential: "one after another",
+  interleaved: "image by image",
 };

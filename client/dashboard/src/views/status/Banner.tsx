@@ -5,8 +5,20 @@ import { useStore } from "../../store/store";
 
 /** Says at once what is wrong, and what is being done about it; goes away with it. */
 export function Banner({ onRetry }: { onRetry: () => void }) {
-  const { status } = useStore();
+  const { status, lease, asksForToken } = useStore();
   const connection = status.connection.value;
+  if (connection.kind === "refused") {
+    return (
+      <div class="banner" role="alert" data-banner="token">
+        <p>
+          <strong>Not let in.</strong> This service asks for a token.
+        </p>
+        <button type="button" onClick={() => (asksForToken.value = true)}>
+          Enter a token
+        </button>
+      </div>
+    );
+  }
   if (connection.kind === "waiting") {
     return (
       <div class="banner" role="alert" data-banner="connection">
@@ -28,6 +40,18 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
           goes on by itself; what you see is the last frame.{" "}
           {loss.reason !== null && <span class="quiet">Reason: {loss.reason}</span>}
         </p>
+      </div>
+    );
+  }
+  if (lease.lost.value !== null) {
+    return (
+      <div class="banner banner-mild" role="alert" data-banner="control">
+        <p>
+          <strong>No longer in control.</strong> {lease.lost.value}
+        </p>
+        <button type="button" onClick={() => (lease.lost.value = null)}>
+          Dismiss
+        </button>
       </div>
     );
   }

@@ -1,13 +1,8 @@
 import { useComputed } from "@preact/signals";
 
-import { RequestError } from "../../store/api";
 import { useStore } from "../../store/store";
-import { fixed, grouped, NOTHING } from "../../ui/format";
-import { HoldIcon, PauseIcon, PlayIcon } from "../../ui/icons";
-import { ActionMenu } from "../../ui/ActionMenu";
-import { Toggle } from "../../ui/controls";
-import { THEMES, type ThemeChoice } from "../../ui/theme";
-import { LAYOUTS } from "../layout";
+import { engineering, fixed, grouped, NOTHING } from "../../ui/format";
+import { Steering } from "./Steering";
 
 /** One line on how things stand: connection, camera, and the flow of frames. */
 export function StatusBar() {
@@ -28,10 +23,12 @@ export function StatusBar() {
 type Tone = "good" | "waiting" | "bad" | "still";
 
 function StateChip() {
-  const { status, held } = useStore();
+  const { status, held, replay } = useStore();
   const state = useComputed((): { tone: Tone; word: string } => {
     if (status.connection.value.kind === "connecting") return { tone: "waiting", word: "Connecting" };
     if (status.connection.value.kind === "waiting") return { tone: "bad", word: "Reconnecting" };
+    if (status.connection.value.kind === "refused") return { tone: "bad", word: "Not let in" };
+    if (replay.active.value) return { tone: "still", word: "Replay" };
     if (status.cameraLoss.value !== null) return { tone: "bad", word: "Camera lost" };
     if (held.value) return { tone: "still", word: "Held" };
     if (status.running.value === false) return { tone: "still", word: "Stopped" };
@@ -83,6 +80,9 @@ function Flow() {
       <Figure name="Reconstruct" field="reconstruct" title="Computing of a frame at the service">
         {useComputed(() => fixed(1000 * (status.newest.value?.reconstruct_s ?? NaN), 1, "ms"))}
       </Figure>
+      <Figure name="Encode" field="encode" title="Bringing the products of a frame into the form they are sent in">
+        {useComputed(() => engineering(status.encode_s.value, "s", 2))}
+      </Figure>
       <Figure name="Dropped" field="dropped" title="Frames left out for this page, which was slower than the camera">
         {useComputed(() => grouped(status.dropped.value))}
       </Figure>
@@ -114,75 +114,3 @@ function Figure({ name, field, title, children }: FigureProps) {
     </div>
   );
 }
-
-function Steering() {
-  const store = useStore();
-  const running = store.status.running.value;
-  const toggle = async (): Promise<void> => {
-    try {
-      const { state } = await store.api.setAcquisition(running !== true);
-      store.status.cameraIs(state, Date.now() / 1000);
-    } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
-      store.status.unreadable.value = error.message;
-    }
-  };
-  return (
-    <div class="steering">
-      <Toggle
-        pressed={store.held.value}
-        title="Hold this frame while the camera goes on (H)"
-        onToggle={() => (store.held.value = !store.held.peek())}
-      >
-        <HoldIcon /> Hold
-      </Toggle>
-      {running !== null && (
-        <button type="button" title={running ? "Stop the camera; its light goes off" : "Start the camera"} onClick={() => void toggle()}>
-          {running ? <PauseIcon /> : <PlayIcon />} {running ? "Stop" : "Start"}
-        </button>
-      )}
-      <PageMenu />
-    </div>
-  );
-}
-
-/** What concerns the page and not the camera. */
-function PageMenu() {
-  const store = useStore();
-  const { choice } = store.theme;
-  const link = async (): Promise<void> => {
-    try {
-      await navigator.clipboard.writeText(window.location.href);
-    } catch {
-      // Refused, or not over https: the address is the same.
-      store.status.unreadable.value = `The link is this page's address: ${window.location.href}`;
-    }
-  };
-  return (
-    <ActionMenu
-      label="Page: layout, colours, help"
-      groups={[
-        {
-          title: "Layout",
-          actions: Object.entries(LAYOUTS).map(([text, layout]) => ({
-            text,
-            run: () => {
-              store.layout.value = layout;
-              store.alone.value = null;
-            },
-          })),
-        },
-        { title: "Colours", actions: THEMES.map((theme) => ({ text: THEME_NAMES[theme] + (theme === choice.value ? " ✓" : ""), run: () => (choice.value = theme) })) },
-        {
-          title: "Help",
-          actions: [
-            { text: "Keys (?)", run: () => (store.help.value = true) },
-            { text: "Copy a link to what is shown", run: () => void link() },
-          ],
-        },
-      ]} // prettier-ignore
-    />
-  );
-}
-
-const THEME_NAMES: Record<ThemeChoice, string> = { auto: "As the system", light: "Light", dark: "Dark" };

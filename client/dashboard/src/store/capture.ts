@@ -1,0 +1,31 @@
+import { type Api, RequestError } from "./api";
+
+/** How long the service is asked to wait for a frame at a time; it waits no longer. */
+const WAIT_S = 10;
+
+/**
+ * Stops the camera, has it capture one frame and stops it again; resolves to the frame's number.
+ *
+ * `capture_s` is how long one takes. Whatever happens, the camera is told to stop.
+ */
+export async function captureOne(api: Api, capture_s: number): Promise<number> {
+  await api.setAcquisition(false);
+  const before = (await api.newestFrame()) ?? 0;
+  await api.setAcquisition(true);
+  try {
+    return await frameAfter(api, before, Math.ceil((2 * capture_s) / WAIT_S) + 1);
+  } finally {
+    await api.setAcquisition(false);
+  }
+}
+
+async function frameAfter(api: Api, before: number, attempts: number): Promise<number> {
+  for (let attempt = 1; ; attempt++) {
+    try {
+      return await api.frameAfter(before, WAIT_S);
+    } catch (error) {
+      const early = error instanceof RequestError && error.kind === "no-frame-yet";
+      if (!early || attempt >= attempts) throw error;
+    }
+  }
+}

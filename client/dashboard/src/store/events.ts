@@ -1,0 +1,97 @@
+/** What happened, for people: notices of the service and what this page noticed, the newest last. */
+import { signal } from "@preact/signals";
+
+import type { Notice } from "../stream/protocol";
+import { engineering, grouped } from "../ui/format";
+
+export type EventTone = "plain" | "good" | "bad";
+
+export interface Happening {
+  /** Counts the happenings of this page. */
+  readonly number: number;
+  /** Unix time. */
+  readonly at_s: number;
+  readonly words: string;
+  readonly tone: EventTone;
+}
+
+/** Only so many are kept. */
+const MOST = 100;
+
+export class Events {
+  readonly all = signal<readonly Happening[]>([]);
+  readonly #now_s: () => number;
+  #number = 0;
+
+  constructor(now_s: () => number = () => Date.now() / 1000) {
+    this.#now_s = now_s;
+  }
+
+  tell(words: string, tone: EventTone = "plain"): void {
+    this.#number += 1;
+    const happening = { number: this.#number, at_s: this.#now_s(), words, tone };
+    this.all.value = [...this.all.peek().slice(1 - MOST), happening];
+  }
+}
+
+/** Why a recording ended, in words. */
+export const END_REASONS: Readonly<Record<string, string | undefined>> = {
+  stopped: "stopped",
+  duration: "reached its duration",
+  size: "reached its size",
+  frames: "has all its frames",
+  "disk-space": "ended because the disk is nearly full",
+  "sequence-changed": "ended because the sequence changed",
+  failed: "failed",
+  shutdown: "ended with the service",
+  interrupted: "was interrupted",
+};
+
+/** A notice as a sentence; null for those that are shown otherwise. */
+export function inWords(notice: Notice): { words: string; tone: EventTone } | null {
+  switch (notice.kind) {
+    case "camera-lost":
+      return { words: notice.reason ? `The camera was lost: ${notice.reason}` : "The camera was lost.", tone: "bad" };
+    case "camera-back":
+      return { words: "The camera is back.", tone: "good" };
+    case "lost-images":
+      return { words: `${grouped(notice.count)} ${notice.count === 1 ? "image" : "images"} did not arrive from the camera intact.`, tone: "bad" };
+    case "sequence-changed": {
+      const { harmonics, exposure_s, images, base_frequency_hz } = notice.sequence;
+      const figures = `${engineering(base_frequency_hz, "Hz")}, m = ${harmonics}, ${engineering(exposure_s, "s")}, ${images} images`;
+      return { words: `The sequence changed: ${figures}.`, tone: "plain" };
+    }
+    case "reconstruction-changed":
+      return { words: "The settings of the reconstruction changed.", tone: "plain" };
+    case "calibration-changed":
+      return notice.calibration_id === "nominal"
+        ? { words: `Nominal gains are used from now on.${notice.reason ? ` ${notice.reason}` : ""}`, tone: notice.reason ? "bad" : "plain" }
+        : { words: `The calibration ${notice.calibration_id} is used from now on.`, tone: "good" };
+    case "lease-changed":
+      return { words: leaseWords(notice), tone: "plain" };
+    case "recording-started":
+      return { words: "A recording began.", tone: "plain" };
+    case "recording-dropped":
+      return { words: `The disk was too slow for ${grouped(notice.count)} ${notice.count === 1 ? "frame" : "frames"} of the recording.`, tone: "bad" };
+    case "recording-stopped": {
+      const why = END_REASONS[notice.reason ?? ""] ?? "ended";
+      const tone = notice.problem ? "bad" : "good";
+      return { words: `The recording ${why}.${notice.problem ? ` ${notice.problem}` : ""}`, tone };
+    }
+    default:
+      return null; // drops have their figure
+  }
+}
+
+function leaseWords({ change, holder, from }: Extract<Notice, { kind: "lease-changed" }>): string {
+  switch (change) {
+    case "taken-over":
+      return `${holder} has taken over control from ${from}.`;
+    case "granted":
+      return `${holder} has taken control.`;
+    case "lapsed":
+      return "Control has lapsed: its holder did not renew it.";
+    default:
+      return "Control was given back: everybody may change things.";
+  }
+}

@@ -1,0 +1,119 @@
+import { computed, effect, signal, untracked } from "@preact/signals";
+
+import { type Api, RequestError } from "./api";
+import type { LeaseDocument } from "./documents";
+
+/** Who controls the camera; times are of this page's clock. */
+export type Control =
+  | { readonly kind: "unknown" }
+  | { readonly kind: "nobody" }
+  | { readonly kind: "us"; readonly holder: string; readonly expires_s: number }
+  | { readonly kind: "other"; readonly holder: string; readonly expires_s: number };
+
+/** How long the lease outlives this page; longer than a minute, which is how seldom a hidden page may get to run. */
+const DURATION_S = 90;
+const RENEW_S = 20;
+/** How soon a renewal that did not reach the service is tried again. */
+const RETRY_S = 3;
+/** How often somebody else's lease is looked at: renewals are told to nobody. */
+const LOOK_S = 5;
+
+/**
+ * The lease as this page sees it: taken, renewed while the page steers, given back.
+ *
+ * Without a lease anybody may change anything as long as nobody holds one.
+ */
+export class Lease {
+  readonly control = signal<Control>({ kind: "unknown" });
+  /** Why nothing can be changed from here; null where everything may. */
+  readonly obstacle = computed(() => {
+    const control = this.control.value;
+    return control.kind === "other" ? `${control.holder} controls the camera` : null;
+  });
+  /** How the page lost the lease without giving it back; null if it did not. */
+  readonly lost = signal<string | null>(null);
+  readonly #api: Api;
+  readonly #now_s: () => number;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(api: Api, now_s: () => number = () => Date.now() / 1000) {
+    this.#api = api;
+    this.#now_s = now_s;
+    effect(() => {
+      const control = this.control.value;
+      untracked(() => {
+        this.#arm(control);
+      });
+    });
+  }
+
+  /** Takes the lease, from its holder if `takeover` says so. Raises RequestError. */
+  async take(holder: string, takeover: boolean): Promise<void> {
+    const granted = await this.#api.takeLease({ holder, duration_s: DURATION_S, on_lapse: "stop", takeover });
+    this.#api.credentials.leaseId.value = granted.lease_id;
+    this.lost.value = null;
+    this.#take(granted);
+  }
+
+  /** Gives the lease back; the camera goes on as it is. */
+  async release(): Promise<void> {
+    try {
+      const after = await this.#api.releaseLease();
+      this.#api.credentials.leaseId.value = null;
+      this.#take(after);
+    } catch (error) {
+      if (!(error instanceof RequestError) || error.kind !== "lease-lost") throw error;
+      await this.#forget();
+    }
+  }
+
+  /** Gives the lease back from a page that is being closed; nobody hears the answer. */
+  abandon(): void {
+    if (this.#api.credentials.leaseId.peek() !== null) this.#api.releaseLease(true).catch(() => undefined);
+  }
+
+  /** Looks who controls the camera, and renews what this page holds. */
+  async look(): Promise<void> {
+    const ours = this.#api.credentials.leaseId.peek();
+    try {
+      if (ours === null) {
+        this.#take(await this.#api.lease());
+      } else {
+        const renewed = await this.#api.renewLease();
+        if (this.#api.credentials.leaseId.peek() === ours) this.#take(renewed);
+      }
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error;
+      if (error.kind === "lease-lost" && ours !== null) await this.#forget();
+      else this.#arm(this.control.peek(), RETRY_S);
+    }
+  }
+
+  /** The service refused a change because of the lease: what is shown of it is old. */
+  refused(kind: string): void {
+    if (kind === "lease-held") void this.look();
+    else if (kind === "lease-lost") void this.#forget();
+  }
+
+  async #forget(): Promise<void> {
+    if (this.#api.credentials.leaseId.peek() === null) return;
+    this.#api.credentials.leaseId.value = null;
+    await this.look();
+    const { holder } = { holder: null, ...this.control.peek() };
+    this.lost.value = holder === null ? "This page's control has lapsed." : `${holder} has taken over control.`;
+  }
+
+  #take({ held, holder, expires_in_s }: LeaseDocument): void {
+    const expires_s = this.#now_s() + (expires_in_s ?? 0);
+    if (!held) this.control.value = { kind: "nobody" };
+    else this.control.value = { kind: this.#api.credentials.leaseId.peek() === null ? "other" : "us", holder: holder ?? "Somebody", expires_s };
+  }
+
+  #arm(control: Control, within_s = Infinity): void {
+    clearTimeout(this.#timer);
+    if (control.kind !== "us" && control.kind !== "other") return;
+    const left_s = Math.max(0.5, control.expires_s - this.#now_s() + 0.2);
+    const wait_s = Math.min(within_s, control.kind === "us" ? RENEW_S : Math.min(LOOK_S, left_s));
+    this.#timer = setTimeout(() => void this.look(), 1000 * wait_s);
+  }
+}

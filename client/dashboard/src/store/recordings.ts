@@ -1,0 +1,80 @@
+import { computed, effect, signal, untracked } from "@preact/signals";
+
+import { type Api, RequestError } from "./api";
+import type { RecordingDocument, RecordingRequest, RecordingsDocument } from "./documents";
+
+/** How often one that runs is looked at. */
+const LOOK_MS = 1000;
+
+/** The recordings of the service, as the page last saw them. */
+export class Recordings {
+  readonly document = signal<RecordingsDocument | null>(null);
+  /** Why the list cannot be had; null if it can. */
+  readonly trouble = signal<string | null>(null);
+  /** The one that runs; null while none does. */
+  readonly active = computed((): RecordingDocument | null => {
+    const { active = null, recordings = [] } = this.document.value ?? {};
+    return recordings.find(({ id }) => id === active) ?? null;
+  });
+  readonly #api: Api;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(api: Api) {
+    this.#api = api;
+    effect(() => {
+      const running = this.active.value?.id;
+      clearTimeout(this.#timer);
+      if (running === undefined) return;
+      void this.document.value; // each answer waits for the next
+      this.#timer = setTimeout(() => void untracked(() => this.#look(running)), LOOK_MS);
+    });
+  }
+
+  /** Reads the list anew. */
+  async refresh(): Promise<void> {
+    try {
+      this.document.value = await this.#api.recordings();
+      this.trouble.value = null;
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error;
+      this.trouble.value = error.message;
+    }
+  }
+
+  async start(wanted: RecordingRequest): Promise<RecordingDocument> {
+    const started = await this.#api.startRecording(wanted);
+    await this.refresh();
+    return started;
+  }
+
+  async stop(id: string): Promise<void> {
+    this.#put(await this.#api.stopRecording(id));
+    await this.refresh();
+  }
+
+  async annotate(id: string, annotations: Readonly<Record<string, unknown>>): Promise<void> {
+    this.#put(await this.#api.annotateRecording(id, annotations));
+  }
+
+  async remove(id: string): Promise<void> {
+    await this.#api.deleteRecording(id);
+    await this.refresh();
+  }
+
+  async #look(id: string): Promise<void> {
+    try {
+      const document = await this.#api.recording(id);
+      if (document.state === "recording") this.#put(document);
+      else await this.refresh();
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error;
+      await this.refresh();
+    }
+  }
+
+  #put(changed: RecordingDocument): void {
+    const known = this.document.peek();
+    if (known === null) return;
+    this.document.value = { ...known, recordings: known.recordings.map((each) => (each.id === changed.id ? changed : each)) };
+  }
+}

@@ -1,0 +1,185 @@
+/** A recording on the page: its frames take the place of the camera's, for all views alike. */
+import { batch, computed, effect, signal, untracked } from "@preact/signals";
+
+import type { FrameReport } from "../stream/summary";
+import { type Api, recordingPath, RequestError } from "./api";
+import type { RecordingDocument, TimelineDocument } from "./documents";
+import { frameOf, type Frames } from "./frames";
+import type { Status } from "./status";
+
+/** Brings products of the frame at a path of the service; raises RequestError. */
+export type FrameLoader = (path: string, products: readonly string[]) => Promise<readonly FrameReport[]>;
+
+/** Recorded seconds that pass in a second of watching. */
+export const REPLAY_SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4] as const;
+
+/** How often a recording that is still being written is looked at again. */
+const GROWS_MS = 2000;
+
+export class Replay {
+  /** The recording that is shown; null while the camera is. */
+  readonly recording = signal<RecordingDocument | null>(null);
+  readonly timeline = signal<TimelineDocument | null>(null);
+  /** The frame that is wanted, by its number in the recording. */
+  readonly frame = signal(0);
+  /** The frame that is on screen; null before the first. */
+  readonly shown = signal<number | null>(null);
+  readonly playing = signal(false);
+  readonly speed = signal<number>(1);
+  readonly trouble = signal<string | null>(null);
+  readonly active = computed(() => this.recording.value !== null);
+  /** Set by what talks to the worker. */
+  loader: FrameLoader | null = null;
+  readonly #api: Api;
+  readonly #frames: Frames;
+  readonly #status: Status;
+  /** Where playing has come to, in s since the recording began. */
+  #at_s = 0;
+  #loading = false;
+  #loaded: { readonly path: string; readonly products: string } | null = null;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(api: Api, frames: Frames, status: Status) {
+    this.#api = api;
+    this.#frames = frames;
+    this.#status = status;
+    effect(() => {
+      if (this.recording.value === null || this.timeline.value === null) return;
+      void [this.frame.value, this.#frames.wanted.value];
+      untracked(() => void this.#load());
+    });
+  }
+
+  /** Shows a recording from a frame on, by default its first. Raises RequestError. */
+  async open(id: string, frame?: number): Promise<void> {
+    const [recording, timeline] = await Promise.all([this.#api.recording(id), this.#api.timeline(id)]);
+    if (timeline.count === 0) throw new RequestError({ detail: `${recording.name} holds no frames.` });
+    batch(() => {
+      this.trouble.value = null;
+      this.playing.value = false;
+      this.shown.value = null;
+      this.#loaded = null;
+      this.recording.value = recording;
+      this.timeline.value = timeline;
+      this.seek(frame ?? timeline.first);
+    });
+    this.#watchGrowth();
+  }
+
+  /** Back to what the camera sees. */
+  leave(): void {
+    clearTimeout(this.#timer);
+    batch(() => {
+      this.playing.value = false;
+      this.recording.value = null;
+      this.timeline.value = null;
+      this.shown.value = null;
+      this.trouble.value = null;
+      this.#status.newest.value = null; // a frame of the camera may have the same number
+    });
+  }
+
+  /** Time of a frame since the recording began, in s. */
+  timeOf(frame: number): number {
+    const timeline = this.timeline.peek();
+    if (timeline === null) return 0;
+    const at = frame - timeline.first;
+    return timeline.times_s?.[at] ?? at * secondsPerFrame(timeline);
+  }
+
+  seek(frame: number): void {
+    const timeline = this.timeline.peek();
+    if (timeline === null) return;
+    this.frame.value = Math.min(timeline.last, Math.max(timeline.first, Math.round(frame)));
+    this.#at_s = this.timeOf(this.frame.peek());
+  }
+
+  step(by: number): void {
+    this.playing.value = false;
+    this.seek(this.frame.peek() + by);
+  }
+
+  /** Plays from here, from the start if this is the end; or pauses. */
+  toggle(): void {
+    const timeline = this.timeline.peek();
+    if (timeline === null) return;
+    if (!this.playing.peek() && this.frame.peek() >= timeline.last) this.seek(timeline.first);
+    this.playing.value = !this.playing.peek();
+  }
+
+  /** Lets `elapsed_s` of watching pass; true while there is more to come. */
+  advance(elapsed_s: number): boolean {
+    const timeline = this.timeline.peek();
+    if (!this.playing.peek() || timeline === null) return false;
+    this.#at_s += elapsed_s * this.speed.peek();
+    let next = this.frame.peek();
+    while (next < timeline.last && this.timeOf(next + 1) <= this.#at_s) next += 1;
+    this.frame.value = next;
+    if (next >= timeline.last) this.playing.value = false;
+    return this.playing.peek();
+  }
+
+  /** One frame at a time: what is wanted meanwhile replaces what was. */
+  async #load(): Promise<void> {
+    const recording = this.recording.peek();
+    const products = this.#frames.wanted.peek();
+    if (recording === null || this.loader === null || this.#loading || products.length === 0) return;
+    const frame = this.frame.peek();
+    const path = `${recordingPath(recording.id)}/frames/${frame}`;
+    const wanted = { path, products: products.join() };
+    if (this.#loaded?.path === wanted.path && this.#loaded.products === wanted.products) return;
+    this.#loading = true;
+    try {
+      const reports = await this.loader(path, products);
+      if (this.recording.peek()?.id === recording.id) this.#show(frame, path, reports);
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error;
+      if (this.recording.peek()?.id === recording.id) {
+        this.trouble.value = error.message;
+        this.playing.value = false;
+      }
+    } finally {
+      this.#loading = false;
+    }
+    this.#loaded = wanted;
+    if (this.recording.peek() !== null) await this.#load();
+  }
+
+  #show(frame: number, path: string, reports: readonly FrameReport[]): void {
+    batch(() => {
+      this.trouble.value = null;
+      for (const report of reports) this.#frames.put(frameOf(report, path));
+      this.shown.value = frame;
+      const meta = reports.at(-1)?.message.meta;
+      if (meta !== undefined) this.#status.frameReplayed(meta, reports.reduce((sum, { message }) => sum + message.encode_s, 0));
+    });
+  }
+
+  /** A recording that is still being written has more frames by and by. */
+  #watchGrowth(): void {
+    clearTimeout(this.#timer);
+    if (this.recording.peek()?.state !== "recording") return;
+    this.#timer = setTimeout(() => void this.#grow(), GROWS_MS);
+  }
+
+  async #grow(): Promise<void> {
+    const id = this.recording.peek()?.id;
+    if (id === undefined) return;
+    try {
+      const [recording, timeline] = await Promise.all([this.#api.recording(id), this.#api.timeline(id)]);
+      if (this.recording.peek()?.id !== id) return;
+      batch(() => {
+        this.recording.value = recording;
+        this.timeline.value = timeline;
+      });
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error;
+    }
+    this.#watchGrowth();
+  }
+}
+
+function secondsPerFrame({ count, duration_s, frame_rate_hz }: TimelineDocument): number {
+  if (frame_rate_hz) return 1 / frame_rate_hz;
+  return count > 1 ? duration_s / (count - 1) : 0;
+}

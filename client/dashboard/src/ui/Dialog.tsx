@@ -1,0 +1,37 @@
+import type { ComponentChildren } from "preact";
+import { useEffect, useRef } from "preact/hooks";
+
+interface DialogProps {
+  readonly open: boolean;
+  readonly title: string;
+  /** Set by whoever leaves: by Escape, by a click beside it, or by what is inside. */
+  readonly onClose: () => void;
+  readonly children: ComponentChildren;
+}
+
+/** Something over the page that is to be answered or closed; the browser keeps the focus in it. */
+export function Dialog({ open, title, onClose, children }: DialogProps) {
+  const dialog = useRef<HTMLDialogElement>(null);
+  useEffect(() => {
+    if (open && !dialog.current?.open) dialog.current?.showModal();
+    else if (!open) dialog.current?.close();
+  }, [open]);
+  return (
+    <dialog
+      ref={dialog}
+      class="dialog"
+      aria-label={title}
+      onClose={onClose}
+      onClick={(event) => {
+        if (event.target === dialog.current) onClose(); // beside it
+      }}
+    >
+      {open && (
+        <div class="dialog-inside">
+          <h2>{title}</h2>
+          {children}
+        </div>
+      )}
+    </dialog>
+  );
+}

@@ -1,0 +1,55 @@
+import type { ComponentChildren } from "preact";
+
+import { useStore } from "../store/store";
+import type { Task } from "./useTask";
+
+interface SteerProps {
+  readonly onClick?: () => void;
+  readonly title?: string;
+  readonly primary?: boolean;
+  readonly danger?: boolean;
+  readonly disabled?: boolean;
+  readonly submit?: boolean;
+  readonly children: ComponentChildren;
+}
+
+/** A button that changes something of the camera: not to be pressed while somebody else controls it, and it says so. */
+export function Steer({ onClick, title, primary = false, danger = false, disabled = false, submit = false, children }: SteerProps) {
+  const { obstacle } = useStore().lease;
+  return (
+    <button
+      type={submit ? "submit" : "button"}
+      class={primary ? "primary" : danger ? "danger" : undefined}
+      title={obstacle.value ?? title}
+      disabled={disabled || obstacle.value !== null}
+      data-obstacle={obstacle.value === null ? undefined : ""}
+      onClick={onClick}
+    >
+      {children}
+    </button>
+  );
+}
+
+/** Why nothing can be changed here, beside controls that are disabled for it. */
+export function Obstacle() {
+  const { lease, asksForControl } = useStore();
+  if (lease.obstacle.value === null) return null;
+  return (
+    <p class="obstacle" role="status">
+      {lease.obstacle.value}: you can look, but not change this.{" "}
+      <button type="button" class="link" onClick={() => (asksForControl.value = true)}>
+        Control…
+      </button>
+    </p>
+  );
+}
+
+/** What a task is doing, or why it was refused. */
+export function TaskLine({ task, field }: { task: Task; field?: string }) {
+  const words = task.busy.value ?? task.refusal.value;
+  return (
+    <p class={task.refusal.value === null || task.busy.value !== null ? "task quiet" : "task refusal"} role="status" data-field={field} data-empty={words === null}>
+      {words ?? ""}
+    </p>
+  );
+}

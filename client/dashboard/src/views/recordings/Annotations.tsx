@@ -1,0 +1,56 @@
+import { useSignal } from "@preact/signals";
+
+import type { RecordingDocument } from "../../store/documents";
+import { useStore } from "../../store/store";
+import { Dialog } from "../../ui/Dialog";
+import { TaskLine } from "../../ui/Steer";
+import { useTask } from "../../ui/useTask";
+import { annotationsOf, linesOf, type Line } from "./lines";
+
+/** What is written about a recording: names and what they say, one a line. */
+export function Annotations({ recording, onClose }: { recording: RecordingDocument; onClose: () => void }) {
+  const { recordings } = useStore();
+  const lines = useSignal<readonly Line[]>([...linesOf(recording.annotations), { name: "", text: "" }]);
+  const task = useTask();
+  const said = annotationsOf(lines.value);
+  const set = (at: number, change: Partial<Line>): void => {
+    lines.value = lines.peek().map((line, n) => (n === at ? { ...line, ...change } : line));
+  };
+  return (
+    <Dialog open title={`Notes on ${recording.name}`} onClose={onClose}>
+      <form
+        class="control"
+        onSubmit={(event) => {
+          event.preventDefault();
+          if (said !== null) void task.run("Writing…", () => recordings.annotate(recording.id, said)).then((done) => { if (done) onClose(); }); // prettier-ignore
+        }}
+      >
+        <div class="lines">
+          {lines.value.map(({ name, text }, at) => (
+            <div key={at} class="line">
+              <input type="text" aria-label={`Name of line ${at + 1}`} placeholder="sample" value={name} onInput={(event) => { set(at, { name: event.currentTarget.value }); }} />
+              <input type="text" aria-label={`Text of line ${at + 1}`} placeholder="corner, white paint" value={text} onInput={(event) => { set(at, { text: event.currentTarget.value }); }} />
+              <button type="button" aria-label={`Remove line ${at + 1}`} onClick={() => (lines.value = lines.peek().filter((_, n) => n !== at))}>
+                ×
+              </button>
+            </div>
+          ))}
+          <button type="button" class="link" onClick={() => (lines.value = [...lines.peek(), { name: "", text: "" }])}>
+            Add a line
+          </button>
+        </div>
+        {said === null && <p class="refusal">Each line needs a name of its own.</p>}
+        <TaskLine task={task} />
+        <div class="dialog-actions">
+          <span class="spring" />
+          <button type="button" onClick={onClose}>
+            Cancel
+          </button>
+          <button type="submit" class="primary" disabled={said === null || task.busy.value !== null}>
+            Save
+          </button>
+        </div>
+      </form>
+    </Dialog>
+  );
+} // prettier-ignore

@@ -1,0 +1,68 @@
+import { useSignal } from "@preact/signals";
+
+import { useStore } from "../../store/store";
+import type { Task } from "../../ui/useTask";
+import { limitsOf } from "./limits";
+
+/** Seconds of the past that one button saves. */
+const PAST_S = 10;
+
+/** What to call a recording and when to end it; and a button that saves what just happened. */
+export function RecordForm({ task }: { task: Task }) {
+  const { recordings } = useStore();
+  const name = useSignal("");
+  const duration_s = useSignal("");
+  const size_mb = useSignal("");
+  const frames = useSignal("");
+  const limits = limitsOf({ duration_s: duration_s.value, size_mb: size_mb.value, frames: frames.value });
+  const called = name.value.trim() === "" ? {} : { name: name.value.trim() };
+  const start = async (): Promise<void> => {
+    if (limits === null) return;
+    if (await task.run("Starting…", () => recordings.start({ ...called, ...limits }))) name.value = "";
+  };
+  const savePast = async (): Promise<void> => {
+    const saved = await task.run(`Saving the last ${PAST_S} s…`, async () => {
+      const { id } = await recordings.start({ ...called, history_s: PAST_S });
+      await recordings.stop(id);
+    });
+    if (saved) name.value = "";
+  };
+  const number = (label: string, unit: string, text: typeof name, field: string) => (
+    <label class="field">
+      <span>{label}</span>
+      <span class="field-input">
+        <input type="text" inputMode="decimal" name={field} autocomplete="off" placeholder="none" value={text.value} onInput={(event) => (text.value = event.currentTarget.value)} />
+        <span class="quiet">{unit}</span>
+      </span>
+    </label>
+  );
+  const busy = task.busy.value !== null;
+  return (
+    <form
+      class="record-form"
+      onSubmit={(event) => {
+        event.preventDefault();
+        void start();
+      }}
+    >
+      <label class="field record-name">
+        <span>Name</span>
+        <input type="text" name="name" maxLength={200} autocomplete="off" placeholder="named after the time" value={name.value} onInput={(event) => (name.value = event.currentTarget.value)} />
+      </label>
+      <fieldset class="record-limits">
+        <legend>Ends after</legend>
+        {number("Duration", "s", duration_s, "duration_s")}
+        {number("Size", "MB", size_mb, "size_mb")}
+        {number("Frames", "", frames, "frames")}
+      </fieldset>
+      <div class="record-actions">
+        <button type="submit" class="record" disabled={busy || limits === null} title={limits === null ? "A limit must be a number above 0" : "Record every frame, raw"}>
+          <i aria-hidden="true" /> Record
+        </button>
+        <button type="button" disabled={busy} title="Keep what the service still holds of the time that has just passed" onClick={() => void savePast()}>
+          Save the last {PAST_S} s
+        </button>
+      </div>
+    </form>
+  );
+}

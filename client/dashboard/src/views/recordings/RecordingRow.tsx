@@ -1,0 +1,85 @@
+import { END_REASONS } from "../../store/events";
+import { recordingPath } from "../../store/api";
+import type { RecordingDocument, RecordingState } from "../../store/documents";
+import { useStore } from "../../store/store";
+import { ActionMenu } from "../../ui/ActionMenu";
+import { download } from "../../ui/files";
+import { grouped } from "../../ui/format";
+import { PlayIcon } from "../../ui/icons";
+import type { Task } from "../../ui/useTask";
+import { bytes, clock, duration } from "../replay/words";
+
+const STATES: Readonly<Record<RecordingState, string | null>> = {
+  recording: "running",
+  finishing: "finishing",
+  complete: null,
+  interrupted: "interrupted",
+  recovering: "being recovered",
+  damaged: "damaged",
+};
+
+interface RowProps {
+  readonly recording: RecordingDocument;
+  readonly task: Task;
+  readonly onAnnotate: () => void;
+  readonly onDelete: () => void;
+}
+
+/** One recording of the list. */
+export function RecordingRow({ recording, task, onAnnotate, onDelete }: RowProps) {
+  const { api, replay } = useStore();
+  const { id, name, state, annotations } = recording;
+  const whole = state === "complete";
+  const shown = replay.recording.value?.id === id;
+  const notes = Object.entries(annotations).map(([key, value]) => `${key}: ${typeof value === "string" ? value : JSON.stringify(value)}`);
+  const why = recording.reason === null ? null : (END_REASONS[recording.reason] ?? recording.reason);
+  return (
+    <li class={shown ? "recording recording-shown" : "recording"} data-recording={id}>
+      <button
+        type="button"
+        class="play"
+        aria-label={`Play ${name}`}
+        title="Show it in all views"
+        disabled={!whole || task.busy.value !== null}
+        onClick={() => void task.run("Opening…", () => replay.open(id))}
+      >
+        <PlayIcon />
+      </button>
+      <div class="recording-words">
+        <p class="recording-name">
+          {name} {STATES[state] !== null && <em class={state === "damaged" ? "tag tag-bad" : "tag"}>{STATES[state]}</em>}
+        </p>
+        <p class="quiet recording-figures" title={why === null ? undefined : `It ${why}.`}>
+          <span>{clock(recording.started_s)}</span>
+          <span data-field="duration">{duration(recording.duration_s)}</span>
+          <span data-field="frames">{grouped(recording.frames)} frames</span>
+          <span data-field="size">{bytes(recording.size_bytes)}</span>
+          {recording.dropped_frames > 0 && <span class="refusal">{grouped(recording.dropped_frames)} left out</span>}
+        </p>
+        {notes.length > 0 && <p class="recording-notes">{notes.join(" · ")}</p>}
+        {recording.problem !== null && <p class="refusal">{recording.problem}</p>}
+      </div>
+      <button
+        type="button"
+        disabled={!whole || task.busy.value !== null}
+        title="The whole recording as HDF5"
+        aria-label={`Download ${name}`}
+        onClick={() => void task.run("Fetching the file…", () => download(api, `${recordingPath(id)}/file`, `${id}.h5`))}
+      >
+        Download
+      </button>
+      <ActionMenu
+        label={`More of ${name}`}
+        groups={[
+          {
+            title: name,
+            actions: [
+              { text: "Notes…", run: onAnnotate },
+              { text: "Delete…", run: onDelete },
+            ],
+          },
+        ]}
+      />
+    </li>
+  );
+}

@@ -1,0 +1,96 @@
+import { useSignal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+
+import type { RecordingDocument } from "../../store/documents";
+import { useStore } from "../../store/store";
+import { Confirm } from "../../ui/Confirm";
+import { grouped } from "../../ui/format";
+import { Panel } from "../../ui/Panel";
+import { TaskLine } from "../../ui/Steer";
+import { useTask, type Task } from "../../ui/useTask";
+import { bytes, duration } from "../replay/words";
+import { Annotations } from "./Annotations";
+import { RecordForm } from "./RecordForm";
+import { RecordingRow } from "./RecordingRow";
+
+/** Recordings: start and stop one, look through them, play them, take them home. */
+export function RecordingsView() {
+  const store = useStore();
+  const { recordings } = store;
+  const task = useTask();
+  const annotating = useSignal<RecordingDocument | null>(null);
+  const deleting = useSignal<RecordingDocument | null>(null);
+  useEffect(() => void recordings.refresh(), [recordings]);
+  const known = recordings.document.value;
+  const doomed = deleting.value;
+  return (
+    <Panel
+      name="recordings"
+      title={<h2>Recordings</h2>}
+      tools={known?.free_bytes != null && <span class="quiet" title={known.directory}>{bytes(known.free_bytes)} free</span>}
+    >
+      <div class="recordings">
+        {recordings.active.value === null ? <RecordForm task={task} /> : <Running recording={recordings.active.value} task={task} />}
+        <TaskLine task={task} field="recordings-status" />
+        {recordings.trouble.value !== null && <p class="refusal">{recordings.trouble.value}</p>}
+        {known !== null && known.recordings.length === 0 && <p class="quiet recordings-none">Nothing was recorded yet.</p>}
+        <ul class="recording-list">
+          {known?.recordings
+            .filter(({ id }) => id !== known.active)
+            .map((recording) => (
+              <RecordingRow
+                key={recording.id}
+                recording={recording}
+                task={task}
+                onAnnotate={() => (annotating.value = recording)}
+                onDelete={() => (deleting.value = recording)}
+              />
+            ))}
+        </ul>
+      </div>
+      {annotating.value !== null && <Annotations recording={annotating.value} onClose={() => (annotating.value = null)} />}
+      <Confirm
+        open={doomed !== null}
+        title="Delete this recording?"
+        word="Delete"
+        onClose={() => (deleting.value = null)}
+        work={async () => {
+          if (doomed === null) return;
+          if (store.replay.recording.peek()?.id === doomed.id) store.replay.leave();
+          await recordings.remove(doomed.id);
+        }}
+      >
+        <p>
+          <strong>{doomed?.name}</strong>, {grouped(doomed?.frames ?? 0)} frames of {duration(doomed?.duration_s ?? 0)}. What it shows cannot be captured again.
+        </p>
+      </Confirm>
+    </Panel>
+  );
+}
+
+/** The recording that runs, and the way to end it. */
+function Running({ recording, task }: { recording: RecordingDocument; task: Task }) {
+  const { recordings } = useStore();
+  const limit_s = recording.limits?.["duration_s"] ?? null;
+  return (
+    <div class="recording-now">
+      <span class="recording-sign">
+        <i aria-hidden="true" /> {recording.name}
+      </span>
+      <span data-field="recording-duration">
+        {duration(recording.duration_s)}
+        {limit_s !== null && <span class="quiet"> of {duration(limit_s)}</span>}
+      </span>
+      <span data-field="recording-frames">
+        {grouped(recording.frames)} <span class="quiet">frames</span>
+      </span>
+      <span data-field="recording-size">{bytes(recording.size_bytes)}</span>
+      {recording.dropped_frames > 0 && <span class="refusal">{grouped(recording.dropped_frames)} left out</span>}
+      <span class="spring" />
+      <button type="button" class="danger" disabled={task.busy.value !== null} onClick={() => void task.run("Writing the rest to the disk…", () => recordings.stop(recording.id))}>
+        Stop recording
+      </button>
+      {limit_s !== null && <progress max={limit_s} value={recording.duration_s} aria-label="Share of the recording that is done" />}
+    </div>
+  );
+}

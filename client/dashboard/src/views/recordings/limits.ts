@@ -1,0 +1,20 @@
+import type { RecordingRequest } from "../../store/documents";
+
+/** Limits of a recording as they are typed; empty for none. */
+export interface TypedLimits {
+  readonly duration_s: string;
+  readonly size_mb: string;
+  readonly frames: string;
+}
+
+/** What is typed, as the service takes it; null where it is no limit. */
+export function limitsOf({ duration_s, size_mb, frames }: TypedLimits): Pick<RecordingRequest, "duration_s" | "max_bytes" | "frames"> | null {
+  const [duration, size, count] = [duration_s, size_mb, frames].map((text) => (text.trim() === "" ? null : Number(text)));
+  const sensible = (value: number | null): boolean => value === null || (Number.isFinite(value) && value > 0);
+  if (![duration, size, count].every(sensible) || (count !== null && !Number.isInteger(count))) return null;
+  return {
+    ...(duration === null ? {} : { duration_s: duration }),
+    ...(size === null ? {} : { max_bytes: Math.max(1, Math.round(1e6 * size)) }),
+    ...(count === null ? {} : { frames: count }),
+  };
+}

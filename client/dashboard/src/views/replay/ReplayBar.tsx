@@ -1,0 +1,84 @@
+import { useEffect } from "preact/hooks";
+
+import type { TimelineDocument } from "../../store/documents";
+import { REPLAY_SPEEDS, type Replay } from "../../store/replay";
+import { useStore } from "../../store/store";
+import { Choice } from "../../ui/controls";
+import { fixed, grouped } from "../../ui/format";
+import { PauseIcon, PlayIcon, StepIcon } from "../../ui/icons";
+import { clock } from "./words";
+
+/** The timeline of the recording that the views show, and the way back to the camera. */
+export function ReplayBar() {
+  const { replay } = useStore();
+  const recording = replay.recording.value;
+  const timeline = replay.timeline.value;
+  if (recording === null || timeline === null) return null;
+  const playing = replay.playing.value;
+  return (
+    <section class="replay" aria-label="Replay" data-frame={replay.shown.value ?? undefined}>
+      <div class="replay-name">
+        <strong title={recording.id}>{recording.name}</strong>
+        <span class={replay.trouble.value === null ? "quiet" : "refusal"} role="status" data-field="replay-status">
+          {replay.trouble.value ?? <CapturedAt started_s={recording.started_s} replay={replay} />}
+        </span>
+      </div>
+      <div class="replay-controls">
+        <button type="button" class="play" aria-label="One frame back" title="One frame back ([)" onClick={() => { replay.step(-1); }}>
+          <StepIcon back />
+        </button>
+        <button type="button" class="play" aria-label={playing ? "Pause the recording" : "Play the recording"} title="Play or pause the recording (P)" onClick={() => { replay.toggle(); }}>
+          {playing ? <PauseIcon /> : <PlayIcon />}
+        </button>
+        <button type="button" class="play" aria-label="One frame on" title="One frame on (])" onClick={() => { replay.step(1); }}>
+          <StepIcon />
+        </button>
+        <Choice label="Speed of the recording" value={replay.speed.value} options={REPLAY_SPEEDS.map((speed) => ({ value: speed, text: `${speed} ×` }))} onChange={(speed) => (replay.speed.value = speed)} />
+      </div>
+      <Scrubber replay={replay} timeline={timeline} />
+      <button type="button" class="primary" onClick={() => { replay.leave(); }}>
+        Back to live
+      </button>
+    </section>
+  );
+} // prettier-ignore
+
+/** The recording from its first frame to its last; dragged, or moved by arrow keys. */
+function Scrubber({ replay, timeline }: { replay: Replay; timeline: TimelineDocument }) {
+  const frame = replay.frame.value;
+  const { first, last, count } = timeline;
+  const time_s = replay.timeOf(frame);
+  useEffect(() => {
+    if (frame > last) replay.seek(last);
+  }, [replay, frame, last]);
+  return (
+    <div class="scrubber">
+      <input
+        type="range"
+        min={first}
+        max={Math.max(last, first + 1)}
+        step={1}
+        value={frame}
+        aria-label="Frame of the recording"
+        aria-valuetext={`frame ${frame - first + 1} of ${count}, ${time_s.toFixed(2)} seconds`}
+        onPointerDown={() => (replay.playing.value = false)}
+        onInput={(event) => {
+          replay.playing.value = false;
+          replay.seek(event.currentTarget.valueAsNumber);
+        }}
+      />
+      <p class="scrubber-words">
+        <span data-field="replay-time">{fixed(time_s, 2, "s")}</span> <span class="quiet">of {fixed(replay.timeOf(last), 2, "s")}</span>
+        <span class="scrubber-frame">
+          <span class="quiet">frame</span> <span data-field="replay-frame">{grouped(frame - first + 1)}</span> <span class="quiet">of {grouped(count)}</span>
+        </span>
+      </p>
+    </div>
+  );
+}
+
+/** When the frame on screen was captured, by the clock on the wall. */
+function CapturedAt({ started_s, replay }: { started_s: number | null; replay: Replay }) {
+  if (started_s === null) return null;
+  return <>captured {clock(started_s + replay.timeOf(replay.shown.value ?? replay.frame.value))}</>;
+}

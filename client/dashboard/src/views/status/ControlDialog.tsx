@@ -1,0 +1,107 @@
+import { useMemo } from "preact/hooks";
+
+import { remembered } from "../../store/settings";
+import { useStore } from "../../store/store";
+import { Dialog } from "../../ui/Dialog";
+import { useNow } from "../../ui/hooks";
+import { TaskLine } from "../../ui/Steer";
+import { useTask } from "../../ui/useTask";
+
+/** Longest name the service takes. */
+const LONGEST_NAME = 80;
+
+/** Who controls the camera, and the way to take control or give it back. */
+export function ControlDialog() {
+  const store = useStore();
+  const { asksForControl } = store;
+  const close = (): void => {
+    asksForControl.value = false;
+  };
+  return (
+    <Dialog open={asksForControl.value} title="Control" onClose={close}>
+      <Control onDone={close} />
+    </Dialog>
+  );
+}
+
+function Control({ onDone }: { onDone: () => void }) {
+  const store = useStore();
+  const { lease } = store;
+  const name = useMemo(() => remembered(store.shelf, "lease.holder", "Dashboard", isName), [store]);
+  const task = useTask();
+  const now_s = useNow(1);
+  const control = lease.control.value;
+  const left = control.kind === "us" || control.kind === "other" ? `${Math.max(0, Math.ceil(control.expires_s - now_s))} s` : "";
+  const act = async (words: string, work: () => Promise<void>): Promise<void> => {
+    if (await task.run(words, work)) onDone();
+  };
+  const take = (takeover: boolean): Promise<void> => act("Taking control…", () => lease.take(name.peek().trim(), takeover));
+  return (
+    <form
+      class="control"
+      onSubmit={(event) => {
+        event.preventDefault();
+        if (control.kind !== "us") void take(control.kind === "other");
+      }}
+    >
+      <p data-field="control-words">
+        {control.kind === "unknown" && "Who controls the camera is not known yet."}
+        {control.kind === "nobody" && "Nobody has control, so everybody may change things. Take it, and only you may; others go on watching."}
+        {control.kind === "us" && (
+          <>
+            You have control, as <strong>{control.holder}</strong>. This page renews it; if it stops doing so, the camera stops and its light goes off after {left}.
+          </>
+        )}
+        {control.kind === "other" && (
+          <>
+            <strong>{control.holder}</strong> has control, for {left} unless it is renewed. You can watch, record, and switch the light off.
+          </>
+        )}
+      </p>
+      {control.kind !== "us" && (
+        <label class="field">
+          <span>What others should call you</span>
+          <input
+            type="text"
+            name="holder"
+            autocomplete="nickname"
+            maxLength={LONGEST_NAME}
+            value={name.value}
+            onInput={(event) => {
+              name.value = event.currentTarget.value;
+            }}
+          />
+        </label>
+      )}
+      <TaskLine task={task} field="control-status" />
+      {control.kind === "other" && task.refusal.value !== null && <p class="quiet">Control can be taken over from tokens of the same role or a lower one.</p>}
+      <div class="dialog-actions">
+        <button type="button" class="danger" onClick={() => void act("Switching the light off…", () => lightOff())}>
+          Light off
+        </button>
+        <span class="spring" />
+        <button type="button" onClick={onDone}>
+          Close
+        </button>
+        {control.kind === "us" ? (
+          <button type="button" class="primary" disabled={task.busy.value !== null} onClick={() => void act("Giving control back…", () => lease.release())}>
+            Give back
+          </button>
+        ) : (
+          <button type="submit" class="primary" disabled={task.busy.value !== null || control.kind === "unknown" || name.value.trim() === ""}>
+            {control.kind === "other" ? "Take over" : "Take control"}
+          </button>
+        )}
+      </div>
+    </form>
+  );
+
+  async function lightOff(): Promise<void> {
+    const { state } = await store.api.safeOff();
+    store.status.cameraIs(state, Date.now() / 1000);
+  }
+}
+
+function isName(value: unknown): value is string {
+  return typeof value === "string" && value.length <= LONGEST_NAME;
+}

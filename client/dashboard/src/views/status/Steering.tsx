@@ -1,0 +1,95 @@
+import { captureOne } from "../../store/capture";
+import { useStore } from "../../store/store";
+import { Toggle } from "../../ui/controls";
+import { fixed } from "../../ui/format";
+import { useNow } from "../../ui/hooks";
+import { ControlIcon, HoldIcon, PauseIcon, PlayIcon, SingleIcon } from "../../ui/icons";
+import { Steer } from "../../ui/Steer";
+import { useTask } from "../../ui/useTask";
+import { PageMenu } from "./PageMenu";
+
+/** What can be done to the camera and to the page from anywhere. */
+export function Steering() {
+  const store = useStore();
+  return (
+    <div class="steering">
+      <RecordingSign />
+      <ControlButton />
+      {!store.replay.active.value && (
+        <Toggle pressed={store.held.value} title="Hold this frame while the camera goes on (H)" onToggle={() => (store.held.value = !store.held.peek())}>
+          <HoldIcon /> <span class="wide">Hold</span>
+        </Toggle>
+      )}
+      <Capture />
+      <PageMenu />
+    </div>
+  );
+}
+
+/** Starts and stops the camera, or has it capture a single frame. */
+function Capture() {
+  const store = useStore();
+  const task = useTask();
+  const running = store.status.running.value;
+  const run = async (words: string, work: () => Promise<unknown>): Promise<void> => {
+    if (!(await task.run(words, work))) store.status.unreadable.value = task.refusal.peek();
+  };
+  const toggle = (): Promise<void> =>
+    run("Switching", async () => {
+      const { state } = await store.api.setAcquisition(running !== true);
+      store.status.cameraIs(state, Date.now() / 1000);
+    });
+  const single = (): Promise<void> =>
+    run("Capturing", async () => {
+      store.held.value = false;
+      store.replay.leave();
+      await captureOne(store.api, store.sequence.peek()?.capture_s ?? 0);
+      store.status.cameraIs("stopped", Date.now() / 1000);
+    });
+  if (running === null) return null;
+  const busy = task.busy.value !== null;
+  return (
+    <>
+      <Steer title="Stop the camera, capture one frame and look at it" disabled={busy} onClick={() => void single()}>
+        <SingleIcon /> <span class="wide">Single</span>
+      </Steer>
+      <Steer title={running ? "Stop the camera; its light goes off" : "Start the camera"} disabled={busy} onClick={() => void toggle()}>
+        {running ? <PauseIcon /> : <PlayIcon />} {running ? "Stop" : "Start"}
+      </Steer>
+    </>
+  );
+}
+
+/** Who controls the camera; a click asks for control, or gives it back. */
+function ControlButton() {
+  const { lease, asksForControl } = useStore();
+  const control = lease.control.value;
+  const words = { unknown: "Control", nobody: "Take control", us: "You have control", other: "" }[control.kind];
+  return (
+    <button type="button" class={`control-button control-${control.kind}`} title="Who controls the camera" data-field="control" onClick={() => (asksForControl.value = true)}>
+      <ControlIcon />
+      {control.kind === "other" ? <Other holder={control.holder} expires_s={control.expires_s} /> : <span class={control.kind === "nobody" ? "wide" : ""}>{words}</span>}
+    </button>
+  );
+}
+
+function Other({ holder, expires_s }: { holder: string; expires_s: number }) {
+  const left_s = Math.max(0, Math.ceil(expires_s - useNow(1)));
+  return (
+    <>
+      <span class="control-holder">{holder}</span> <span class="quiet">{left_s} s</span>
+    </>
+  );
+}
+
+/** That a recording runs, and for how long. */
+function RecordingSign() {
+  const { recordings } = useStore();
+  const active = recordings.active.value;
+  if (active === null) return null;
+  return (
+    <span class="recording-sign" title={`${active.name} is being recorded`} data-field="recording-sign">
+      <i aria-hidden="true" /> {fixed(active.duration_s, 0, "s")}
+    </span>
+  );
+}

@@ -1,0 +1,66 @@
+import { useSignal } from "@preact/signals";
+
+import { kindOf } from "../../store/api";
+import { useStore } from "../../store/store";
+import { Dialog } from "../../ui/Dialog";
+
+/** Asks for the token that the service lets people in with. */
+export function TokenDialog() {
+  const { asksForToken } = useStore();
+  const close = (): void => {
+    asksForToken.value = false;
+  };
+  return (
+    <Dialog open={asksForToken.value} title="Who are you?" onClose={close}>
+      <TokenForm onDone={close} />
+    </Dialog>
+  );
+}
+
+function TokenForm({ onDone }: { onDone: () => void }) {
+  const { credentials } = useStore().api;
+  const text = useSignal("");
+  const known = credentials.token.value !== null;
+  const problem = credentials.refused.value;
+  return (
+    <form
+      class="control"
+      onSubmit={(event) => {
+        event.preventDefault();
+        credentials.use(text.peek());
+        onDone();
+      }}
+    >
+      <p class={known && problem !== null ? "refusal" : ""} data-field="token-words">
+        {known && problem !== null && kindOf(problem) === "token-refused"
+          ? "The service does not know this token: it may be mistyped, revoked or expired."
+          : "The service asks everybody for a token. Whoever runs it makes one with transientcam token create."}
+      </p>
+      <label class="field">
+        <span>Token</span>
+        <input type="password" name="token" autocomplete="off" spellcheck={false} value={text.value} onInput={(event) => (text.value = event.currentTarget.value)} />
+      </label>
+      <p class="quiet">It is kept until this tab is closed, and sent to this service only.</p>
+      <div class="dialog-actions">
+        {known && (
+          <button
+            type="button"
+            onClick={() => {
+              credentials.use(null);
+              onDone();
+            }}
+          >
+            Forget the token
+          </button>
+        )}
+        <span class="spring" />
+        <button type="button" onClick={onDone}>
+          Close
+        </button>
+        <button type="submit" class="primary" disabled={text.value.trim() === ""}>
+          Use this token
+        </button>
+      </div>
+    </form>
+  );
+}

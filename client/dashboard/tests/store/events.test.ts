@@ -1,0 +1,39 @@
+import { describe, expect, test } from "vitest";
+
+import { Events, inWords } from "../../src/store/events";
+import type { AppliedSequence, Notice } from "../../src/stream/protocol";
+
+const words = (notice: Record<string, unknown>): string | undefined => inWords({ type: "notice", ...notice } as unknown as Notice)?.words;
+
+describe("what happened", () => {
+  test("is kept in order, but not for ever", () => {
+    const events = new Events(() => 5);
+    for (let n = 0; n < 250; n++) events.tell(`event ${n}`);
+    expect(events.all.value).toHaveLength(100);
+    expect(events.all.value.at(-1)).toEqual({ number: 250, at_s: 5, words: "event 249", tone: "plain" });
+  });
+
+  test("to the sequence is said with its figures", () => {
+    const sequence = { base_frequency_hz: 23e6, harmonics: 4, exposure_s: 5e-4, images: 20 } as AppliedSequence;
+    expect(words({ kind: "sequence-changed", sequence })).toBe("The sequence changed: 23.0\u202fMHz, m = 4, 500\u202fµs, 20 images.");
+  });
+
+  test("to control is said with the names", () => {
+    expect(words({ kind: "lease-changed", change: "taken-over", holder: "B", from: "A" })).toBe("B has taken over control from A.");
+    expect(words({ kind: "lease-changed", change: "lapsed", holder: "A" })).toContain("lapsed");
+  });
+
+  test("to the calibration is said with its reason", () => {
+    expect(words({ kind: "calibration-changed", calibration_id: "nominal", reason: "It has 3 harmonics." })).toBe("Nominal gains are used from now on. It has 3 harmonics.");
+    expect(words({ kind: "calibration-changed", calibration_id: "c1", reason: null })).toContain("c1");
+  });
+
+  test("to a recording is said with why it ended", () => {
+    expect(words({ kind: "recording-stopped", recording: "r", reason: "disk-space", problem: null })).toBe("The recording ended because the disk is nearly full.");
+  });
+
+  test("is not said of drops, which have their figure, nor of kinds this page does not know", () => {
+    expect(words({ kind: "dropped", channel: 0, count: 1, total: 1 })).toBeUndefined();
+    expect(words({ kind: "eclipse" })).toBeUndefined();
+  });
+});
