@@ -3,9 +3,10 @@
 What is heavy is imported when a verb runs, so that ``transientcam --help`` stays quick.
 """
 
+import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.console import Console
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from transientcam_server.reconstruct import Measurement, Reconstruction
 
 Background = Literal["none", "median"]
+_Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 
 
 def serve(
@@ -57,6 +59,11 @@ def serve(
         Path | None, typer.Option(help="Its private key in PEM, where it is in another file.")
     ] = None,
     log_level: Annotated[str | None, typer.Option(help="debug, info, warning or error.")] = None,
+    check: Annotated[
+        bool,
+        typer.Option("--check", help="Only say which settings hold, and where each was given."),
+    ] = False,
+    as_json: _Json = False,
 ) -> None:
     """Run the daemon: a camera on the network, with its dashboard."""
     from transientcam_server.configuration import load_settings
@@ -72,6 +79,9 @@ def serve(
         "tls_key": tls_key,
         "log_level": log_level,
     }
+    if check:
+        _check(command_line, config, as_json=as_json)
+        return
     settings = load_settings(command_line, file=config, environment=os.environ)
 
     import transientcam_moments as tm
@@ -87,10 +97,41 @@ def serve(
             # NumPy serves until the compiled kernels are ready
             tm.kernels.compile_in_background()
             app = build_app(opened, settings)
-            run.serve(app, settings, listener, on_listening=lambda: _announce(url, settings.camera))
+            run.serve(
+                app,
+                settings,
+                listener,
+                on_listening=lambda: _announce(url, settings.camera, as_json=as_json),
+            )
 
 
-def _announce(url: str, camera: str) -> None:
+def _check(command_line: dict[str, Any], config: Path | None, *, as_json: bool) -> None:
+    from transientcam_server import checking
+    from transientcam_server.configuration import load
+    from transientcam_server.errors import SettingsError
+
+    try:
+        configuration = load(command_line, file=config, environment=os.environ)
+        checking.require_usable(configuration)
+    except SettingsError as error:
+        if not as_json:
+            raise
+        mistakes = checking.mistakes_document(error)
+        typer.echo(json.dumps({"valid": False, "mistakes": mistakes}, default=str))
+        raise typer.Exit(code=1) from error
+    document = checking.to_document(configuration)
+    if as_json:
+        typer.echo(json.dumps({"valid": True, "settings": document}))
+        return
+    for line in checking.to_toml(document):
+        typer.echo(line)
+
+
+def _announce(url: str, camera: str, *, as_json: bool) -> None:
+    if as_json:
+        # whoever waits for the line reads it from a pipe
+        print(json.dumps({"url": url, "camera": camera, "pid": os.getpid()}), flush=True)  # noqa: T201
+        return
     console = Console()
     console.print(
         f"transientcam serves {camera} at [bold link={url}]{url}[/] (Ctrl-C ends it)",
@@ -135,6 +176,7 @@ def reconstruct(
         typer.Option(help="Of a recording: what to compute; may be repeated.  [default: images]"),
     ] = None,
     plot: Annotated[Path | None, typer.Option(help="Also draw a picture into this .png.")] = None,
+    as_json: _Json = False,
 ) -> None:
     """Reconstruct a measurement in a file: density, cumulative density, range, direct, indirect.
 
@@ -158,7 +200,7 @@ def reconstruct(
         raise typer.BadParameter(f"{mistake['loc'][0]}: {mistake['msg']}") from error
     if commands_recording.is_recording(input):
         commands_recording.reconstruct_recording(
-            input, output, products=product, settings=settings, bins=bins
+            input, output, products=product, settings=settings, bins=bins, as_json=as_json
         )
         return
     measurement = offline.load(
@@ -183,40 +225,60 @@ def reconstruct(
         if plot is not None:
             progress.update(task, description="drawing")
             pictures.save_picture(plot, result)
-    _tell(console, measurement, result, output)
+    if as_json:
+        typer.echo(json.dumps(_document(measurement, result, output)))
+    else:
+        _tell(console, _document(measurement, result, output))
 
 
-def _tell(
-    console: Console, measurement: "Measurement", result: "Reconstruction", output: Path
-) -> None:
+def _document(measurement: "Measurement", result: "Reconstruction", output: Path) -> dict[str, Any]:
     import numpy as np
 
     import transientcam_moments as tm
 
     height, width = result.flags.shape
+    counts = {
+        str(flag.name).lower(): int(np.count_nonzero(result.flags & flag.value))
+        for flag in filter(None, tm.Flags)
+    }
+    return {
+        "file": str(output),
+        "width": width,
+        "height": height,
+        "harmonics": measurement.harmonics,
+        "base_frequency_hz": measurement.base_frequency_hz,
+        "times": result.time_s.size,
+        "flagged": counts,
+    }
+
+
+def _tell(console: Console, document: dict[str, Any]) -> None:
     console.print(
-        f"{output}: {width} x {height} pixels, m = {measurement.harmonics} at "
-        f"{measurement.base_frequency_hz / 1e6:g} MHz, {result.time_s.size} times of flight",
+        "{file}: {width} x {height} pixels, m = {harmonics} at ".format(**document)
+        + f"{document['base_frequency_hz'] / 1e6:g} MHz, {document['times']} times of flight",
         soft_wrap=True,
     )
-    for flag in filter(None, tm.Flags):
-        count = int(np.count_nonzero(result.flags & flag.value))
+    for flag, count in document["flagged"].items():
         if count:
-            console.print(f"  {count} pixels flagged {str(flag.name).lower().replace('_', ' ')}")
+            console.print(f"  {count} pixels flagged {flag.replace('_', ' ')}")
 
 
 def compile_kernels(
     harmonics: Annotated[
         list[int], typer.Option(min=1, max=32, help="Orders m to compile for; may be repeated.")
     ] = [3, 4, 8],  # noqa: B006 - typer copies it
+    as_json: _Json = False,
 ) -> None:
     """Compile the kernels of the reconstruction now, for images and packages."""
     import transientcam_moments as tm
 
-    console = Console()
     if not tm.kernels.state()["enabled"]:
-        console.print("Kernels are off (TRANSIENTCAM_KERNELS); everything is left to NumPy.")
+        if as_json:
+            typer.echo(json.dumps(tm.kernels.state()))
+        else:
+            typer.echo("Kernels are off (TRANSIENTCAM_KERNELS); everything is left to NumPy.")
         return
+    console = Console(stderr=as_json)
     with Progress(
         TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=console
     ) as progress:
@@ -227,8 +289,11 @@ def compile_kernels(
 
         tm.kernels.compile(harmonics=harmonics, progress=advance)
     state = tm.kernels.state()
-    for failure in state["failed"]:
-        console.print(f"failed: {failure}", soft_wrap=True)
-    console.print(f"{len(state['compiled'])} kernels are ready.")
+    if as_json:
+        typer.echo(json.dumps(state))
+    else:
+        for failure in state["failed"]:
+            console.print(f"failed: {failure}", soft_wrap=True)
+        console.print(f"{len(state['compiled'])} kernels are ready.")
     if state["failed"]:
         raise typer.Exit(code=1)

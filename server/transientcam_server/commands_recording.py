@@ -38,13 +38,14 @@ def replay(
     config: Annotated[
         Path | None, typer.Option(help="Settings in TOML.  [default: ./transientcam.toml]")
     ] = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Serve a recording as if it were the camera: every frame again, bit for bit."""
     from transientcam_server.commands import serve
 
     looped = "on" if loop else "off"
     spec = f"recording:{recording}?speed={speed}&loop={looped}"
-    serve(camera=spec, host=host, port=port, config=config)
+    serve(camera=spec, host=host, port=port, config=config, as_json=as_json)
 
 
 def recover(
@@ -58,7 +59,7 @@ def recover(
     from transientcam_server.recording import recovery
 
     directory = path if path.is_dir() else path.parent
-    with _nobody_writing(directory):
+    with _nobody_writing(directory), Console(stderr=True).status("recovering"):
         if path.is_dir():
             parts = recovery.unfinished(path)
             recovered = recovery.recover_all(path)
@@ -96,6 +97,7 @@ def convert(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="The .npz, .nc or .zarr to write.")
     ],
+    as_json: JsonOption = False,
 ) -> None:
     """Convert a recording for NumPy (.npz), netCDF programs (.nc) or Dask and the like (.zarr)."""
     from transientcam_server.recording import Recording
@@ -104,7 +106,10 @@ def convert(
     with Recording(recording) as opened, _progress("converting") as advance:
         converting.convert(opened, output, progress=advance)
         frames = opened.frames
-    Console(stderr=True).print(f"{output}: {frames} frames", soft_wrap=True)
+    if as_json:
+        typer.echo(json.dumps({"file": str(output), "frames": frames}))
+    else:
+        Console(stderr=True).print(f"{output}: {frames} frames", soft_wrap=True)
 
 
 def is_recording(path: Path) -> bool:
@@ -120,6 +125,7 @@ def reconstruct_recording(
     products: list[str] | None,
     settings: "ReconstructionSettings",
     bins: int,
+    as_json: bool = False,
 ) -> None:
     """Reconstruct every frame of a recording, going on where an earlier run stopped."""
     from transientcam_server.recording import Recording, offline
@@ -133,6 +139,10 @@ def reconstruct_recording(
     with Recording(recording) as opened, _progress("reconstructing") as advance:
         before = offline.reconstruct(opened, output, what, progress=advance)
         frames = opened.frames
+    if as_json:
+        document = {"file": str(output), "products": wanted, "frames": frames, "before": before}
+        typer.echo(json.dumps(document))
+        return
     resumed = f", {before} of them before" if before else ""
     Console(stderr=True).print(
         f"{output}: {', '.join(wanted)} of {frames} frames{resumed}", soft_wrap=True

@@ -86,12 +86,16 @@ def revoke(
     token_id: Annotated[str, typer.Argument(metavar="ID", help="As `token list` shows it.")],
     config: _Config = None,
     tokens_file: _File = None,
+    as_json: _Json = False,
 ) -> None:
     """Make a token invalid; whoever uses it is sent away."""
     from transientcam_server.tokens import TokenFile
 
     token = TokenFile(_path(config, tokens_file)).revoke(token_id)
-    typer.echo(f"Token {token.id} of {token.name} is not valid any more.")
+    if as_json:
+        typer.echo(json.dumps(_document(token.model_dump(mode="json"))))
+    else:
+        typer.echo(f"Token {token.id} of {token.name} is not valid any more.")
 
 
 def _path(config: Path | None, tokens_file: Path | None) -> Path:

@@ -1,5 +1,6 @@
 """`transientcam reconstruct` and `compile`, through the command line of the client."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,20 @@ def test_flagged_pixels_are_told(
 
     assert run(["reconstruct", str(measurement), "-o", str(tmp_path / "out.npz")]) == 0
     assert "1 pixels flagged non finite" in capfd.readouterr().err
+
+
+def test_what_was_reconstructed_is_printed_as_json(
+    measurement: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out.npz"
+
+    assert run(["reconstruct", str(measurement), "-o", str(out), "--bins", "40", "--json"]) == 0
+
+    document = json.loads(capfd.readouterr().out)
+    assert document["file"] == str(out)
+    assert (document["width"], document["height"], document["times"]) == (5, 6, 40)
+    assert (document["harmonics"], document["base_frequency_hz"]) == (4, F_HZ)
+    assert document["flagged"]["non_finite"] == 0
 
 
 @pytest.mark.parametrize(
@@ -145,8 +160,10 @@ def test_a_kernel_that_cannot_be_compiled_is_named_and_fails_the_command(
     monkeypatch.setattr(kernels, "state", lambda: state)
 
     assert run(["compile"]) == 1
-
     assert "density m=3: no disk" in capfd.readouterr().out
+
+    assert run(["compile", "--json"]) == 1
+    assert json.loads(capfd.readouterr().out) == state
 
 
 def test_where_kernels_are_off_there_is_nothing_to_compile(
@@ -155,5 +172,7 @@ def test_where_kernels_are_off_there_is_nothing_to_compile(
     monkeypatch.setattr(kernels, "state", lambda: {"enabled": False})
 
     assert run(["compile"]) == 0
-
     assert "NumPy" in capfd.readouterr().out
+
+    assert run(["compile", "--json"]) == 0
+    assert json.loads(capfd.readouterr().out) == {"enabled": False}

@@ -49,6 +49,9 @@ def test_convert_writes_what_the_suffix_says(
     assert run(["convert", str(source), "-o", str(tmp_path / "a.npz")]) == 0
     with np.load(tmp_path / "a.npz") as archive:
         np.testing.assert_array_equal(archive["raw"][1], frame(1).images)
+    assert run(["convert", str(source), "-o", str(tmp_path / "b.npz"), "--json"]) == 0
+    document = {"file": str(tmp_path / "b.npz"), "frames": 2}
+    assert json.loads(capsys.readouterr().out) == document
     assert run(["convert", str(source), "-o", str(tmp_path / "a.xyz")]) == 1
     assert ".nc, .npz, .zarr" in capsys.readouterr().err
 
@@ -58,7 +61,9 @@ def test_reconstruct_takes_a_recording(tmp_path: Path, capsys: pytest.CaptureFix
     output = tmp_path / "products.h5"
 
     command = ["reconstruct", str(source), "-o", str(output)]
-    assert run([*command, "--product", "range", "--product", "flags"]) == 0
+    assert run([*command, "--product", "range", "--product", "flags", "--json"]) == 0
+    document = {"file": str(output), "products": ["range", "flags"], "frames": 2, "before": 0}
+    assert json.loads(capsys.readouterr().out) == document
     with h5py.File(output) as file:
         assert file["range"].shape == (2, 12, 16)
         assert "direct" not in file
@@ -69,16 +74,23 @@ def test_reconstruct_takes_a_recording(tmp_path: Path, capsys: pytest.CaptureFix
 def test_replay_serves_a_recording(tmp_path: Path) -> None:
     source = record(tmp_path / "a.h5", 3)
     with subprocess.Popen(
-        [Path(sys.executable).with_name("transientcam"), "replay", source, "--loop", "--port", "0"],
+        [
+            Path(sys.executable).with_name("transientcam"),
+            "replay",
+            source,
+            "--loop",
+            "--port",
+            "0",
+            "--json",
+        ],
         stdout=subprocess.PIPE,
         text=True,
     ) as daemon:
         assert daemon.stdout is not None
         try:
-            text = ""
-            while "http://" not in text:
-                text = daemon.stdout.readline()
-            url = "http://" + text.partition("http://")[2].split()[0]
+            told = json.loads(daemon.stdout.readline())
+            assert told["pid"] == daemon.pid
+            url = told["url"]
             answer = httpx.get(f"{url}/api/v1/frames/latest", params={"wait_s": 10}, timeout=30)
             assert answer.json()["width"] == 16
         finally:

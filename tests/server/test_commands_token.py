@@ -79,7 +79,8 @@ def test_an_empty_list_says_where_it_looked(
 def test_a_revoked_token_is_gone(capsys: pytest.CaptureFixture[str], file: TokenFile) -> None:
     document = create(capsys, "a")
 
-    assert run(["token", "revoke", document["id"]]) == 0
+    assert run(["token", "revoke", document["id"], "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["id"] == document["id"]
     assert not file
     assert run(["token", "revoke", document["id"]]) == 1
     assert document["id"] in capsys.readouterr().err
