@@ -34,6 +34,11 @@ export class Lease {
   readonly lost = signal<string | null>(null);
   readonly #api: Api;
   readonly #now_s: () => number;
+  #changing = false;
+  /** Somebody wanted to look meanwhile. */
+  #missed = false;
+  /** The lease that this page held is over, and who has one now is not known yet. */
+  #orphaned = false;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(api: Api, now_s: () => number = () => Date.now() / 1000) {
@@ -49,22 +54,26 @@ export class Lease {
 
   /** Takes the lease, from its holder if `takeover` says so. Raises RequestError. */
   async take(holder: string, takeover: boolean): Promise<void> {
-    const granted = await this.#api.takeLease({ holder, duration_s: DURATION_S, on_lapse: "stop", takeover });
-    this.#api.credentials.leaseId.value = granted.lease_id;
-    this.lost.value = null;
-    this.#take(granted);
+    await this.#alone(async () => {
+      const granted = await this.#api.takeLease({ holder, duration_s: DURATION_S, on_lapse: "stop", takeover });
+      this.#api.credentials.leaseId.value = granted.lease_id;
+      this.lost.value = null;
+      this.#orphaned = false;
+      this.#take(granted);
+    });
   }
 
   /** Gives the lease back; the camera goes on as it is. */
   async release(): Promise<void> {
-    try {
-      const after = await this.#api.releaseLease();
-      this.#api.credentials.leaseId.value = null;
-      this.#take(after);
-    } catch (error) {
-      if (!(error instanceof RequestError) || error.kind !== "lease-lost") throw error;
-      await this.#forget();
-    }
+    await this.#alone(async () => {
+      try {
+        const after = await this.#api.releaseLease();
+        this.#api.credentials.leaseId.value = null;
+        this.#take(after);
+      } catch (error) {
+        if (!(error instanceof RequestError) || error.kind !== "lease-lost") throw error;
+      }
+    });
   }
 
   /** Gives the lease back from a page that is being closed; nobody hears the answer. */
@@ -74,14 +83,14 @@ export class Lease {
 
   /** Looks who controls the camera, and renews what this page holds. */
   async look(): Promise<void> {
+    if (this.#changing) {
+      this.#missed = true;
+      return;
+    }
     const ours = this.#api.credentials.leaseId.peek();
     try {
-      if (ours === null) {
-        this.#take(await this.#api.lease());
-      } else {
-        const renewed = await this.#api.renewLease();
-        if (this.#api.credentials.leaseId.peek() === ours) this.#take(renewed);
-      }
+      const found = await (ours === null ? this.#api.lease() : this.#api.renewLease());
+      if (this.#api.credentials.leaseId.peek() === ours) this.#take(found);
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;
       if (error.kind === "lease-lost" && ours !== null) await this.#forget();
@@ -95,16 +104,33 @@ export class Lease {
     else if (kind === "lease-lost") void this.#forget();
   }
 
+  /** Changes the lease; the notice of that may come before the answer, and says less. */
+  async #alone(change: () => Promise<void>): Promise<void> {
+    this.#changing = true;
+    try {
+      await change();
+    } finally {
+      this.#changing = false;
+      if (this.#missed) {
+        this.#missed = false;
+        await this.look();
+      }
+    }
+  }
+
   async #forget(): Promise<void> {
     if (this.#api.credentials.leaseId.peek() === null) return;
     this.#api.credentials.leaseId.value = null;
+    this.#orphaned = true;
     await this.look();
-    const { holder } = { holder: null, ...this.control.peek() };
-    this.lost.value = holder === null ? "This page's control has lapsed." : `${holder} has taken over control.`;
   }
 
   #take({ held, holder, expires_in_s }: LeaseDocument): void {
     const expires_s = this.#now_s() + (expires_in_s ?? 0);
+    if (this.#orphaned) {
+      this.#orphaned = false;
+      this.lost.value = held ? `${holder} has taken over control.` : "This page's control has lapsed.";
+    }
     if (!held) this.control.value = { kind: "nobody" };
     else this.control.value = { kind: this.#api.credentials.leaseId.peek() === null ? "other" : "us", holder: holder ?? "Somebody", expires_s };
   }

@@ -68,6 +68,7 @@ export class Replay {
 
   /** Back to what the camera sees. */
   leave(): void {
+    if (!this.active.peek()) return;
     clearTimeout(this.#timer);
     batch(() => {
       this.playing.value = false;
