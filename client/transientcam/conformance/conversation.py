@@ -131,7 +131,7 @@ class Conversation:
                 try:
                     data = self._connection.recv(timeout=timeout_s)
                 except TimeoutError:
-                    what = f"the stream says nothing for {timeout_s:g} s"
+                    what = f"nothing is said on the stream within {timeout_s:g} s"
                     raise PromiseBroken(what) from None
             return parse_server_message(data)
         except ProtocolError as error:

@@ -1,5 +1,6 @@
 """The camera that is checked: requests, streams, and its state before anything was touched."""
 
+import re
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -129,7 +130,9 @@ class Device:
 
     def offers(self, method: str, path: str) -> bool:
         """Return whether an operation is described."""
-        return method.lower() in self.openapi.get("paths", {}).get(API + path, {})
+        wanted = _nameless(API + path)
+        paths = self.openapi.get("paths", {})
+        return any(method.lower() in paths[each] for each in paths if _nameless(each) == wanted)
 
     @property
     def camera(self) -> dict[str, Any]:
@@ -178,12 +181,15 @@ class Device:
             yield
         finally:
             # the check may have lost it, as a part of what it checks
-            if not self.send("PUT", f"{API}/lease").is_success:
+            held = self.send("PUT", f"{API}/lease").is_success
+            if not held:
                 self.hold(None)
-            self._restore(before)
-            if self._lease_id is not None:
-                self.send("DELETE", f"{API}/lease")
-            self.hold(None)
+            try:
+                self._restore(before)
+            finally:
+                if held:
+                    self.send("DELETE", f"{API}/lease")
+                self.hold(None)
 
     @contextmanager
     def as_another(self) -> Iterator[dict[str, str]]:
@@ -259,6 +265,11 @@ class Device:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def _nameless(path: str) -> str:
+    """Return a path without the names of its parameters, which clients never see."""
+    return re.sub(r"\{\w+\}", "{}", path)
 
 
 def _named(response: httpx.Response) -> str:

@@ -30,9 +30,10 @@ def a_broken_body_is_a_problem(device: Device) -> None:
 
 def a_wrong_value_is_named(device: Device) -> None:
     """A value that cannot be used is answered with 422, and named with what would do."""
-    response = device.send("PUT", f"{API}/acquisition", json={"running": "perhaps"})
-    problem = device.refusal(response, 422, "invalid-request", field="running")
-    equal(problem.get("value"), "perhaps", "`value` in the problem")
+    with device.control():
+        response = device.send("PUT", f"{API}/acquisition", json={"running": "perhaps"})
+        problem = device.refusal(response, 422, "invalid-request", field="running")
+        equal(problem.get("value"), "perhaps", "`value` in the problem")
 
 
 def an_unknown_field_is_named(device: Device) -> None:

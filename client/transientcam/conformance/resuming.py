@@ -37,7 +37,7 @@ def _expect_from(device: Device, start: int) -> None:
             if isinstance(message, Notice) and message.kind in ("gap", "dropped"):
                 due = _after(message, due)
             if isinstance(message, Frame):
-                equal(message.frame, due, f"after frames {seen or 'none'}, the next of {start} on")
+                equal(message.frame, due, f"the next frame when resuming from {start}")
                 seen.append(message.frame)
                 due = message.frame + 1
 

@@ -1,0 +1,234 @@
+"""The checks against a real daemon, which keeps every promise, and against one that does not."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from tests.conformance.breaking import NOTHING, Breaking
+from tests.conformance.broken_promises import API, BROKEN, BROKEN_WITH_TOKENS
+from tests.conformance.conftest import Breakable, breakable_daemon
+from transientcam.cli import run as command
+from transientcam.conformance import CHECKS, GROUPS, Check, Device, Report, chosen, run
+from transientcam.errors import ParameterError, ServerUnreachable
+from transientcam.wire import LEASE_HEADER
+from transientcam_server.tokens import Role, TokenFile, utc_now
+
+PATIENCE_S = 20.0
+SHORT_S = 1.5
+NOT_THERE_YET = ("the service shows no frames of recordings", "the service describes no parameters")
+BY_NAME = {each.name: each for each in CHECKS}
+
+
+def only(name: str) -> tuple[Check, ...]:
+    return (BY_NAME[name],)
+
+
+def said(report: Report) -> str:
+    return "; ".join(f"{each.check.name}: {each.reason}" for each in report.failed)
+
+
+def test_the_daemon_keeps_every_promise(daemon: Breakable) -> None:
+    with Device(daemon.served.url, patience_s=PATIENCE_S) as device:
+        before = device.state()
+        report = run(device)
+        after = device.state()
+        recordings = device.read(f"{API}/recordings")["recordings"]
+        held = device.read(f"{API}/lease")["held"]
+
+    assert not report.failed, said(report)
+    assert len(report.results) == len(CHECKS) + 1
+    assert {each.reason for each in report.results if each.outcome == "skipped"} <= {
+        "the service asks nobody for a token",
+        *NOT_THERE_YET,
+    }
+    assert after == before
+    assert not recordings
+    assert not held
+
+
+@pytest.mark.parametrize(("name", "breaking", "word"), BROKEN, ids=[each[0] for each in BROKEN])
+def test_a_broken_promise_fails_its_check(
+    breakable: Breakable, name: str, breaking: Breaking, word: str
+) -> None:
+    breakable.breaker.current = breaking
+    # what is large takes its time also where it is broken
+    patience_s = PATIENCE_S if BY_NAME[name].group == "sizes" else SHORT_S
+    with Device(breakable.served.url, patience_s=patience_s) as device:
+        result = run(device, only(name)).results[0]
+
+    if result.reason in NOT_THERE_YET:
+        pytest.skip(result.reason)
+    assert (result.check.name, result.outcome) == (name, "failed"), result.reason
+    assert word in str(result.reason)
+
+
+def test_every_check_has_a_daemon_that_fails_it() -> None:
+    broken = {name for name, _, _ in (*BROKEN, *BROKEN_WITH_TOKENS)}
+
+    about_parameters = {each.name for each in CHECKS if each.group == "parameters"}
+    assert broken | about_parameters == set(BY_NAME)
+
+
+def test_a_broken_promise_fails_no_other_check(breakable: Breakable) -> None:
+    breaking = {name: breaking for name, breaking, _ in BROKEN}
+    for name in ("a-wrong-method-is-a-problem", "an-unknown-product-is-a-problem"):
+        breakable.breaker.current = breaking[name]
+        with Device(breakable.served.url, patience_s=SHORT_S) as device:
+            report = run(device, chosen(["problems"]))
+
+        assert [each.check.name for each in report.failed] == [name]
+
+
+def test_what_cannot_be_read_fails_a_check_and_ends_nothing(breakable: Breakable) -> None:
+    breakable.breaker.current = Breaking(answer=lambda each: each.plain(200))
+    with Device(breakable.served.url, patience_s=SHORT_S) as device:
+        report = run(device, chosen(["routes", "tags", "lease", "parameters"]))
+
+    passed = [each.check.name for each in report.results if each.outcome == "passed"]
+    assert passed == ["head-is-get-without-its-body"]  # which reads nothing
+    assert not report.camera
+
+
+@pytest.fixture(scope="module")
+def guarded(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[tuple[Breakable, dict[Role, str]]]:
+    """A daemon that asks for tokens, and a token of each role."""
+    path = tmp_path_factory.mktemp("tokens") / "tokens.json"
+    tokens = {role: TokenFile(path).create(str(role), role, now=utc_now())[1] for role in Role}
+    with breakable_daemon(
+        tmp_path_factory.mktemp("recordings"), require_token=True, tokens_file=path
+    ) as daemon:
+        yield daemon, tokens
+
+
+Guarded = tuple[Breakable, dict[Role, str]]
+
+
+def test_with_tokens_the_promises_about_them_are_kept(guarded: Guarded) -> None:
+    daemon, tokens = guarded
+    with Device(daemon.served.url, token=tokens[Role.ADMIN], patience_s=PATIENCE_S) as device:
+        report = run(device, chosen(["authentication", "stream"]))
+
+    assert not report.failed, said(report)
+    assert report.counts["skipped"] == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "breaking", "word"), BROKEN_WITH_TOKENS, ids=[each[0] for each in BROKEN_WITH_TOKENS]
+)
+def test_a_broken_promise_about_tokens_fails_its_check(
+    guarded: Guarded, name: str, breaking: Breaking, word: str
+) -> None:
+    daemon, tokens = guarded
+    daemon.breaker.current = breaking
+    try:
+        with Device(daemon.served.url, token=tokens[Role.ADMIN], patience_s=SHORT_S) as device:
+            result = run(device, only(name)).results[0]
+    finally:
+        daemon.breaker.current = NOTHING
+
+    assert result.outcome == "failed"
+    assert word in str(result.reason)
+
+
+def test_who_may_only_look_changes_nothing_and_is_told_why(guarded: Guarded) -> None:
+    daemon, tokens = guarded
+    with Device(daemon.served.url, token=tokens[Role.VIEWER], patience_s=PATIENCE_S) as device:
+        report = run(device, chosen(["tags", "lease", "recording"]))
+
+    assert not report.failed, said(report)
+    reasons = {each.check.name: each.reason for each in report.results if each.reason}
+    assert "viewer" in str(reasons["the-right-tag-changes-it"])
+    assert "may not delete" in str(reasons["a-file-can-be-fetched-in-parts"])
+
+
+def test_a_camera_that_somebody_controls_is_left_alone(daemon: Breakable) -> None:
+    with Device(daemon.served.url, patience_s=PATIENCE_S) as device, httpx.Client() as other:
+        address = f"{daemon.served.url}{API}/lease"
+        lease = other.post(address, json={"holder": "bench 2"}).json()
+        try:
+            report = run(device, chosen(["tags", "lease"]))
+        finally:
+            other.delete(address, headers={LEASE_HEADER: lease["lease_id"]})
+
+    reasons = [each.reason for each in report.results if each.outcome == "skipped"]
+    assert not report.failed, said(report)
+    assert reasons
+    assert all("bench 2" in str(each) for each in reasons)
+
+
+def test_a_camera_that_does_not_capture_does_not_afterwards(daemon: Breakable) -> None:
+    with Device(daemon.served.url, patience_s=PATIENCE_S) as device:
+        device.send("PUT", f"{API}/acquisition", json={"running": False})
+        try:
+            report = run(device, chosen(["resume"]))
+            running = device.read(f"{API}/acquisition")["running"]
+        finally:
+            device.send("PUT", f"{API}/acquisition", json={"running": True})
+
+    assert not report.failed, said(report)
+    assert running is False
+
+
+def test_a_daemon_that_is_not_there_is_said_at_once() -> None:
+    with (
+        Device("http://127.0.0.1:9", patience_s=SHORT_S) as device,
+        pytest.raises(ServerUnreachable),
+    ):
+        run(device)
+
+
+def test_a_group_that_is_not_there_is_named() -> None:
+    with pytest.raises(ParameterError, match="no-such"):
+        chosen(["problems", "no-such"])
+
+
+def test_every_check_states_a_promise_and_has_a_name_of_its_own() -> None:
+    assert len(BY_NAME) == len(CHECKS)
+    assert all(each.promise.endswith(".") for each in CHECKS)
+    assert set(GROUPS) == {each.group for each in CHECKS}
+
+
+def test_the_command_prints_a_line_a_check_and_writes_the_report(
+    daemon: Breakable, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "report.json"
+    url = daemon.served.url
+
+    assert command(["conformance", url, "--only", "problems", "--json", str(file)]) == 0
+
+    printed = capsys.readouterr().out
+    document = json.loads(file.read_text())
+    names = [each.name for each in chosen(["problems"])]
+    assert [each["name"] for each in document["checks"][:-1]] == names
+    assert all(name in printed for name in names)
+    assert (document["passed"], document["failed"]) == (len(names) + 1, 0)
+    assert document["camera"]["model"] in printed
+
+
+def test_the_command_fails_and_says_what_is_broken(
+    breakable: Breakable, capsys: pytest.CaptureFixture[str]
+) -> None:
+    breaking = {name: breaking for name, breaking, _ in BROKEN}
+    breakable.breaker.current = breaking["an-unknown-product-is-a-problem"]
+    url = breakable.served.url
+
+    assert command(["conformance", url, "--only", "problems", "--json", "-"]) == 1
+
+    captured = capsys.readouterr()
+    (failed,) = (each for each in json.loads(captured.out)["checks"] if each["outcome"] == "failed")
+    assert failed["name"] == "an-unknown-product-is-a-problem"
+    assert failed["reason"] in captured.err
+    assert failed["promise"] in captured.err
+
+
+def test_the_command_refuses_a_group_that_is_not_there(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert command(["conformance", "http://127.0.0.1:9", "--only", "no-such"]) == 1
+
+    assert "no-such" in capsys.readouterr().err
