@@ -29,7 +29,10 @@ _Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 def serve(
     camera: Annotated[
         str | None,
-        typer.Option(help="usb[:SERIAL], sim:SCENE or recording:FILE  [default: sim:mirrors]"),
+        typer.Option(
+            help="usb[:SERIAL], sim:SCENE or recording:FILE  [default: sim:mirrors]",
+            autocompletion=lambda: _camera_names(),
+        ),
     ] = None,
     host: Annotated[
         str | None, typer.Option(help="Address to listen on.  [default: 127.0.0.1]")
@@ -103,6 +106,12 @@ def serve(
                 listener,
                 on_listening=lambda: _announce(url, settings.camera, as_json=as_json),
             )
+
+
+def _camera_names() -> list[str]:
+    from transientcam_driver import list_scenes
+
+    return ["usb", *(f"sim:{scene.name}" for scene in list_scenes())]
 
 
 def _check(command_line: dict[str, Any], config: Path | None, *, as_json: bool) -> None:

@@ -4,6 +4,7 @@ Exit codes: 0 done, 1 failed (one sentence on standard error says why), 2 wrong 
 130 interrupted.
 """
 
+import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -11,7 +12,7 @@ from typing import Annotated, Final
 
 import typer
 
-from transientcam.cli.verbs import extra_of, load_verbs
+from transientcam.cli.verbs import extra_of, load_verbs, words_to_complete
 from transientcam.errors import CommandUnavailable
 
 FAILED: Final = 1
@@ -33,7 +34,7 @@ def run(arguments: Sequence[str]) -> int:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback()(_top)
-    load_verbs(app, arguments)
+    load_verbs(app, arguments or words_to_complete(os.environ))
     try:
         typer.main.get_command(app)(args=list(arguments), prog_name="transientcam")
     except SystemExit as end:

@@ -9,13 +9,13 @@ import typer
 
 from transientcam.camera import Camera
 from transientcam.cli.formats import Format, frame_bytes
-from transientcam.cli.options import JsonOption, TokenOption, UrlArgument
+from transientcam.cli.options import JsonOption, ProductArgument, TokenOption, UrlArgument
 from transientcam.frame import Frame
 
 
 def capture(
     url: UrlArgument,
-    product: Annotated[str, typer.Argument(help="What to capture: range, transient, raw, …")],
+    product: ProductArgument,
     output: Annotated[
         Path,
         typer.Option("--output", "-o", help="File to write; - is standard output."),

@@ -4,8 +4,22 @@ from typing import Annotated
 
 import typer
 
+from transientcam.wire import PRODUCTS
+
 UrlArgument = Annotated[
     str, typer.Argument(metavar="URL", help="The daemon, such as http://127.0.0.1:8000.")
+]
+ProductArgument = Annotated[
+    str,
+    typer.Argument(
+        help="What to capture: range, transient, raw, …", autocompletion=lambda: list(PRODUCTS)
+    ),
+]
+ProductsArgument = Annotated[
+    list[str] | None,
+    typer.Argument(
+        help="What to stream; range, if nothing is named.", autocompletion=lambda: list(PRODUCTS)
+    ),
 ]
 TokenOption = Annotated[
     str | None,

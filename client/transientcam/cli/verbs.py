@@ -4,7 +4,7 @@ Only the verb that is asked for is imported, so that the client's verbs start fa
 verb that lacks its packages stands in nobody's way.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final
 
@@ -29,6 +29,17 @@ def load_verbs(app: typer.Typer, arguments: Sequence[str]) -> None:
     wanted = [points[named]] if named in points else [points[name] for name in sorted(points)]
     for point in wanted:
         _add(app, point)
+
+
+def words_to_complete(environment: Mapping[str, str]) -> list[str]:
+    """Return the words so far, where a shell asks how they may go on; else nothing.
+
+    bash hands them over in one variable, zsh and fish in another one.
+    """
+    if "_TRANSIENTCAM_COMPLETE" not in environment:
+        return []
+    words = environment.get("_TYPER_COMPLETE_ARGS") or environment.get("COMP_WORDS") or ""
+    return words.split()[1:]
 
 
 def extra_of(module: str, verb: str) -> str | None:

@@ -12,16 +12,14 @@ from rich.live import Live
 from rich.text import Text
 
 from transientcam.camera import Camera
-from transientcam.cli.options import JsonOption, TokenOption, UrlArgument
+from transientcam.cli.options import JsonOption, ProductsArgument, TokenOption, UrlArgument
 from transientcam.cli.statistics import Sample, Statistics
 from transientcam.wire import Notice
 
 
 def watch(
     url: UrlArgument,
-    products: Annotated[
-        list[str] | None, typer.Argument(help="What to stream; range, if nothing is named.")
-    ] = None,
+    products: ProductsArgument = None,
     count: Annotated[
         int | None, typer.Option(min=1, help="Stop after so many frames of the first product.")
     ] = None,

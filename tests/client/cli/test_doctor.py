@@ -15,6 +15,7 @@ from websockets.sync.server import ServerConnection
 
 from tests.client.conftest import ReplayServer
 from tests.serving import Served, serving
+from transientcam import Camera
 from transientcam.cli import daemon_checks, findings, run
 from transientcam.cli.findings import Finding, Reported
 
@@ -25,6 +26,8 @@ _Offer = Callable[[Iterable[Reported]], None]
 def daemon() -> Iterator[Served]:
     with serving("sim:wall?noise=off") as served:
         served.start_all_workers()
+        with Camera(served.url, timeout_s=60.0) as camera:
+            camera.latest(wait_s=10.0)
         yield served
 
 
