@@ -13,14 +13,19 @@ from collections.abc import Callable, Coroutine, Hashable, Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import asdict
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from numpy.typing import NDArray
 
-from transientcam_driver import AppliedSequence, CalibrationMismatch, RawFrame
+from transientcam_driver import (
+    AppliedSequence,
+    CalibrationMismatch,
+    Capabilities,
+    RawFrame,
+    Simulation,
+)
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.calibration import Calibration, calibration_id
-from transientcam_server.cameras import Camera
 from transientcam_server.encoding import Encoding
 from transientcam_server.errors import Problem
 from transientcam_server.lens import Intrinsics
@@ -47,6 +52,20 @@ _REMEMBERED_CROPS = 32
 Judge = Callable[[Recipe, Any], dict[str, float] | None]
 
 
+class Source(Protocol):
+    """What a pipeline has to know of a camera."""
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What it can do."""
+        ...
+
+    @property
+    def simulation(self) -> Simulation | None:
+        """Who knows the truth."""
+        ...
+
+
 class Pipeline:
     """Makes frames of captures and computes on ``executor`` what is asked of them.
 
@@ -63,7 +82,7 @@ class Pipeline:
 
     def __init__(
         self,
-        camera: Camera,
+        camera: Source,
         settings: ReconstructionSettings,
         executor: Executor,
         *,
@@ -114,6 +133,13 @@ class Pipeline:
         if self.calibration is None:
             return None
         return self.calibration.capture.misfit(applied, self._capabilities)
+
+    def beside(self, camera: Source) -> "Pipeline":
+        """Return one for frames of another camera, as of a recording, on the same workers."""
+        other = Pipeline(camera, self.reconstruction.settings, self._executor, workers=2)
+        other._long = self._long
+        other._tasks = self._tasks
+        return other
 
     def product(self, name: str) -> Product:
         """Return a product this camera has.

@@ -168,6 +168,12 @@ CAMERA_BUSY: Final = ProblemKind(
     "A job has the camera for itself until it has ended; `job` is its id. Cancel it, or wait for "
     "it. Switching the light off is possible meanwhile, and ends it.",
 )
+RECORDING_DAMAGED: Final = ProblemKind(
+    "recording-damaged",
+    409,
+    "The recording is damaged",
+    "The file, or this frame of it, is not what was written. Other frames may be whole.",
+)
 REQUEST_LATE: Final = ProblemKind(
     "request-late",
     408,

@@ -46,6 +46,7 @@ from transientcam_server.outbox import Channel, Goodbye
 from transientcam_server.pipeline import Pipeline
 from transientcam_server.reconstruction import Reconstruction
 from transientcam_server.recording import Header
+from transientcam_server.recording.frames import RecordedFramesOf
 from transientcam_server.recording.library import Library
 from transientcam_server.recording.replay import ReplayCamera
 from transientcam_server.settings import ReconstructionSettings, Settings
@@ -103,6 +104,9 @@ class Service:
         self.lease = LeaseDesk(report=self._lease_changed, alarm=self._alarm)
         self.recordings = Library(
             settings.recordings, header=self._recording_header, tell=self._tell_from_thread
+        )
+        self.recorded_frames = RecordedFramesOf(
+            self.recordings, self.pipeline, lens=settings.lens
         )
         self.metrics = Metrics(self)
         self.identity = {"name": "transientcam", "version": VERSION}

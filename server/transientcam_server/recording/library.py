@@ -190,6 +190,21 @@ class Library:
             raise _unknown(recording_id)
         return document
 
+    def find(self, recording_id: str) -> Path:
+        """Return the file of a recording, also of one that is still being written.
+
+        Raises
+        ------
+        Problem
+            ``unknown-recording``, or ``recording-unfinished`` while it is being recovered.
+        """
+        path = self._path(recording_id)
+        if path is None:
+            raise _unknown(recording_id)
+        if recording_id in self._recovering:
+            raise _unfinished(recording_id)
+        return path
+
     def path(self, recording_id: str) -> Path:
         """Return the file of a whole recording.
 
@@ -202,11 +217,7 @@ class Library:
         if path is None:
             raise _unknown(recording_id)
         if path.name.endswith(".part"):
-            raise Problem(
-                kinds.RECORDING_UNFINISHED,
-                f"{recording_id} is not finished.",
-                recording=recording_id,
-            )
+            raise _unfinished(recording_id)
         return path
 
     def annotate(self, recording_id: str, annotations: Mapping[str, Any]) -> dict[str, Any]:
@@ -226,11 +237,7 @@ class Library:
     def delete(self, recording_id: str) -> dict[str, Any]:
         """Delete a recording and describe what it was."""
         if self._recorder_of(recording_id) is not None or recording_id in self._recovering:
-            raise Problem(
-                kinds.RECORDING_UNFINISHED,
-                f"{recording_id} is not finished.",
-                recording=recording_id,
-            )
+            raise _unfinished(recording_id)
         document = self.describe(recording_id)
         path = self._path(recording_id)
         if path is None:
@@ -498,6 +505,12 @@ def _unknown(recording_id: str) -> Problem:
     shown = recording_id[:64]
     return Problem(
         kinds.UNKNOWN_RECORDING, f"There is no recording {shown!r}.", field="recording", value=shown
+    )
+
+
+def _unfinished(recording_id: str) -> Problem:
+    return Problem(
+        kinds.RECORDING_UNFINISHED, f"{recording_id} is not finished.", recording=recording_id
     )
 
 

@@ -111,6 +111,42 @@ class RecordingsDocument(Document):
     recordings: list[RecordingDocument]
 
 
+class TimelineDocument(Document):
+    """Which frames a recording has, and when they were captured."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "first": 1,
+                    "last": 4,
+                    "count": 4,
+                    "duration_s": 0.283,
+                    "frame_rate_hz": 10.6,
+                    "host_time_s": 1795161600.25,
+                    "times_s": [0.0, 0.094, 0.189, 0.283],
+                    "times_step": 1,
+                }
+            ]
+        }
+    )
+
+    first: int | None = None
+    """Recorded frames are counted from 1; null before there is any."""
+    last: int | None = None
+    count: int
+    duration_s: float
+    """From the first to the last."""
+    frame_rate_hz: float | None = None
+    """On average; null before there are two."""
+    host_time_s: float | None = None
+    """Arrival of the first frame, Unix time."""
+    times_s: list[float]
+    """Arrival of every `times_step`-th frame, beginning with the first, after the first."""
+    times_step: int
+    """1 unless there are very many."""
+
+
 class RecordingRequest(Document):
     """What should be recorded, and until when; the least of all limits ends it."""
 

@@ -1,0 +1,233 @@
+"""Frames of recordings, computed as those of the camera are, also while one is being recorded.
+
+Everything here lives on the event loop; files are read on workers. A file is open only while it
+is read: one that stayed open would be in the way of whoever finishes or annotates it.
+"""
+
+import asyncio
+import contextlib
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from transientcam_driver import Capabilities, RawFrame
+from transientcam_server import problem_kinds as kinds
+from transientcam_server.errors import DamagedFrame, NotARecording, Problem
+from transientcam_server.lens import known_intrinsics
+from transientcam_server.pipeline import Frame, Pipeline
+from transientcam_server.products import Recipe
+from transientcam_server.reconstruction import Reconstruction
+from transientcam_server.recording.layout import Header
+from transientcam_server.recording.library import Library
+from transientcam_server.recording.reader import Recording
+from transientcam_server.settings import LensSettings, ReconstructionSettings
+
+if TYPE_CHECKING:
+    from transientcam_server.calibration import Calibration
+
+LATEST: Final = "latest"
+MAX_TIMES: Final = 4096
+"""So many times, at most, are told of one recording."""
+Settings = Literal["recorded", "current"]
+Find = Callable[[], Path]
+"""Says where the file is now: it gets its name when it is finished."""
+_OPENED: Final = 2
+_FRAMES: Final = 2
+_RECORDED_ID: Final = 0
+"""What the metadata call settings that were not this service's."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedCamera:
+    """What a pipeline asks of a camera."""
+
+    capabilities: Capabilities
+    simulation: None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedGains:
+    """Of a calibration, a reconstruction asks no more."""
+
+    id: str
+    gains: NDArray[Any]
+    bad: NDArray[np.bool_] | None
+
+
+class RecordedFrames:
+    """The frames of one recording, counted from 1, and what was computed of the last few."""
+
+    def __init__(
+        self, find: Find, header: Header, pipeline: Pipeline, *, lens: LensSettings
+    ) -> None:
+        self.pipeline = pipeline.beside(RecordedCamera(header.capabilities))
+        self._camera_pipeline = pipeline
+        self._find = find
+        self._header = header
+        self._lens = lens
+        self._frames: OrderedDict[tuple[int, int], asyncio.Task[Frame]] = OrderedDict()
+
+    async def frame(self, name: str, settings: Settings = "recorded") -> Frame:
+        """Return a frame by its number, or the last one that was written.
+
+        Raises
+        ------
+        Problem
+            ``unknown-frame``, ``recording-damaged``.
+        """
+        number = len(await self.host_time_s()) if name == LATEST else int(name)
+        reconstruction = self._reconstruction(settings)
+        key = number, reconstruction.id
+        task = self._frames.get(key)
+        if task is None or _failed(task):  # one that is not there yet may be there next time
+            task = self.pipeline.start(self._read(number, reconstruction))
+            self._frames[key] = task
+        self._frames.move_to_end(key)
+        while len(self._frames) > _FRAMES:
+            self._frames.popitem(last=False)
+        return await asyncio.shield(task)
+
+    async def host_time_s(self) -> NDArray[np.float64]:
+        """Return when each of the frames that were written so far arrived, Unix time."""
+        times, _ = await self.pipeline.run(_read_times, self._find)
+        return times
+
+    async def _read(self, number: int, reconstruction: Reconstruction) -> Frame:
+        raw, _ = await self.pipeline.run(_read_frame, self._find, number)
+        return Frame(self.pipeline, number, raw, self._recipe(reconstruction))
+
+    def _recipe(self, reconstruction: Reconstruction) -> Recipe:
+        header = self._header
+        capabilities, planes = header.capabilities, header.calibration_planes
+        gains = None
+        if planes is not None:
+            name = str(header.calibration.get("id", "recorded"))
+            gains = RecordedGains(name, planes, header.calibration_bad)
+        return Recipe(
+            header.applied,
+            reconstruction.settings,
+            2.0**capabilities.bits - 1.0,
+            cast("Calibration | None", gains),
+            reconstruction.id,
+            known_intrinsics(
+                self._lens,
+                width=capabilities.width,
+                height=capabilities.height,
+                recorded=header.camera.get("intrinsics"),
+            ),
+        )
+
+    def _reconstruction(self, settings: Settings) -> Reconstruction:
+        """Return the settings it was recorded with, if this version knows them all, or today's."""
+        if settings == "recorded":
+            with contextlib.suppress(ValidationError):
+                recorded = ReconstructionSettings.model_validate(dict(self._header.reconstruction))
+                return Reconstruction(_RECORDED_ID, recorded)
+        return self._camera_pipeline.reconstruction
+
+
+class RecordedFramesOf:
+    """The frames of the recordings of a library; those asked for last are at hand."""
+
+    def __init__(self, library: Library, pipeline: Pipeline, *, lens: LensSettings) -> None:
+        self._library = library
+        self._pipeline = pipeline
+        self._lens = lens
+        self._opened: OrderedDict[str, RecordedFrames] = OrderedDict()
+
+    async def opened(self, recording_id: str) -> RecordedFrames:
+        """Return the frames of a recording, whole or still being written.
+
+        Raises
+        ------
+        Problem
+            ``unknown-recording``, ``recording-unfinished`` (while it is being recovered), or
+            ``recording-damaged``.
+        """
+        find = partial(self._library.find, recording_id)
+        await self._pipeline.run(find)  # it may have been deleted since
+        found = self._opened.get(recording_id)
+        if found is None:
+            header, _ = await self._pipeline.run(_read_header, find)
+            found = RecordedFrames(find, header, self._pipeline, lens=self._lens)
+            self._opened[recording_id] = found
+        self._opened.move_to_end(recording_id)
+        while len(self._opened) > _OPENED:
+            self._opened.popitem(last=False)
+        return found
+
+
+def _failed(task: "asyncio.Task[Frame]") -> bool:
+    return task.done() and (task.cancelled() or task.exception() is not None)
+
+
+def timeline(host_time_s: NDArray[Any]) -> dict[str, Any]:
+    """Return when the frames of a recording came, in no more than `MAX_TIMES` numbers."""
+    count = len(host_time_s)
+    since_s = host_time_s - host_time_s[0] if count else host_time_s
+    duration_s = float(since_s[-1]) if count else 0.0
+    step = max(1, -(-count // MAX_TIMES))
+    return {
+        "first": 1 if count else None,
+        "last": count or None,
+        "count": count,
+        "duration_s": duration_s,
+        "frame_rate_hz": (count - 1) / duration_s if duration_s > 0.0 else None,
+        "host_time_s": float(host_time_s[0]) if count else None,
+        "times_s": [round(float(each), 6) for each in since_s[::step]],
+        "times_step": step,
+    }
+
+
+# -- on workers --------------------------------------------------------------------------------
+
+
+def _read_header(find: Find) -> Header:
+    with _opened(find) as recording:
+        return recording.header
+
+
+def _read_times(find: Find) -> NDArray[np.float64]:
+    with _opened(find) as recording:
+        return recording.series("host_time_s")
+
+
+def _read_frame(find: Find, number: int) -> RawFrame:
+    with _opened(find) as recording:
+        if not 1 <= number <= recording.frames:
+            raise _unknown_frame(number, recording.frames)
+        try:
+            return recording.frame(number - 1)
+        except DamagedFrame as error:
+            detail = f"Frame {number} cannot be read: {error.reason}."
+            raise Problem(kinds.RECORDING_DAMAGED, detail, field="frame", value=number) from error
+
+
+def _opened(find: Find) -> Recording:
+    try:
+        try:
+            return Recording(find())
+        except FileNotFoundError:  # it was finished, and got its name, this moment
+            return Recording(find())
+    except (NotARecording, OSError) as error:
+        raise Problem(kinds.RECORDING_DAMAGED, "The file cannot be read as one.") from error
+
+
+def _unknown_frame(number: int, last: int) -> Problem:
+    there = f"it has frames 1 to {last}" if last else "it has none yet"
+    return Problem(
+        kinds.UNKNOWN_FRAME,
+        f"The recording has no frame {number}; {there}.",
+        field="frame",
+        value=number,
+        limit=f"from 1 to {last}" if last else None,
+        first=1 if last else None,
+        last=last or None,
+    )
