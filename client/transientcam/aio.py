@@ -255,10 +255,11 @@ class AsyncCamera:
         reconnect: bool | Reconnect = False,
         credits: int | None = DEFAULT_CREDITS,  # noqa: A002 - the protocol calls them so
         max_rate_hz: float | None = None,
+        start: int | None = None,
     ) -> "AsyncStream":
         """Return a stream of frames as they are captured; enter it to have it closed."""
         subscribe = subscribe_message(
-            products, token=self._token, credits=credits, max_rate_hz=max_rate_hz
+            products, token=self._token, credits=credits, max_rate_hz=max_rate_hz, start=start
         )
         state = StreamState(subscribe, on_notice=on_notice, reconnect=reconnect_policy(reconnect))
         stream = AsyncStream(self._address.stream, state, timeout_s=self._timeout_s)
@@ -359,9 +360,12 @@ class AsyncStream:
         *products: str | Subscription,
         credits: int | None = DEFAULT_CREDITS,  # noqa: A002 - the protocol calls them so
         max_rate_hz: float | None = None,
+        start: int | None = None,
     ) -> None:
         """Ask for other products from now on; frames already on their way still arrive."""
-        message = subscribe_message(products, token=None, credits=credits, max_rate_hz=max_rate_hz)
+        message = subscribe_message(
+            products, token=None, credits=credits, max_rate_hz=max_rate_hz, start=start
+        )
         data = self._state.resubscribe(message)
         if self._connection is not None:
             with translated(self._url):

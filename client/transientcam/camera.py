@@ -281,6 +281,7 @@ class Camera:
         reconnect: bool | Reconnect = False,
         credits: int | None = DEFAULT_CREDITS,  # noqa: A002 - the protocol calls them so
         max_rate_hz: float | None = None,
+        start: int | None = None,
     ) -> Stream:
         """Return a stream of frames as they are captured.
 
@@ -289,7 +290,8 @@ class Camera:
         Parameters
         ----------
         products
-            Names, or `wire.Subscription` where each has its own rate.
+            Names, or `Subscription` where each has its own rate, region, decimation or encoding;
+            frames arrive decoded.
         on_notice
             Called with each notice, within ``receive``; `Stream.notices` keeps them too.
         reconnect
@@ -299,6 +301,9 @@ class Camera:
             How many frames may be on their way at once; None leaves it to the network.
         max_rate_hz
             No more frames a second than this.
+        start
+            Number of the first frame wanted; None for the next one. Those that are kept still come
+            one after the other, and the notice ``gap`` says which are not.
 
         Raises
         ------
@@ -306,7 +311,7 @@ class Camera:
             If there is no product, or a number is out of range.
         """
         subscribe = subscribe_message(
-            products, token=self._token, credits=credits, max_rate_hz=max_rate_hz
+            products, token=self._token, credits=credits, max_rate_hz=max_rate_hz, start=start
         )
         state = StreamState(subscribe, on_notice=on_notice, reconnect=reconnect_policy(reconnect))
         stream = Stream(self._address.stream, state, timeout_s=self._timeout_s)

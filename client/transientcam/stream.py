@@ -96,15 +96,20 @@ class Stream:
         *products: str | Subscription,
         credits: int | None = DEFAULT_CREDITS,  # noqa: A002 - the protocol calls them so
         max_rate_hz: float | None = None,
+        start: int | None = None,
     ) -> None:
-        """Ask for other products from now on; frames already on their way still arrive.
+        """Ask for other products from now on, or from frame ``start`` on as far as it is kept.
+
+        Frames that are already on their way still arrive.
 
         Raises
         ------
         ParameterError
             If there is no product, or a number is out of range.
         """
-        message = subscribe_message(products, token=None, credits=credits, max_rate_hz=max_rate_hz)
+        message = subscribe_message(
+            products, token=None, credits=credits, max_rate_hz=max_rate_hz, start=start
+        )
         data = self._state.resubscribe(message)
         if self._connection is not None:
             with translated(self._url):

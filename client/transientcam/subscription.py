@@ -21,7 +21,9 @@ from transientcam.errors import (
 from transientcam.frame import Frame
 from transientcam.rest import problem_error
 from transientcam.wire import (
+    ENCODINGS,
     MAX_CREDITS,
+    MAX_DECIMATION,
     SUBPROTOCOL,
     Ack,
     Channel,
@@ -56,11 +58,15 @@ class Reconnect:
         Bounds of the wait.
     attempts
         How many times to try before giving up; None for no end.
+    resume
+        Whether to go on with the frame after the last one, as far as the daemon has them still,
+        instead of the newest.
     """
 
     first_wait_s: float = 0.1
     longest_wait_s: float = 5.0
     attempts: int | None = None
+    resume: bool = False
 
     def wait_s(self, attempt: int) -> float:
         """Return how long to wait before an attempt, counted from 0."""
@@ -81,6 +87,7 @@ def subscribe_message(
     token: str | None,
     credits: int | None,  # noqa: A002 - the protocol calls them so
     max_rate_hz: float | None,
+    start: int | None = None,
 ) -> Subscribe:
     """Build the message that subscribes to some products, given by name or in full.
 
@@ -95,11 +102,25 @@ def subscribe_message(
     if not subscriptions:
         raise ParameterError("products", (), "at least one product, such as 'range'")
     for each in subscriptions:
-        if each.max_rate_hz is not None and not 0.0 < each.max_rate_hz < float("inf"):
-            raise ParameterError("max_rate_hz", each.max_rate_hz, "a number of Hz above 0")
+        _check(each)
+    if start is not None and start < 1:
+        raise ParameterError("start", start, "the number of a frame, from 1, or None")
     if credits is not None and not 1 <= credits <= MAX_CREDITS:
         raise ParameterError("credits", credits, f"from 1 to {MAX_CREDITS}, or None")
-    return Subscribe(subscriptions, token=token, credits=credits)
+    return Subscribe(subscriptions, token=token, credits=credits, start=start)
+
+
+def _check(subscription: Subscription) -> None:
+    rate_hz, region = subscription.max_rate_hz, subscription.region
+    if rate_hz is not None and not 0.0 < rate_hz < float("inf"):
+        raise ParameterError("max_rate_hz", rate_hz, "a number of Hz above 0")
+    if subscription.encoding not in ENCODINGS:
+        raise ParameterError("encoding", subscription.encoding, f"one of {', '.join(ENCODINGS)}")
+    if region is not None and (len(region) != len("xywh") or min(region) < 0):
+        raise ParameterError("region", region, "x, y, width and height in pixels")
+    if not 1 <= subscription.decimation <= MAX_DECIMATION:
+        limit = f"an integer from 1 to {MAX_DECIMATION}"
+        raise ParameterError("decimation", subscription.decimation, limit)
 
 
 class StreamState:
@@ -121,6 +142,7 @@ class StreamState:
         self._reconnect = reconnect
         self._attempt = 0
         self._owed: int | None = None
+        self._last: int | None = None
 
     def opening(self, subprotocol: str | None) -> bytes:
         """Return the first message of a connection for which the server chose ``subprotocol``.
@@ -133,7 +155,11 @@ class StreamState:
         if subprotocol != SUBPROTOCOL:
             raise ProtocolError("subprotocol", subprotocol, SUBPROTOCOL)
         self._owed = None
-        return encode(self.subscribe)
+        if self.hello is None:
+            return encode(self.subscribe)
+        resumes = self._reconnect is not None and self._reconnect.resume
+        start = self._last + 1 if resumes and self._last is not None else None
+        return encode(replace(self.subscribe, start=start))
 
     def resubscribe(self, subscribe: Subscribe) -> bytes:
         """Return the message that asks for something else from now on."""
@@ -155,7 +181,7 @@ class StreamState:
             case Frame():
                 if self.hello is None:
                     raise ProtocolError("type", "frame", "hello, before anything else")
-                self._owed = message.frame
+                self._owed = self._last = message.frame
                 return message
             case Hello():
                 if self._attempt:

@@ -167,7 +167,9 @@ class _Client:
             channel = self._channel(wanted, f"subscriptions[{index}].")
             if any(_alike(channel, each) for each in channels):
                 raise _refused(
-                    f"subscriptions[{index}].product", wanted.product, "each product and form once"
+                    f"subscriptions[{index}].product",
+                    wanted.product,
+                    "another product, or this one in another form",
                 )
             channels.append(channel)
         service.hub.subscribe(outbox, channels, credit=message.credits)
@@ -186,10 +188,10 @@ class _Client:
     def _channel(self, wanted: wire.Subscription, path: str) -> Channel:
         product = self._service.pipeline.product(wanted.product)
         if product.over_time:
-            limit = "a product without times of flight; coefficients hold all of them"
+            limit = "a product without times of flight (coefficients hold all of them)"
             raise _refused(f"{path}product", product.name, limit)
         if wanted.encoding not in product.description.encodings:
-            limit = f"{product.name} travels as {' or '.join(product.description.encodings)}"
+            limit = f"{' or '.join(product.description.encodings)} for {product.name}"
             raise _refused(f"{path}encoding", wanted.encoding, limit)
         capabilities = self._service.camera.capabilities
         try:
@@ -234,5 +236,5 @@ def _alike(one: Channel, other: Channel) -> bool:
 
 
 def _refused(field: str, value: object, limit: str) -> Problem:
-    detail = f"{field} cannot be streamed here: {limit}."
+    detail = f"{value} cannot be streamed here: {field} must be {limit}."
     return Problem(kinds.BAD_MESSAGE, detail, field=field, value=value, limit=limit)

@@ -92,6 +92,7 @@ def test_validating_touches_nothing(camera: Camera) -> None:
 
 def test_every_product_arrives_as_the_contract_says(held: Camera) -> None:
     lengths = {"y": 120, "x": 163, "coefficient": 7, "moment": 4, "image": 16, "time": 64}
+    lengths |= {"return": 6, "coordinate": 3, "bound": 2}
     for product, described in wire.PRODUCTS.items():
         frame = held.frame(product)
 
@@ -344,3 +345,25 @@ def test_many_readers_take_the_same_frames_at_once(served: Served) -> None:
 
     for numbers in asyncio.run(run()):
         assert numbers == sorted(set(numbers))
+
+
+def test_a_stream_begins_with_a_frame_that_has_passed(camera: Camera) -> None:
+    with camera.stream("flags") as live:
+        latest = live.receive(timeout_s=_PATIENCE_S).frame
+        while live.receive(timeout_s=_PATIENCE_S).frame < latest + 4:
+            pass
+    with camera.stream("flags", start=latest) as stream:
+        numbers = [stream.receive(timeout_s=_PATIENCE_S).frame for _ in range(8)]
+
+    assert numbers == list(range(latest, latest + 8))
+
+
+def test_a_thin_stream_holds_the_values_of_the_whole_one(camera: Camera) -> None:
+    thin = wire.Subscription("range", encoding="u16", region=(10, 20, 60, 40), decimation=4)
+    with camera.stream("range", thin) as stream:
+        whole, part = (stream.receive(timeout_s=_PATIENCE_S) for _ in range(2))
+
+    assert part.frame == whole.frame
+    assert part.meta["region"] == [10, 20, 60, 40]
+    expected = whole.array[20:60:4, 10:70:4]
+    np.testing.assert_allclose(part.array, expected, atol=0.51 * part.extra["scale"])

@@ -9,6 +9,7 @@ from tests.client.conftest import Recording
 from transientcam import wire
 from transientcam.errors import (
     FrameTimeout,
+    ParameterError,
     ProblemError,
     ProtocolError,
     ServerUnreachable,
@@ -285,3 +286,57 @@ def test_a_policy_is_given_as_such_or_as_yes_and_no() -> None:
     assert reconnect_policy(policy) is policy
     assert reconnect_policy(True) == Reconnect()
     assert reconnect_policy(False) is None
+
+
+def _opened(state: StreamState) -> wire.Subscribe:
+    message = wire.parse_client_message(state.opening(wire.SUBPROTOCOL))
+    assert isinstance(message, wire.Subscribe)
+    return message
+
+
+@pytest.mark.parametrize(("resume", "start"), [(True, 18), (False, None)])
+def test_after_a_reconnection_only_who_wants_that_goes_on_where_it_was(
+    resume: bool, start: int | None, recorded: dict[str, Recording]
+) -> None:
+    subscribe = subscribe_message(("range",), token=None, credits=None, max_rate_hz=None, start=5)
+    state = StreamState(subscribe, reconnect=Reconnect(resume=resume))
+    assert _opened(state).start == 5
+    state.received(recorded["hello"].data)
+    state.received(recorded["frame"].data)
+    state.retry_after_s(_LOST)
+
+    assert _opened(state).start == start
+
+
+def test_a_subscription_says_region_decimation_and_encoding() -> None:
+    wanted = wire.Subscription("range", encoding="u16", region=(1, 2, 30, 40), decimation=2)
+    state = StreamState(subscribe_message((wanted,), token=None, credits=None, max_rate_hz=None))
+
+    assert _opened(state).subscriptions == (wanted,)
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"encoding": "f16"}, "encoding"),
+        ({"region": (1, 2, 3)}, "region"),
+        ({"region": (-1, 0, 3, 3)}, "region"),
+        ({"decimation": 0}, "decimation"),
+        ({"decimation": 65}, "decimation"),
+        ({"max_rate_hz": 0.0}, "max_rate_hz"),
+    ],
+)
+def test_what_a_server_would_refuse_is_refused_before_it_is_asked(
+    options: dict[str, Any], field: str
+) -> None:
+    with pytest.raises(ParameterError) as caught:
+        subscribe_message(
+            (wire.Subscription("range", **options),), token=None, credits=None, max_rate_hz=None
+        )
+
+    assert caught.value.field == field
+
+
+def test_frames_are_counted_from_one() -> None:
+    with pytest.raises(ParameterError, match="start"):
+        subscribe_message(("range",), token=None, credits=None, max_rate_hz=None, start=0)

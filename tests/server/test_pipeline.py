@@ -105,7 +105,8 @@ def test_the_meta_tells_what_the_computation_took_and_found(camera: Camera, raw:
 
         assert meta["reconstruct_s"] > 0.0
         assert meta["pixels"]["total"] == 163 * 120
-        assert set(meta) == set(wire.FrameMeta.__annotations__)
+        # which pixels are there is known of each answer alone
+        assert set(meta) == set(wire.FrameMeta.__annotations__) - {"region", "decimation"}
         assert set(meta["pixels"]) == set(wire.PixelCounts.__annotations__)
 
     with_frame(camera, raw, test)

@@ -65,6 +65,10 @@ class FrameMeta(TypedDict):
     pixels: PixelCounts | None
     predicted_range_std_m: PredictedStd | None
     """None until the range of this frame was computed."""
+    region: list[int]
+    """Which pixels of the frame this is about: column and row of the first, width, height."""
+    decimation: int
+    """Only every so many of them are here, both ways."""
 
 
 @dataclass(frozen=True, slots=True)
