@@ -1,22 +1,21 @@
-"""Connections that cannot hurt: how many there are, and how long each may take for a request.
+"""Connections that cannot hurt: how many there are, and how long each may take.
 
-The HTTP server waits for ever for the rest of a request and reads heads of any length; here is
-what bounds both.
+The HTTP server waits for ever for the rest of a request or for a client that reads nothing, and
+reads heads of any length; here is what bounds all of it.
 """
 
 import asyncio
-from typing import Any, Final, cast
+from typing import Any, cast
 
 from starlette.responses import Response
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import Problem
+from transientcam_server.patience import Patience
 from transientcam_server.problems import problem_response
 from transientcam_server.settings import LimitSettings
-
-STALLED_S: Final = 30.0
-"""A client that takes nothing of an answer for so long is sent away."""
 
 
 class BoundedConnection(HttpToolsProtocol):
@@ -26,7 +25,7 @@ class BoundedConnection(HttpToolsProtocol):
         super().__init__(*arguments, **options)
         self._limits = limits
         self._deadline: asyncio.TimerHandle | None = None
-        self._stalled: asyncio.TimerHandle | None = None
+        self._patience: Patience | None = None
         self._in_head = True
         self._head_bytes = 0
 
@@ -35,6 +34,7 @@ class BoundedConnection(HttpToolsProtocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Take part, or refuse where there are too many already."""
         super().connection_made(cast("asyncio.Transport", transport))  # uvloop has its own class
+        self._patience = Patience(self.transport, limit_s=self._limits.stalled_s, loop=self.loop)
         problem = self._too_many()
         if problem is None:
             self._expect_within(self._limits.head_s)
@@ -44,7 +44,8 @@ class BoundedConnection(HttpToolsProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget every timer."""
         self._expect_within(None)
-        self._cancel_stalled()
+        if self._patience is not None:
+            self._patience.end()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
@@ -64,12 +65,13 @@ class BoundedConnection(HttpToolsProtocol):
     def pause_writing(self) -> None:
         """Start to lose patience with a client that does not read."""
         super().pause_writing()
-        self._cancel_stalled()
-        self._stalled = self.loop.call_later(STALLED_S, self.transport.abort)
+        if self._patience is not None:
+            self._patience.begin()
 
     def resume_writing(self) -> None:
         """Find it again."""
-        self._cancel_stalled()
+        if self._patience is not None:
+            self._patience.end()
         super().resume_writing()
 
     # -- of the parser -------------------------------------------------------------------------
@@ -136,10 +138,40 @@ class BoundedConnection(HttpToolsProtocol):
             self.transport.write(_bytes(problem_response(problem)))
         self.transport.close()
 
-    def _cancel_stalled(self) -> None:
-        if self._stalled is not None:
-            self._stalled.cancel()
-            self._stalled = None
+
+class BoundedStream(WebSocketsSansIOProtocol):
+    """One WebSocket, which is cut where its client reads nothing any more.
+
+    uvicorn's own end of one without pongs waits until everything is written, which is never.
+    """
+
+    def __init__(self, *arguments: Any, limits: LimitSettings, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._limits = limits
+        self._patience: Patience | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Take part."""
+        super().connection_made(transport)
+        self._patience = Patience(self.transport, limit_s=self._limits.stalled_s, loop=self.loop)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the timer."""
+        if self._patience is not None:
+            self._patience.end()
+        super().connection_lost(exc)
+
+    def pause_writing(self) -> None:
+        """Start to lose patience with a client that does not read."""
+        super().pause_writing()
+        if self._patience is not None:
+            self._patience.begin()
+
+    def resume_writing(self) -> None:
+        """Find it again."""
+        if self._patience is not None:
+            self._patience.end()
+        super().resume_writing()
 
 
 def _bytes(response: Response) -> bytes:

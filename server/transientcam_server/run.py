@@ -14,7 +14,7 @@ from fastapi import FastAPI
 from transientcam.wire import MAX_CLIENT_MESSAGE_BYTES
 from transientcam_server import logs
 from transientcam_server.announcement import announced
-from transientcam_server.connections import BoundedConnection
+from transientcam_server.connections import BoundedConnection, BoundedStream
 from transientcam_server.errors import AddressUnavailable
 from transientcam_server.service import Service
 from transientcam_server.settings import Settings
@@ -88,7 +88,7 @@ class Server(uvicorn.Server):
                 http=partial(BoundedConnection, limits=settings.limits),  # type: ignore[arg-type]
                 ssl_certfile=settings.tls_certificate,
                 ssl_keyfile=settings.tls_key,
-                ws="websockets-sansio",
+                ws=partial(BoundedStream, limits=settings.limits),  # type: ignore[arg-type]
                 ws_per_message_deflate=False,  # 17 ms a frame for a tenth of its size
                 ws_ping_interval=PING_S,
                 ws_ping_timeout=PING_S,

@@ -146,6 +146,8 @@ class LimitSettings(_Group):
     """Time for the head of a request to arrive."""
     body_s: _Finite = Field(default=30.0, gt=0.0, le=3600.0)
     """Time for its body."""
+    stalled_s: _Finite = Field(default=20.0, gt=0.0, le=3600.0)
+    """Time for a client to take anything of what waits for it; then its connection is cut."""
     head_bytes: int = Field(default=128 * 1024, ge=1024, le=16 * 1024 * 1024)
     """Length of request line and headers; the line alone may have 64 KiB whatever this says."""
 

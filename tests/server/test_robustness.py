@@ -262,3 +262,20 @@ def test_a_failing_report_of_a_frame_does_not_end_the_acquisition(served: Served
     frames = acquisition.status().frames
 
     wait_until(lambda: acquisition.status().frames > frames)
+
+
+def test_a_viewer_that_is_stuck_is_gone_after_a_while_and_everybody_else_stays() -> None:
+    from tests.serving import serving
+
+    with serving("sim:mirrors?noise=off", limits={"stalled_s": 0.2}) as daemon:
+        hub = daemon.service.hub
+        with (
+            streaming(daemon.stream_url) as healthy,
+            never_reading(daemon.stream_url, "raw", "coefficients"),
+        ):
+            healthy.subscribe("flags")
+            wait_until(lambda: len(hub.subscribers) == 2)
+            wait_until(lambda: hub.clients == 1)
+            numbers = [healthy.frame().meta["frame"] for _ in range(5)]
+
+    assert numbers == list(range(numbers[0], numbers[0] + 5))
