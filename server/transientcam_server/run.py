@@ -1,5 +1,6 @@
 """The service as a process: its socket, its server, its signals."""
 
+import os
 import signal
 import socket
 import threading
@@ -17,6 +18,7 @@ from transientcam_server.announcement import announced
 from transientcam_server.connections import BoundedConnection, BoundedStream
 from transientcam_server.errors import AddressUnavailable
 from transientcam_server.service import Service
+from transientcam_server.service_manager import ServiceManager, supervised
 from transientcam_server.settings import Settings
 
 USER_TIMEOUT_MS: Final = 20_000
@@ -114,6 +116,8 @@ class Server(uvicorn.Server):
             capabilities = self._service.camera.capabilities
             announcement = announced(self._settings, capabilities, port=port)
             await self._around.enter_async_context(announcement)
+            manager = ServiceManager.of(os.environ)
+            await self._around.enter_async_context(supervised(self._service.acquisition, manager))
         if self.started:
             self._on_listening()
 
