@@ -24,7 +24,7 @@ class ReconstructionSettings(_Group):
 
     smoothing_px: _Finite = Field(default=_DEFAULTS.smoothing_sigma_px, ge=0.0, le=10.0)
     """Standard deviation of the Gaussian that smooths the moments, in pixels; 0 for none."""
-    bias: _Finite = Field(default=_DEFAULTS.epsilon, gt=0.0, lt=1.0)
+    bias: _Finite = Field(default=_DEFAULTS.epsilon, ge=1e-6, le=0.99)
     """Smallest eigenvalue every pixel's moments are raised to, over its brightness (Sec. 4.3)."""
     return_threshold: _Finite = Field(default=_DEFAULTS.threshold, ge=0.0, le=1.0)
     """Weight from which a return counts as the first, over the pixel's strongest return."""

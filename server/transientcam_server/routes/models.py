@@ -64,7 +64,9 @@ class SubPhasesDocument(Document):
     """How one exposure is divided between phases (Sec. 4.1)."""
 
     scheme: Literal["arccos", "harmonic-cancellation", "none"] = "arccos"
+    """How its parts are chosen; `none` has one."""
     n: int = Field(default=8, ge=1, le=255)
+    """How many parts."""
 
 
 class SequenceDocument(Document):
@@ -265,6 +267,7 @@ class AcquisitionRequest(Document):
     )
 
     running: bool
+    """Whether frames are captured; the light is off while they are not."""
 
 
 class PixelCountsDocument(Document):

@@ -86,6 +86,15 @@ class RecordingDocument(Document):
     """When it ends by itself; null once it has ended."""
 
 
+class RecordingLimitsDocument(Document):
+    """When recordings end by themselves, whatever was asked for; null without such a limit."""
+
+    max_duration_s: float | None = None
+    max_bytes: int | None = None
+    min_free_bytes: int
+    """What the disk keeps."""
+
+
 class RecordingsDocument(Document):
     """All recordings, the newest first."""
 
@@ -96,6 +105,11 @@ class RecordingsDocument(Document):
                     "directory": "/var/lib/transientcam/recordings",
                     "free_bytes": 214748364800,
                     "active": None,
+                    "limits": {
+                        "max_duration_s": None,
+                        "max_bytes": None,
+                        "min_free_bytes": 1073741824,
+                    },
                     "recordings": [RECORDING_EXAMPLE],
                 }
             ]
@@ -108,6 +122,7 @@ class RecordingsDocument(Document):
     """What its disk has left; null before the first recording made the directory."""
     active: str | None = None
     """The one that runs."""
+    limits: RecordingLimitsDocument
     recordings: list[RecordingDocument]
 
 

@@ -15,6 +15,7 @@ from transientcam_server.routes import files
 from transientcam_server.routes.recording_models import (
     RecordingChange,
     RecordingDocument,
+    RecordingLimitsDocument,
     RecordingRequest,
     RecordingsDocument,
     document,
@@ -44,6 +45,11 @@ async def read_recordings(service: ServiceOf) -> RecordingsDocument:
         directory=str(library.directory),
         free_bytes=await asyncio.to_thread(library.free_bytes),
         active=library.active_id,
+        limits=RecordingLimitsDocument(
+            **service.settings.recordings.model_dump(
+                include=set(RecordingLimitsDocument.model_fields)
+            )
+        ),
         recordings=[document(each) for each in described],
     )
 

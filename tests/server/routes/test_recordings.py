@@ -90,6 +90,7 @@ def test_nothing_is_made_on_the_disk_before_the_first_recording(
 
     assert document == {
         "directory": str(directory),
+        "limits": {"max_duration_s": None, "max_bytes": None, "min_free_bytes": 0},
         "free_bytes": None,
         "active": None,
         "recordings": [],
