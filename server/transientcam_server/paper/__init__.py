@@ -5,13 +5,37 @@ One file a figure; all have the shape of `PaperFigure`.
 
 from typing import Final
 
-from transientcam_server.paper import figure02, figure03, figure05, figure06, figure07, figure08
+from transientcam_server.paper import (
+    figure02,
+    figure03,
+    figure05,
+    figure06,
+    figure07,
+    figure08,
+    figure09,
+    figure10,
+    figure13,
+    figure14,
+    figure15,
+)
 from transientcam_server.paper.bench import Bench
 from transientcam_server.paper.figure import Made, PaperFigure, Statement, Table
 
 FIGURES: Final[dict[int, PaperFigure]] = {
     module.FIGURE.number: module.FIGURE
-    for module in (figure02, figure03, figure05, figure06, figure07, figure08)
+    for module in (
+        figure02,
+        figure03,
+        figure05,
+        figure06,
+        figure07,
+        figure08,
+        figure09,
+        figure10,
+        figure13,
+        figure14,
+        figure15,
+    )
 }
 """Every figure by its number."""
 

@@ -74,7 +74,7 @@ class Bench:
         self.seed = seed
         self.quick = quick
         self.waveform = waveform
-        self._calibrations: dict[Sequence, Calibration] = {}
+        self._calibrations: dict[tuple[Any, ...], Calibration] = {}
         self._shots: dict[tuple[Any, ...], list[Shot]] = {}
 
     def few(self, full: int, quick: int) -> int:
@@ -126,17 +126,17 @@ class Bench:
             camera.stop()
         return images, applied
 
-    def calibration(self, sequence: Sequence) -> Calibration:
+    def calibration(self, sequence: Sequence, **options: str) -> Calibration:
         """Return the calibration of a sequence: filter and diffusor before the lens (Fig. 4)."""
-        single = replace(sequence, takes=1)
-        if single not in self._calibrations:
+        key = (replace(sequence, takes=1), *sorted(options.items()))
+        if key not in self._calibrations:
             with ExitStack() as stack:
-                camera = self._camera(stack, "calibration", {}, 0.0)
-                camera.configure(single)
+                camera = self._camera(stack, "calibration", options, 0.0)
+                camera.configure(key[0])
                 takes = self.few(_CALIBRATION_TAKES, _QUICK_CALIBRATION_TAKES)
                 capture = capture_calibration(camera, takes=takes, average=tm.average_takes)
-            self._calibrations[single] = evaluate(capture)
-        return self._calibrations[single]
+            self._calibrations[key] = evaluate(capture)
+        return self._calibrations[key]
 
     def _captured(
         self,
@@ -146,7 +146,7 @@ class Bench:
         at_s: float,
         options: Mapping[str, str],
     ) -> list[Shot]:
-        calibration = self.calibration(sequence)
+        calibration = self.calibration(sequence, **options)
         shots = []
         with ExitStack() as stack:
             camera = self._camera(stack, scene, options, at_s)

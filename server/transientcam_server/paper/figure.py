@@ -77,7 +77,7 @@ def check(
     """
     value = float(value)
     limits = []
-    passes = value == value  # noqa: PLR0124 - no number is outside of any limits
+    passes = value == value
     if at_least is not None:
         limits.append(f"at least {form.format(at_least)}")
         passes = passes and value >= at_least

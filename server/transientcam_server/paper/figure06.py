@@ -53,7 +53,8 @@ def _ranked_truth(shot: Shot) -> tuple[_Array, _Array]:
 
 
 def _errors(shot: Shot, k: int) -> tuple[_Array, _Array]:
-    """Return the errors (H, W) of time in s and of strength, of the return nearest the true k-th."""
+    """Return the errors (H, W) of time in s and of strength, of the return nearest the true "
+    "k-th."""
     delay_s, true_weight = _ranked_truth(shot)
     time_s, weight = _strongest(shot)
     apart = np.where(np.isfinite(time_s), np.abs(time_s - delay_s[k]), np.inf)
@@ -91,7 +92,8 @@ def _statements(
         check(
             "Fig. 6",
             "Phase noise increases as the strength of the return weakens.",
-            "deviation of the time between two captures, each rank over the stronger one, the least",
+            "deviation of the time between two captures, each rank over the stronger one, the "
+            "least",
             min(noise[1] / noise[0], noise[2] / noise[1]),
             at_least=1.0,
             form="{:.2f}",

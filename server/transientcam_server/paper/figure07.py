@@ -150,7 +150,7 @@ def _statements(
     truth = smoothed[0]
     begin, end = _must_peak(phase, lower, upper)
     slack = 1e-6  # of the density's wrapped tail
-    of_five = dict((m, greatest) for m, _, greatest in widths)[_M]
+    of_five = {m: greatest for m, _, greatest in widths}[_M]
     return [
         check(
             "Fig. 7",
@@ -199,7 +199,8 @@ def _statements(
         check(
             "Sec. 5.2",
             "We can give specific bounds on possible locations of local maxima.",
-            "width of the interval in which a maximum must be, around the highest lower bound, over "
+            "width of the interval in which a maximum must be, around the highest lower bound, "
+            "over "
             f"2 π / m (the true one, at {float(phase[truth.argmax()]):.2f} rad, is in "
             f"[{begin:.2f}, {end:.2f}])",
             (end - begin) / (2 * np.pi / _M),
