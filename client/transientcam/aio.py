@@ -1,7 +1,7 @@
 """The twins of `Camera` and `Stream` for asyncio."""
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Mapping, Sequence
 from contextlib import AsyncExitStack
 from pathlib import Path
 from types import TracebackType
@@ -13,10 +13,12 @@ from websockets.typing import Data
 
 from transientcam import rest
 from transientcam.address import parse_address
+from transientcam.calibrations import Calibrations
 from transientcam.connection import answer, http_options, request_options, stream_options
 from transientcam.deadline import Deadline
 from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamError
 from transientcam.frame import Frame
+from transientcam.jobs import PROGRESS_EVERY_S, WAIT_S, Jobs, OnProgress, ended
 from transientcam.lease import AsyncLease, OnLapse
 from transientcam.subscription import (
     DEFAULT_CREDITS,
@@ -88,6 +90,38 @@ class AsyncCamera:
     async def validate(self, settings: Mapping[str, Any]) -> dict[str, Any]:
         """Return what a sequence would really be set to, without setting it."""
         return await self._ask(rest.sequence(settings, only_validate=True))
+
+    async def reconstruction(self) -> dict[str, Any]:
+        """Return how frames are computed: smoothing, biasing, estimator and thresholds."""
+        return await self._ask(rest.document("reconstruction"))
+
+    async def set_reconstruction(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """Change how frames are computed, what is left out to its default."""
+        return await self._ask(rest.reconstruction(settings))
+
+    async def parameters(self) -> dict[str, Any]:
+        """Return everything that can be set, with its value, unit and limits."""
+        return await self._ask(rest.document("parameters"))
+
+    @property
+    def calibrations(self) -> Calibrations[Awaitable[dict[str, Any]], Awaitable[bytes]]:
+        """The calibrations that the daemon keeps: to measure, use, export and take in."""
+        return Calibrations(self._ask, self._ask)
+
+    @property
+    def jobs(self) -> Jobs[Awaitable[dict[str, Any]]]:
+        """Long work of the daemon: how far it is, and how to end it."""
+        return Jobs(self._ask)
+
+    async def wait_for(
+        self, job_id: str, *, on_progress: OnProgress | None = None
+    ) -> dict[str, Any]:
+        """Wait until a job is done or cancelled, and return its document."""
+        wait_s = WAIT_S if on_progress is None else PROGRESS_EVERY_S
+        while not ended(job := await self.jobs.get(job_id, wait_s=wait_s)):
+            if on_progress is not None:
+                on_progress(job)
+        return job
 
     async def acquisition(self) -> dict[str, Any]:
         """Return whether the camera captures, and how fast."""

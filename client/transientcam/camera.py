@@ -9,8 +9,10 @@ import httpx
 
 from transientcam import rest
 from transientcam.address import parse_address
+from transientcam.calibrations import Calibrations
 from transientcam.connection import answer, http_options, request_options
 from transientcam.frame import Frame
+from transientcam.jobs import PROGRESS_EVERY_S, WAIT_S, Jobs, OnProgress, ended
 from transientcam.lease import Lease, OnLapse
 from transientcam.stream import Stream
 from transientcam.subscription import (
@@ -103,6 +105,49 @@ class Camera:
     def validate(self, settings: Mapping[str, Any]) -> dict[str, Any]:
         """Return what a sequence would really be set to, without setting it."""
         return self._ask(rest.sequence(settings, only_validate=True))
+
+    @property
+    def reconstruction(self) -> dict[str, Any]:
+        """How frames are computed: smoothing, biasing, estimator and thresholds.
+
+        Assigning a mapping changes it from the next frame on, what is left out to its default.
+        """
+        return self._ask(rest.document("reconstruction"))
+
+    @reconstruction.setter
+    def reconstruction(self, settings: Mapping[str, Any]) -> None:
+        self._ask(rest.reconstruction(settings))
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Everything that can be set, in ``parameters``, with its value, unit and limits."""
+        return self._ask(rest.document("parameters"))
+
+    @property
+    def calibrations(self) -> Calibrations[dict[str, Any], bytes]:
+        """The calibrations that the daemon keeps: to measure, use, export and take in."""
+        return Calibrations(self._ask, self._ask)
+
+    @property
+    def jobs(self) -> Jobs[dict[str, Any]]:
+        """Long work of the daemon: how far it is, and how to end it."""
+        return Jobs(self._ask)
+
+    def wait_for(self, job_id: str, *, on_progress: OnProgress | None = None) -> dict[str, Any]:
+        """Wait until a job is done or cancelled, and return its document.
+
+        ``on_progress`` is called with the document meanwhile, twice a second.
+
+        Raises
+        ------
+        ProblemError
+            If the job failed.
+        """
+        wait_s = WAIT_S if on_progress is None else PROGRESS_EVERY_S
+        while not ended(job := self.jobs.get(job_id, wait_s=wait_s)):
+            if on_progress is not None:
+                on_progress(job)
+        return job
 
     @property
     def acquisition(self) -> dict[str, Any]:

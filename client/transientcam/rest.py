@@ -52,12 +52,14 @@ class Request(Generic[_T]):
     accept: str = _JSON
     patience_s: float = 0.0
     """How much longer than usual the server may take, because it was asked to wait."""
+    content_type: str = _JSON
+    """Of the body, where there is one."""
 
     @property
     def headers(self) -> dict[str, str]:
         """Headers that belong to this request."""
         accept = {"accept": f"{self.accept}, {PROBLEM_MEDIA_TYPE}"}
-        return accept if self.body is None else accept | {"content-type": _JSON}
+        return accept if self.body is None else accept | {"content-type": self.content_type}
 
     def result(self, answer: Answer) -> _T:
         """Return what the answer holds.
@@ -91,6 +93,30 @@ def document(
         None if body is None else _json_bytes(body),
         patience_s=patience_s,
     )
+
+
+def file(path: str, media_type: str) -> Request[bytes]:
+    """Build a request that is answered with a file."""
+    return Request("GET", path, lambda answer: _body(answer, media_type), accept=media_type)
+
+
+def upload(
+    path: str, content: bytes, *, media_type: str, patience_s: float
+) -> Request[dict[str, Any]]:
+    """Build a request that sends a file and is answered with a JSON object."""
+    return Request(
+        "POST",
+        path,
+        _read_document,
+        body=content,
+        patience_s=patience_s,
+        content_type=media_type,
+    )
+
+
+def reconstruction(settings: Mapping[str, Any]) -> Request[dict[str, Any]]:
+    """Build the request that changes how frames are computed."""
+    return document("reconstruction", method="PUT", body=settings)
 
 
 def sequence(

@@ -76,6 +76,41 @@ _CALLS: dict[
         lambda c: c.validate({"takes": 2}),
         ("POST", "sequence/validate", "", {"takes": 2}),
     ),
+    "reconstruction": (
+        lambda c: c.reconstruction,
+        lambda c: c.reconstruction(),
+        ("GET", "reconstruction", "", None),
+    ),
+    "parameters": (
+        lambda c: c.parameters,
+        lambda c: c.parameters(),
+        ("GET", "parameters", "", None),
+    ),
+    "measure": (
+        lambda c: c.calibrations.measure(name="warm", frames=5),
+        lambda c: c.calibrations.measure(name="warm", frames=5),
+        ("POST", "calibrations", "", {"name": "warm", "frames": 5, "activate": False}),
+    ),
+    "activate": (
+        lambda c: c.calibrations.activate("nominal"),
+        lambda c: c.calibrations.activate("nominal"),
+        ("PUT", "calibrations/active", "", {"id": "nominal"}),
+    ),
+    "calibration": (
+        lambda c: c.calibrations.get("SIM-1"),
+        lambda c: c.calibrations.get("SIM-1"),
+        ("GET", "calibrations/SIM-1", "", None),
+    ),
+    "job": (
+        lambda c: c.jobs.get("5a0c", wait_s=2.0),
+        lambda c: c.jobs.get("5a0c", wait_s=2.0),
+        ("GET", "jobs/5a0c", "wait_s=2.0", None),
+    ),
+    "cancel": (
+        lambda c: c.jobs.cancel("5a0c"),
+        lambda c: c.jobs.cancel("5a0c"),
+        ("DELETE", "jobs/5a0c", "", None),
+    ),
     "acquisition": (
         lambda c: c.acquisition,
         lambda c: c.acquisition(),
@@ -174,7 +209,7 @@ def _public(kind: type) -> set[str]:
 
 
 def test_the_twins_have_the_same_face() -> None:
-    assert _public(AsyncCamera) == _public(Camera) | {"set_sequence"}
+    assert _public(AsyncCamera) == _public(Camera) | {"set_sequence", "set_reconstruction"}
     assert _public(AsyncStream) == _public(Stream)
 
 

@@ -1,10 +1,12 @@
 """`transientcam calibrate`, through the command line of the client."""
 
 import json
+import threading
 from pathlib import Path
 
 import pytest
 
+from tests.serving import serving
 from transientcam.cli import run
 from transientcam_driver import CalibrationCapture
 
@@ -64,3 +66,60 @@ def test_what_cannot_be_done_is_said_and_nothing_written(
     assert run(["calibrate", *CAMERA, "-o", str(out), *arguments]) == code
     assert message in capfd.readouterr().err
     assert not out.exists()
+
+
+# -- where a daemon has the camera -----------------------------------------------------------------
+
+
+def test_a_daemon_measures_keeps_uses_and_exports_one(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "c.npz"
+    with serving("sim:calibration") as daemon:
+        arguments = ["--name", "warm", "--takes", "3", "--activate", "-o", str(out)]
+        assert run(["calibrate", daemon.url, *arguments]) == 0
+        active = daemon.service.calibrations.active_id
+
+    assert CalibrationCapture.load(out).id == active
+    said = capfd.readouterr().out
+    assert f"{active} (warm)" in said
+    assert "163 x 120 pixels of SIM-ideal-0" in said
+    assert "in use" in said
+
+
+def test_what_a_daemon_measured_is_printed_as_json(capfd: pytest.CaptureFixture[str]) -> None:
+    with serving("sim:calibration") as daemon:
+        assert run(["calibrate", daemon.url, "--takes", "2", "--json"]) == 0
+
+    result = json.loads(capfd.readouterr().out)
+    assert result["measured"]["calibration"] == result["calibration"]["id"]
+    assert result["file"] is None
+    assert not result["calibration"]["active"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "hint"),
+    [
+        (["http://127.0.0.1:1", "--camera", "usb"], "--camera"),
+        (["http://127.0.0.1:1", "--sequence", "{}"], "--sequence"),
+        (["--activate", "-o", "c.npz"], "--activate"),
+        (["--name", "warm", "-o", "c.npz"], "--name"),
+        (["--camera", "sim:calibration"], "--output"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(
+    capfd: pytest.CaptureFixture[str], arguments: list[str], hint: str
+) -> None:
+    assert run(["calibrate", *arguments]) == 2
+    assert hint in capfd.readouterr().err
+
+
+def test_a_daemon_that_cannot_measure_says_why(capfd: pytest.CaptureFixture[str]) -> None:
+    with serving("sim:calibration") as daemon:
+        end = threading.Event()
+        daemon.service.acquisition.occupy("another", lambda camera, go_on: end.wait())
+        code = run(["calibrate", daemon.url])
+        end.set()
+
+    assert code == 1
+    assert "another has the camera" in capfd.readouterr().err
