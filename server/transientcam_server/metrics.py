@@ -115,6 +115,7 @@ class _ServiceCollector(Collector):
         yield from self._build()
         yield from self._device()
         yield from self._frames()
+        yield from self._history()
         yield from self._clients()
 
     def _build(self) -> Iterator[Metric]:
@@ -195,9 +196,28 @@ class _ServiceCollector(Collector):
                 shares.add_metric((flag,), count / pixels["total"])
         yield shares
 
+    def _history(self) -> Iterator[Metric]:
+        history = self._service.history
+        yield GaugeMetricFamily(
+            "transientcam_history_frames", "Former frames that can still be had.", history.count
+        )
+        yield GaugeMetricFamily(
+            "transientcam_history_bytes", "Memory of their raw images.", history.size_bytes
+        )
+        yield GaugeMetricFamily(
+            "transientcam_history_limit_bytes",
+            "What it may be at most.",
+            history.settings.max_bytes,
+        )
+
     def _clients(self) -> Iterator[Metric]:
         hub = self._service.hub
         yield GaugeMetricFamily("transientcam_stream_clients", "Streams open now.", hub.clients)
+        yield GaugeMetricFamily(
+            "transientcam_preview_clients",
+            "Clients that are shown a film now.",
+            self._service.previews,
+        )
         yield CounterMetricFamily(
             "transientcam_frames_dropped",
             "Frames that clients were too slow for, of all clients together.",

@@ -16,7 +16,13 @@ from transientcam_server.problems import problem_of, problem_response
 _log = logging.getLogger(__name__)
 REQUEST_ID_HEADER: Final = "X-Request-ID"
 _ACCEPTED: Final = re.compile(r"[A-Za-z0-9._:+/=-]{1,128}")
+_HEAD: Final = "transientcam.head"
 _READS: Final = frozenset(("GET", "HEAD", "OPTIONS"))
+
+
+def asks_for_head(scope: Scope) -> bool:
+    """Whether a request that is answered as GET is HEAD; what never ends has to know."""
+    return bool(scope.get(_HEAD))
 
 
 class Requests:
@@ -58,7 +64,7 @@ class Requests:
                 message = {**message, "body": b""}
             await send(message)
 
-        inner = {**scope, "method": "GET"} if head else scope
+        inner = {**scope, "method": "GET", _HEAD: True} if head else scope
         try:
             await self._app(inner, receive, watched)
         except Exception as error:

@@ -66,6 +66,8 @@ class Service:
     ----------
     applied
         The sequence that frames are captured with from now on.
+    previews
+        How many clients are shown a film.
     """
 
     def __init__(self, camera: Camera, settings: Settings) -> None:
@@ -73,6 +75,7 @@ class Service:
         self.settings = settings
         self.hub = Hub()
         self.history = History(settings.history)
+        self.previews = 0
         self.guard = Guard(settings)
         self._executor = ThreadPoolExecutor(settings.workers, thread_name_prefix="worker")
         self.accuracy = Accuracy(camera, settings.reconstruction, settings.sensor)

@@ -51,6 +51,20 @@ def test_frames_clients_and_latency_are_counted(served: Served, http: httpx.Clie
     assert samples["transientcam_http_requests_total{status=5xx}"] == 0
 
 
+def test_the_memory_of_former_frames_is_told_with_its_limit(
+    served: Served, http: httpx.Client
+) -> None:
+    http.get("/api/v1/frames/3", params={"wait_s": 10.0})
+    http.put("/api/v1/acquisition", json={"running": False})
+
+    samples, frames = scrape(http), http.get("/api/v1/frames").json()
+
+    assert samples["transientcam_history_frames"] == frames["count"] >= 3
+    assert samples["transientcam_history_bytes"] == frames["bytes"]
+    assert samples["transientcam_history_limit_bytes"] == 256 * 1024**2
+    assert samples["transientcam_preview_clients"] == 0
+
+
 def test_intervals_are_those_of_the_camera_s_clock_within_one_sequence(served: Served) -> None:
     metrics = Metrics(served.service)
     for epoch, time_s in ((1, 0.0), (1, 0.1), (1, 0.3), (2, 9.0), (2, 9.25)):
