@@ -1,11 +1,18 @@
 /** The REST side of the service: requests, and problems in plain words. */
 import type { AppliedSequence, CameraDocument, PixelDocument, Plan, Problem, SequenceDocument, Tradeoff } from "../stream/protocol";
+import { frameUrl } from "../stream/frameUrl";
 import { Credentials } from "./credentials";
 import type {
   AcquisitionDocument,
+  CalibrationDocument,
+  CalibrationRequest,
+  CalibrationsDocument,
   GrantedLease,
+  JobDocument,
   LeaseDocument,
   LeaseRequest,
+  ParameterDocument,
+  ReconstructionDocument,
   RecordingDocument,
   RecordingRequest,
   RecordingsDocument,
@@ -44,6 +51,12 @@ interface Details {
   /** Goes out even if the page is closed meanwhile. */
   readonly keepalive?: boolean;
   readonly headers?: Readonly<Record<string, string>>;
+}
+
+/** What was read, and the tag of its version, to change just this one. */
+export interface Tagged<T> {
+  readonly document: T;
+  readonly tag: string | null;
 }
 
 /** Where frames of a recording are, beside those of the camera. */
@@ -89,7 +102,7 @@ export class Api {
 
   /** Everything about one pixel of a frame but its curves, which the page computes itself. */
   pixel(x: number, y: number, frame: string = LIVE): Promise<PixelDocument> {
-    return this.#json("GET", `${frame}/pixel?x=${x}&y=${y}&bins=1`) as Promise<PixelDocument>;
+    return this.#json("GET", frameUrl(frame, `pixel?x=${x}&y=${y}&bins=1`)) as Promise<PixelDocument>;
   }
 
   // -- the sequence ------------------------------------------------------------------------------
@@ -161,6 +174,65 @@ export class Api {
     return this.#json("DELETE", recordingPath(id)) as Promise<RecordingDocument>;
   }
 
+  // -- reconstruction and parameters -------------------------------------------------------------
+
+  /** How frames are computed, with the tag of this version. */
+  async reconstruction(): Promise<Tagged<ReconstructionDocument>> {
+    const answer = await this.#ask("GET", "/reconstruction", {});
+    await this.#refuse(answer);
+    return { document: (await answer.json()) as ReconstructionDocument, tag: answer.headers.get("ETag") };
+  }
+
+  /** Changes how frames are computed, unless somebody else has since the version with `tag`. */
+  setReconstruction(settings: Readonly<Record<string, unknown>>, tag: string | null): Promise<ReconstructionDocument> {
+    const headers = tag === null ? {} : { "If-Match": tag };
+    return this.#json("PUT", "/reconstruction", { body: settings, headers }) as Promise<ReconstructionDocument>;
+  }
+
+  /** What can be set in the document at a path, and within which limits; by its name in that document. */
+  async parameters(path: string): Promise<ParameterDocument[]> {
+    const { parameters } = (await this.#json("GET", "/parameters")) as { parameters: ParameterDocument[] };
+    const ours = parameters.filter(({ resource, access }) => resource === `/api/v1${path}` && access === "read-write");
+    return ours.map((parameter) => ({ ...parameter, name: parameter.pointer.slice(1) }));
+  }
+
+  // -- calibrations ------------------------------------------------------------------------------
+
+  calibrations(): Promise<CalibrationsDocument> {
+    return this.#json("GET", "/calibrations") as Promise<CalibrationsDocument>;
+  }
+
+  /** Starts measuring a calibration; the job says how far it is. */
+  measureCalibration(wanted: CalibrationRequest): Promise<JobDocument> {
+    return this.#json("POST", "/calibrations", { body: wanted }) as Promise<JobDocument>;
+  }
+
+  activateCalibration(id: string): Promise<unknown> {
+    return this.#json("PUT", "/calibrations/active", { body: { id } });
+  }
+
+  importCalibration(file: Blob): Promise<CalibrationDocument> {
+    return this.#json("POST", "/calibrations/import", { body: file }) as Promise<CalibrationDocument>;
+  }
+
+  deleteCalibration(id: string): Promise<CalibrationDocument> {
+    return this.#json("DELETE", calibrationPath(id)) as Promise<CalibrationDocument>;
+  }
+
+  // -- jobs --------------------------------------------------------------------------------------
+
+  async jobs(): Promise<readonly JobDocument[]> {
+    return ((await this.#json("GET", "/jobs")) as { jobs: readonly JobDocument[] }).jobs;
+  }
+
+  job(id: string): Promise<JobDocument> {
+    return this.#json("GET", `/jobs/${encodeURIComponent(id)}`) as Promise<JobDocument>;
+  }
+
+  cancelJob(id: string): Promise<JobDocument> {
+    return this.#json("DELETE", `/jobs/${encodeURIComponent(id)}`) as Promise<JobDocument>;
+  }
+
   // -- files -------------------------------------------------------------------------------------
 
   /** A file of the service, as the browser keeps large ones: not in memory. */
@@ -209,6 +281,10 @@ export class Api {
     this.onRefusal?.(problem);
     throw new RequestError(problem);
   }
+}
+
+export function calibrationPath(id: string): string {
+  return `/calibrations/${encodeURIComponent(id)}`;
 }
 
 export function recordingPath(id: string): string {

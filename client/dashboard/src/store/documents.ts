@@ -1,5 +1,5 @@
 /** Documents of the service's REST side, as far as the page reads them; frames and sequences are in the protocol. */
-import type { AppliedSequence, CameraState } from "../stream/protocol";
+import type { AppliedSequence, CameraState, Problem } from "../stream/protocol";
 
 export interface AcquisitionDocument {
   readonly running: boolean;
@@ -68,11 +68,81 @@ export interface RecordingRequest {
 
 /** Which frames a recording holds, and when they were captured. */
 export interface TimelineDocument {
-  readonly first: number;
-  readonly last: number;
+  /** Null before there is any. */
+  readonly first: number | null;
+  readonly last: number | null;
   readonly count: number;
   readonly duration_s: number;
-  readonly frame_rate_hz?: number | null;
-  /** Since the first frame. */
-  readonly times_s?: readonly number[];
+  /** Of every `times_step`-th frame, after the first. */
+  readonly times_s: readonly number[];
+  readonly times_step: number;
+  /** Unix time of the first. */
+  readonly host_time_s: number | null;
+}
+
+/** How frames are computed: settings by their names, and the number that frames carry. */
+export interface ReconstructionDocument {
+  readonly reconstruction_id: number;
+  readonly [name: string]: unknown;
+}
+
+/** Something that can be set, and within which limits. */
+export interface ParameterDocument {
+  readonly name: string;
+  /** The document that it stands in, and where. */
+  readonly resource: string;
+  readonly pointer: string;
+  readonly value: unknown;
+  readonly type: "number" | "integer" | "boolean" | "string";
+  readonly unit: string | null;
+  readonly min: number | null;
+  readonly max: number | null;
+  readonly allowed: readonly (string | number)[] | null;
+  readonly access: "read-write" | "read-only";
+  readonly description: string;
+}
+
+/** A calibration, and whether it is good for what is captured at present. */
+export interface CalibrationDocument {
+  readonly id: string;
+  readonly name: string;
+  readonly created_at: number;
+  readonly age_s: number;
+  readonly device: { readonly model: string; readonly serial: string; readonly width: number; readonly height: number };
+  readonly sequence: Readonly<Record<string, unknown>>;
+  readonly exposure_s: number;
+  readonly temperature_c: number;
+  readonly bytes: number;
+  readonly fits: boolean;
+  /** Why not. */
+  readonly reason: string | null;
+  readonly active: boolean;
+  /** Shares of pixels that contradict themselves: now, and when it was measured. */
+  readonly drift: { readonly invalid_share: number; readonly invalid_share_at_capture: number | null; readonly frame: number } | null;
+}
+
+export interface CalibrationsDocument {
+  /** "nominal" for the gains of an ideal modulation. */
+  readonly active: string;
+  readonly directory: string;
+  /** The newest first. */
+  readonly calibrations: readonly CalibrationDocument[];
+}
+
+export interface CalibrationRequest {
+  readonly name: string;
+  readonly frames: number;
+  readonly activate: boolean;
+}
+
+/** Long work, and where it stands. */
+export interface JobDocument {
+  readonly id: string;
+  readonly kind: string;
+  readonly state: "queued" | "running" | "done" | "failed" | "cancelled";
+  /** From 0 to 1. */
+  readonly progress: number;
+  readonly step: string;
+  readonly result: Readonly<Record<string, unknown>> | null;
+  readonly problem: Problem | null;
 }

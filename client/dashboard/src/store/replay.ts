@@ -10,6 +10,20 @@ import type { Status } from "./status";
 /** Brings products of the frame at a path of the service; raises RequestError. */
 export type FrameLoader = (path: string, products: readonly string[]) => Promise<readonly FrameReport[]>;
 
+/** A recording's frames by number, and when each was captured after the first. */
+export interface Timeline {
+  readonly first: number;
+  readonly last: number;
+  readonly count: number;
+  readonly started_s: number | null;
+  /** Of every `step`-th frame. */
+  readonly times_s: readonly number[];
+  readonly step: number;
+}
+
+/** Which settings a recorded frame is computed with: those it was recorded with, or those the service has now. */
+export type ReplaySettings = "recorded" | "current";
+
 /** Recorded seconds that pass in a second of watching. */
 export const REPLAY_SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4] as const;
 
@@ -19,13 +33,14 @@ const GROWS_MS = 2000;
 export class Replay {
   /** The recording that is shown; null while the camera is. */
   readonly recording = signal<RecordingDocument | null>(null);
-  readonly timeline = signal<TimelineDocument | null>(null);
+  readonly timeline = signal<Timeline | null>(null);
   /** The frame that is wanted, by its number in the recording. */
   readonly frame = signal(0);
   /** The frame that is on screen; null before the first. */
   readonly shown = signal<number | null>(null);
   readonly playing = signal(false);
   readonly speed = signal<number>(1);
+  readonly settings = signal<ReplaySettings>("recorded");
   readonly trouble = signal<string | null>(null);
   readonly active = computed(() => this.recording.value !== null);
   /** Set by what talks to the worker. */
@@ -45,15 +60,16 @@ export class Replay {
     this.#status = status;
     effect(() => {
       if (this.recording.value === null || this.timeline.value === null) return;
-      void [this.frame.value, this.#frames.wanted.value];
+      void [this.frame.value, this.settings.value, this.#frames.wanted.value];
       untracked(() => void this.#load());
     });
   }
 
   /** Shows a recording from a frame on, by default its first. Raises RequestError. */
   async open(id: string, frame?: number): Promise<void> {
-    const [recording, timeline] = await Promise.all([this.#api.recording(id), this.#api.timeline(id)]);
-    if (timeline.count === 0) throw new RequestError({ detail: `${recording.name} holds no frames.` });
+    const [recording, document] = await Promise.all([this.#api.recording(id), this.#api.timeline(id)]);
+    const timeline = timelineOf(document);
+    if (timeline === null) throw new RequestError({ detail: `${recording.name} holds no frames.` });
     batch(() => {
       this.trouble.value = null;
       this.playing.value = false;
@@ -84,8 +100,16 @@ export class Replay {
   timeOf(frame: number): number {
     const timeline = this.timeline.peek();
     if (timeline === null) return 0;
-    const at = frame - timeline.first;
-    return timeline.times_s?.[at] ?? at * secondsPerFrame(timeline);
+    const place = (frame - timeline.first) / timeline.step;
+    const [before, after] = [timeline.times_s[Math.floor(place)], timeline.times_s[Math.floor(place) + 1]];
+    return after === undefined ? (before ?? timeline.times_s.at(-1) ?? 0) : before + (place % 1) * (after - before);
+  }
+
+  /** The settings of the reconstruction changed: frames that are computed with the present ones look otherwise. */
+  recompute(): void {
+    if (this.settings.peek() !== "current") return;
+    this.#loaded = null;
+    void this.#load();
   }
 
   seek(frame: number): void {
@@ -126,7 +150,7 @@ export class Replay {
     const products = this.#frames.wanted.peek();
     if (recording === null || this.loader === null || this.#loading || products.length === 0) return;
     const frame = this.frame.peek();
-    const path = `${recordingPath(recording.id)}/frames/${frame}`;
+    const path = `${recordingPath(recording.id)}/frames/${frame}${this.settings.peek() === "current" ? "?reconstruction=current" : ""}`;
     const wanted = { path, products: products.join() };
     if (this.#loaded?.path === wanted.path && this.#loaded.products === wanted.products) return;
     this.#loading = true;
@@ -167,7 +191,8 @@ export class Replay {
     const id = this.recording.peek()?.id;
     if (id === undefined) return;
     try {
-      const [recording, timeline] = await Promise.all([this.#api.recording(id), this.#api.timeline(id)]);
+      const [recording, document] = await Promise.all([this.#api.recording(id), this.#api.timeline(id)]);
+      const timeline = timelineOf(document) ?? this.timeline.peek();
       if (this.recording.peek()?.id !== id) return;
       batch(() => {
         this.recording.value = recording;
@@ -180,7 +205,6 @@ export class Replay {
   }
 }
 
-function secondsPerFrame({ count, duration_s, frame_rate_hz }: TimelineDocument): number {
-  if (frame_rate_hz) return 1 / frame_rate_hz;
-  return count > 1 ? duration_s / (count - 1) : 0;
+function timelineOf({ first, last, count, host_time_s, times_s, times_step }: TimelineDocument): Timeline | null {
+  return first === null || last === null ? null : { first, last, count, started_s: host_time_s, times_s, step: times_step };
 }

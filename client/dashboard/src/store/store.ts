@@ -4,6 +4,7 @@ import { useContext } from "preact/hooks";
 
 import type { AppliedSequence, CameraDocument } from "../stream/protocol";
 import { Api, kindOf } from "./api";
+import { Calibrations } from "./calibrations";
 import { Credentials } from "./credentials";
 import { Events } from "./events";
 import { Frames } from "./frames";
@@ -13,6 +14,7 @@ import { browserShelf, oneOf, remembered, sessionShelf, type Shelf } from "./set
 import { isLayout, OVERVIEW, type Layout } from "../views/layout";
 import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
+import { Reconstruction } from "./reconstruction";
 import { Recordings } from "./recordings";
 import { Replay } from "./replay";
 import { Status } from "./status";
@@ -33,6 +35,8 @@ export class Store {
   /** Who controls the camera. */
   readonly lease: Lease;
   readonly recordings: Recordings;
+  readonly reconstruction: Reconstruction;
+  readonly calibrations: Calibrations;
   /** A recording in the place of the camera. */
   readonly replay: Replay;
   /** What happened. */
@@ -75,6 +79,8 @@ export class Store {
     this.shelf = shelf;
     this.lease = new Lease(api);
     this.recordings = new Recordings(api);
+    this.reconstruction = new Reconstruction(api);
+    this.calibrations = new Calibrations(api);
     this.replay = new Replay(api, this.frames, this.status);
     api.onRefusal = (problem) => {
       this.lease.refused(kindOf(problem));

@@ -180,9 +180,18 @@ export class StreamClient {
         break;
       case "sequence-changed":
         this.#takeSequence(notice.sequence);
+        // A calibration is good for some sequences only.
+        if (this.#store.calibrations.document.peek() !== null) void this.#store.calibrations.refresh();
         break;
       case "lease-changed":
         void this.#store.lease.look();
+        break;
+      case "reconstruction-changed":
+        this.#store.replay.recompute();
+        if (this.#store.reconstruction.current.peek() !== null) void this.#store.reconstruction.refresh();
+        break;
+      case "calibration-changed":
+        if (this.#store.calibrations.document.peek() !== null) void this.#store.calibrations.refresh();
         break;
       case "recording-started":
       case "recording-stopped":

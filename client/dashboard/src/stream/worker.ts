@@ -1,4 +1,5 @@
 /** The worker: owns the socket, decodes, summarises, and hands buffers to the page without copying. */
+import { frameUrl } from "./frameUrl";
 import { StreamConnection, type ConnectionEvent } from "./connection";
 import { type CameraDocument, decodeMessage, type Problem, ProtocolError } from "./protocol";
 import { type FrameReport, summarised } from "./summary";
@@ -54,7 +55,7 @@ async function askForCamera(): Promise<CameraDocument> {
 /** One product of a frame by REST, or why it cannot be had. */
 async function fetchProduct(path: string, product: string): Promise<FrameReport | Problem> {
   try {
-    const answer = await fetch(`${path}/${product}.msgpack`, { headers: authorization() });
+    const answer = await fetch(frameUrl(path, `${product}.msgpack`), { headers: authorization() });
     if (!answer.ok) {
       const problem: Problem = { title: `The service answered ${answer.status} ${answer.statusText}.`, status: answer.status };
       return { ...problem, ...((await answer.json().catch(() => ({}))) as Problem) };

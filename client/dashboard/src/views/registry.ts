@@ -1,8 +1,11 @@
 import type { ComponentType } from "preact";
 
 import { AccuracyView } from "./accuracy/AccuracyView";
+import { CalibrationView } from "./calibration/CalibrationView";
+import { EventsView } from "./events/EventsView";
 import { MapView } from "./map/MapView";
 import { PointsView } from "./points/PointsView";
+import { ReconstructionView } from "./reconstruction/ReconstructionView";
 import { RecordingsView } from "./recordings/RecordingsView";
 import { ResponseView } from "./response/ResponseView";
 import { SequenceView } from "./sequence/SequenceView";
@@ -25,4 +28,7 @@ export const VIEWS: readonly { readonly name: ViewName; readonly title: string; 
   { name: "sequence", title: "Sequence", view: SequenceView },
   { name: "accuracy", title: "Accuracy against time", view: AccuracyView },
   { name: "recordings", title: "Recordings", view: RecordingsView },
+  { name: "reconstruction", title: "Reconstruction", view: ReconstructionView },
+  { name: "calibration", title: "Calibration", view: CalibrationView },
+  { name: "events", title: "What happened", view: EventsView },
 ];

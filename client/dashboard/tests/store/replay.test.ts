@@ -24,7 +24,7 @@ class Screen {
   readonly replay = new Replay(
     {
       recording: (id: string) => Promise.resolve({ id, name: "corner", state: "complete" }),
-      timeline: (id: string) => Promise.resolve({ first: 1, last: id === "empty" ? 0 : 6, count: id === "empty" ? 0 : 6, duration_s: 1.5, times_s: TIMES }),
+      timeline: (id: string) => Promise.resolve(id === "empty" ? { first: null, last: null, count: 0, times_s: [], times_step: 1 } : { first: 1, last: 6, count: 6, duration_s: 1.5, host_time_s: 5, times_s: TIMES, times_step: 1 }),
     } as unknown as Api,
     this.frames,
     this.status,
@@ -121,6 +121,22 @@ describe("a recording on the page", () => {
     screen.replay.step(1);
     await screen.answer();
     expect([screen.shown, screen.replay.trouble.value]).toEqual([2, null]);
+  });
+
+  test("is computed anew with the present settings, whenever they change", async () => {
+    await screen.answer();
+    screen.replay.recompute(); // nothing to do with how it was recorded
+    expect(screen.asked).toHaveLength(1);
+    screen.replay.settings.value = "current";
+    expect(screen.asked.at(-1)).toContain("/frames/1?reconstruction=current range");
+    await screen.answer();
+    screen.replay.recompute();
+    expect(screen.asked).toHaveLength(3);
+  });
+
+  test("of very many frames tells the time of some, and the others lie between", () => {
+    screen.replay.timeline.value = { first: 1, last: 7, count: 7, started_s: 0, times_s: [0, 0.3, 0.9], step: 3 };
+    expect([1, 2, 4, 5, 6, 7].map((frame) => screen.replay.timeOf(frame))).toEqual([0, 0.1, 0.3, 0.5, 0.7, 0.9].map((time) => expect.closeTo(time, 9)));
   });
 
   test("is left at once: a frame that is on its way does not come any more", async () => {

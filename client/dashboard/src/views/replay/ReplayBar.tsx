@@ -1,7 +1,6 @@
 import { useEffect } from "preact/hooks";
 
-import type { TimelineDocument } from "../../store/documents";
-import { REPLAY_SPEEDS, type Replay } from "../../store/replay";
+import { REPLAY_SPEEDS, type Replay, type ReplaySettings, type Timeline } from "../../store/replay";
 import { useStore } from "../../store/store";
 import { Choice } from "../../ui/controls";
 import { fixed, grouped } from "../../ui/format";
@@ -20,7 +19,7 @@ export function ReplayBar() {
       <div class="replay-name">
         <strong title={recording.id}>{recording.name}</strong>
         <span class={replay.trouble.value === null ? "quiet" : "refusal"} role="status" data-field="replay-status">
-          {replay.trouble.value ?? <CapturedAt started_s={recording.started_s} replay={replay} />}
+          {replay.trouble.value ?? <CapturedAt started_s={timeline.started_s ?? recording.started_s} replay={replay} />}
         </span>
       </div>
       <div class="replay-controls">
@@ -34,6 +33,15 @@ export function ReplayBar() {
           <StepIcon />
         </button>
         <Choice label="Speed of the recording" value={replay.speed.value} options={REPLAY_SPEEDS.map((speed) => ({ value: speed, text: `${speed} ×` }))} onChange={(speed) => (replay.speed.value = speed)} />
+        <Choice
+          label="Computed with"
+          value={replay.settings.value}
+          options={[
+            { value: "recorded" as ReplaySettings, text: "recorded settings" },
+            { value: "current", text: "present settings" },
+          ]}
+          onChange={(settings) => (replay.settings.value = settings)}
+        />
       </div>
       <Scrubber replay={replay} timeline={timeline} />
       <button type="button" class="primary" onClick={() => { replay.leave(); }}>
@@ -44,7 +52,7 @@ export function ReplayBar() {
 } // prettier-ignore
 
 /** The recording from its first frame to its last; dragged, or moved by arrow keys. */
-function Scrubber({ replay, timeline }: { replay: Replay; timeline: TimelineDocument }) {
+function Scrubber({ replay, timeline }: { replay: Replay; timeline: Timeline }) {
   const frame = replay.frame.value;
   const { first, last, count } = timeline;
   const time_s = replay.timeOf(frame);

@@ -1,0 +1,116 @@
+import { signal } from "@preact/signals";
+
+import { type Api, plainWords, RequestError } from "./api";
+import type { CalibrationRequest, CalibrationsDocument, JobDocument } from "./documents";
+
+/** How often a measurement is asked how far it is. */
+const LOOK_S = 0.4;
+/** How often drift is looked at while the list is in sight. */
+const DRIFT_S = 15;
+
+const ENDED: readonly string[] = ["done", "failed", "cancelled"];
+
+/** The calibrations of the service, and the measurement of one. */
+export class Calibrations {
+  readonly document = signal<CalibrationsDocument | null>(null);
+  /** Why the list cannot be had; null if it can. */
+  readonly trouble = signal<string | null>(null);
+  /** The measurement that runs; null while none does. */
+  readonly job = signal<JobDocument | null>(null);
+  /** How the last measurement that this page followed ended, in words. */
+  readonly outcome = signal<{ readonly words: string; readonly good: boolean } | null>(null);
+  readonly #api: Api;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(api: Api) {
+    this.#api = api;
+  }
+
+  /** Keeps the list as it is at the service while it is looked at; the answer ends it. */
+  follow(): () => void {
+    void this.refresh();
+    void this.#findJob();
+    const timer = setInterval(() => void this.refresh(), 1000 * DRIFT_S);
+    return () => {
+      clearInterval(timer);
+    };
+  }
+
+  async refresh(): Promise<void> {
+    try {
+      this.document.value = await this.#api.calibrations();
+      this.trouble.value = null;
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error;
+      this.trouble.value = error.message;
+    }
+  }
+
+  async measure(wanted: CalibrationRequest): Promise<void> {
+    this.outcome.value = null;
+    this.#take(await this.#api.measureCalibration(wanted));
+  }
+
+  async cancel(): Promise<void> {
+    const job = this.job.peek();
+    if (job !== null) this.#take(await this.#api.cancelJob(job.id));
+  }
+
+  async activate(id: string): Promise<void> {
+    await this.#api.activateCalibration(id);
+    await this.refresh();
+  }
+
+  async take(file: Blob): Promise<void> {
+    await this.#api.importCalibration(file);
+    await this.refresh();
+  }
+
+  async remove(id: string): Promise<void> {
+    await this.#api.deleteCalibration(id);
+    await this.refresh();
+  }
+
+  /** Somebody else may have begun to measure. */
+  async #findJob(): Promise<void> {
+    if (this.job.peek() !== null) return;
+    try {
+      const running = (await this.#api.jobs()).find(({ kind, state }) => kind === "calibration" && !ENDED.includes(state));
+      if (running !== undefined) this.#take(running);
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error;
+    }
+  }
+
+  #take(job: JobDocument): void {
+    clearTimeout(this.#timer);
+    if (!ENDED.includes(job.state)) {
+      this.job.value = job;
+      this.#timer = setTimeout(() => void this.#look(job.id), 1000 * LOOK_S);
+      return;
+    }
+    this.job.value = null;
+    this.outcome.value = outcomeOf(job);
+    void this.refresh();
+  }
+
+  async #look(id: string): Promise<void> {
+    try {
+      this.#take(await this.#api.job(id));
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error;
+      if (error.problem.status === 404) {
+        this.job.value = null; // the service was started anew
+        return;
+      }
+      this.#timer = setTimeout(() => void this.#look(id), 1000 * LOOK_S);
+    }
+  }
+}
+
+function outcomeOf({ state, problem, result }: JobDocument): { words: string; good: boolean } {
+  if (state === "cancelled") return { words: "The measurement was cancelled.", good: false };
+  if (state === "failed") return { words: problem === null ? "The measurement failed." : plainWords(problem), good: false };
+  const [bad, rejected] = [Number(result?.["bad_pixels"] ?? 0), Number(result?.["rejected_images"] ?? 0)];
+  return { words: `Measured: ${bad} bad ${bad === 1 ? "pixel" : "pixels"}, ${rejected} ${rejected === 1 ? "image" : "images"} left out as unlike the others.`, good: true };
+}

@@ -1,0 +1,38 @@
+import { signal } from "@preact/signals";
+
+import { type Api, RequestError, type Tagged } from "./api";
+import type { ParameterDocument, ReconstructionDocument } from "./documents";
+
+/** How frames are computed, and what can be set of it within which limits. */
+export class Reconstruction {
+  /** Null before it was read. */
+  readonly current = signal<Tagged<ReconstructionDocument> | null>(null);
+  readonly parameters = signal<readonly ParameterDocument[]>([]);
+  readonly trouble = signal<string | null>(null);
+  readonly #api: Api;
+
+  constructor(api: Api) {
+    this.#api = api;
+  }
+
+  async refresh(): Promise<void> {
+    try {
+      const [current, parameters] = await Promise.all([this.#api.reconstruction(), this.#api.parameters("/reconstruction")]);
+      this.current.value = current;
+      this.parameters.value = parameters;
+      this.trouble.value = null;
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error;
+      this.trouble.value = error.message;
+    }
+  }
+
+  /** Sets what is given, everything else to the paper's values; unless somebody else has changed it since `tag`. */
+  async set(settings: Readonly<Record<string, unknown>>, tag: string | null): Promise<void> {
+    try {
+      await this.#api.setReconstruction(settings, tag);
+    } finally {
+      await this.refresh();
+    }
+  }
+}

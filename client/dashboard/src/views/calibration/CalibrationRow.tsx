@@ -1,0 +1,80 @@
+import { calibrationPath } from "../../store/api";
+import type { CalibrationDocument } from "../../store/documents";
+import { useStore } from "../../store/store";
+import { ActionMenu } from "../../ui/ActionMenu";
+import { download } from "../../ui/files";
+import { engineering, fixed } from "../../ui/format";
+import { Steer } from "../../ui/Steer";
+import type { Task } from "../../ui/useTask";
+import { clock } from "../replay/words";
+import { ageOf, driftOf } from "./words";
+
+/** What is used where no calibration is. */
+export function NominalRow({ active, task }: { active: boolean; task: Task }) {
+  const { calibrations } = useStore();
+  return (
+    <li class={active ? "recording recording-shown" : "recording"} data-calibration="nominal">
+      <div class="recording-words">
+        <p class="recording-name">Nominal gains {active && <em class="tag tag-good">in use</em>}</p>
+        <p class="quiet recording-figures">those of an ideal modulation; nothing was measured</p>
+      </div>
+      {!active && (
+        <Steer disabled={task.busy.value !== null} onClick={() => void task.run("Switching…", () => calibrations.activate("nominal"))}>
+          Use
+        </Steer>
+      )}
+    </li>
+  );
+}
+
+interface RowProps {
+  readonly calibration: CalibrationDocument;
+  readonly task: Task;
+  readonly onDelete: () => void;
+}
+
+/** One calibration of the list. */
+export function CalibrationRow({ calibration, task, onDelete }: RowProps) {
+  const { api, calibrations } = useStore();
+  const { id, name, fits, reason, active, drift } = calibration;
+  const called = name || id;
+  const drifted = drift === null ? null : driftOf(drift);
+  return (
+    <li class={active ? "recording recording-shown" : "recording"} data-calibration={id}>
+      <div class="recording-words">
+        <p class="recording-name" title={id}>
+          {called} {active && fits && <em class="tag tag-good">in use</em>} {active && !fits && <em class="tag">waits for its sequence</em>}
+        </p>
+        <p class="quiet recording-figures">
+          <span title={clock(calibration.created_at)}>{ageOf(calibration.age_s)}</span>
+          <span>{fixed(calibration.temperature_c, 1, "°C")}</span>
+          <span>{sequenceOf(calibration)}</span>
+          <span>{engineering(calibration.bytes, "B")}</span>
+        </p>
+        {!fits && (
+          <p class="refusal" data-field="misfit">
+            Does not fit: {reason}
+          </p>
+        )}
+        {drifted !== null && (
+          <p class={drifted.grown ? "refusal" : "recording-notes"} data-field="drift">
+            {drifted.words}
+          </p>
+        )}
+      </div>
+      {!active && (
+        <Steer title={fits ? "Calibrate frames with it from the next one on" : (reason ?? "It does not fit")} disabled={!fits || task.busy.value !== null} onClick={() => void task.run("Switching…", () => calibrations.activate(id))}>
+          Use
+        </Steer>
+      )}
+      <button type="button" aria-label={`Export ${called}`} title="Its file, to be taken in elsewhere" disabled={task.busy.value !== null} onClick={() => void task.run("Fetching the file…", () => download(api, `${calibrationPath(id)}/file`, `${id}.npz`))}>
+        Export
+      </button>
+      <ActionMenu label={`More of ${called}`} groups={[{ title: called, actions: active ? [{ text: "Use the nominal gains", run: () => void task.run("Switching…", () => calibrations.activate("nominal")) }] : [{ text: "Delete…", run: onDelete }] }]} />
+    </li>
+  );
+}
+
+function sequenceOf({ sequence, exposure_s }: CalibrationDocument): string {
+  return `${engineering(Number(sequence["base_frequency_hz"]), "Hz")}, m = ${String(sequence["harmonics"])}, ${engineering(exposure_s, "s")}`;
+}

@@ -1,0 +1,144 @@
+import { useSignal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+
+import type { CalibrationDocument, JobDocument } from "../../store/documents";
+import { useStore } from "../../store/store";
+import { Confirm } from "../../ui/Confirm";
+import { fixed } from "../../ui/format";
+import { Panel } from "../../ui/Panel";
+import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
+import { useTask, type Task } from "../../ui/useTask";
+import { CalibrationRow, NominalRow } from "./CalibrationRow";
+
+/** As the service has it where nothing is said. */
+const DEFAULT_FRAMES = "40";
+
+/** Calibrations: measure one, use it, see how it does, take it elsewhere. */
+export function CalibrationView() {
+  const { calibrations } = useStore();
+  const task = useTask();
+  const deleting = useSignal<CalibrationDocument | null>(null);
+  useEffect(() => calibrations.follow(), [calibrations]);
+  const known = calibrations.document.value;
+  const job = calibrations.job.value;
+  const outcome = calibrations.outcome.value;
+  const doomed = deleting.value;
+  return (
+    <Panel name="calibration" title={<h2>Calibration</h2>} tools={<Import task={task} />}>
+      <div class="panel-body">
+        {job === null ? <MeasureForm task={task} /> : <Measuring job={job} task={task} />}
+        <Obstacle />
+        <TaskLine task={task} field="calibration-status" />
+        {outcome !== null && job === null && task.refusal.value === null && (
+          <p class={outcome.good ? "quiet" : "refusal"} role="status" data-field="calibration-outcome">
+            {outcome.words}
+          </p>
+        )}
+        {calibrations.trouble.value !== null && <p class="refusal">{calibrations.trouble.value}</p>}
+        {known !== null && (
+          <ul class="recording-list" aria-label="Calibrations">
+            <NominalRow active={known.active === "nominal"} task={task} />
+            {known.calibrations.map((calibration) => (
+              <CalibrationRow key={calibration.id} calibration={calibration} task={task} onDelete={() => (deleting.value = calibration)} />
+            ))}
+          </ul>
+        )}
+      </div>
+      <Confirm
+        open={doomed !== null}
+        title="Delete this calibration?"
+        word="Delete"
+        onClose={() => (deleting.value = null)}
+        work={async () => {
+          if (doomed !== null) await calibrations.remove(doomed.id);
+        }}
+      >
+        <p>
+          <strong>{doomed?.name || doomed?.id}</strong>: its images cannot be captured again as the camera was then.
+        </p>
+      </Confirm>
+    </Panel>
+  );
+}
+
+function MeasureForm({ task }: { task: Task }) {
+  const { calibrations } = useStore();
+  const name = useSignal("");
+  const frames = useSignal(DEFAULT_FRAMES);
+  const activate = useSignal(true);
+  const count = Number(frames.value);
+  const sensible = frames.value.trim() !== "" && Number.isInteger(count) && count >= 2;
+  const measure = (): Promise<boolean> => task.run("Starting…", () => calibrations.measure({ name: name.peek().trim(), frames: count, activate: activate.peek() }));
+  return (
+    <form
+      class="record-form"
+      onSubmit={(event) => {
+        event.preventDefault();
+        void measure();
+      }}
+    >
+      <label class="field record-name">
+        <span>Name</span>
+        <input type="text" name="name" maxLength={200} autocomplete="off" placeholder="after warm-up" value={name.value} onInput={(event) => (name.value = event.currentTarget.value)} />
+      </label>
+      <label class="field">
+        <span>Frames, with light and as many without</span>
+        <input type="text" inputMode="numeric" name="frames" autocomplete="off" aria-invalid={!sensible} value={frames.value} onInput={(event) => (frames.value = event.currentTarget.value)} />
+      </label>
+      <div class="record-actions">
+        <Steer submit primary title="Measure with the present sequence; no frames come meanwhile" disabled={!sensible || task.busy.value !== null}>
+          Measure
+        </Steer>
+      </div>
+      <p class="quiet form-wide">
+        Put filter and diffusor before the lens first, so that the light shines at the sensor.{" "}
+        <label class="check">
+          <input type="checkbox" checked={activate.value} onChange={(event) => (activate.value = event.currentTarget.checked)} /> Use it at once
+        </label>
+      </p>
+    </form>
+  );
+}
+
+/** The measurement that runs. */
+function Measuring({ job, task }: { job: JobDocument; task: Task }) {
+  const { calibrations } = useStore();
+  return (
+    <div class="measuring">
+      <span>
+        Measuring: <span data-field="job-step">{job.step}</span>
+      </span>
+      <span data-field="job-progress">{fixed(100 * job.progress, 0, "%")}</span>
+      <span class="spring" />
+      <button type="button" disabled={task.busy.value !== null} onClick={() => void task.run("Cancelling…", () => calibrations.cancel())}>
+        Cancel
+      </button>
+      <progress max={1} value={job.progress} aria-label="Progress of the calibration" />
+    </div>
+  );
+}
+
+/** Takes in a file that was exported elsewhere. */
+function Import({ task }: { task: Task }) {
+  const { calibrations } = useStore();
+  const input = useRef<HTMLInputElement>(null);
+  return (
+    <>
+      <input
+        ref={input}
+        type="file"
+        accept=".npz"
+        hidden
+        aria-label="File of a calibration"
+        onChange={(event) => {
+          const file = event.currentTarget.files?.[0];
+          event.currentTarget.value = "";
+          if (file !== undefined) void task.run(`Taking in ${file.name}…`, () => calibrations.take(file));
+        }}
+      />
+      <button type="button" title="Take in a calibration that was exported elsewhere" disabled={task.busy.value !== null} onClick={() => input.current?.click()}>
+        Import…
+      </button>
+    </>
+  );
+}

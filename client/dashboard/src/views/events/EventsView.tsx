@@ -1,0 +1,22 @@
+import { useStore } from "../../store/store";
+import { Panel } from "../../ui/Panel";
+
+/** What happened since the page was opened, the newest first. */
+export function EventsView() {
+  const { events } = useStore();
+  const all = [...events.all.value].reverse();
+  return (
+    <Panel name="events" title={<h2>What happened</h2>}>
+      <div class="panel-body">
+        {all.length === 0 && <p class="quiet recordings-none">Nothing worth telling since the page was opened.</p>}
+        <ul class="events" tabIndex={0} aria-label="What happened">
+          {all.map(({ number, at_s, words, tone }) => (
+            <li key={number} class={`event event-${tone}`}>
+              <time class="quiet">{new Date(1000 * at_s).toLocaleTimeString()}</time> {words}
+            </li>
+          ))}
+        </ul>
+      </div>
+    </Panel>
+  );
+}

@@ -1,0 +1,117 @@
+import { useSignal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+
+import type { ParameterDocument } from "../../store/documents";
+import { useStore } from "../../store/store";
+import { Panel } from "../../ui/Panel";
+import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
+import { useTask } from "../../ui/useTask";
+import { draftOf, isNumber, labelOf, limitsOf, readingOf, unitOf, type Draft } from "./fields";
+
+/** How images become moments and moments become returns; changed while frames come. */
+export function ReconstructionView() {
+  const { reconstruction } = useStore();
+  const task = useTask();
+  /** What was typed, and the version that it began with; null while nothing was. */
+  const typed = useSignal<{ readonly draft: Draft; readonly tag: string | null } | null>(null);
+  useEffect(() => void reconstruction.refresh(), [reconstruction]);
+  const current = reconstruction.current.value;
+  const parameters = reconstruction.parameters.value;
+  const draft = typed.value?.draft ?? draftOf(parameters);
+  const reading = readingOf(parameters, draft);
+  const wrong = "wrong" in reading ? reading : null;
+  const set = (name: string, text: string): void => {
+    task.dismiss();
+    typed.value = { draft: { ...draft, [name]: text }, tag: typed.peek()?.tag ?? current?.tag ?? null };
+  };
+  const apply = async (settings: Record<string, unknown>, tag: string | null): Promise<void> => {
+    if (await task.run("Applying…", () => reconstruction.set(settings, tag))) typed.value = null;
+  };
+  return (
+    <Panel
+      name="reconstruction"
+      title={<h2>Reconstruction</h2>}
+      tools={
+        <Steer title="Smoothing, bias and all else as in the paper" disabled={task.busy.value !== null || current === null} onClick={() => void apply({}, current?.tag ?? null)}>
+          The paper's values
+        </Steer>
+      }
+    >
+      <form
+        class="panel-body"
+        onSubmit={(event) => {
+          event.preventDefault();
+          if ("settings" in reading) void apply(reading.settings, typed.peek()?.tag ?? current?.tag ?? null);
+        }}
+      >
+        {reconstruction.trouble.value !== null && <p class="refusal">{reconstruction.trouble.value}</p>}
+        <div class="parameter-fields">
+          {parameters.map((parameter) => (
+            <Parameter
+              key={parameter.name}
+              parameter={parameter}
+              text={draft[parameter.name] ?? ""}
+              wrong={wrong?.wrong === parameter.name}
+              onInput={(text) => {
+                set(parameter.name, text);
+              }}
+            />
+          ))}
+        </div>
+        <Obstacle />
+        {wrong !== null && <p class="refusal">{wrong.words}</p>}
+        <TaskLine task={task} field="reconstruction-status" />
+        {typed.value !== null && (
+          <div class="editor-actions">
+            <button
+              type="button"
+              onClick={() => {
+                typed.value = null;
+                task.dismiss();
+              }}
+            >
+              Undo
+            </button>
+            <Steer submit primary disabled={wrong !== null || task.busy.value !== null}>
+              Apply
+            </Steer>
+          </div>
+        )}
+      </form>
+    </Panel>
+  );
+}
+
+interface ParameterProps {
+  readonly parameter: ParameterDocument;
+  readonly text: string;
+  readonly wrong: boolean;
+  readonly onInput: (text: string) => void;
+}
+
+/** One thing that can be set. */
+function Parameter({ parameter, text, wrong, onInput }: ParameterProps) {
+  const { name, description, allowed } = parameter;
+  const choices = allowed ?? (parameter.type === "boolean" ? ["true", "false"] : []);
+  return (
+    <label class="field" title={description}>
+      <span>{labelOf(name)}</span>
+      {choices.length > 0 ? (
+        <select name={name} value={text} onChange={(event) => { onInput(event.currentTarget.value); }}>
+          {choices.map((choice) => (
+            <option key={choice} value={String(choice)}>
+              {String(choice).replaceAll("-", " ")}
+            </option>
+          ))}
+        </select>
+      ) : (
+        <span class="field-input">
+          <input type="text" inputMode={isNumber(parameter) ? "decimal" : "text"} autocomplete="off" name={name} value={text} aria-invalid={wrong} onInput={(event) => { onInput(event.currentTarget.value); }} />
+          <span class="quiet">{unitOf(parameter)}</span>
+        </span>
+      )}
+      <small class="quiet">{description}</small>
+      {isNumber(parameter) && <small class="quiet">{limitsOf({ ...parameter, unit: unitOf(parameter) })}</small>}
+    </label>
+  );
+} // prettier-ignore

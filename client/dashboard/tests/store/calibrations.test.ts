@@ -1,0 +1,69 @@
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+
+import { type Api, RequestError } from "../../src/store/api";
+import { Calibrations } from "../../src/store/calibrations";
+import type { JobDocument } from "../../src/store/documents";
+
+const job = (state: JobDocument["state"], more: Partial<JobDocument> = {}): JobDocument => ({ id: "j", kind: "calibration", state, progress: 0.5, step: "capturing", result: null, problem: null, ...more });
+
+let answers: (JobDocument | RequestError)[];
+let lists: number;
+let calibrations: Calibrations;
+beforeEach(() => {
+  vi.useFakeTimers();
+  answers = [];
+  lists = 0;
+  calibrations = new Calibrations({
+    calibrations: () => {
+      lists += 1;
+      return Promise.resolve({ active: "nominal", directory: "", calibrations: [] });
+    },
+    measureCalibration: () => Promise.resolve(job("queued")),
+    cancelJob: () => Promise.resolve(job("running")),
+    jobs: () => Promise.resolve([job("done"), job("running", { id: "theirs" })]),
+    job: () => {
+      const answer = answers.shift() ?? job("running");
+      return answer instanceof RequestError ? Promise.reject(answer) : Promise.resolve(answer);
+    },
+  } as unknown as Api);
+});
+afterEach(() => {
+  vi.useRealTimers();
+});
+
+test("a measurement is followed to its end, and the list read anew then", async () => {
+  await calibrations.measure({ name: "", frames: 40, activate: true });
+  expect(calibrations.job.value?.state).toBe("queued");
+  answers.push(job("running", { progress: 0.7 }));
+  await vi.advanceTimersByTimeAsync(500);
+  expect(calibrations.job.value?.progress).toBe(0.7);
+  answers.push(job("done", { result: { bad_pixels: 3, rejected_images: 1 } }));
+  await vi.advanceTimersByTimeAsync(500);
+  expect(calibrations.job.value).toBeNull();
+  expect(calibrations.outcome.value).toEqual({ good: true, words: "Measured: 3 bad pixels, 1 image left out as unlike the others." });
+  expect(lists).toBe(1);
+});
+
+test("a measurement that failed says why", async () => {
+  await calibrations.measure({ name: "", frames: 40, activate: true });
+  answers.push(job("failed", { problem: { title: "The camera is not connected" } }));
+  await vi.advanceTimersByTimeAsync(500);
+  expect(calibrations.outcome.value).toEqual({ good: false, words: "The camera is not connected" });
+});
+
+test("a service that cannot be reached for a while loses no measurement; one started anew does", async () => {
+  await calibrations.measure({ name: "", frames: 40, activate: true });
+  answers.push(new RequestError({ title: "The service cannot be reached." }));
+  await vi.advanceTimersByTimeAsync(500);
+  expect(calibrations.job.value).not.toBeNull();
+  answers.push(new RequestError({ title: "There is no such job", status: 404 }));
+  await vi.advanceTimersByTimeAsync(500);
+  expect(calibrations.job.value).toBeNull();
+});
+
+test("a measurement that somebody else began is shown", async () => {
+  const end = calibrations.follow();
+  await vi.advanceTimersByTimeAsync(1);
+  expect(calibrations.job.value?.id).toBe("theirs");
+  end();
+});
