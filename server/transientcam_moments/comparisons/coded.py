@@ -136,8 +136,8 @@ def coded(
     Notes
     -----
     Non-negative least squares over shifted copies of the correlation, by SciPy's NNLS, which is
-    sparse of itself; the row of `sparsity` makes it prefer few. Neighbouring bins with light are
-    one return at their centroid.
+    sparse of itself; the row of `sparsity` makes it prefer few. Between two shifts the correlation
+    is straight, so that light closer than one shift is one return, at its centroid.
     """
     in_range("sparsity", sparsity, 0.0, float(np.finfo(float).max), ">= 0 and finite")
     pixels = _pixels(samples)
@@ -151,7 +151,7 @@ def coded(
     found: list[tuple[Real, Real] | None] = []
     for pixel, usable in enumerate(pixels.usable):
         light = _solved(rows, np.append(y[:, pixel], 0.0)) if usable else None
-        found.append(cluster(light))
+        found.append(cluster(light, gap=bins // len(y)))
     phase, weight = stacked(found)
     return pixels.sparse(phase, weight / size)
 

@@ -9,7 +9,7 @@ from transientcam_moments.comparisons.technique import Technique
 
 _LEAST = 2
 _STARTS = 24  # phases around the turn among which pairs are tried
-_TRIED = 3  # of these pairs
+_TRIED = 10  # of these pairs
 
 
 def dorrington(b: Array) -> SparseEstimate:

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from transientcam_moments._arrays import flat_planes, in_range
 from transientcam_moments.cumulative import cumulative
 from transientcam_moments.levinson import Coefficients
-from transientcam_moments.maximum_entropy import density
 from transientcam_moments.peaks import peaks
 from transientcam_moments.pisarenko import DIRECT_THRESHOLD, Returns, Separation, separate
 
@@ -63,10 +62,10 @@ class SparseEstimate(Estimate):
         turns, within = _turns(phase_rad)
         total = self.weight.sum(axis=0)
         come = np.empty((len(within), *total.shape), total.dtype)
-        for out, turn, phase in zip(come, turns, within, strict=True):
+        for index, (turn, phase) in enumerate(zip(turns, within, strict=True)):
             # NaN is later than everything
-            out[...] = np.where(self.phase_rad <= phase, self.weight, 0).sum(axis=0)
-            out += turn * total + (turn + phase / _FULL_TURN) * self.uniform
+            came = np.where(self.phase_rad <= phase, self.weight, 0).sum(axis=0)
+            come[index] = came + turn * total + (turn + phase / _FULL_TURN) * self.uniform
         return come
 
     def separate(self, threshold: float = DIRECT_THRESHOLD) -> Separation:
@@ -138,7 +137,9 @@ class MaximumEntropyEstimate(Estimate):
 
     def separate(self, threshold: float = DIRECT_THRESHOLD) -> Separation:
         """Tell the light of the first peak, from valley to valley, from all other light."""
-        found = GridEstimate(density(self.coefficients, grid_rad(GRID_PHASES))).separate(threshold)
+        edges = np.arange(GRID_PHASES + 1) * (_FULL_TURN / GRID_PHASES)
+        light = np.diff(self.cumulative(edges), axis=0)  # in bins: peaks may be sharper than them
+        found = GridEstimate(light * (GRID_PHASES / _FULL_TURN)).separate(threshold)
         phase = self.first_phase_rad(threshold)
         return Separation(found.direct, found.indirect, phase)
 

@@ -22,7 +22,7 @@ def regularised(
     spatial: float = 3e-3,
     delta: float = 0.02,
     bins: int = BINS,
-    iterations: int = 100,
+    iterations: int = 200,
 ) -> GridEstimate:
     """Estimate densities that come close to the moments and vary little.
 

@@ -86,7 +86,10 @@ def program(m: int, *, bins: int, epsilon: float) -> Callable[..., Real | None]:
         v = np.concatenate([c.real, c.imag])
         limits = np.concatenate([v, -v, [epsilon * np.abs(v).sum()]])
         costs = np.concatenate([np.ones(bins) if cost is None else cost, no_cost])
-        found: Any = linprog(costs, A_ub=rows, b_ub=limits, method="highs")
+        # so small a program is solved before it could be presolved
+        found: Any = linprog(
+            costs, A_ub=rows, b_ub=limits, method="highs-ds", options={"presolve": False}
+        )
         light: NDArray[np.float64] | None = None if found.x is None else found.x[:bins]
         return light
 
