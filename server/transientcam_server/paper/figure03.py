@@ -49,8 +49,7 @@ class Steps:
 
 
 def make(bench: Bench) -> Made:
-    """Sweep the delay over one period, a column of pixels for each, and capture with phase "
-    "steps."""
+    """Sweep the delay over one period, a column of pixels each, and capture with phase steps."""
     steps = (1, 2, 4, 8, 16) if bench.quick else (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
     schemes = [Steps("none", 1)]
     schemes += [Steps("arccos", n) for n in steps]

@@ -53,8 +53,7 @@ def _ranked_truth(shot: Shot) -> tuple[_Array, _Array]:
 
 
 def _errors(shot: Shot, k: int) -> tuple[_Array, _Array]:
-    """Return the errors (H, W) of time in s and of strength, of the return nearest the true "
-    "k-th."""
+    """Return errors (H, W) of time in s and of strength: of the return nearest the true k-th."""
     delay_s, true_weight = _ranked_truth(shot)
     time_s, weight = _strongest(shot)
     apart = np.where(np.isfinite(time_s), np.abs(time_s - delay_s[k]), np.inf)
