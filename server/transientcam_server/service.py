@@ -5,7 +5,7 @@ import contextlib
 import logging
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from importlib.metadata import version
 from typing import Annotated, Any, Final
@@ -47,7 +47,7 @@ from transientcam_server.pipeline import Pipeline
 from transientcam_server.reconstruction import Reconstruction
 from transientcam_server.recording import Header
 from transientcam_server.recording.frames import RecordedFramesOf
-from transientcam_server.recording.library import Library
+from transientcam_server.recording.library import Library, Wanted
 from transientcam_server.recording.replay import ReplayCamera
 from transientcam_server.settings import ReconstructionSettings, Settings
 from transientcam_server.stream_encodings import encoding_name, travelling
@@ -200,8 +200,30 @@ class Service:
         """Carry an event from the acquisition's thread to the loop."""
         assert self._loop is not None  # noqa: S101 - the thread is started after it is set
         if isinstance(event, Captured):
+            # first, so that no frame can be missing from the past of a recording that begins now
+            self._loop.call_soon_threadsafe(self._happened, event)
             self.recordings.offer(event.raw, event.applied)
-        self._loop.call_soon_threadsafe(self._happened, event)
+        else:
+            self._loop.call_soon_threadsafe(self._happened, event)
+
+    async def record(self, wanted: Wanted, *, history_s: float | None) -> dict[str, Any]:
+        """Start a recording, with the frames of the last seconds if wanted, and describe it.
+
+        Raises
+        ------
+        Problem
+            As `Library.start`.
+        """
+        if history_s is None:
+            return await asyncio.to_thread(self.recordings.start, wanted)
+        # it waits for its past, also if nobody waits for the answer any more
+        return await asyncio.shield(self.pipeline.start(self._record_past(wanted, history_s)))
+
+    async def _record_past(self, wanted: Wanted, history_s: float) -> dict[str, Any]:
+        described = await asyncio.to_thread(self.recordings.start, replace(wanted, past=True))
+        past = [(each.raw, each.recipe.applied) for each in self.history.newest(history_s)]
+        count = self.recordings.precede(described["id"], past)
+        return described | {"history_frames": count}
 
     def _tell_from_thread(self, kind: str, details: Mapping[str, Any]) -> None:
         assert self._loop is not None  # noqa: S101 - nothing is recorded before it is set

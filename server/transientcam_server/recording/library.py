@@ -13,7 +13,7 @@ import secrets
 import shutil
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -39,11 +39,12 @@ Tell = Callable[[str, Mapping[str, Any]], None]
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What somebody wants recorded."""
+    """What somebody wants recorded; ``past`` for frames that have passed, see `Library.precede`."""
 
     name: str | None = None
     limits: Limits = field(default_factory=Limits)
     annotations: Mapping[str, Any] | None = None
+    past: bool = False
 
 
 class Library:
@@ -160,6 +161,16 @@ class Library:
         self._tell("recording-started", {"recording": recorder.header.recording_id})
         return document
 
+    def precede(
+        self, recording_id: str, past: Sequence[tuple[RawFrame, AppliedSequence]]
+    ) -> int:
+        """Let a recording begin with frames that have passed; return how many those are.
+
+        One that wants them waits for this call, which itself never waits.
+        """
+        recorder = self._recorder_of(recording_id)
+        return 0 if recorder is None else recorder.precede(past)
+
     def stop(self, recording_id: str) -> dict[str, Any]:
         """End a recording, if it has not ended, and describe it."""
         recorder = self._recorder_of(recording_id)
@@ -271,6 +282,7 @@ class Library:
             free_bytes=self._free_bytes,
             on_dropped=self._dropped,
             on_end=self._ended,
+            awaits_past=wanted.past,
             unix_s=self._unix_s,
         )
 

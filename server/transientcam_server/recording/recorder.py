@@ -7,7 +7,7 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
@@ -68,6 +68,8 @@ class Recorder:
         since the call before, and in all.
     on_end
         Called last, on the writing thread.
+    awaits_past
+        Write nothing before `precede` was called.
     """
 
     def __init__(
@@ -80,6 +82,7 @@ class Recorder:
         free_bytes: Callable[[], int],
         on_dropped: Callable[[int, int], None] = lambda count, total: None,
         on_end: Callable[["Recorder"], None] = lambda recorder: None,
+        awaits_past: bool = False,
         clock: Callable[[], float] = time.monotonic,
         unix_s: Callable[[], float] = time.time,
     ) -> None:
@@ -94,6 +97,9 @@ class Recorder:
         self._unix_s = unix_s
         self._changed = threading.Condition()
         self._waiting: deque[tuple[RawFrame, int]] = deque()
+        self._past: deque[RawFrame] = deque()
+        self._past_s = 0.0
+        self._awaits_past = awaits_past
         self._work: deque[Callable[[], None]] = deque()
         self._reason: Reason | None = None
         self._problem: str | None = None
@@ -113,10 +119,28 @@ class Recorder:
         """Start the thread."""
         self._thread.start()
 
+    def precede(self, past: Sequence[tuple[RawFrame, AppliedSequence]]) -> int:
+        """Let frames that were captured before it began come first; return how many.
+
+        Of these, oldest first, are taken those of the recording's sequence that were not offered.
+        """
+        with self._changed:
+            offered = {id(raw) for raw, _ in self._waiting}
+            if self._reason is None:
+                for raw, applied in past:
+                    if id(raw) in offered:
+                        break
+                    if self._is_ours(applied):
+                        self._past.append(raw)
+            if self._past:
+                self._past_s = max(0.0, self.header.started_s - self._past[0].host_time_s)
+            self._awaits_past = False
+            self._changed.notify()
+            return len(self._past)
+
     def offer(self, raw: RawFrame, applied: AppliedSequence) -> None:
         """Take a frame; never waits for the disk."""
-        ours = self.header.applied
-        if (applied.sequence, applied.low_frequency_hz) != (ours.sequence, ours.low_frequency_hz):
+        if not self._is_ours(applied):
             self.stop("sequence-changed")
             return
         with self._changed:
@@ -161,7 +185,7 @@ class Recorder:
             frames=self._writer.frames,
             dropped_frames=self._dropped,
             size_bytes=self._size_bytes,
-            duration_s=until_s - self._began_s,
+            duration_s=self._past_s + until_s - self._began_s,
             reason=self._reason,
             problem=self._problem,
             finished=self._finished.is_set(),
@@ -189,18 +213,31 @@ class Recorder:
     def _step(self) -> bool:
         """Write what is next; false once there is nothing more to come."""
         with self._changed:
-            if not (self._waiting or self._work or self._reason):
+            idle = self._awaits_past or not (self._past or self._waiting)
+            if idle and not (self._work or self._reason):
                 self._changed.wait(LOOK_S)
             work = list(self._work)
             self._work.clear()
-            frame = self._waiting.popleft() if self._waiting else None
             ending = self._reason is not None
+            frame = self._next() if ending or not self._awaits_past else None
         for each in work:
             each()
         if frame is not None:
             self._writer.append(frame[0], dropped_frames=frame[1])
         self._look()
         return frame is not None or not ending
+
+    def _next(self) -> tuple[RawFrame, int] | None:
+        if self._past:
+            return self._past.popleft(), 0
+        return self._waiting.popleft() if self._waiting else None
+
+    def _is_ours(self, applied: AppliedSequence) -> bool:
+        ours = self.header.applied
+        return (applied.sequence, applied.low_frequency_hz) == (
+            ours.sequence,
+            ours.low_frequency_hz,
+        )
 
     def _look(self) -> None:
         """Bring it to the disk, and hold it to its limits."""
@@ -224,6 +261,7 @@ class Recorder:
         with self._changed:
             if self._reason is None:
                 self._reason = reason
+            self._past.clear()
             self._waiting.clear()
 
     def _fail(self, error: Exception) -> None:
@@ -233,6 +271,7 @@ class Recorder:
             self._problem = in_words(error)
         with self._changed:
             self._reason = "failed"
+            self._past.clear()
             self._waiting.clear()
 
     def _tell_dropped(self) -> None:

@@ -84,6 +84,8 @@ class RecordingDocument(Document):
     """Of the software that recorded it."""
     limits: dict[str, float | None] | None = None
     """When it ends by itself; null once it has ended."""
+    history_frames: int | None = None
+    """Of the past that it began with; only in the answer that tells of its start."""
 
 
 class RecordingLimitsDocument(Document):
@@ -184,8 +186,12 @@ class RecordingRequest(Document):
     )
     """For people; without one it is named after the time."""
     duration_s: float | None = Field(default=None, gt=0, allow_inf_nan=False)
+    """From now on."""
     max_bytes: int | None = Field(default=None, ge=1)
     frames: int | None = Field(default=None, ge=1)
+    """Those of the past count, too."""
+    history_s: float | None = Field(default=None, gt=0, le=3600, allow_inf_nan=False)
+    """Begin with the frames of so many seconds before, as far as `GET /frames` has them."""
     annotations: dict[str, Any] = Field(default_factory=dict)
     """Anything worth keeping with it, at most 16 KiB as JSON."""
 

@@ -70,12 +70,13 @@ async def read_recordings(service: ServiceOf) -> RecordingsDocument:
 async def start_recording(service: ServiceOf, wanted: RecordingRequest) -> RecordingDocument:
     """Record every frame from now on, raw, until it is stopped or a limit is reached.
 
-    One recording runs at a time. A change of the sequence ends it.
+    With `history_s` it begins with the frames of the last seconds, as far as they are kept and of
+    the same sequence. One recording runs at a time. A change of the sequence ends it.
     """
     service.acquisition.require_free()  # what a calibration captures is not recorded
     limits = Limits(duration_s=wanted.duration_s, size_bytes=wanted.max_bytes, frames=wanted.frames)
     order = Wanted(name=wanted.name, limits=limits, annotations=wanted.annotations)
-    return document(await asyncio.to_thread(service.recordings.start, order))
+    return document(await service.record(order, history_s=wanted.history_s))
 
 
 @router.get(

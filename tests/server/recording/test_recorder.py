@@ -79,6 +79,65 @@ def test_what_is_offered_before_the_stop_is_in_the_file(start: Start, tmp_path: 
         assert_same(recording.frame(5), frame(5))
 
 
+def test_frames_of_the_past_come_first_and_none_comes_twice(start: Start, tmp_path: Path) -> None:
+    recorder = start(awaits_past=True)
+    captured = [frame(number) for number in range(8)]
+    for raw in captured[5:]:  # while its past is still being looked for
+        recorder.offer(raw, APPLIED)
+
+    count = recorder.precede([(raw, APPLIED) for raw in captured[2:7]])
+    recorder.stop()
+
+    assert count == 3
+    assert recorder.wait(PATIENCE_S)
+    with Recording(tmp_path / "a.h5") as recording:
+        assert [raw.number for raw in recording] == [2, 3, 4, 5, 6, 7]
+        assert_same(recording.frame(0), captured[2])
+        assert recording.series("dropped_frames").tolist() == [0] * 6
+
+
+def test_frames_of_another_sequence_are_no_past(start: Start, tmp_path: Path) -> None:
+    recorder = start(awaits_past=True)
+    other = replace(APPLIED, sequence=Sequence(harmonics=9))
+
+    count = recorder.precede([(frame(0), other), (frame(1), APPLIED)])
+    recorder.stop()
+
+    assert count == 1
+    assert recorder.wait(PATIENCE_S)
+    with Recording(tmp_path / "a.h5") as recording:
+        assert [raw.number for raw in recording] == [1]
+
+
+def test_its_past_belongs_to_how_long_it_lasts(start: Start, tmp_path: Path) -> None:
+    recorder = start(awaits_past=True, limits=Limits(duration_s=1000.0))
+    began_s = header().started_s
+    past = [(replace(frame(0), host_time_s=began_s - 2000.0), APPLIED)]
+
+    recorder.precede(past)
+    recorder.offer(frame(1), APPLIED)
+    duration_s = recorder.progress.duration_s
+    reason = recorder.progress.reason
+    recorder.stop()
+
+    assert recorder.wait(PATIENCE_S)
+    assert duration_s >= 2000.0
+    assert reason is None  # the limit counts from now on
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.end["duration_s"] >= 2000.0
+
+
+def test_one_that_is_stopped_before_its_past_is_known_ends(start: Start, tmp_path: Path) -> None:
+    recorder = start(awaits_past=True)
+    recorder.offer(frame(3), APPLIED)
+    recorder.stop()
+
+    assert recorder.wait(PATIENCE_S)
+    assert recorder.precede([(frame(1), APPLIED)]) == 0
+    with Recording(tmp_path / "a.h5") as recording:
+        assert [raw.number for raw in recording] == [3]
+
+
 def test_a_slow_disk_costs_frames_and_never_the_camera(start: Start, tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
     writer = GatedWriter(tmp_path / "a.h5", header())

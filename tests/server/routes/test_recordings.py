@@ -35,6 +35,21 @@ def daemon(directory: Path) -> Iterator[Served]:
 
 
 @pytest.fixture
+def captured(daemon: Served) -> list[RawFrame]:
+    """Every frame from now on."""
+    frames: list[RawFrame] = []
+    happened = daemon.service._happened
+
+    def listen(event: object) -> None:
+        if isinstance(event, Captured):
+            frames.append(event.raw)
+        happened(event)  # type: ignore[arg-type]  # whatever it is
+
+    daemon.service._happened = listen  # type: ignore[method-assign]  # to see what goes in
+    return frames
+
+
+@pytest.fixture
 def http(daemon: Served) -> Iterator[httpx.Client]:
     with httpx.Client(base_url=daemon.url, timeout=60.0) as client:
         hold_to_contract(client, daemon.app.openapi())
@@ -59,17 +74,8 @@ def recorded(http: httpx.Client, **wanted: Any) -> dict[str, Any]:
 
 
 def test_a_recording_has_every_frame_as_it_was_captured(
-    daemon: Served, http: httpx.Client, directory: Path
+    daemon: Served, http: httpx.Client, directory: Path, captured: list[RawFrame]
 ) -> None:
-    captured: list[RawFrame] = []
-    happened = daemon.service._happened
-
-    def listen(event: object) -> None:
-        if isinstance(event, Captured):
-            captured.append(event.raw)
-        happened(event)  # type: ignore[arg-type]  # whatever it is
-
-    daemon.service._happened = listen  # type: ignore[method-assign]  # to see what goes in
     document = recorded(http, frames=5)
 
     assert document["frames"] == 5
@@ -81,6 +87,49 @@ def test_a_recording_has_every_frame_as_it_was_captured(
             assert_same(raw, by_number[raw.number])
         assert recording.header.applied == daemon.camera.applied
         assert recording.header.camera["scene"] == "mirrors"
+
+
+def test_what_just_happened_can_be_saved(
+    http: httpx.Client, directory: Path, captured: list[RawFrame]
+) -> None:
+    http.get("/api/v1/frames/6", params={"wait_s": 10.0})
+
+    started = http.post(RECORDINGS, json={"history_s": 10.0}).json()
+    number = http.get("/api/v1/frames/latest").json()["frame"]
+    http.get("/api/v1/frames/latest", params={"after": number + 1, "wait_s": 10.0})
+    document = http.post(f"{RECORDINGS}/{started['id']}/stop").json()
+
+    assert started["history_frames"] >= 6
+    assert document["frames"] >= started["history_frames"] + 1
+    with Recording(directory / f"{document['id']}.h5") as recording:
+        numbers = recording.series("frame")
+        # from the first frame on, without a gap and without a frame twice
+        np.testing.assert_array_equal(numbers, np.arange(len(numbers)) + numbers[0])
+        assert numbers[0] <= captured[0].number
+        by_number = {raw.number: raw for raw in captured}
+        for raw in recording:
+            if raw.number in by_number:
+                assert_same(raw, by_number[raw.number])
+    assert document["duration_s"] > 0.3
+
+
+def test_only_as_much_of_the_past_is_saved_as_was_asked_for(http: httpx.Client) -> None:
+    http.get("/api/v1/frames/12", params={"wait_s": 10.0})
+    http.put("/api/v1/acquisition", json={"running": False})
+
+    started = http.post(RECORDINGS, json={"history_s": 0.5}).json()
+    document = http.post(f"{RECORDINGS}/{started['id']}/stop").json()
+
+    assert 0 < document["frames"] < http.get("/api/v1/frames").json()["count"]
+    assert document["frames"] == started["history_frames"]
+
+
+@pytest.mark.parametrize("history_s", [0, -1, 3601, "long"])
+def test_a_past_that_cannot_be_is_refused(http: httpx.Client, history_s: object) -> None:
+    response = http.post(RECORDINGS, json={"history_s": history_s})
+
+    assert response.status_code == 422
+    assert response.json()["field"] == "history_s"
 
 
 def test_nothing_is_made_on_the_disk_before_the_first_recording(
