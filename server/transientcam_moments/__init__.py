@@ -12,7 +12,7 @@ of pixels after them, single or double precision, NumPy, JAX or CuPy. ::
     direct, indirect, phase_rad = tm.separate(tm.pisarenko(b))
 """
 
-from transientcam_moments import kernels, noise
+from transientcam_moments import comparisons, kernels, noise
 from transientcam_moments.bad_pixels import fill_bad_pixels, find_bad_pixels
 from transientcam_moments.biasing import (
     Biased,
@@ -69,6 +69,7 @@ __all__ = [
     "bounds",
     "calibrate",
     "calibration_of",
+    "comparisons",
     "cumulative",
     "density",
     "effective_modulation",

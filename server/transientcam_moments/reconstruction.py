@@ -10,6 +10,7 @@ from transientcam_moments._arrays import Array, as_array, chosen, in_range, in_t
 from transientcam_moments.bad_pixels import fill_bad_pixels
 from transientcam_moments.biasing import EPSILON, bias, estimate_zeroth, smallest_eigenvalue
 from transientcam_moments.calibration import calibrate
+from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
 from transientcam_moments.cumulative import cumulative
 from transientcam_moments.errors import ParameterError
 from transientcam_moments.flags import INVALID, Flags, flags
@@ -28,7 +29,16 @@ from transientcam_moments.ranging import range_m
 from transientcam_moments.smoothing import SIGMA_PX, smooth
 from transientcam_moments.takes import average_takes
 
-ESTIMATORS = ("pisarenko", "maximum-entropy", "single-frequency")
+_OWN = ("pisarenko", "maximum-entropy", "single-frequency")
+ESTIMATORS = (
+    *_OWN,
+    *(
+        each.name
+        for each in TECHNIQUES.values()
+        if each.measures == "moments" and each.name not in _OWN
+    ),
+)
+"""What the range may be taken from; see `transientcam_moments.comparisons`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +62,9 @@ class Settings:
     threshold : float
         The range is that of the first return, or peak, with this share of the strongest one's
         weight, or density.
-    estimator : {"pisarenko", "maximum-entropy", "single-frequency"}
-        What the range is taken from; the last one is the usual arg b_1, for comparison.
+    estimator : str
+        What the range is taken from: "pisarenko", "maximum-entropy", "single-frequency", which is
+        the usual arg b_1, or another of the `comparisons` of moments.
     minimum_brightness : float
         Pixels with b_0 at or below it have no signal, in the unit of the moments.
     full_scale : float
@@ -83,6 +94,11 @@ class Settings:
         in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
         in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
         chosen("estimator", self.estimator, ESTIMATORS)
+
+    @property
+    def least_harmonics(self) -> int:
+        """The smallest m that the estimator gives a range of."""
+        return TECHNIQUES[self.estimator].least_harmonics
 
 
 def reconstruct(
@@ -270,7 +286,21 @@ class Reconstruction:
 
     @cached_property
     def _separation(self) -> Separation:
-        return separate(self.returns, self.settings.threshold)
+        rival = self._rival
+        if rival is None:
+            return separate(self.returns, self.settings.threshold)
+        xp = namespace(self.smoothed)
+        b = np.asarray(self.smoothed)
+        check_order(b.shape[0] - 1, least=rival.least_harmonics, name=rival.name)
+        # as measured: none of them asks for biased moments
+        found = rival.estimate(b).separate(self.settings.threshold)
+        return Separation(*(xp.asarray(part) for part in found))
+
+    @property
+    def _rival(self) -> Technique | None:
+        """The technique of the settings where it is none of those that this class knows."""
+        name = self.settings.estimator
+        return None if name in _OWN else TECHNIQUES[name]
 
     @property
     def brightness(self) -> Array:
@@ -279,7 +309,9 @@ class Reconstruction:
 
     @property
     def uniform(self) -> Array:
-        """Brightness of the uniform part."""
+        """Brightness of the uniform part; of a rival's, all that it does not explain."""
+        if self._rival is not None:
+            return self.brightness - self.direct - self.indirect
         return self.returns.uniform
 
     @property
@@ -294,14 +326,17 @@ class Reconstruction:
 
     @cached_property
     def phase_rad(self) -> Array:
-        """Phase of the direct return by the estimator of the settings; NaN where there is none."""
+        """Phase of the direct return by the estimator of the settings; NaN where there is none.
+
+        Raises ParameterError, as `direct` does, where the estimator needs more harmonics.
+        """
         xp = namespace(self.moments)
-        if self.settings.estimator == "pisarenko":
-            phase = self._separation.phase_rad
-        elif self.settings.estimator == "maximum-entropy":
+        if self.settings.estimator == "maximum-entropy":
             phase = self.peaks.first_rad
-        else:
+        elif self.settings.estimator == "single-frequency":
             phase = in_turn(xp.arctan2(self.moments[1].imag, self.moments[1].real))
+        else:
+            phase = self._separation.phase_rad
         return xp.where(self.has_range, phase, np.nan).astype(self.brightness.dtype)
 
     @cached_property

@@ -5,6 +5,7 @@ import pytest
 
 import transientcam_moments as tm
 from tests.moments import oracles
+from transientcam_moments.reconstruction import ESTIMATORS
 
 SHAPE = (6, 7)
 FREQUENCY_HZ = 23e6
@@ -61,6 +62,51 @@ def test_every_estimator_finds_a_single_return(estimator: str) -> None:
     result = tm.reconstruct(b, tm.Settings(estimator=estimator))
 
     assert oracles.around(result.phase_rad - phase).max() < 1e-6
+
+
+RIVALS = [each for each in ESTIMATORS if each not in ("pisarenko", "maximum-entropy")]
+
+
+@pytest.mark.parametrize("estimator", RIVALS)
+def test_a_rival_gives_the_range_image_and_no_light_is_lost(estimator: str) -> None:
+    least = tm.Settings(estimator=estimator).least_harmonics
+    phase = np.linspace(0.5, 5.5, 6)
+    b = oracles.moments_of_returns(phase[None], np.full((1, 6), 100.0), max(least, 3))
+    b = b.reshape((-1, 2, 3)).astype(np.complex64)
+    b[0] += 5
+    b[1, 0, 1] = np.nan
+
+    result = tm.reconstruct(b, tm.Settings(estimator=estimator, smoothing_sigma_px=0))
+
+    seen = np.isfinite(result.range_m)
+    assert np.array_equal(seen, result.has_range)
+    assert result.flags[0, 1] == tm.Flags.NON_FINITE
+    apart = oracles.around(result.phase_rad - phase.reshape((2, 3)))[seen]
+    assert apart.max() < (0.15 if estimator in ("sra-table", "regularised") else 0.02)
+    assert result.range_m.dtype == result.direct.dtype == np.float32
+    total = result.direct + result.indirect + result.uniform
+    assert np.allclose(total[seen], result.brightness[seen], rtol=1e-5)
+    if estimator != "single-frequency":
+        expected = tm.comparisons.TECHNIQUES[estimator].estimate(b).separate(0.1).direct
+        assert np.array_equal(result.direct[seen], expected[seen])
+
+
+@pytest.mark.parametrize("estimator", RIVALS)
+def test_an_estimator_without_enough_harmonics_says_how_many_it_needs(estimator: str) -> None:
+    least = tm.Settings(estimator=estimator).least_harmonics
+    if least == 1:
+        return
+    b = scene(least - 1)[0]
+
+    result = tm.reconstruct(b, tm.Settings(estimator=estimator))
+
+    for name in ("range_m", "direct", "uniform"):
+        with pytest.raises(tm.ParameterError, match=estimator) as caught:
+            getattr(result, name)
+        assert caught.value.field == "harmonics"
+        assert caught.value.value == least - 1
+        assert str(least) in caught.value.limit
+    assert result.brightness.shape == b.shape[1:]  # all else is there
 
 
 def test_multipath_disturbs_a_single_frequency_and_not_the_others() -> None:

@@ -30,6 +30,7 @@ from transientcam_moments.comparisons import (
     sra,
     sra_table,
 )
+from transientcam_moments.comparisons._pixels import check_order
 from transientcam_moments.comparisons.estimate import (
     Estimate,
     GridEstimate,
@@ -69,5 +70,6 @@ __all__ = [
     "MaximumEntropyEstimate",
     "SparseEstimate",
     "Technique",
+    "check_order",
     "grid_rad",
 ]
