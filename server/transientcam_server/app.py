@@ -20,6 +20,7 @@ from transientcam_server.routes import (
     jobs,
     lease,
     metrics,
+    parameters,
     plan,
     preview,
     reconstruction,
@@ -47,6 +48,7 @@ _RESOURCES = (
     recording_frames,
     simulation,
     plan,
+    parameters,
     jobs,
 )
 
