@@ -35,7 +35,7 @@ from transientcam_server.drift import invalid_share
 from transientcam_server.errors import Problem
 from transientcam_server.history import History
 from transientcam_server.jobs import Job, JobDesk
-from transientcam_server.pipeline import Pipeline
+from transientcam_server.pipeline import Frame, Pipeline
 from transientcam_server.products import STAGES, Recipe
 
 _log = logging.getLogger(__name__)
@@ -117,6 +117,17 @@ class CalibrationDesk:
     def active_id(self) -> str:
         """The calibration that is used wherever it is good for the sequence."""
         return calibration_id(self._pipeline.calibration)
+
+    @property
+    def active_since_s(self) -> float | None:
+        """When the active calibration was measured, in Unix time; None without one."""
+        calibration = self._pipeline.calibration
+        return None if calibration is None else calibration.capture.captured_unix_s
+
+    @property
+    def known_drift(self) -> Drift | None:
+        """What `drift` has found last."""
+        return self._drift if self._drift_of == self.active_id else None
 
     def notice(self, applied: AppliedSequence) -> dict[str, Any]:
         """Return which gains are used with a sequence, and why not those of the active one."""
@@ -234,13 +245,21 @@ class CalibrationDesk:
             except Problem:  # no older ones are there
                 break
             if frame.recipe.calibration is calibration:
-                found = await frame.stage("moments")
-                share, _ = await self._pipeline.run(self._share, frame.recipe, found)
+                share = await self._share_of(frame)
                 if share is not None:
                     shares.append(share)
         if not shares:
             return None
         return Drift(min(shares), calibration.capture.notes.get("invalid_share"), last)
+
+    async def _share_of(self, frame: Frame) -> float | None:
+        try:
+            found = await frame.stage("moments")
+            share, _ = await self._pipeline.run(self._share, frame.recipe, found)
+        except Exception:  # one frame that cannot be computed says nothing of the calibration
+            _log.exception("frame %d: counting its invalid pixels failed", frame.number)
+            return None
+        return share
 
     def _share(self, recipe: Recipe, found: tm.Reconstruction) -> float | None:
         return invalid_share(found, self._accuracy.noise(recipe, found))

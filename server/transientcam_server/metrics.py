@@ -14,6 +14,8 @@ from prometheus_client.registry import Collector
 
 import transientcam_moments as tm
 from transientcam_server.acquisition import Back, Captured, Event, Lost
+from transientcam_server.calibration import NOMINAL_ID
+from transientcam_server.recording.metrics import RecordingCollector
 
 if TYPE_CHECKING:  # it makes its metrics
     from transientcam_server.service import Service
@@ -62,6 +64,7 @@ class Metrics:
         self.losses = 0
         self.reconnects = 0
         self.registry.register(_ServiceCollector(service, self))
+        self.registry.register(RecordingCollector(service.recordings))
         prometheus.ProcessCollector(registry=self.registry)
         prometheus.PlatformCollector(registry=self.registry)
         prometheus.GCCollector(registry=self.registry)
@@ -116,6 +119,7 @@ class _ServiceCollector(Collector):
         yield from self._device()
         yield from self._frames()
         yield from self._history()
+        yield from self._calibration()
         yield from self._clients()
 
     def _build(self) -> Iterator[Metric]:
@@ -209,6 +213,28 @@ class _ServiceCollector(Collector):
             "What it may be at most.",
             history.settings.max_bytes,
         )
+
+    def _calibration(self) -> Iterator[Metric]:
+        calibrations = self._service.calibrations
+        yield GaugeMetricFamily(
+            "transientcam_calibration_active",
+            "Whether a measurement calibrates frames, where it fits the sequence.",
+            calibrations.active_id != NOMINAL_ID,
+        )
+        captured_unix_s = calibrations.active_since_s
+        if captured_unix_s is not None:
+            yield GaugeMetricFamily(
+                "transientcam_calibration_timestamp_seconds",
+                "When the active calibration was measured.",
+                captured_unix_s,
+            )
+        drift = calibrations.known_drift
+        if drift is not None:
+            yield GaugeMetricFamily(
+                "transientcam_calibration_invalid_pixels_ratio",
+                "Share of pixels whose moments contradict each other by more than noise explains.",
+                drift.invalid_share,
+            )
 
     def _clients(self) -> Iterator[Metric]:
         hub = self._service.hub

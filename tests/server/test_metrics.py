@@ -1,5 +1,7 @@
 """What a scrape tells, and that it stays small."""
 
+import time
+from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
@@ -8,7 +10,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from tests.server.streaming import streaming
-from tests.serving import Served
+from tests.serving import Served, serving
 from transientcam import wire
 from transientcam_driver import RawFrame
 from transientcam_server.acquisition import Captured, Lost
@@ -63,6 +65,32 @@ def test_the_memory_of_former_frames_is_told_with_its_limit(
     assert samples["transientcam_history_bytes"] == frames["bytes"]
     assert samples["transientcam_history_limit_bytes"] == 256 * 1024**2
     assert samples["transientcam_preview_clients"] == 0
+
+
+def test_recordings_are_counted_with_why_they_ended(tmp_path: Path) -> None:
+    kept = {"directory": tmp_path, "min_free_bytes": 0}
+    with (
+        serving(recordings=kept) as daemon,
+        httpx.Client(base_url=daemon.url, timeout=60) as http,
+    ):
+        before = scrape(http)
+        first = http.post("/api/v1/recordings", json={"frames": 2}).json()["id"]
+        while http.get(f"/api/v1/recordings/{first}").json()["state"] != "complete":
+            time.sleep(0.02)
+        second = http.post("/api/v1/recordings", json={}).json()["id"]
+        during = scrape(http)
+        stopped = http.post(f"/api/v1/recordings/{second}/stop").json()
+        after = scrape(http)
+
+    prefix = "transientcam_recording"
+    assert f"{prefix}_disk_free_bytes" in before
+    assert [each[f"{prefix}_active"] for each in (before, during, after)] == [0, 1, 0]
+    assert before[f"{prefix}s_ended_total{{reason=frames}}"] == 0
+    assert after[f"{prefix}s_ended_total{{reason=frames}}"] == 1
+    assert after[f"{prefix}s_ended_total{{reason=stopped}}"] == 1
+    assert after[f"{prefix}_frames_total"] == 2 + stopped["frames"]
+    assert after[f"{prefix}_bytes_total"] >= during[f"{prefix}_bytes_total"] > 0
+    assert after[f"{prefix}_dropped_frames_total"] == 0
 
 
 def test_intervals_are_those_of_the_camera_s_clock_within_one_sequence(served: Served) -> None:

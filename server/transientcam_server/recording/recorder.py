@@ -242,7 +242,8 @@ class Recorder:
     def _look(self) -> None:
         """Bring it to the disk, and hold it to its limits."""
         now_s = self._clock()
-        self._size_bytes = self._writer.bytes_written
+        # HDF5 gives back some of what it took, which nobody need know
+        self._size_bytes = max(self._size_bytes, self._writer.bytes_written)
         if now_s - self._looked_s >= _LOOK_AT_DISK_S:
             self._looked_s = now_s
             self._writer.synchronise(now_s)

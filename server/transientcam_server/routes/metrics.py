@@ -27,4 +27,5 @@ _TEXT: Final[dict[int | str, dict[str, Any]]] = {
 )
 async def read_metrics(service: ServiceOf) -> Response:
     """Return what Prometheus scrapes; where tokens are asked for, a viewer's will do."""
+    await service.calibrations.drift()  # counted anew every few seconds at most
     return Response(service.metrics.exposition(), media_type=CONTENT_TYPE)

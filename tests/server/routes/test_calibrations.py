@@ -77,6 +77,9 @@ def test_the_active_one_says_how_many_pixels_are_invalid(http: httpx.Client) -> 
     # the light still shines at the sensor, so nothing has drifted
     assert 0.0 <= listed["drift"]["invalid_share"] < 0.02
     assert 0.0 <= listed["drift"]["invalid_share_at_capture"] < 0.02
+    metrics = http.get("/metrics").text
+    assert "transientcam_calibration_active 1.0" in metrics
+    assert "transientcam_calibration_invalid_pixels_ratio" in metrics
 
 
 def test_without_an_active_one_frames_are_nominal_and_nothing_drifts(http: httpx.Client) -> None:

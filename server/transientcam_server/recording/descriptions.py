@@ -1,0 +1,114 @@
+"""What the service says of a recording: of one that runs, and of a file."""
+
+import os
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+from transientcam_server.errors import NotARecording
+from transientcam_server.recording.directory import id_of
+from transientcam_server.recording.layout import Header
+from transientcam_server.recording.reader import Recording
+from transientcam_server.recording.recorder import Recorder
+
+
+class Descriptions:
+    """Describes files, and reads each only once as long as it stays the same."""
+
+    def __init__(self) -> None:
+        self._known: dict[Path, tuple[tuple[int, int], dict[str, Any]]] = {}
+
+    def of_file(self, path: Path) -> dict[str, Any] | None:
+        """Describe a file; None where there is none any more."""
+        try:
+            status = path.stat()
+        except FileNotFoundError:  # deleted, or recovered, this moment
+            return None
+        return self._of_content(path, status) | {"size_bytes": status.st_size}
+
+    def _of_content(self, path: Path, status: os.stat_result) -> dict[str, Any]:
+        stamp = status.st_mtime_ns, status.st_size
+        known = self._known.get(path)
+        if known is None or known[0] != stamp:
+            known = self._known[path] = stamp, _read(path)
+        return known[1]
+
+
+def of_recorder(recorder: Recorder, part: Path) -> dict[str, Any]:
+    """Describe a recording that runs, and is written into ``part``."""
+    progress = recorder.progress
+    document = _of_header(recorder.header) | {
+        "state": "recording" if progress.reason is None else "finishing",
+        "frames": progress.frames,
+        "dropped_frames": progress.dropped_frames,
+        "duration_s": progress.duration_s,
+        "size_bytes": progress.size_bytes,
+        "reason": progress.reason,
+        "problem": progress.problem,
+        "limits": asdict(recorder.limits),
+    }
+    try:
+        with Recording(part) as recording:
+            document["annotations"] = recording.annotations
+    except (NotARecording, OSError):  # it was finished this moment
+        document["annotations"] = {}
+    return document
+
+
+def _of_header(header: Header) -> dict[str, Any]:
+    return {
+        "id": header.recording_id,
+        "name": header.name,
+        "started_s": header.started_s,
+        "sequence": header.applied.to_document(),
+        "camera": {
+            "model": header.capabilities.model,
+            "serial": header.capabilities.serial,
+            **header.camera,
+        },
+        "calibration": dict(header.calibration),
+        "width": header.capabilities.width,
+        "height": header.capabilities.height,
+        "versions": dict(header.versions),
+        "limits": None,
+        "problem": None,
+    }
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Describe a file."""
+    unfinished = path.name.endswith(".part")
+    try:
+        with Recording(path) as recording:
+            end, host_time_s = recording.end, recording.series("host_time_s")
+            between_s = float(host_time_s[-1] - host_time_s[0]) if len(host_time_s) else 0.0
+            return _of_header(recording.header) | {
+                "id": id_of(path),
+                "state": "interrupted" if unfinished else "complete",
+                "frames": recording.frames,
+                "dropped_frames": int(recording.series("dropped_frames").sum()),
+                "duration_s": float(end.get("duration_s", between_s)),
+                "reason": end.get("reason", "interrupted"),
+                "problem": end.get("problem"),
+                "annotations": recording.annotations,
+            }
+    except (NotARecording, OSError) as error:
+        return {"id": id_of(path), "state": "damaged", "problem": str(error)} | _NOTHING
+
+
+_NOTHING: Final[dict[str, Any]] = {
+    "name": "",
+    "started_s": None,
+    "frames": 0,
+    "dropped_frames": 0,
+    "duration_s": 0.0,
+    "reason": None,
+    "annotations": {},
+    "sequence": None,
+    "camera": {},
+    "calibration": {},
+    "width": None,
+    "height": None,
+    "versions": {},
+    "limits": None,
+}
