@@ -74,9 +74,19 @@ class Watch:
 
 
 @pytest.fixture
-def served() -> Iterator[Served]:
-    """A daemon whose frames are all alike, so that a picture has to stay the same by itself."""
-    with serving("sim:mirrors?noise=off") as daemon:
+def camera() -> str:
+    """A camera whose frames are all alike, so that a picture has to stay the same by itself."""
+    return "sim:mirrors?noise=off"
+
+
+@pytest.fixture
+def served(camera: str, tmp_path: Path) -> Iterator[Served]:
+    """A daemon that keeps what it stores where nobody else does."""
+    stored = {
+        "recordings": {"directory": tmp_path / "recordings", "min_free_bytes": 0},
+        "calibrations": {"directory": tmp_path / "calibrations"},
+    }
+    with serving(camera, **stored) as daemon:
         yield daemon
 
 

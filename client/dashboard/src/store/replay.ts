@@ -51,7 +51,9 @@ export class Replay {
   /** Where playing has come to, in s since the recording began. */
   #at_s = 0;
   #loading = false;
-  #loaded: { readonly path: string; readonly products: string } | null = null;
+  /** What is on screen, in words; "" for nothing. */
+  #loaded = "";
+  #recomputed = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(api: Api, frames: Frames, status: Status) {
@@ -74,7 +76,7 @@ export class Replay {
       this.trouble.value = null;
       this.playing.value = false;
       this.shown.value = null;
-      this.#loaded = null;
+      this.#loaded = "";
       this.recording.value = recording;
       this.timeline.value = timeline;
       this.seek(frame ?? timeline.first);
@@ -108,7 +110,7 @@ export class Replay {
   /** The settings of the reconstruction changed: frames that are computed with the present ones look otherwise. */
   recompute(): void {
     if (this.settings.peek() !== "current") return;
-    this.#loaded = null;
+    this.#recomputed += 1;
     void this.#load();
   }
 
@@ -151,8 +153,8 @@ export class Replay {
     if (recording === null || this.loader === null || this.#loading || products.length === 0) return;
     const frame = this.frame.peek();
     const path = `${recordingPath(recording.id)}/frames/${frame}${this.settings.peek() === "current" ? "?reconstruction=current" : ""}`;
-    const wanted = { path, products: products.join() };
-    if (this.#loaded?.path === wanted.path && this.#loaded.products === wanted.products) return;
+    const wanted = [path, ...products, this.#recomputed].join();
+    if (this.#loaded === wanted) return;
     this.#loading = true;
     try {
       const reports = await this.loader(path, products);

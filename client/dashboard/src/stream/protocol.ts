@@ -74,6 +74,20 @@ export interface CameraDocument {
   readonly reason: string | null;
   readonly simulated: boolean;
   readonly capabilities: Readonly<Record<string, unknown>>;
+  /** Where its pixels look, in pixels, and who says so; of the whole frame. */
+  readonly intrinsics?: Intrinsics;
+}
+
+/** A pinhole camera: pixel (x, y) looks along ((x - cx) / fx, (y - cy) / fy, 1), y down. */
+export interface Intrinsics {
+  readonly fx: number;
+  readonly fy: number;
+  readonly cx: number;
+  readonly cy: number;
+  readonly width: number;
+  readonly height: number;
+  /** "assumed" where nobody knows. */
+  readonly source: string;
 }
 
 /** Light that came back after one time of flight; its weight in units of b_0. */

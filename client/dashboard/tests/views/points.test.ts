@@ -1,14 +1,15 @@
 import { describe, expect, test } from "vitest";
 
-import { byFlags, byValue, fillCloud, makeCloud } from "../../src/views/points/cloud";
+import { byFlags, byValue, fieldOfView, fillCloud, makeCloud, pinholeOf } from "../../src/views/points/cloud";
+import { plyOf } from "../../src/views/points/ply";
 
-const FIELD_RAD = Math.PI / 2;
+const WIDE_RAD = Math.PI / 2;
 
 describe("a cloud of points", () => {
   test("has each pixel at its range along its ray", () => {
     const cloud = makeCloud(12);
     const range = Float32Array.from({ length: 12 }, (_, pixel) => 1 + pixel);
-    expect(fillCloud(cloud, range, 4, FIELD_RAD, () => undefined)).toBe(12);
+    expect(fillCloud(cloud, range, 4, pinholeOf(4, 3, WIDE_RAD), () => undefined)).toBe(12);
     for (let pixel = 0; pixel < 12; pixel++) {
       const [x, y, z] = cloud.positions.slice(3 * pixel, 3 * pixel + 3);
       expect(Math.hypot(x, y, z)).toBeCloseTo(range[pixel], 5);
@@ -21,9 +22,40 @@ describe("a cloud of points", () => {
   test("leaves out pixels without a range, and keeps the colours of the others with them", () => {
     const cloud = makeCloud(3);
     const range = new Float32Array([NaN, 2, Infinity]);
-    expect(fillCloud(cloud, range, 3, FIELD_RAD, byValue(new Float32Array([0, 9, 0]), 0, 9, "grey"))).toBe(1);
+    expect(fillCloud(cloud, range, 3, pinholeOf(3, 1, WIDE_RAD), byValue(new Float32Array([0, 9, 0]), 0, 9, "grey"))).toBe(1);
     expect([...cloud.colours.slice(0, 3)]).toEqual([255, 255, 255]);
     expect(cloud.positions[2]).toBe(-2);
+  });
+
+  test("follows the lens where it is known", () => {
+    const cloud = makeCloud(1);
+    fillCloud(cloud, new Float32Array([3]), 1, { fx: 2, fy: 4, cx: -1, cy: -4 }, () => undefined);
+    // right by 1/2, down by 1, for each 1 ahead: 3 m along (1, 2, 2) / 3
+    expect([...cloud.positions]).toEqual([1, -2, -2].map((each) => expect.closeTo(each, 6)));
+    expect(fieldOfView(4, pinholeOf(4, 3, 1.2))).toBeCloseTo(1.2, 12);
+  });
+
+  test("is handed out as the camera sees it: x right, y down, z ahead", () => {
+    const cloud = makeCloud(2);
+    const count = fillCloud(cloud, new Float32Array([3, NaN]), 2, { fx: 2, fy: 4, cx: -1, cy: -4 }, byValue([9, 0], 0, 9, "grey"));
+    const file = plyOf(cloud, count, { fx: 2 });
+    const end = "end_header\n";
+    const text = new TextDecoder().decode(file);
+    const head = text.slice(0, text.indexOf(end) + end.length);
+    expect(head.split("\n")).toEqual([
+      "ply",
+      "format binary_little_endian 1.0",
+      'comment {"unit":"m","fx":2}',
+      "element vertex 1",
+      ..."xyz".split("").map((axis) => `property float ${axis}`),
+      ...["red", "green", "blue"].map((colour) => `property uchar ${colour}`),
+      "end_header",
+      "",
+    ]);
+    const vertices = new DataView(file.buffer, head.length);
+    expect([0, 4, 8].map((at) => vertices.getFloat32(at, true))).toEqual([1, 2, 2].map((each) => expect.closeTo(each, 6)));
+    expect([12, 13, 14].map((at) => vertices.getUint8(at))).toEqual([255, 255, 255]);
+    expect(vertices.byteLength).toBe(15);
   });
 
   test("is coloured by the gravest flag", () => {

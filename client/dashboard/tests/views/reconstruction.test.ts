@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 
 import type { ParameterDocument } from "../../src/store/documents";
-import { draftOf, labelOf, limitsOf, readingOf, unitOf } from "../../src/views/reconstruction/fields";
+import { draftOf, labelOf, readingOf, spanOf, unitOf } from "../../src/views/reconstruction/fields";
 
 const parameter = (name: string, value: unknown, more: Partial<ParameterDocument> = {}): ParameterDocument => ({
   name,
@@ -38,7 +38,7 @@ describe("a form made of parameters", () => {
   test.each([
     ["smoothing_px", "11", "Smoothing must be a number from 0 to 10\u202fpx."],
     ["smoothing_px", "", "Smoothing must be a number from 0 to 10\u202fpx."],
-    ["rounds", "1.5", "Rounds must be an integer of at least 1."],
+    ["rounds", "1.5", "Rounds must be an integer at least 1."],
   ])("says what is wrong: %s = %s", (name, text, words) => {
     expect(readingOf(PARAMETERS, { ...draftOf(PARAMETERS), [name]: text })).toEqual({ wrong: name, words });
   });
@@ -46,6 +46,7 @@ describe("a form made of parameters", () => {
   test("names and measures what it does not know, too", () => {
     expect(labelOf("inner_radius_px")).toBe("Inner radius");
     expect(unitOf(parameter("x", 0, { unit: "dn" }))).toBe("DN");
-    expect(limitsOf(parameter("x", 0, { max: 0.25 }))).toBe("a number of at most 0.25");
+    expect(spanOf(parameter("x", 0, { max: 0.25 }))).toBe("at most 0.25");
+    expect(spanOf(parameter("x", 0, { min: 0, max: 0.99 }))).toBe("from 0 to 0.99");
   });
 });

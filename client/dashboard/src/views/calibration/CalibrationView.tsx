@@ -71,7 +71,7 @@ function MeasureForm({ task }: { task: Task }) {
   const measure = (): Promise<boolean> => task.run("Starting…", () => calibrations.measure({ name: name.peek().trim(), frames: count, activate: activate.peek() }));
   return (
     <form
-      class="record-form"
+      class="record-form measure-form"
       onSubmit={(event) => {
         event.preventDefault();
         void measure();
@@ -82,7 +82,7 @@ function MeasureForm({ task }: { task: Task }) {
         <input type="text" name="name" maxLength={200} autocomplete="off" placeholder="after warm-up" value={name.value} onInput={(event) => (name.value = event.currentTarget.value)} />
       </label>
       <label class="field">
-        <span>Frames, with light and as many without</span>
+        <span>Frames, with and without light</span>
         <input type="text" inputMode="numeric" name="frames" autocomplete="off" aria-invalid={!sensible} value={frames.value} onInput={(event) => (frames.value = event.currentTarget.value)} />
       </label>
       <div class="record-actions">

@@ -1,15 +1,19 @@
 import { signal, useComputed } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 
+import { LIVE, RequestError } from "../../store/api";
 import { aNumber, oneOf, remembered } from "../../store/settings";
 import { useStore } from "../../store/store";
+import { frameUrl } from "../../stream/frameUrl";
 import { Choice } from "../../ui/controls";
-import { savePicture } from "../../ui/download";
-import { grouped } from "../../ui/format";
+import { save, savePicture } from "../../ui/download";
+import { download } from "../../ui/files";
+import { fixed, grouped } from "../../ui/format";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { AMPLITUDE } from "../map/catalogue";
-import { byFlags, byValue, fillCloud } from "./cloud";
+import { byFlags, byValue, fieldOfView, fillCloud, pinholeOf, type Pinhole } from "./cloud";
+import { plyOf } from "./ply";
 import type { PointScene } from "./Scene";
 
 const COLOURINGS = ["range", "light", "validity"] as const;
@@ -25,8 +29,16 @@ export function PointsView() {
   const store = useStore();
   const colouring = useMemo(() => remembered<Colouring>(store.shelf, "points.colouring", "range", oneOf(COLOURINGS)), [store]);
   const pointSize = useMemo(() => remembered(store.shelf, "points.size", 2, aNumber), [store]);
-  // No service says how wide its camera looks: simulated scenes begin with 45 degrees.
+  // Only where the service does not know where its camera looks.
   const field_deg = useMemo(() => remembered(store.shelf, "points.field_deg", 45, isField), [store]);
+  const known = useComputed(() => {
+    const told = store.camera.value?.intrinsics;
+    return told === undefined || told.source === "assumed" ? null : told;
+  });
+  const lensOf = (width: number, height: number): Pinhole => {
+    const told = known.value;
+    return told !== null && told.width === width && told.height === height ? told : pinholeOf(width, height, field_deg.value * DEGREE);
+  };
   useProducts(NEEDED[colouring.value]);
   const range = store.frames.of("range");
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -66,9 +78,9 @@ export function PointsView() {
   useDrawing(() => {
     const [frame, chosen, drawn] = [range.value, colouring.value, scene.value];
     const other = chosen === "light" ? store.frames.of(AMPLITUDE).value : chosen === "validity" ? store.frames.of("flags").value : null;
-    const fieldOfView_rad = field_deg.value * DEGREE;
     if (frame === null || drawn === null) return;
     const [height, width] = frame.shape;
+    const lens = lensOf(width, height);
     const fits = other?.values.length === frame.values.length;
     const colourOf =
       chosen === "validity" && fits
@@ -76,10 +88,30 @@ export function PointsView() {
         : chosen === "light" && fits
           ? byValue(other.values, 0, other.map?.high ?? 1, "grey")
           : byValue(frame.values, frame.map?.low ?? 0, frame.map?.high ?? 1, "viridis");
-    count.value = fillCloud(drawn.cloudFor(width * height), frame.values, width, fieldOfView_rad, colourOf);
-    drawn.show(count.value, { width, height, fieldOfView_rad });
+    count.value = fillCloud(drawn.cloudFor(width * height), frame.values, width, lens, colourOf);
+    drawn.show(count.value, { width, height, fieldOfView_rad: fieldOfView(width, lens) });
     if (canvas.current !== null) Object.assign(canvas.current.dataset, { frame: frame.meta.frame, points: count.value, colouring: chosen, low: frame.map?.low, high: frame.map?.high });
   }, [scene, range]);
+
+  const saveShown = (): void => {
+    const [frame, drawn] = [range.peek(), scene.peek()];
+    if (frame === null || drawn === null) return;
+    const [height, width] = frame.shape;
+    const { fx, fy, cx, cy } = lensOf(width, height);
+    const facts = { frame: frame.meta.frame, intrinsics: { fx, fy, cx, cy, width, height, source: known.peek()?.source ?? "assumed" } };
+    save(`points-${frame.meta.frame}.ply`, new Blob([plyOf(drawn.cloudFor(width * height), count.peek(), facts)]));
+  };
+  const saveAll = async (): Promise<void> => {
+    const frame = range.peek();
+    if (frame === null) return;
+    const place = frame.origin === LIVE ? `/frames/${frame.meta.frame}` : frame.origin;
+    try {
+      await download(store.api, frameUrl(place, "pointcloud.ply"), `pointcloud-${frame.meta.frame}.ply`);
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error;
+      store.status.unreadable.value = error.message;
+    }
+  };
 
   const onKeyDown = (event: KeyboardEvent): void => {
     const turn = TURNS[event.key];
@@ -107,6 +139,8 @@ export function PointsView() {
             savePicture(`points-${range.peek()?.meta.frame ?? 0}`, canvas.current);
           },
         },
+        { text: "Points as shown (PLY)", run: saveShown },
+        { text: "Points with light and flags (PLY)", run: () => void saveAll() },
       ]}
     >
       <div class="points" ref={box}>
@@ -126,21 +160,27 @@ export function PointsView() {
           <span>
             <span data-field="points">{grouped(count.value)}</span> <span class="quiet">points</span>
           </span>
-          <label class="choice" title="How wide the camera looks, across: the service does not tell">
-            <span class="quiet">field of view</span>
-            <input
-              class="limit"
-              type="number"
-              min={5}
-              max={150}
-              value={field_deg.value}
-              aria-label="Horizontal field of view in degrees"
-              onChange={(event) => {
-                if (isField(event.currentTarget.valueAsNumber)) field_deg.value = event.currentTarget.valueAsNumber;
-              }}
-            />
-            °
-          </label>
+          {known.value !== null ? (
+            <span title={`As the ${known.value.source} says`} data-field="field_of_view">
+              <span class="quiet">field of view</span> {fixed(fieldOfView(known.value.width, known.value) / DEGREE, 1, "°")}
+            </span>
+          ) : (
+            <label class="choice" title="How wide the camera looks, across: the service does not know">
+              <span class="quiet">field of view</span>
+              <input
+                class="limit"
+                type="number"
+                min={5}
+                max={150}
+                value={field_deg.value}
+                aria-label="Horizontal field of view in degrees"
+                onChange={(event) => {
+                  if (isField(event.currentTarget.valueAsNumber)) field_deg.value = event.currentTarget.valueAsNumber;
+                }}
+              />
+              °
+            </label>
+          )}
           <span class="panel-tools">
             <button type="button" onClick={() => scene.peek()?.fromCamera()}>
               Camera's eye

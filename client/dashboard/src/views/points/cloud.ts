@@ -13,9 +13,23 @@ export function makeCloud(pixels: number): Cloud {
   return { positions: new Float32Array(3 * pixels), colours: new Uint8Array(3 * pixels) };
 }
 
-/** Focal length of a pinhole camera in pixels. */
-export function focalLength(width: number, fieldOfView_rad: number): number {
-  return width / (2 * Math.tan(fieldOfView_rad / 2));
+/** A pinhole camera, in pixels: a pixel looks along ((x - cx) / fx, (y - cy) / fy, 1), y down; centres are whole numbers. */
+export interface Pinhole {
+  readonly fx: number;
+  readonly fy: number;
+  readonly cx: number;
+  readonly cy: number;
+}
+
+/** Square pixels around the axis; the field of view is horizontal. */
+export function pinholeOf(width: number, height: number, fieldOfView_rad: number): Pinhole {
+  const focal = width / (2 * Math.tan(fieldOfView_rad / 2));
+  return { fx: focal, fy: focal, cx: (width - 1) / 2, cy: (height - 1) / 2 };
+}
+
+/** How wide a camera looks, across. */
+export function fieldOfView(width: number, { fx }: Pinhole): number {
+  return 2 * Math.atan(width / (2 * fx));
 }
 
 /**
@@ -27,18 +41,17 @@ export function fillCloud(
   cloud: Cloud,
   range_m: ArrayLike<number>,
   width: number,
-  fieldOfView_rad: number,
+  { fx, fy, cx, cy }: Pinhole,
   colourOf: (pixel: number, colours: Uint8Array, at: number) => void,
 ): number {
   const height = range_m.length / width;
-  const focal = focalLength(width, fieldOfView_rad);
   let at = 0;
   for (let y = 0, pixel = 0; y < height; y++) {
-    const up = (height / 2 - y - 0.5) / focal;
+    const up = (cy - y) / fy;
     for (let x = 0; x < width; x++, pixel++) {
       const range = range_m[pixel];
       if (!Number.isFinite(range)) continue;
-      const right = (x + 0.5 - width / 2) / focal;
+      const right = (x - cx) / fx;
       const depth = range / Math.sqrt(1 + right * right + up * up);
       cloud.positions[at] = right * depth;
       cloud.positions[at + 1] = up * depth;

@@ -6,7 +6,7 @@ import { useStore } from "../../store/store";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
-import { draftOf, isNumber, labelOf, limitsOf, readingOf, unitOf, type Draft } from "./fields";
+import { draftOf, isNumber, labelOf, readingOf, spanOf, unitOf, type Draft } from "./fields";
 
 /** How images become moments and moments become returns; changed while frames come. */
 export function ReconstructionView() {
@@ -111,7 +111,7 @@ function Parameter({ parameter, text, wrong, onInput }: ParameterProps) {
         </span>
       )}
       <small class="quiet">{description}</small>
-      {isNumber(parameter) && <small class="quiet">{limitsOf({ ...parameter, unit: unitOf(parameter) })}</small>}
+      {isNumber(parameter) && <small class="quiet">{spanOf(parameter)}</small>}
     </label>
   );
 } // prettier-ignore

@@ -1,6 +1,6 @@
 /** A form made of what the service says can be set: texts as they are typed, and what they stand for. */
 import type { ParameterDocument } from "../../store/documents";
-import { significant, withUnit } from "../../ui/format";
+import { withUnit } from "../../ui/format";
 
 export type Draft = Readonly<Record<string, string>>;
 
@@ -38,14 +38,19 @@ export function isNumber({ type }: ParameterDocument): boolean {
   return type === "number" || type === "integer";
 }
 
+/** "from 0 to 10 px" */
+export function spanOf(parameter: ParameterDocument): string {
+  const { min, max } = parameter;
+  const written = (value: number): string => String(Number(value.toPrecision(3)));
+  const end = unitOf(parameter);
+  if (min !== null && max !== null) return `from ${written(min)} to ${withUnit(written(max), end)}`;
+  if (min !== null) return `at least ${withUnit(written(min), end)}`;
+  return max === null ? "" : `at most ${withUnit(written(max), end)}`;
+}
+
 /** "a number from 0 to 10 px" */
-export function limitsOf({ type, min, max, unit }: ParameterDocument): string {
-  const kind = type === "integer" ? "an integer" : "a number";
-  const written = (value: number): string => significant(value, value !== 0 && Math.abs(value) < 1 ? 2 : Math.max(1, String(Math.trunc(value)).length));
-  const end = unit ?? "";
-  if (min !== null && max !== null) return `${kind} from ${written(min)} to ${withUnit(written(max), end)}`;
-  if (min !== null) return `${kind} of at least ${withUnit(written(min), end)}`;
-  return max === null ? kind : `${kind} of at most ${withUnit(written(max), end)}`;
+function limitsOf(parameter: ParameterDocument): string {
+  return `${parameter.type === "integer" ? "an integer" : "a number"} ${spanOf(parameter)}`.trim();
 }
 
 const LABELS: Readonly<Record<string, string | undefined>> = {

@@ -70,7 +70,7 @@ export function RecordingsView() {
 
 /** The recording that runs, and the way to end it. */
 function Running({ recording, task }: { recording: RecordingDocument; task: Task }) {
-  const { recordings } = useStore();
+  const { recordings, replay } = useStore();
   const limit_s = recording.limits?.["duration_s"] ?? null;
   return (
     <div class="recording-now">
@@ -87,6 +87,11 @@ function Running({ recording, task }: { recording: RecordingDocument; task: Task
       <span data-field="recording-size">{bytes(recording.size_bytes)}</span>
       {recording.dropped_frames > 0 && <span class="refusal">{grouped(recording.dropped_frames)} left out</span>}
       <span class="spring" />
+      {replay.recording.value?.id !== recording.id && (
+        <button type="button" disabled={recording.frames === 0 || task.busy.value !== null} onClick={() => void task.run("Opening…", () => replay.open(recording.id))}>
+          Watch from its start
+        </button>
+      )}
       <button type="button" class="danger" disabled={task.busy.value !== null} onClick={() => void task.run("Writing the rest to the disk…", () => recordings.stop(recording.id))}>
         Stop recording
       </button>

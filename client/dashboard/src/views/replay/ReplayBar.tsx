@@ -70,6 +70,9 @@ function Scrubber({ replay, timeline }: { replay: Replay; timeline: Timeline }) 
         aria-label="Frame of the recording"
         aria-valuetext={`frame ${frame - first + 1} of ${count}, ${time_s.toFixed(2)} seconds`}
         onPointerDown={() => (replay.playing.value = false)}
+        onKeyDown={(event) => {
+          if (SLIDER_KEYS.includes(event.key)) event.stopPropagation(); // they would move the light
+        }}
         onInput={(event) => {
           replay.playing.value = false;
           replay.seek(event.currentTarget.valueAsNumber);
@@ -84,6 +87,8 @@ function Scrubber({ replay, timeline }: { replay: Replay; timeline: Timeline }) 
     </div>
   );
 }
+
+const SLIDER_KEYS = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"];
 
 /** When the frame on screen was captured, by the clock on the wall. */
 function CapturedAt({ started_s, replay }: { started_s: number | null; replay: Replay }) {

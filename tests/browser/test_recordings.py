@@ -1,0 +1,224 @@
+import io
+import re
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from playwright.sync_api import Page, expect
+
+from tests.browser.conftest import Watch
+from tests.browser.dashboard import choose, colours, map_canvas, map_pixels, open_page, point_at
+from tests.serving import Served
+
+PANEL = ".panel-recordings"
+
+
+@pytest.fixture
+def camera() -> str:
+    """A camera no two frames of which are alike."""
+    return "sim:mirrors?seed=11"
+
+
+def show(page: Page) -> None:
+    open_page(page)
+    choose(page, "response", "Recordings")
+
+
+def recordings(served: Served) -> list[dict[str, Any]]:
+    listed: list[dict[str, Any]] = httpx.get(f"{served.url}/api/v1/recordings").json()["recordings"]
+    return listed
+
+
+def record(served: Served, *, frames: int, name: str = "corner") -> str:
+    """A finished recording, made by somebody else than the page."""
+    url = f"{served.url}/api/v1/recordings"
+    started = httpx.post(url, json={"name": name, "frames": frames}).raise_for_status().json()
+    recording: str = started["id"]
+    for _ in range(100):
+        if httpx.get(f"{url}/{recording}").json()["state"] == "complete":
+            return recording
+        httpx.get(f"{served.url}/api/v1/frames/latest", params={"wait_s": 0.2, "after": 10**9})
+    raise AssertionError("the recording does not end")
+
+
+def recorded(served: Served, recording: str, frame: int, product: str) -> NDArray[Any]:
+    url = f"{served.url}/api/v1/recordings/{recording}/frames/{frame}/{product}.npy"
+    array: NDArray[Any] = np.load(io.BytesIO(httpx.get(url, timeout=60).raise_for_status().content))
+    return array
+
+
+def shows_recorded(page: Page, frame: int) -> None:
+    expect(page.locator(".replay")).to_have_attribute("data-frame", str(frame))
+
+
+def test_a_recording_is_started_watched_and_stopped(page: Page, served: Served) -> None:
+    show(page)
+    panel = page.locator(PANEL)
+    expect(panel).to_contain_text("Nothing was recorded yet.")
+    panel.get_by_label("Name", exact=True).fill("corner at 3 m")
+    panel.get_by_label("Duration").fill("no")
+    expect(panel.get_by_role("button", name="Record", exact=True)).to_be_disabled()
+    panel.get_by_label("Duration").fill("600")
+    panel.get_by_role("button", name="Record", exact=True).click()
+    expect(panel.locator("[data-field=recording-duration]")).to_contain_text("of 10:00")
+    expect(page.locator("[data-field=recording-sign]")).to_be_visible()
+    expect(panel.locator("[data-field=recording-frames]")).to_have_text(re.compile(r"^[1-9]"))
+    assert recordings(served)[0]["limits"]["duration_s"] == 600
+    panel.get_by_role("button", name="Stop recording").click()
+    row = panel.locator("[data-recording]")
+    expect(row).to_contain_text("corner at 3 m")
+    expect(page.locator("[data-field=recording-sign]")).to_have_count(0)
+    told = recordings(served)[0]
+    assert (told["state"], told["reason"]) == ("complete", "stopped")
+    expect(row.locator("[data-field=frames]")).to_have_text(f"{told['frames']} frames")
+    expect(row.locator("[data-field=size]")).to_have_text(re.compile(r"^\d+(\.\d+)?\u202f[kM]B$"))
+    expect(page.locator(".toast").last).to_have_text("The recording stopped.")
+
+
+def test_what_just_happened_is_saved(page: Page, served: Served) -> None:
+    show(page)
+    kept = httpx.get(f"{served.url}/api/v1/frames").json()
+    page.get_by_role("button", name="Save the last 10 s").click()
+    expect(page.locator(f"{PANEL} [data-recording]")).to_have_count(1)
+    saved = recordings(served)[0]
+    assert saved["state"] == "complete"
+    assert saved["frames"] >= kept["count"]
+
+
+def test_a_recording_is_annotated_downloaded_and_deleted(
+    page: Page, served: Served, watch: Watch
+) -> None:
+    recording = record(served, frames=2)
+    url = f"{served.url}/api/v1/recordings/{recording}"
+    show(page)
+    row = page.locator(f"{PANEL} [data-recording]")
+    row.get_by_label("More of corner").select_option(label="Notes…")
+    dialog = page.get_by_role("dialog", name="Notes on corner")
+    dialog.get_by_label("Name of line 1").fill("sample")
+    dialog.get_by_label("Text of line 1").fill("white paint")
+    dialog.get_by_role("button", name="Add a line").click()
+    dialog.get_by_label("Name of line 2").fill("distance_m")
+    dialog.get_by_label("Text of line 2").fill("3.5")
+    dialog.get_by_role("button", name="Save").click()
+    expect(row).to_contain_text("sample: white paint · distance_m: 3.5")
+    assert httpx.get(url).json()["annotations"] == {"sample": "white paint", "distance_m": 3.5}
+    with page.expect_download() as download:
+        row.get_by_role("button", name="Download corner").click()
+    assert download.value.suggested_filename == f"{recording}.h5"
+    assert Path(download.value.path()).read_bytes() == httpx.get(f"{url}/file").content
+    row.get_by_label("More of corner").select_option(label="Delete…")
+    confirm = page.get_by_role("dialog", name="Delete this recording?")
+    confirm.get_by_role("button", name="Keep").click()
+    assert httpx.get(url).status_code == 200
+    row.get_by_label("More of corner").select_option(label="Delete…")
+    confirm.get_by_role("button", name="Delete").click()
+    expect(row).to_have_count(0)
+    assert httpx.get(url).status_code == 404
+
+
+def test_all_views_show_the_frame_that_is_scrubbed_to(page: Page, served: Served) -> None:
+    recording = record(served, frames=6)
+    open_page(page)
+    choose(page, "sequence", "Recordings")
+    point_at(page, "map", 40, 50, click=True)
+    page.get_by_role("button", name="Play corner").click()
+    shows_recorded(page, 1)
+    expect(page.locator("[data-field=state]")).to_have_text("Replay")
+    slider = page.get_by_label("Frame of the recording")
+    slider.focus()
+    for frame in (2, 3, 4):
+        page.keyboard.press("ArrowRight")
+        shows_recorded(page, frame)
+        canvas = map_canvas(page)
+        low, high = (float(str(canvas.get_attribute(f"data-{end}"))) for end in ("low", "high"))
+        expected = colours(recorded(served, recording, frame, "range"), low, high, "viridis")
+        np.testing.assert_allclose(map_pixels(page).astype(int), expected, atol=6)
+    expect(page.locator("[data-field=replay-frame]")).to_have_text("4")
+    # what the views show of light and of the pixel is of this frame, too
+    coefficients = page.evaluate(
+        "() => [...transientcam.store.frames.of('coefficients').peek().values.slice(0, 500)]"
+    )
+    np.testing.assert_allclose(
+        coefficients, recorded(served, recording, 4, "coefficients").ravel()[:500]
+    )
+    url = f"{served.url}/api/v1/recordings/{recording}/frames/4/pixel"
+    told = httpx.get(url, params={"x": 40, "y": 50, "bins": 1}).json()
+    page.wait_for_function(
+        "([range, brightness]) => { const told = transientcam.store.details.document.peek();"
+        " return told?.range_m === range && told.brightness === brightness; }",
+        arg=[told["range_m"], told["brightness"]],
+    )
+    page.get_by_role("button", name="Back to live").click()
+    expect(page.locator(".replay")).to_have_count(0)
+    expect(page.locator("[data-field=state]")).to_have_text("Live")
+    newest = httpx.get(f"{served.url}/api/v1/frames/latest").json()["frame"]
+    page.wait_for_function(
+        "(newest) => document.querySelector('.panel-map .stage canvas').dataset.frame > newest",
+        arg=newest,
+    )
+
+
+def test_a_recording_plays_by_itself_to_its_end(page: Page, served: Served) -> None:
+    record(served, frames=6)
+    show(page)
+    page.get_by_role("button", name="Play corner").click()
+    shows_recorded(page, 1)
+    page.get_by_label("Speed of the recording").select_option("0.5")
+    page.keyboard.press("p")
+    shows_recorded(page, 6)
+    expect(page.get_by_role("button", name="Play the recording")).to_be_visible()
+    page.keyboard.press("[")
+    shows_recorded(page, 5)
+    page.get_by_role("button", name="One frame on").click()
+    shows_recorded(page, 6)
+
+
+def test_a_recorded_frame_is_computed_with_the_present_settings(page: Page, served: Served) -> None:
+    recording = record(served, frames=2)
+    show(page)
+    page.get_by_role("button", name="Play corner").click()
+    shows_recorded(page, 1)
+    page.get_by_label("Computed with").select_option(label="present settings")
+    httpx.put(
+        f"{served.url}/api/v1/reconstruction", json={"estimator": "single-frequency"}
+    ).raise_for_status()
+    url = f"{served.url}/api/v1/recordings/{recording}/frames/1/range.npy"
+    answer = httpx.get(url, params={"reconstruction": "current"}).raise_for_status()
+    wanted = np.load(io.BytesIO(answer.content))
+    assert not np.array_equal(wanted, recorded(served, recording, 1, "range"), equal_nan=True)
+    page.wait_for_function(
+        "([at, value]) => Math.abs(transientcam.store.frames.of('range').peek().values[at] - value)"
+        " < 1e-6",
+        arg=[163 * 60 + 80, float(wanted[60, 80])],
+    )
+
+
+def test_an_address_shows_a_recorded_frame(page: Page, served: Served, watch: Watch) -> None:
+    recording = record(served, frames=4)
+    page.goto(f"/?debug#map=direct&recording={recording}&frame=3")
+    shows_recorded(page, 3)
+    page.get_by_role("button", name="One frame on").click()
+    expect(page).to_have_url(re.compile(rf"#map=direct&recording={recording}&frame=4$"))
+    page.get_by_role("button", name="Back to live").click()
+    expect(page).to_have_url(re.compile(r"#map=direct$"))
+    watch.refusals_expected = True
+    page.evaluate("() => { location.hash = '#recording=gone'; }")
+    expect(page.locator("[data-banner=message]")).to_contain_text("cannot be shown")
+
+
+def test_a_recording_is_watched_while_it_grows(page: Page, served: Served) -> None:
+    show(page)
+    page.get_by_role("button", name="Record", exact=True).click()
+    page.locator("[data-field=recording-frames]").get_by_text(re.compile(r"^[1-9]")).wait_for()
+    page.get_by_role("button", name="Watch from its start").click()
+    shows_recorded(page, 1)
+    count = page.evaluate("() => transientcam.store.replay.timeline.peek().count")
+    page.wait_for_function(
+        "(count) => transientcam.store.replay.timeline.peek().count > count", arg=count
+    )
+    page.get_by_role("button", name="Stop recording").click()
+    expect(page.locator(f"{PANEL} [data-recording]")).to_have_count(1)
+    shows_recorded(page, 1)
