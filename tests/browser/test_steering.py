@@ -77,9 +77,7 @@ def test_a_change_that_is_refused_for_the_lease_says_who_has_it(
     assert words.startswith("the night shift controls the camera")
 
 
-def test_control_is_taken_over_in_both_directions(
-    page: Page, served: Served, watch: Watch
-) -> None:
+def test_control_is_taken_over_in_both_directions(page: Page, served: Served, watch: Watch) -> None:
     open_page(page)
     lease(served, "POST", holder="the night shift", duration_s=600)
     expect(page.locator("[data-field=control]")).to_contain_text("the night shift")
@@ -177,7 +175,7 @@ def show_token(page: Page, token: str) -> None:
 
 
 def test_a_service_that_asks_for_a_token_is_shown_one(page_of_guarded: Any) -> None:
-    page, served, tokens = page_of_guarded
+    page, _, tokens = page_of_guarded
     page.goto("/?debug")
     dialog = page.get_by_role("dialog", name="Who are you?")
     expect(dialog).to_be_visible()
@@ -201,7 +199,7 @@ def test_a_service_that_asks_for_a_token_is_shown_one(page_of_guarded: Any) -> N
 
 
 def test_a_viewer_looks_and_is_told_what_it_may_not(page_of_guarded: Any) -> None:
-    page, served, tokens = page_of_guarded
+    page, _, tokens = page_of_guarded
     page.goto("/?debug")
     show_token(page, tokens[Role.VIEWER])
     page.locator(".panel-map canvas[data-frame]").wait_for()
