@@ -1,5 +1,6 @@
 """For every check a daemon that fails it, and a word that the reason has to say."""
 
+import json
 from dataclasses import replace
 from typing import Any
 
@@ -76,6 +77,21 @@ def _has(message: Map, wanted: Map) -> bool:
 
 def _no_routes(answer: Answer) -> Answer:
     return answer.with_json(paths={}) if answer.path == "/openapi.json" else answer
+
+
+def describing(name: str, **changes: Any) -> Breaking:
+    """Describe a parameter otherwise than it is."""
+
+    def answer(each: Answer) -> Answer:
+        if each.path != f"{API}/parameters":
+            return each
+        parameters = json.loads(each.body)["parameters"]
+        for parameter in parameters:
+            if parameter["name"] == name:
+                parameter.update(changes)
+        return each.with_json(parameters=parameters)
+
+    return Breaking(answer=answer)
 
 
 def one_bit_wrong(product: str) -> Breaking:
@@ -179,6 +195,31 @@ BROKEN: list[tuple[str, Breaking, str]] = [
     ("every-problem-has-a-page", with_status("/problems/not-found", 404), "/problems/not-found"),
     ("every-answer-names-its-request", without_header("x-request-id"), "X-Request-ID"),
     # parameters
+    (
+        "every-value-is-within-its-limits",
+        describing("sequence.exposure_s", max=1e-9),
+        "above its max",
+    ),
+    (
+        "every-parameter-has-unit-and-meaning",
+        describing("sequence.exposure_s", description=""),
+        "description",
+    ),
+    (
+        "parameters-are-what-their-resources-say",
+        describing("sequence.exposure_s", value=0.04),
+        "sequence.exposure_s",
+    ),
+    (
+        "a-parameter-out-of-range-is-refused-and-changes-nothing",
+        describing("sequence.harmonics", max=2),
+        "beyond its limits gives 200",
+    ),
+    (
+        "the-limits-of-a-sequence-are-taken",
+        describing("sequence.harmonics", max=4711),
+        "its limit, is refused",
+    ),
     (
         "a-sequence-out-of-range-is-refused-and-changes-nothing",
         answering(f"{API}/sequence", "PUT", field=None),

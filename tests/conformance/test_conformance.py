@@ -18,7 +18,6 @@ from transientcam_server.tokens import Role, TokenFile, utc_now
 
 PATIENCE_S = 20.0
 SHORT_S = 1.5
-NOT_THERE_YET = ("the service shows no frames of recordings", "the service describes no parameters")
 BY_NAME = {each.name: each for each in CHECKS}
 
 
@@ -42,7 +41,6 @@ def test_the_daemon_keeps_every_promise(daemon: Breakable) -> None:
     assert len(report.results) == len(CHECKS) + 1
     assert {each.reason for each in report.results if each.outcome == "skipped"} <= {
         "the service asks nobody for a token",
-        *NOT_THERE_YET,
     }
     assert after == before
     assert not recordings
@@ -59,8 +57,6 @@ def test_a_broken_promise_fails_its_check(
     with Device(breakable.served.url, patience_s=patience_s) as device:
         result = run(device, only(name)).results[0]
 
-    if result.reason in NOT_THERE_YET:
-        pytest.skip(result.reason)
     assert (result.check.name, result.outcome) == (name, "failed"), result.reason
     assert word in str(result.reason)
 
@@ -68,8 +64,7 @@ def test_a_broken_promise_fails_its_check(
 def test_every_check_has_a_daemon_that_fails_it() -> None:
     broken = {name for name, _, _ in (*BROKEN, *BROKEN_WITH_TOKENS)}
 
-    about_parameters = {each.name for each in CHECKS if each.group == "parameters"}
-    assert broken | about_parameters == set(BY_NAME)
+    assert broken == set(BY_NAME)
 
 
 def test_a_broken_promise_fails_no_other_check(breakable: Breakable) -> None:
