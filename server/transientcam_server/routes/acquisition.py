@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.access import needs
 from transientcam_server.problems import documented
-from transientcam_server.routes.models import AcquisitionDocument, AcquisitionRequest
+from transientcam_server.routes.camera_models import AcquisitionDocument, AcquisitionRequest
 from transientcam_server.service import Service, ServiceOf
 from transientcam_server.tokens import Role
 

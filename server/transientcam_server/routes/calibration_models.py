@@ -5,7 +5,8 @@ from typing import Any, Final
 from pydantic import ConfigDict, Field, JsonValue
 
 from transientcam_driver.calibrating import DEFAULT_TAKES
-from transientcam_server.routes.models import Document
+from transientcam_server.routes.document import Document
+from transientcam_server.routes.sequence_models import SEQUENCE_EXAMPLE
 
 _EXAMPLE: Final[dict[str, JsonValue]] = {
     "id": "SIM-prototype-0-3f9c2a71b04e",
@@ -13,15 +14,7 @@ _EXAMPLE: Final[dict[str, JsonValue]] = {
     "created_at": 1795161600.25,
     "age_s": 3600.0,
     "device": {"model": "simulated", "serial": "SIM-prototype-0", "width": 163, "height": 120},
-    "sequence": {
-        "base_frequency_hz": 23e6,
-        "harmonics": 3,
-        "zeroth": "low-frequency",
-        "exposure_s": 0.00192,
-        "takes": 1,
-        "take_order": "sequential",
-        "sub_phases": {"scheme": "arccos", "n": 8},
-    },
+    "sequence": SEQUENCE_EXAMPLE,
     "exposure_s": 0.00192,
     "temperature_c": 31.5,
     "bytes": 1466368,

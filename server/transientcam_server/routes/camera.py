@@ -8,7 +8,7 @@ from typing import Any
 from fastapi import APIRouter
 
 from transientcam_driver import CameraError, Status
-from transientcam_server.routes.models import CameraDocument
+from transientcam_server.routes.camera_models import CameraDocument
 from transientcam_server.service import ServiceOf
 
 router = APIRouter(tags=["camera"])

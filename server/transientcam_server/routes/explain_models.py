@@ -4,7 +4,8 @@ from typing import Literal
 
 from pydantic import ConfigDict
 
-from transientcam_server.routes.models import Document, SequenceDocument
+from transientcam_server.routes.document import Document
+from transientcam_server.routes.sequence_models import SequenceDocument
 
 
 class EffectDocument(Document):

@@ -23,7 +23,8 @@ from transientcam_server.routes.frame_answers import (
     pixel_answer,
     product_answer,
 )
-from transientcam_server.routes.models import FrameDocument, HistoryDocument, PixelDocument
+from transientcam_server.routes.frame_models import FrameDocument, HistoryDocument
+from transientcam_server.routes.pixel_models import PixelDocument
 from transientcam_server.service import Service, ServiceOf
 
 router = APIRouter(tags=["frames"])

@@ -5,7 +5,7 @@ from fastapi import APIRouter
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import Problem
 from transientcam_server.problems import documented
-from transientcam_server.routes.models import LivenessDocument, ReadinessDocument
+from transientcam_server.routes.service_models import LivenessDocument, ReadinessDocument
 from transientcam_server.service import ServiceOf
 
 router = APIRouter(tags=["health"])

@@ -6,7 +6,7 @@ import transientcam_moments as tm
 from transientcam import wire
 from transientcam_server.encoding import ENCODINGS
 from transientcam_server.products import Product
-from transientcam_server.routes.models import InfoDocument, VersionsDocument
+from transientcam_server.routes.service_models import InfoDocument, VersionsDocument
 from transientcam_server.service import VERSION, ServiceOf
 
 router = APIRouter(tags=["info"])

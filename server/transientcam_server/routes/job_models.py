@@ -4,7 +4,7 @@ from typing import Any, Final, Literal
 
 from pydantic import ConfigDict, Field, JsonValue
 
-from transientcam_server.routes.models import Document
+from transientcam_server.routes.document import Document
 
 EXAMPLE: Final[dict[str, JsonValue]] = {
     "id": "5a0c1f6be2d4",

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field, JsonValue, StringConstraints
 
 from transientcam_server.lease import DEFAULT_DURATION_S, MAX_DURATION_S, MIN_DURATION_S
-from transientcam_server.routes.models import Document
+from transientcam_server.routes.document import Document
 
 _HELD: dict[str, JsonValue] = {
     "held": True,

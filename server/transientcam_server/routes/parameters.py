@@ -7,7 +7,7 @@ from pydantic import ConfigDict, JsonValue
 
 from transientcam_server import parameters
 from transientcam_server.recording.replay import ReplayCamera
-from transientcam_server.routes.models import Document
+from transientcam_server.routes.document import Document
 from transientcam_server.service import ServiceOf
 
 router = APIRouter(tags=["parameters"])

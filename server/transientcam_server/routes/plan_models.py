@@ -4,7 +4,9 @@ from typing import Any
 
 from pydantic import ConfigDict, Field, JsonValue
 
-from transientcam_server.routes.models import Document, FrameDocument, SequenceDocument
+from transientcam_server.routes.document import Document
+from transientcam_server.routes.frame_models import META_EXAMPLE, FrameDocument
+from transientcam_server.routes.sequence_models import SequenceDocument
 
 _SEQUENCE: dict[str, JsonValue] = {
     "base_frequency_hz": 23e6,
@@ -30,26 +32,6 @@ _CHOICE: dict[str, JsonValue] = {
         "bound_width": None,
         "separation_share": None,
     },
-}
-_FRAME: JsonValue = {
-    "frame": 1204,
-    "sequence_id": 1,
-    "calibration_id": "nominal",
-    "reconstruction_id": 1,
-    "device_time_s": 113.52,
-    "host_time_s": 1795161600.25,
-    "capture_s": 0.0944,
-    "reconstruct_s": 0.0042,
-    "base_frequency_hz": 23e6,
-    "harmonics": 3,
-    "zeroth": "low-frequency",
-    "exposure_s": 0.00192,
-    "takes": 1,
-    "width": 163,
-    "height": 120,
-    "temperature_c": 31.5,
-    "lost_images": 0,
-    "rejected_images": 0,
 }
 
 
@@ -228,7 +210,7 @@ class TradeoffDocument(Document):
                     "compared_by": "range_std_m",
                     "scene_of_frame": 1204,
                     "current": {
-                        "meta": _FRAME,
+                        "meta": META_EXAMPLE,
                         "sequence": _SEQUENCE,
                         "capture_s": 0.0904,
                         "frame_rate_hz": 10.6,

@@ -21,7 +21,8 @@ from transientcam_server.routes.frame_answers import (
     pixel_answer,
     product_answer,
 )
-from transientcam_server.routes.models import FrameDocument, PixelDocument
+from transientcam_server.routes.frame_models import FrameDocument
+from transientcam_server.routes.pixel_models import PixelDocument
 from transientcam_server.routes.recording_models import TimelineDocument
 from transientcam_server.service import Service, ServiceOf
 

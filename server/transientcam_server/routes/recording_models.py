@@ -4,25 +4,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, ConfigDict, Field, JsonValue
 
-from transientcam_server.routes.models import AppliedDocument, Document
+from transientcam_server.routes.document import Document
+from transientcam_server.routes.sequence_models import APPLIED_EXAMPLE, AppliedDocument
 
 _ID_EXAMPLE = "20261120T081500Z-3f9c2a"
 _ANNOTATIONS_EXAMPLE: dict[str, JsonValue] = {"sample": "corner, white paint", "operator": "Åsa"}
-_SEQUENCE_EXAMPLE: dict[str, JsonValue] = {
-    "base_frequency_hz": 23e6,
-    "harmonics": 3,
-    "zeroth": "low-frequency",
-    "exposure_s": 0.00192,
-    "takes": 1,
-    "take_order": "sequential",
-    "sub_phases": {"scheme": "arccos", "n": 8},
-    "sequence_id": 1,
-    "images": 16,
-    "capture_s": 0.0904,
-    "frame_rate_hz": 10.593220338983052,
-    "unambiguous_range_m": 6.517227,
-    "data_rate_bytes_s": 6641355.93,
-}
 RECORDING_EXAMPLE: dict[str, JsonValue] = {
     "id": _ID_EXAMPLE,
     "name": "corner at 3 m",
@@ -35,7 +21,7 @@ RECORDING_EXAMPLE: dict[str, JsonValue] = {
     "reason": "duration",
     "problem": None,
     "annotations": _ANNOTATIONS_EXAMPLE,
-    "sequence": _SEQUENCE_EXAMPLE,
+    "sequence": APPLIED_EXAMPLE,
     "camera": {"model": "AMCW lidar (simulated)", "serial": "SIM-mirrors", "scene": "mirrors"},
     "calibration": {"id": "nominal"},
     "width": 163,

@@ -11,7 +11,7 @@ from transientcam_server import problem_kinds as kinds
 from transientcam_server.access import needs
 from transientcam_server.problems import documented
 from transientcam_server.routes import etags
-from transientcam_server.routes.models import AppliedDocument, SequenceDocument
+from transientcam_server.routes.sequence_models import AppliedDocument, SequenceDocument
 from transientcam_server.service import ServiceOf
 from transientcam_server.tokens import Role
 

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 
-from transientcam_server.routes.models import Document
+from transientcam_server.routes.document import Document
 
 _EXAMPLE_SCENES = [
     {"name": "corner", "description": "Two walls that light each other."},

@@ -1,0 +1,120 @@
+"""The JSON documents about the service itself."""
+
+from typing import Any, Literal
+
+from pydantic import ConfigDict
+
+from transientcam_server.routes.document import Document
+
+
+class InfoDocument(Document):
+    """What answers here."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "name": "transientcam",
+                    "version": "0.1.0",
+                    "api": "v1",
+                    "stream": {"path": "/api/v1/stream", "subprotocol": "transientcam.v1.msgpack"},
+                    "products": [
+                        {
+                            "name": "range",
+                            "unit": "m",
+                            "axes": ["y", "x"],
+                            "dtype": "<f4",
+                            "summary": "range of the first return; NaN without one",
+                            "formats": ["msgpack", "npy", "png"],
+                            "over_time": False,
+                            "streamed": True,
+                        }
+                    ],
+                    "clients": 1,
+                    "kernels": {"enabled": True, "compiled": [], "compiling": None, "failed": []},
+                    "reconstruction": {
+                        "smoothing_px": 0.6,
+                        "bias": 0.004,
+                        "return_threshold": 0.1,
+                        "estimator": "pisarenko",
+                        "minimum_brightness_dn": 0.0,
+                    },
+                }
+            ]
+        }
+    )
+
+    class ProductDocument(Document):
+        """An array that a frame can be asked for."""
+
+        name: str
+        unit: str
+        axes: list[str]
+        dtype: str
+        summary: str
+        formats: list[str]
+        """Suffixes it can be had in."""
+        over_time: bool
+        """Whether it takes `time_s` or `bins`."""
+        streamed: bool
+        """Whether the stream offers it."""
+
+    class StreamDocument(Document):
+        """Where the stream is."""
+
+        path: str
+        subprotocol: str
+
+    name: str
+    version: str
+    api: str
+    stream: StreamDocument
+    products: list[ProductDocument]
+    clients: int
+    """Streams open now."""
+    kernels: dict[str, Any]
+    """Which compiled kernels are ready; the others are computed with NumPy meanwhile."""
+    reconstruction: dict[str, float | str]
+    """Settings of the reconstruction."""
+
+
+class LivenessDocument(Document):
+    """The process answers."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"status": "alive"}]})
+
+    status: Literal["alive"] = "alive"
+
+
+class ReadinessDocument(Document):
+    """Frames can be had."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"status": "ready"}]})
+
+    status: Literal["ready"] = "ready"
+
+
+class VersionsDocument(Document):
+    """Which interfaces are served."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "name": "transientcam",
+                    "version": "0.1.0",
+                    "api": [{"name": "v1", "path": "/api/v1"}],
+                }
+            ]
+        }
+    )
+
+    class ApiDocument(Document):
+        """One version of the interface."""
+
+        name: str
+        path: str
+
+    name: str
+    version: str
+    api: list[ApiDocument]
