@@ -2,11 +2,11 @@
 
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, JsonValue
 
 from transientcam_server.routes.document import Document
 
-_EXAMPLE_SCENES = [
+_EXAMPLE_SCENES: list[JsonValue] = [
     {"name": "corner", "description": "Two walls that light each other."},
     {"name": "mirrors", "description": "Three returns in each pixel."},
 ]
