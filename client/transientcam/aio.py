@@ -11,13 +11,14 @@ import httpx
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Data
 
-from transientcam import rest
+from transientcam import frame_requests, rest
 from transientcam.address import parse_address
 from transientcam.calibrations import Calibrations
 from transientcam.connection import answer, http_options, request_options, stream_options
 from transientcam.deadline import Deadline
 from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamError
 from transientcam.frame import Frame
+from transientcam.frame_requests import Part, Which
 from transientcam.jobs import PROGRESS_EVERY_S, WAIT_S, Jobs, OnProgress, ended
 from transientcam.lease import AsyncLease, OnLapse
 from transientcam.subscription import (
@@ -176,25 +177,74 @@ class AsyncCamera:
         """Switch the light off, whoever holds the lease."""
         return await self._ask(rest.document("acquisition/safe-off", method="POST"))
 
+    async def frames(self) -> dict[str, Any]:
+        """Return which frames of the last seconds can be had, by their numbers."""
+        return await self._ask(rest.document("frames"))
+
+    async def timeline(self, recording: str) -> dict[str, Any]:
+        """Return which frames a recording has, and when they were captured."""
+        return await self._ask(frame_requests.timeline(recording))
+
+    async def meta(
+        self,
+        *,
+        number: int | None = None,
+        recording: str | None = None,
+        wait_s: float | None = None,
+        after: int | None = None,
+    ) -> dict[str, Any]:
+        """Return what is known of a frame; parameters as for `frame`."""
+        return await self._ask(frame_requests.meta(Which(number, recording, wait_s, after)))
+
     async def latest(
         self, *, wait_s: float | None = None, after: int | None = None
     ) -> dict[str, Any]:
         """Return what is known of the newest frame; ``wait_s`` and ``after`` as for `frame`."""
-        return await self._ask(rest.latest(rest.Newest(wait_s, after)))
+        return await self.meta(wait_s=wait_s, after=after)
 
     async def frame(
         self,
         product: str,
         *,
+        number: int | None = None,
+        recording: str | None = None,
+        region: Sequence[int] | None = None,
+        decimation: int | None = None,
         time_s: object = None,
         bins: int | None = None,
+        y: int | None = None,
         wait_s: float | None = None,
         after: int | None = None,
     ) -> Frame:
-        """Return one product of the newest frame."""
-        return await self._ask(
-            rest.frame(product, rest.Newest(wait_s, after), time_s=time_s, bins=bins)
-        )
+        """Return one product of the newest frame, or of another one; see `Camera.frame`."""
+        which = Which(number, recording, wait_s, after)
+        part = Part(time_s, bins, y, region, decimation)
+        return await self._ask(frame_requests.frame(product, which, part))
+
+    async def file(
+        self,
+        product: str,
+        form: str,
+        *,
+        colour: bool = False,
+        number: int | None = None,
+        recording: str | None = None,
+        region: Sequence[int] | None = None,
+        decimation: int | None = None,
+        time_s: object = None,
+        bins: int | None = None,
+        y: int | None = None,
+        wait_s: float | None = None,
+        after: int | None = None,
+    ) -> bytes:
+        """Return one product of a frame as a file; parameters as for `frame`.
+
+        ``form`` is ``"png"``, ``"npy"``, ``"npz"``, ``"tiff"``, ``"ply"`` or ``"csv"``; not every
+        product fits every one. ``colour`` makes a PNG for the eye.
+        """
+        which = Which(number, recording, wait_s, after)
+        part = Part(time_s, bins, y, region, decimation)
+        return await self._ask(frame_requests.file(product, form, which, part, colour=colour))
 
     async def picture(
         self,
@@ -205,7 +255,7 @@ class AsyncCamera:
         after: int | None = None,
     ) -> bytes:
         """Return one product of the newest frame as PNG: 16 bit (range in mm), or for the eye."""
-        return await self._ask(rest.picture(product, rest.Newest(wait_s, after), colour=colour))
+        return await self.file(product, "png", colour=colour, wait_s=wait_s, after=after)
 
     async def pixel(
         self,
@@ -213,11 +263,14 @@ class AsyncCamera:
         x: int,
         y: int,
         bins: int | None = None,
+        number: int | None = None,
+        recording: str | None = None,
         wait_s: float | None = None,
         after: int | None = None,
     ) -> dict[str, Any]:
-        """Return everything about one pixel of the newest frame."""
-        return await self._ask(rest.pixel(rest.Newest(wait_s, after), x=x, y=y, bins=bins))
+        """Return everything about one pixel of a frame; parameters as for `frame`."""
+        which = Which(number, recording, wait_s, after)
+        return await self._ask(frame_requests.pixel(which, x=x, y=y, bins=bins))
 
     async def simulation(self) -> dict[str, Any]:
         """Return what is simulated; a problem where the camera is real."""
@@ -242,11 +295,21 @@ class AsyncCamera:
         name: str | None = None,
         duration_s: float | None = None,
         frames: int | None = None,
+        history_s: float | None = None,
         annotations: Mapping[str, Any] | None = None,
     ) -> dict[str, Any]:
-        """Let the daemon record raw frames, until a limit or `stop_recording`; describe it."""
+        """Let the daemon record raw frames, until a limit or `stop_recording`; describe it.
+
+        With ``history_s`` it begins with the frames of the last seconds: what just happened.
+        """
         return await self._ask(
-            rest.record(name=name, duration_s=duration_s, frames=frames, annotations=annotations)
+            rest.record(
+                name=name,
+                duration_s=duration_s,
+                frames=frames,
+                history_s=history_s,
+                annotations=annotations,
+            )
         )
 
     async def recordings(self) -> dict[str, Any]:

@@ -1,17 +1,18 @@
 """A camera on the network, as one object."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
 
 import httpx
 
-from transientcam import rest
+from transientcam import frame_requests, rest
 from transientcam.address import parse_address
 from transientcam.calibrations import Calibrations
 from transientcam.connection import answer, http_options, request_options
 from transientcam.frame import Frame
+from transientcam.frame_requests import Part, Which
 from transientcam.jobs import PROGRESS_EVERY_S, WAIT_S, Jobs, OnProgress, ended
 from transientcam.lease import Lease, OnLapse
 from transientcam.stream import Stream
@@ -203,35 +204,97 @@ class Camera:
         """Switch the light off, whoever holds the lease."""
         return self._ask(rest.document("acquisition/safe-off", method="POST"))
 
+    @property
+    def frames(self) -> dict[str, Any]:
+        """Which frames of the last seconds can be had, by their numbers."""
+        return self._ask(rest.document("frames"))
+
+    def timeline(self, recording: str) -> dict[str, Any]:
+        """Return which frames a recording has, and when they were captured."""
+        return self._ask(frame_requests.timeline(recording))
+
+    def meta(
+        self,
+        *,
+        number: int | None = None,
+        recording: str | None = None,
+        wait_s: float | None = None,
+        after: int | None = None,
+    ) -> dict[str, Any]:
+        """Return what is known of a frame; parameters as for `frame`."""
+        return self._ask(frame_requests.meta(Which(number, recording, wait_s, after)))
+
     def latest(self, *, wait_s: float | None = None, after: int | None = None) -> dict[str, Any]:
         """Return what is known of the newest frame; ``wait_s`` and ``after`` as for `frame`."""
-        return self._ask(rest.latest(rest.Newest(wait_s, after)))
+        return self.meta(wait_s=wait_s, after=after)
 
     def frame(
         self,
         product: str,
         *,
+        number: int | None = None,
+        recording: str | None = None,
+        region: Sequence[int] | None = None,
+        decimation: int | None = None,
         time_s: object = None,
         bins: int | None = None,
+        y: int | None = None,
         wait_s: float | None = None,
         after: int | None = None,
     ) -> Frame:
-        """Return one product of the newest frame.
+        """Return one product of the newest frame, or of another one.
 
         Parameters
         ----------
         product
             Its name; `wire.PRODUCTS` lists them.
+        number
+            A former frame, as far as `frames` has it, or one that is still to come.
+        recording
+            Id of a recording instead, whose frames are counted from 1.
+        region
+            x, y, width and height of the part wanted, in pixels.
+        decimation
+            Every so many pixels of it, both ways.
         time_s
-            For ``transient`` and ``cumulative``: the times of flight to evaluate at, in s.
+            For products over time: the times of flight to evaluate at, in s.
         bins
             For the same, instead: how many times, evenly over the unambiguous time.
+        y
+            For ``streak``: its row.
         wait_s
             How long to wait for a frame, if there is none yet, or none after ``after``.
         after
             Number of a frame; only a newer one will do.
         """
-        return self._ask(rest.frame(product, rest.Newest(wait_s, after), time_s=time_s, bins=bins))
+        which = Which(number, recording, wait_s, after)
+        part = Part(time_s, bins, y, region, decimation)
+        return self._ask(frame_requests.frame(product, which, part))
+
+    def file(
+        self,
+        product: str,
+        form: str,
+        *,
+        colour: bool = False,
+        number: int | None = None,
+        recording: str | None = None,
+        region: Sequence[int] | None = None,
+        decimation: int | None = None,
+        time_s: object = None,
+        bins: int | None = None,
+        y: int | None = None,
+        wait_s: float | None = None,
+        after: int | None = None,
+    ) -> bytes:
+        """Return one product of a frame as a file; parameters as for `frame`.
+
+        ``form`` is ``"png"``, ``"npy"``, ``"npz"``, ``"tiff"``, ``"ply"`` or ``"csv"``; not every
+        product fits every one. ``colour`` makes a PNG for the eye.
+        """
+        which = Which(number, recording, wait_s, after)
+        part = Part(time_s, bins, y, region, decimation)
+        return self._ask(frame_requests.file(product, form, which, part, colour=colour))
 
     def picture(
         self,
@@ -242,7 +305,7 @@ class Camera:
         after: int | None = None,
     ) -> bytes:
         """Return one product of the newest frame as PNG: 16 bit (range in mm), or for the eye."""
-        return self._ask(rest.picture(product, rest.Newest(wait_s, after), colour=colour))
+        return self.file(product, "png", colour=colour, wait_s=wait_s, after=after)
 
     def pixel(
         self,
@@ -250,11 +313,14 @@ class Camera:
         x: int,
         y: int,
         bins: int | None = None,
+        number: int | None = None,
+        recording: str | None = None,
         wait_s: float | None = None,
         after: int | None = None,
     ) -> dict[str, Any]:
-        """Return everything about one pixel of the newest frame."""
-        return self._ask(rest.pixel(rest.Newest(wait_s, after), x=x, y=y, bins=bins))
+        """Return everything about one pixel of a frame; parameters as for `frame`."""
+        which = Which(number, recording, wait_s, after)
+        return self._ask(frame_requests.pixel(which, x=x, y=y, bins=bins))
 
     @property
     def simulation(self) -> dict[str, Any]:
@@ -280,11 +346,21 @@ class Camera:
         name: str | None = None,
         duration_s: float | None = None,
         frames: int | None = None,
+        history_s: float | None = None,
         annotations: Mapping[str, Any] | None = None,
     ) -> dict[str, Any]:
-        """Let the daemon record raw frames, until a limit or `stop_recording`; describe it."""
+        """Let the daemon record raw frames, until a limit or `stop_recording`; describe it.
+
+        With ``history_s`` it begins with the frames of the last seconds: what just happened.
+        """
         return self._ask(
-            rest.record(name=name, duration_s=duration_s, frames=frames, annotations=annotations)
+            rest.record(
+                name=name,
+                duration_s=duration_s,
+                frames=frames,
+                history_s=history_s,
+                annotations=annotations,
+            )
         )
 
     def recordings(self) -> dict[str, Any]:

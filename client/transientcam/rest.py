@@ -11,8 +11,7 @@ from typing import Any, Final, Generic, TypeVar
 import numpy as np
 
 from transientcam.errors import ParameterError, ProblemError, ProtocolError
-from transientcam.frame import Frame
-from transientcam.wire import MEDIA_TYPE, PROBLEM_MEDIA_TYPE, parse_frame
+from transientcam.wire import PROBLEM_MEDIA_TYPE
 
 _T = TypeVar("_T")
 _JSON: Final = "application/json"
@@ -89,7 +88,7 @@ def document(
         method,
         path,
         _read_document,
-        _query(params),
+        query(params),
         None if body is None else _json_bytes(body),
         patience_s=patience_s,
     )
@@ -97,7 +96,7 @@ def document(
 
 def file(path: str, media_type: str) -> Request[bytes]:
     """Build a request that is answered with a file."""
-    return Request("GET", path, lambda answer: _body(answer, media_type), accept=media_type)
+    return Request("GET", path, lambda answer: body_of(answer, media_type), accept=media_type)
 
 
 def upload(
@@ -174,6 +173,7 @@ def record(
     name: str | None,
     duration_s: float | None,
     frames: int | None,
+    history_s: float | None,
     annotations: Mapping[str, Any] | None,
 ) -> Request[dict[str, Any]]:
     """Build the request that starts a recording."""
@@ -181,6 +181,7 @@ def record(
         "name": name,
         "duration_s": duration_s,
         "frames": frames,
+        "history_s": history_s,
         "annotations": None if annotations is None else dict(annotations),
     }
     body = {key: value for key, value in wanted.items() if value is not None}
@@ -191,71 +192,17 @@ def recording(
     recording_id: str, *, method: str = "GET", part: str = "", patience_s: float = 0.0
 ) -> Request[dict[str, Any]]:
     """Build a request about one recording."""
-    return document(_recording(recording_id) + part, method=method, patience_s=patience_s)
+    return document(recording_path(recording_id) + part, method=method, patience_s=patience_s)
 
 
 def recording_file(recording_id: str) -> str:
     """Return the path of a recording's file."""
-    return _recording(recording_id) + "/file"
+    return recording_path(recording_id) + "/file"
 
 
-def _recording(recording_id: str) -> str:
-    return f"recordings/{_segment(recording_id)}"
-
-
-@dataclass(frozen=True, slots=True)
-class Newest:
-    """Which frame is new enough: one after frame ``after``, waited for as long as ``wait_s``."""
-
-    wait_s: float | None = None
-    after: int | None = None
-
-    @property
-    def params(self) -> tuple[tuple[str, object], ...]:
-        """What of it goes into a query."""
-        return (("wait_s", self.wait_s), ("after", self.after))
-
-    @property
-    def patience_s(self) -> float:
-        """How much longer the answer may take."""
-        return self.wait_s or 0.0
-
-
-def latest(newest: Newest) -> Request[dict[str, Any]]:
-    """Build the request for what is known of the newest frame."""
-    return document("frames/latest", params=newest.params, patience_s=newest.patience_s)
-
-
-def frame(
-    product: str, newest: Newest, *, time_s: object = None, bins: int | None = None
-) -> Request[Frame]:
-    """Build the request for one product of the newest frame."""
-    return Request(
-        "GET",
-        f"frames/latest/{_segment(product)}.msgpack",
-        lambda answer: parse_frame(_body(answer, MEDIA_TYPE)),
-        _query((*_times(time_s), ("bins", bins), *newest.params)),
-        accept=MEDIA_TYPE,
-        patience_s=newest.patience_s,
-    )
-
-
-def picture(product: str, newest: Newest, *, colour: bool = False) -> Request[bytes]:
-    """Build the request for one product of the newest frame as PNG."""
-    return Request(
-        "GET",
-        f"frames/latest/{_segment(product)}.png",
-        lambda answer: _body(answer, "image/png"),
-        _query((("view", "colour" if colour else None), *newest.params)),
-        accept="image/png",
-        patience_s=newest.patience_s,
-    )
-
-
-def pixel(newest: Newest, *, x: int, y: int, bins: int | None = None) -> Request[dict[str, Any]]:
-    """Build the request for everything about one pixel of the newest frame."""
-    params = (("x", x), ("y", y), ("bins", bins), *newest.params)
-    return document("frames/latest/pixel", params=params, patience_s=newest.patience_s)
+def recording_path(recording_id: str) -> str:
+    """Return the path of a recording."""
+    return f"recordings/{segment(recording_id)}"
 
 
 def problem(answer: Answer) -> ProblemError:
@@ -292,10 +239,17 @@ def problem_error(fields: Mapping[str, Any], *, status: int = 0) -> ProblemError
 
 
 def _read_document(answer: Answer) -> dict[str, Any]:
-    return _object(_body(answer, _JSON))
+    return _object(body_of(answer, _JSON))
 
 
-def _body(answer: Answer, media_type: str) -> bytes:
+def body_of(answer: Answer, media_type: str) -> bytes:
+    """Return the body of an answer of a media type.
+
+    Raises
+    ------
+    ProtocolError
+        If it is of another.
+    """
     if answer.media_type != media_type:
         raise ProtocolError("content-type", answer.media_type, media_type)
     return answer.body
@@ -326,20 +280,19 @@ def _plain(value: object) -> object:
     raise TypeError(f"{type(value).__name__} has no JSON")
 
 
-def _query(params: Iterable[tuple[str, object]]) -> tuple[tuple[str, str], ...]:
+def query(params: Iterable[tuple[str, object]]) -> tuple[tuple[str, str], ...]:
+    """Return parameters as they travel, without those that are None."""
     return tuple((key, str(value)) for key, value in params if value is not None)
 
 
-def _times(time_s: object) -> list[tuple[str, object]]:
-    if time_s is None:
-        return []
-    times = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
-    if times.ndim != 1 or not np.isfinite(times).all():
-        raise ParameterError("time_s", time_s, "finite times in seconds, in one dimension")
-    return [("time_s", repr(float(time))) for time in times]
+def segment(name: str) -> str:
+    """Return a name that may be a part of a path.
 
-
-def _segment(name: str) -> str:
+    Raises
+    ------
+    ParameterError
+        If it would be more than that.
+    """
     if not name or not name.replace("-", "").replace("_", "").isalnum():
         raise ParameterError("product", name, "a product's name, such as range")
     return name

@@ -141,6 +141,37 @@ _CALLS: dict[
         lambda c: c.frame("cumulative", bins=8, wait_s=1.0, after=3),
         ("GET", "frames/latest/cumulative.msgpack", "bins=8&wait_s=1.0&after=3", None),
     ),
+    "former": (
+        lambda c: c.frame("range", number=7, region=(1, 2, 3, 4), decimation=2),
+        lambda c: c.frame("range", number=7, region=(1, 2, 3, 4), decimation=2),
+        ("GET", "frames/7/range.msgpack", "region=1%2C2%2C3%2C4&decimation=2", None),
+    ),
+    "recorded": (
+        lambda c: c.frame("streak", recording="a1", number=3, y=60, bins=9),
+        lambda c: c.frame("streak", recording="a1", number=3, y=60, bins=9),
+        ("GET", "recordings/a1/frames/3/streak.msgpack", "bins=9&y=60", None),
+    ),
+    "meta": (
+        lambda c: c.meta(recording="a1", number=3),
+        lambda c: c.meta(recording="a1", number=3),
+        ("GET", "recordings/a1/frames/3", "", None),
+    ),
+    "frames": (lambda c: c.frames, lambda c: c.frames(), ("GET", "frames", "", None)),
+    "timeline": (
+        lambda c: c.timeline("a1"),
+        lambda c: c.timeline("a1"),
+        ("GET", "recordings/a1/frames", "", None),
+    ),
+    "file": (
+        lambda c: c.file("range", "png", number=7, decimation=3),
+        lambda c: c.file("range", "png", number=7, decimation=3),
+        ("GET", "frames/7/range.png", "decimation=3", None),
+    ),
+    "past": (
+        lambda c: c.record(history_s=5.0),
+        lambda c: c.record(history_s=5.0),
+        ("POST", "recordings", "", {"history_s": 5.0}),
+    ),
     "picture": (
         lambda c: c.picture("range", colour=True),
         lambda c: c.picture("range", colour=True),

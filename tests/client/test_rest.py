@@ -2,15 +2,13 @@
 
 import json
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.client.conftest import Recording
-from transientcam import rest, wire
+from transientcam import rest
 from transientcam.errors import ParameterError, ProblemError, ProtocolError
-from transientcam.rest import Answer, Newest
+from transientcam.rest import Answer
 
 _PROBLEM = {
     "type": "/problems/invalid-sequence",
@@ -60,50 +58,6 @@ def test_numpy_numbers_are_numbers() -> None:
 def test_what_json_cannot_carry_is_refused_before_it_is_sent(value: object) -> None:
     with pytest.raises(ParameterError, match="document is"):
         rest.sequence({"exposure_s": value})
-
-
-def test_times_of_flight_keep_every_digit() -> None:
-    times_s = np.array([1.1e-9, 1 / 3, np.float32(0.1)])
-
-    request = rest.frame("transient", Newest(), time_s=times_s)
-
-    assert [name for name, _ in request.params] == ["time_s"] * 3
-    assert [float(value) for _, value in request.params] == times_s.tolist()
-
-
-def test_a_single_time_of_flight_is_one() -> None:
-    assert rest.frame("transient", Newest(), time_s=1e-9).params == (("time_s", "1e-09"),)
-
-
-@pytest.mark.parametrize("time_s", [math.nan, [math.inf], [[1.0]]])
-def test_times_that_are_none_are_refused(time_s: object) -> None:
-    with pytest.raises(ParameterError, match="time_s is"):
-        rest.frame("transient", Newest(), time_s=time_s)
-
-
-@pytest.mark.parametrize("product", ["", "../sequence", "a/b", "a?b", "a b", "range.npy", "é/"])
-def test_a_product_that_is_no_name_never_becomes_a_path(product: str) -> None:
-    with pytest.raises(ParameterError, match="product is"):
-        rest.frame(product, Newest())
-    with pytest.raises(ParameterError, match="product is"):
-        rest.picture(product, Newest())
-
-
-def test_a_request_that_waits_has_the_patience_for_it() -> None:
-    request = rest.latest(Newest(wait_s=7.5, after=3))
-
-    assert request.params == (("wait_s", "7.5"), ("after", "3"))
-    assert request.patience_s == 7.5
-    assert rest.latest(Newest()).patience_s == 0.0
-
-
-def test_a_frame_is_read_from_the_body(recorded: dict[str, Recording]) -> None:
-    request = rest.frame("range", Newest())
-
-    frame = request.result(Answer(200, wire.MEDIA_TYPE, recorded["frame"].data))
-
-    assert frame.product == "range"
-    assert request.headers["accept"] == "application/vnd.msgpack, application/problem+json"
 
 
 def test_a_refusal_is_raised_with_all_it_says() -> None:
@@ -162,12 +116,3 @@ def test_an_answer_of_another_kind_is_refused(answer: Answer, field: str) -> Non
         rest.document("info").result(answer)
 
     assert caught.value.field == field
-
-
-@pytest.mark.parametrize(
-    ("request_", "media_type"),
-    [(rest.frame("range", Newest()), "image/png"), (rest.picture("range", Newest()), "text/html")],
-)
-def test_a_body_of_another_kind_is_refused(request_: rest.Request[Any], media_type: str) -> None:
-    with pytest.raises(ProtocolError, match="content-type is"):
-        request_.result(Answer(200, media_type, b"\x89PNG"))

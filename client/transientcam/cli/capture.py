@@ -1,14 +1,14 @@
-"""``transientcam capture``: one product of the newest frame, into a file."""
+"""``transientcam capture``: one product of a frame, into a file."""
 
 import json
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from transientcam.camera import Camera
-from transientcam.cli.formats import Format, frame_bytes
+from transientcam.cli.formats import MADE_BY_DAEMON, Format, frame_bytes
 from transientcam.cli.options import JsonOption, ProductArgument, TokenOption, UrlArgument
 from transientcam.frame import Frame
 
@@ -20,6 +20,18 @@ def capture(
         Path,
         typer.Option("--output", "-o", help="File to write; - is standard output."),
     ],
+    number: Annotated[
+        int | None, typer.Option(min=1, help="A former frame, instead of the newest.")
+    ] = None,
+    recording: Annotated[
+        str | None, typer.Option(help="Take it from the recording with this id.")
+    ] = None,
+    region: Annotated[
+        str | None, typer.Option(help="Only this part: x,y,width,height in pixels.")
+    ] = None,
+    decimation: Annotated[
+        int | None, typer.Option(min=1, help="Only every so many pixels, both ways.")
+    ] = None,
     time_s: Annotated[
         list[float] | None,
         typer.Option(help="Time of flight in seconds; give it once for each. For transients."),
@@ -27,22 +39,36 @@ def capture(
     bins: Annotated[
         int | None, typer.Option(help="How many times of flight instead, evenly spaced.")
     ] = None,
+    y: Annotated[int | None, typer.Option(help="Row of a streak.")] = None,
     form: Annotated[
         Format | None, typer.Option("--format", help="Format; without it, by the file's suffix.")
     ] = None,
     colour: Annotated[bool, typer.Option(help="PNG in colours for the eye.")] = False,
-    wait_s: Annotated[float, typer.Option(help="How long to wait for a first frame.")] = 10.0,
+    wait_s: Annotated[
+        float, typer.Option(help="How long to wait for a frame that is still to come.")
+    ] = 10.0,
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Save one product of the newest frame in a file."""
+    """Save one product of a frame in a file."""
     form = form or _format_of(output)
+    wanted: dict[str, Any] = {
+        "number": number,
+        "recording": recording,
+        "region": _region_of(region),
+        "decimation": decimation,
+        "time_s": time_s,
+        "bins": bins,
+        "y": y,
+        # what is recorded is not waited for
+        "wait_s": wait_s if recording is None else None,
+    }
     with Camera(url, token=token) as camera:
-        if form is Format.PNG:
-            data = camera.picture(product, colour=colour, wait_s=wait_s)
+        if form in MADE_BY_DAEMON:
+            data = camera.file(product, form.value, colour=colour, **wanted)
             report: dict[str, object] = {"product": product}
         else:
-            frame = camera.frame(product, time_s=time_s, bins=bins, wait_s=wait_s)
+            frame = camera.frame(product, **wanted)
             data = frame_bytes(frame, form)
             report = _report(frame)
     if str(output) == "-":
@@ -54,13 +80,25 @@ def capture(
 
 
 def _format_of(output: Path) -> Format:
+    suffix = output.suffix.removeprefix(".").lower()
     try:
-        return Format(output.suffix.removeprefix(".").lower())
+        return Format("tiff" if suffix == "tif" else suffix)
     except ValueError:
         known = ", ".join(Format)
         raise typer.BadParameter(
             f"{output} has no suffix that is a format; give --format, one of {known}.",
             param_hint="--output",
+        ) from None
+
+
+def _region_of(text: str | None) -> list[int] | None:
+    if text is None:
+        return None
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise typer.BadParameter(
+            f"{text!r} is not x,y,width,height in whole pixels.", param_hint="--region"
         ) from None
 
 

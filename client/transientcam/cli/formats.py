@@ -4,7 +4,7 @@ import io
 import json
 from collections.abc import Callable
 from enum import StrEnum
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,14 +23,24 @@ class Format(StrEnum):
     """``array`` with ``product``, ``unit``, ``axes``, ``meta`` (JSON), ``time_s``, ``labels``."""
     PNG = "png"
     """As the daemon draws it: 16 bit, or colours for the eye."""
+    TIFF = "tiff"
+    """The values as they are, a page for each image; also ``.tif``."""
+    PLY = "ply"
+    """Of pointcloud: points with range, amplitude and flags."""
+    CSV = "csv"
+    """A line for each row, of what is an image."""
     MSGPACK = "msgpack"
     """The message of docs/stream.md."""
     JSON = "json"
     """Everything as text; null for NaN, [re, im] for a complex number."""
 
 
+MADE_BY_DAEMON: Final = frozenset((Format.PNG, Format.TIFF, Format.PLY, Format.CSV))
+"""What is fetched as it is."""
+
+
 def frame_bytes(frame: Frame, form: Format) -> bytes:
-    """Return ``frame`` in any format but PNG, which only the daemon makes."""
+    """Return ``frame`` in any format but those of `MADE_BY_DAEMON`."""
     return _WRITERS[form](frame)
 
 

@@ -21,6 +21,10 @@ def record(
         float | None, typer.Option("--duration", help="Stop after so many seconds.")
     ] = None,
     frames: Annotated[int | None, typer.Option(min=1, help="Stop after so many frames.")] = None,
+    history_s: Annotated[
+        float | None,
+        typer.Option("--history", help="Begin with so many seconds that have just passed."),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="Also download the recording into this .h5."),
@@ -34,7 +38,11 @@ def record(
     console = Console(stderr=True)
     with Camera(url, token=token) as camera:
         running = camera.record(
-            name=name, duration_s=duration_s, frames=frames, annotations=annotations
+            name=name,
+            duration_s=duration_s,
+            frames=frames,
+            history_s=history_s,
+            annotations=annotations,
         )
         try:
             with console.status("recording") as status:

@@ -11,7 +11,7 @@ from PIL import Image
 from rich.console import Console
 
 from tests.serving import Served, serving
-from transientcam import Notice, wire
+from transientcam import Camera, Notice, wire
 from transientcam.cli import run
 from transientcam.cli.statistics import Sample
 from transientcam.cli.watch import Screen
@@ -26,7 +26,7 @@ def served() -> Iterator[Served]:
 def test_capture_saves_every_format(
     served: Served, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for suffix in ("npy", "npz", "png", "msgpack", "json"):
+    for suffix in ("npy", "npz", "png", "msgpack", "json", "tiff", "csv"):
         path = tmp_path / f"range.{suffix}"
 
         assert run(["capture", served.url, "range", "-o", str(path)]) == 0
@@ -38,6 +38,9 @@ def test_capture_saves_every_format(
         assert parts["array"].shape == (120, 163)
     with Image.open(tmp_path / "range.png") as image:
         assert image.size == (163, 120)
+    with Image.open(tmp_path / "range.tiff") as image:
+        assert (image.size, image.mode) == ((163, 120), "F")
+    assert np.loadtxt(tmp_path / "range.csv", delimiter=",").shape == (120, 163)
     assert wire.parse_frame((tmp_path / "range.msgpack").read_bytes()).product == "range"
     assert len(json.loads((tmp_path / "range.json").read_text())["array"]) == 120
 
@@ -60,6 +63,36 @@ def test_capture_takes_times_of_flight(
     assert report["meta"]["frame"] >= 1
 
 
+def test_capture_takes_a_part_of_a_former_frame_or_of_a_recorded_one(
+    served: Served, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    part, recorded = tmp_path / "part.npz", tmp_path / "recorded.tif"
+    cut = ["--region", "40,30,64,48", "--decimation", "2"]
+    with Camera(served.url) as camera:
+        number = camera.latest(wait_s=10.0)["frame"]
+        camera.latest(after=number, wait_s=10.0)
+        recording = camera.record(history_s=10.0)["id"]
+        camera.stop_recording(recording)
+
+    former = ["capture", served.url, "range", "--number", str(number), *cut, "-o", str(part)]
+    assert run(former) == 0
+    old = ["capture", served.url, "range", "--recording", recording, "--number", "2"]
+    assert run([*old, "-o", str(recorded)]) == 0
+
+    with np.load(part) as parts:
+        meta = json.loads(parts["meta"].item())
+        assert parts["array"].shape == (24, 32)
+    assert (meta["frame"], meta["region"], meta["decimation"]) == (number, [40, 30, 64, 48], 2)
+    with Image.open(recorded) as image:
+        assert image.size == (163, 120)
+    cloud = tmp_path / "cloud.ply"
+    assert run(["capture", served.url, "pointcloud", "-o", str(cloud)]) == 0
+    assert cloud.read_bytes().startswith(b"ply\nformat binary_little_endian 1.0\n")
+    capsys.readouterr()
+    assert run(["capture", served.url, "range", "--region", "a,b", "-o", str(part)]) == 2
+    assert "x,y,width,height" in " ".join(capsys.readouterr().err.split())
+
+
 def test_capture_writes_to_standard_output(
     served: Served, capfdbinary: pytest.CaptureFixture[bytes]
 ) -> None:
@@ -74,7 +107,9 @@ def test_a_refusal_of_the_daemon_is_one_sentence(
     assert run(["capture", served.url, "rang", "-o", str(tmp_path / "r.npy")]) == 1
 
     error = capsys.readouterr().err
-    assert error.startswith("transientcam: There is no product 'rang'; there are brightness, ")
+    assert error.startswith(
+        "transientcam: There is no product 'rang'; there are bounds, brightness, "
+    )
     assert error.count("\n") == 1
     assert not list(tmp_path.iterdir())
 
