@@ -1,0 +1,113 @@
+"""What can be said of docker/ without building it; docker/build-and-check does that for real."""
+
+import os
+import re
+import shutil
+import subprocess
+from typing import Any
+
+import pytest
+import yaml
+
+from tests.conftest import ROOT
+from transientcam_server.announcement import inside_container
+from transientcam_server.configuration import load_settings
+from transientcam_server.errors import SettingsError
+
+_DOCKER = ROOT / "docker"
+_OURS = ("simulated", "usb", "camera-behind-tls")
+
+
+def services() -> dict[str, Any]:
+    found: dict[str, Any] = yaml.safe_load((_DOCKER / "compose.yaml").read_text())["services"]
+    return found
+
+
+def image_environment() -> dict[str, str]:
+    """Return the variables that the image sets."""
+    text = (_DOCKER / "Dockerfile").read_text().replace("\\\n", " ")
+    (line,) = [each for each in text.splitlines() if each.startswith("ENV ")]
+    return dict(re.findall(r"(\w+)=(\S+)", line.removeprefix("ENV ")))
+
+
+@pytest.mark.parametrize("name", _OURS)
+def test_a_camera_s_container_can_write_nowhere_but_where_it_has_to(name: str) -> None:
+    service = services()[name]
+
+    assert service["read_only"] is True
+    assert service["cap_drop"] == ["ALL"]
+    assert service["security_opt"] == ["no-new-privileges:true"]
+    assert not service.get("privileged", False)
+    assert "devices" not in service
+    written = [each for each in service["volumes"] if not each.endswith(":ro")]
+    mounts = {each.split(":")[1] for each in written} - {"/dev/bus/usb"}
+    assert mounts == {"/var/lib/transientcam", "/var/cache/transientcam"}
+
+
+@pytest.mark.parametrize("name", ["simulated", "usb"])
+def test_who_asks_for_no_token_is_reached_from_this_machine_alone(name: str) -> None:
+    assert services()[name]["ports"] == ["127.0.0.1:8000:8000"]
+
+
+def test_who_is_reached_by_others_asks_for_tokens_behind_tls() -> None:
+    service = services()["camera-behind-tls"]
+
+    assert "ports" not in service
+    assert service["environment"]["TRANSIENTCAM_REQUIRE_TOKEN"] == "true"
+    caddyfile = (_DOCKER / "Caddyfile").read_text()
+    assert "reverse_proxy camera-behind-tls:8000" in caddyfile
+
+
+@pytest.mark.parametrize("name", _OURS)
+def test_the_settings_of_a_container_are_settings(name: str) -> None:
+    given = {
+        key: re.sub(r"\$\{\w+:-([^}]*)\}", r"\1", value)
+        for key, value in services()[name]["environment"].items()
+    }
+    environment = image_environment() | given
+
+    try:
+        settings = load_settings({}, environment=environment)
+    except SettingsError as error:  # nobody has made a token yet
+        (mistake,) = error.mistakes
+        assert mistake.place == "TRANSIENTCAM_HOST"
+        assert "token create" in mistake.reason
+        assert name == "camera-behind-tls"
+    else:
+        assert settings.host == "0.0.0.0"
+        assert settings.camera in ("sim:mirrors", "usb")
+
+
+def test_the_image_alone_lets_nobody_in_without_a_token() -> None:
+    with pytest.raises(SettingsError, match="whoever asks will need a token"):
+        load_settings({}, environment=image_environment())
+
+
+def test_the_image_is_known_as_a_container() -> None:
+    assert inside_container(image_environment(), root=_DOCKER)
+
+
+def test_usb_comes_by_a_rule_that_replugging_survives() -> None:
+    usb = services()["usb"]
+
+    assert usb["device_cgroup_rules"] == ["c 189:* rmw"]
+    assert "/dev/bus/usb:/dev/bus/usb" in usb["volumes"]
+
+
+def test_the_image_runs_as_somebody_and_is_asked_whether_it_is_ready() -> None:
+    text = (_DOCKER / "Dockerfile").read_text()
+
+    assert re.search(r"^USER 10001:10001$", text, re.MULTILINE)
+    assert "/readyz" in text[text.index("HEALTHCHECK") :]
+    assert "STOPSIGNAL SIGTERM" in text
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
+def test_the_script_that_builds_it_is_a_script() -> None:
+    script = _DOCKER / "build-and-check"
+
+    assert os.access(script, os.X_OK)
+    subprocess.run(["bash", "-n", script], check=True)
+    wrong = subprocess.run([script, "--nonsense"], capture_output=True, text=True, check=False)
+    assert wrong.returncode == 2
+    assert "docker/build-and-check [--base IMAGE]" in wrong.stdout
