@@ -22,7 +22,7 @@ def make(bench: Bench) -> Made:
     """Capture the mirrors at seven frequencies, and follow one pixel."""
     shot = bench.shot("mirrors", SEQUENCE)
     y, x = _pixel(shot)
-    sampled = shot.found.moments[:, :: bench.few(12, 30), :: bench.few(12, 30)].reshape(
+    sampled = shot.found.moments[:, :: bench.few(12, 40), :: bench.few(12, 40)].reshape(
         _ORDER + 1, -1
     )
     sampled = tm.bias(sampled.astype(np.complex128)).moments  # rounding took of what biasing gave

@@ -16,6 +16,7 @@ _Array = NDArray[Any]
 SIGNAL_TO_NOISE: Final = 70.0
 _END_S: Final = 40e-9
 _TIMES: Final = 800
+_COLUMNS: Final = 4
 _SHOWN_DRAWS: Final = 20
 _VALLEYS_S: Final = (11e-9, 21e-9, 38e-9)
 """After each return of the continuous response."""
@@ -299,11 +300,14 @@ def _ranked(title: str, errors: dict[str, float]) -> str:
 
 def _draw(outcomes: _Outcomes) -> Any:
     with style.style():
-        picture = style.new(11.0, 13.0)
+        rows = -(-len(CONTENDERS) // _COLUMNS)
+        picture = style.new(11.0, 3.25 * rows)
         for part, case, letter in zip(picture.subfigures(2, 1), _CASES, "ab", strict=True):
             part.suptitle(f"({letter}) {case.name} response", fontsize=11, x=0.02, ha="left")
-            panels = part.subplots(4, 4, sharex=True, sharey=True)
-            for axes, contender in zip(panels.flat, CONTENDERS, strict=True):
+            panels = part.subplots(rows, _COLUMNS, sharex=True, sharey=True, squeeze=False)
+            for axes in panels.flat[len(CONTENDERS) :]:
+                axes.set_visible(False)
+            for axes, contender in zip(panels.flat, CONTENDERS, strict=False):
                 _draw_one(axes, contender, outcomes[contender.name, case.name])
             for axes in panels[-1]:
                 axes.set_xlabel("τ / ns")

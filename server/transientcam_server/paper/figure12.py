@@ -227,14 +227,11 @@ def _table(ranged: list[Ranged]) -> Table:
 def _remarks(ranged: list[Ranged]) -> list[str]:
     best = _of(ranged, "maximum-entropy", 3)
     same = [each for each in ranged if each.entry.base_frequency_hz == _F]
-    remarks = [_beaten(f"With the paper's data set (f = {_F / 1e6:g} MHz, m up to 4)", same, best)]
-    own = min(
-        (each for each in ranged if each.entry.base_frequency_hz == _HALF and _own(each)),
-        key=lambda each: each.rms_m,
-    )
+    title = f"With the paper's data set (f = {_F / 1e6:g} MHz, m up to 4)"
+    remarks = [_beaten(title, same, each) for each in (best, _of(ranged, "pisarenko", 4))]
     more = [each for each in ranged if each.entry.base_frequency_hz == _HALF]
-    remarks.append(_beaten(f"With f = {_HALF / 1e6:g} MHz, m up to 8", more, own))
-    return remarks
+    title = f"With f = {_HALF / 1e6:g} MHz, m up to 8"
+    return remarks + [_beaten(title, more, each) for each in more if _own(each)]
 
 
 def _own(each: Ranged) -> bool:
@@ -270,7 +267,7 @@ def _draw(ranged: list[Ranged], direction: _Array) -> Any:
     rows = -(-len(ranged) // columns)
     with style.style():
         picture = style.new(11.0, 2.5 * rows)
-        panels = picture.subplots(rows, columns, sharex=True, sharey=True)
+        panels = picture.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for axes in panels.flat[len(ranged) :]:
             axes.set_visible(False)
         for axes, each in zip(panels.flat, ranged, strict=False):
@@ -293,7 +290,7 @@ def _draw_one(axes: Any, each: Ranged, direction: _Array) -> None:
     name = f"{name}\n({rest}" if rest else name.replace(", ", "\n")
     frequency = f"{each.entry.base_frequency_hz / 1e6:g} MHz, m = {each.entry.m}"
     axes.set_title(f"{name}\n{frequency}: RMS {1e3 * each.rms_m:.0f} mm", fontsize=8)
-    axes.set(xlim=(-1.05, 1.05), ylim=(1.3, 2.9))
+    axes.set(xlim=(-0.8, 0.8), ylim=(1.3, 2.9))
 
 
 FIGURE: Final = PaperFigure(

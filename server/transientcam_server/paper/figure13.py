@@ -154,8 +154,8 @@ def _table(frames: dict[float, list[Shot]]) -> Table:
 
 def _draw(frames: dict[float, Shot]) -> Any:
     with style.style():
-        picture = style.new(10.0, 7.6)
-        panels = picture.subplots(3, 3)
+        picture = style.new(11.0, 2.3 * len(frames))
+        panels = picture.subplots(len(frames), 3)
         densities = {at_s: _density(shot) for at_s, shot in frames.items()}
         for column, time_s in enumerate(_TIMES_S):
             most = float(np.percentile([each[column] for each in densities.values()], 99))

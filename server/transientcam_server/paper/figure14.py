@@ -38,6 +38,11 @@ def _wrong(shot: Shot) -> _Array:
     return error
 
 
+def _outliers(shot: Shot) -> float:
+    """Return the share of lit pixels with much light on the wrong side."""
+    return float((np.abs(_wrong(shot))[shot.lit] > _OUTLIER).mean())
+
+
 def _time_errors_s(shot: Shot) -> tuple[_Array, _Array]:
     """Return the errors (H, W) of the time of the direct return: Pisarenko's, one frequency's."""
     turn = 2 * np.pi * shot.base_frequency_hz
@@ -51,9 +56,7 @@ def _statements(shots: list[Shot], daylight: Shot) -> list[Statement]:
     wrong = np.concatenate(
         [np.abs(_wrong(shot))[where] for shot, where in zip(shots, mirrored, strict=True)]
     )
-    outliers = float(
-        np.mean([(np.abs(_wrong(shot))[shot.lit] > _OUTLIER).mean() for shot in shots])
-    )
+    outliers = float(np.mean([_outliers(shot) for shot in shots]))
     ours, single = (
         np.concatenate(
             [
@@ -89,6 +92,10 @@ def _statements(shots: list[Shot], daylight: Shot) -> list[Statement]:
             at_least=0.001,
             at_most=0.1,
             form="{:.1%}",
+            otherwise="at 0.5 ms noise splits a return in two in some pixels, and those of the "
+            "actor "
+            "see different depths from image to image while it walks: where it stands still "
+            f"(t = {MOMENTS_S[1]:g} s) it is {_outliers(shots[1]):.1%}",
         ),
         check(
             "Sec. 6.3",
@@ -128,7 +135,7 @@ def _table(frames: dict[float, Shot]) -> Table:
             (
                 at_s,
                 100 * float(np.nanmedian(np.abs(_wrong(shot))[where])),
-                100 * float((np.abs(_wrong(shot))[shot.lit] > _OUTLIER).mean()),
+                100 * _outliers(shot),
                 float(tm.SPEED_OF_LIGHT_M_S * np.nanmedian(ours) / 2 * 1e3),
                 float(tm.SPEED_OF_LIGHT_M_S * np.nanmedian(single) / 2 * 1e3),
             )
@@ -152,7 +159,7 @@ def _draw(frames: dict[float, Shot]) -> Any:
     )
     with style.style():
         picture = style.new(9.5, 9.4)
-        panels = picture.subplots(4, 3)
+        panels = picture.subplots(4, len(frames))
         most = max(float(np.percentile(shot.truth.brightness, 99)) for shot in frames.values())
         for number, (name, image_of) in enumerate(rows):
             last = number == len(rows) - 1
