@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, cast
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,17 +20,13 @@ from pydantic import ValidationError
 from transientcam_driver import Capabilities, RawFrame
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import DamagedFrame, NotARecording, Problem
-from transientcam_server.lens import known_intrinsics
 from transientcam_server.pipeline import Frame, Pipeline
-from transientcam_server.products import Recipe
 from transientcam_server.reconstruction import Reconstruction
 from transientcam_server.recording.layout import Header
 from transientcam_server.recording.library import Library
 from transientcam_server.recording.reader import Recording
+from transientcam_server.recording.recipe import recorded_recipe
 from transientcam_server.settings import LensSettings, ReconstructionSettings
-
-if TYPE_CHECKING:
-    from transientcam_server.calibration import Calibration
 
 LATEST: Final = "latest"
 MAX_TIMES: Final = 4096
@@ -50,15 +46,6 @@ class RecordedCamera:
 
     capabilities: Capabilities
     simulation: None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RecordedGains:
-    """Of a calibration, a reconstruction asks no more."""
-
-    id: str
-    gains: NDArray[Any]
-    bad: NDArray[np.bool_] | None
 
 
 class RecordedFrames:
@@ -101,27 +88,11 @@ class RecordedFrames:
 
     async def _read(self, number: int, reconstruction: Reconstruction) -> Frame:
         raw, _ = await self.pipeline.run(_read_frame, self._find, number)
-        return Frame(self.pipeline, number, raw, self._recipe(reconstruction))
-
-    def _recipe(self, reconstruction: Reconstruction) -> Recipe:
-        header = self._header
-        capabilities, planes = header.capabilities, header.calibration_planes
-        gains = None
-        if planes is not None:
-            name = str(header.calibration.get("id", "recorded"))
-            gains = RecordedGains(name, planes, header.calibration_bad)
-        return Recipe(
-            header.applied,
-            reconstruction.settings,
-            2.0**capabilities.bits - 1.0,
-            cast("Calibration | None", gains),
-            reconstruction.id,
-            known_intrinsics(
-                self._lens,
-                width=capabilities.width,
-                height=capabilities.height,
-                recorded=header.camera.get("intrinsics"),
-            ),
+        return Frame(
+            self.pipeline,
+            number,
+            raw,
+            recorded_recipe(self._header, reconstruction, lens=self._lens),
         )
 
     def _reconstruction(self, settings: Settings) -> Reconstruction:

@@ -7,21 +7,20 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import RawFrame
 from transientcam_server.errors import InputError
-from transientcam_server.products import PRODUCTS, STAGES, Product, Recipe, View
+from transientcam_server.products import PRODUCTS, STAGES, Product, View
+from transientcam_server.reconstruction import Reconstruction
 from transientcam_server.recording import hdf5, swmr
 from transientcam_server.recording.reader import Recording
+from transientcam_server.recording.recipe import recorded_recipe
 from transientcam_server.recording.writer import synchronise_directory
 from transientcam_server.settings import ReconstructionSettings
-
-if TYPE_CHECKING:
-    from transientcam_server.calibration import Calibration
 
 DEFAULT_PRODUCTS: Final = ("range", "direct", "indirect", "brightness", "validity", "flags")
 KNOWN_PRODUCTS: Final = tuple(
@@ -40,32 +39,15 @@ class Wanted:
     bins: int = 256
 
 
-@dataclass(frozen=True, slots=True)
-class _RecordedGains:
-    """Of a calibration, a reconstruction asks no more."""
-
-    gains: NDArray[Any]
-    bad: NDArray[np.bool_] | None
-
-
 class Reconstructor:
     """Computes products of frames, each stage once a frame."""
 
     def __init__(self, recording: Recording, wanted: Wanted) -> None:
-        header = recording.header
-        capabilities, sequence = header.capabilities, header.applied.sequence
-        gains = None
-        if header.calibration_planes is not None:
-            gains = _RecordedGains(header.calibration_planes, header.calibration_bad)
-        self._recipe = Recipe(
-            header.applied,
-            wanted.settings,
-            2.0**capabilities.bits - 1.0,
-            cast("Calibration | None", gains),
-        )
+        capabilities = recording.header.capabilities
+        self._recipe = recorded_recipe(recording.header, Reconstruction(1, wanted.settings))
         self._size = capabilities.height, capabilities.width
         self.products = [PRODUCTS[name] for name in wanted.products]
-        self.time_s = np.arange(wanted.bins) / (wanted.bins * sequence.base_frequency_hz)
+        self.time_s = np.arange(wanted.bins) / (wanted.bins * self._recipe.base_frequency_hz)
 
     def shape(self, product: Product) -> tuple[int, ...]:
         """Shape of a product of one frame."""
