@@ -340,6 +340,7 @@ class Acquisition:
         before = self._camera.applied
         try:
             go_on()
+            self._arrivals_s.clear()
             if self._started:
                 self._started = False
                 self._camera.stop()

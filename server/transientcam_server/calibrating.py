@@ -149,13 +149,14 @@ class CalibrationDesk:
         Problem
             ``unknown-calibration``, ``calibration-misfit``.
         """
-        calibration: Calibration | None = None
+        calibration = None
         if wanted_id != NOMINAL_ID:
             stored = await asyncio.to_thread(self.kept.get, wanted_id)
             self._require_fit(self.misfit(stored, applied()))
-            calibration, _ = await self._pipeline.run_long(load_calibration, stored.path)
+            loaded, _ = await self._pipeline.run_long(load_calibration, stored.path)
             # the sequence may be another one by now
-            self._require_fit(calibration.capture.misfit(applied(), self._camera.capabilities))
+            loaded.capture.require_fit(applied(), self._camera.capabilities)
+            calibration = loaded
         if self.active_id != wanted_id:
             _log.info("frames are calibrated by %s", wanted_id)
             self._pipeline.calibration = calibration

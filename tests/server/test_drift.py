@@ -21,7 +21,7 @@ def moments(phase_error_rad: tuple[float, ...], *, seed: int = 1) -> NDArray[np.
     noise = random.normal(0.0, STD_DN, (2, len(exact), *SHAPE))
     b = np.stack(exact) + noise[0] + 1j * noise[1]
     b[0] = b[0].real
-    return b.astype(np.complex64)
+    return np.asarray(b, dtype=np.complex64)
 
 
 def share(b: NDArray[np.complex64]) -> float | None:

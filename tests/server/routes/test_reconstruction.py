@@ -4,7 +4,7 @@ import httpx
 import pytest
 
 from tests.serving import Served
-from transientcam import Camera
+from transientcam import Camera, Notice
 
 PATH = "/api/v1/reconstruction"
 
@@ -92,7 +92,7 @@ def test_what_no_frame_can_be_computed_with_is_refused(
 
 
 def test_streams_are_told_and_a_lease_keeps_others_out(served: Served, http: httpx.Client) -> None:
-    notices = []
+    notices: list[Notice] = []
     with (
         Camera(served.url, timeout_s=60) as camera,
         camera.stream("range", on_notice=notices.append) as stream,
