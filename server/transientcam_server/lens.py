@@ -72,10 +72,11 @@ class Intrinsics:
         KeyError, TypeError, ValueError
             If it says something else.
         """
-        lengths = [float(document[name]) for name in ("fx", "fy", "cx", "cy")]
-        if not (all(map(math.isfinite, lengths)) and min(lengths[:2]) > 0.0):
+        fx, fy, cx, cy = (float(document[name]) for name in ("fx", "fy", "cx", "cy"))
+        if not (all(map(math.isfinite, (fx, fy, cx, cy))) and min(fx, fy) > 0.0):
             raise ValueError("focal lengths must be greater than 0")
-        return cls(*lengths, int(document["width"]), int(document["height"]), "recording")
+        width, height = int(document["width"]), int(document["height"])
+        return cls(fx, fy, cx, cy, width, height, "recording")
 
     def points(self, range_m: NDArray[Any]) -> NDArray[np.float32]:
         """Return the points (3, H, W) in m at distances (H, W) along the pixels' rays."""

@@ -1,6 +1,7 @@
 """Where the pixels look, and who says so."""
 
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from transientcam_driver.simulation.light import camera_rays
 from transientcam_server.lens import Intrinsics, known_intrinsics
 from transientcam_server.settings import LensSettings
 
-SIZE = {"width": 163, "height": 120}
+SIZE: dict[str, Any] = {"width": 163, "height": 120}
 SCENE = Intrinsics.of_field(40.0, **SIZE, source="scene")
 
 

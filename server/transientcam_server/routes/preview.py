@@ -23,14 +23,19 @@ MEDIA_TYPE: Final = "multipart/x-mixed-replace"
 _FILM: Final = f"{MEDIA_TYPE}; boundary={_BOUNDARY}"
 _WAIT_S: Final = 10.0
 MAX_FRAMES: Final = 2**31
-_CONTENT: Final[dict[str, Any]] = {MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}}
+_RESPONSES: Final[dict[int | str, dict[str, Any]]] = {
+    200: {
+        "description": "JPEG pictures without an end",
+        "content": {MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
 
 
 @router.get(
     "/preview.mjpeg",
     summary="A product as a film",
     response_class=StreamingResponse,
-    responses={200: {"description": "JPEG pictures without an end", "content": _CONTENT}}
+    responses=_RESPONSES
     | documented(
         kinds.UNKNOWN_PRODUCT, kinds.NOT_ACCEPTABLE, kinds.INVALID_REQUEST, kinds.TOO_MANY_CLIENTS
     ),

@@ -1,13 +1,13 @@
 """Frames of recordings: what the camera's frames are asked, of any that was recorded."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Path, Query, Response
 
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.pipeline import Frame, Pipeline
 from transientcam_server.problems import documented
-from transientcam_server.recording.frames import timeline
+from transientcam_server.recording.frames import Settings, timeline
 from transientcam_server.routes.frame_answers import (
     CSV_RESPONSES,
     PRODUCT_PROBLEMS,
@@ -54,12 +54,12 @@ class Chosen:
         service: Service,
         recording: str,
         frame: str,
-        settings: Literal["recorded", "current"],
+        settings: Settings,
     ) -> None:
         self._service = service
         self._recording = recording
         self._frame = frame
-        self._settings = settings
+        self._settings: Settings = settings
 
     async def frame(self) -> Frame:
         """Read it."""
@@ -77,7 +77,7 @@ async def _chosen(
     recording: RecordingName,
     frame: FrameName,
     reconstruction: Annotated[
-        Literal["recorded", "current"],
+        Settings,
         Query(description="settings it was recorded with, or those the service has now"),
     ] = "recorded",
 ) -> Chosen:

@@ -243,7 +243,7 @@ def test_a_region_and_every_so_many_pixels_of_it_are_cut_out_of_the_whole(
 
 
 def test_every_format_knows_which_part_it_holds(still: httpx.Client) -> None:
-    cut = {"region": "40,30,64,48", "decimation": 2}
+    cut: dict[str, Any] = {"region": "40,30,64,48", "decimation": 2}
     array = still.get(f"{LATEST}/range.npy", params=cut)
     with np.load(io.BytesIO(still.get(f"{LATEST}/range.npz", params=cut).content)) as file:
         meta = json.loads(file["meta"].item())
@@ -317,7 +317,7 @@ def test_a_pointcloud_is_as_far_away_as_the_range_and_says_whose_rays(
 
 
 def test_a_ply_holds_the_pixels_of_the_pointcloud_that_have_a_range(still: httpx.Client) -> None:
-    cut = {"region": "40,30,64,48", "decimation": 3}
+    cut: dict[str, Any] = {"region": "40,30,64,48", "decimation": 3}
     cloud = product(still, "pointcloud", **cut).array
     range_m = product(still, "range", **cut).array
     direct = product(still, "direct", **cut).array

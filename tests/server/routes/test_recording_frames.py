@@ -113,7 +113,7 @@ def test_products_of_a_recorded_frame_are_those_it_had_when_it_was_live(
 
 
 def test_every_format_and_part_can_be_had(http: httpx.Client, recorded: str) -> None:
-    cut = {"region": "40,30,64,48", "decimation": 2}
+    cut: dict[str, Any] = {"region": "40,30,64,48", "decimation": 2}
     whole = product(http, f"{recorded}/2/range").array
 
     part = http.get(f"{recorded}/2/range.npy", params=cut)
