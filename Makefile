@@ -36,6 +36,7 @@ bench: .venv/test.stamp  ## Measure speed, everything in one run on the same dat
 	$(BIN)/python -m benchmarks
 
 docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (half an hour on a quiet machine)
+	$(BIN)/python -m benchmarks.reference --write
 	$(BIN)/python -m benchmarks --write
 	$(BIN)/python -m benchmarks.stability
 	$(BIN)/python -m benchmarks.accuracy --write

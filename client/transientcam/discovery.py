@@ -14,13 +14,13 @@ import ipaddress
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, cast
 
 from transientcam.errors import ParameterError
 from transientcam.translation import translated
 
 if TYPE_CHECKING:
-    from zeroconf import ServiceInfo, Zeroconf
+    from zeroconf import ServiceInfo, ServiceListener, Zeroconf
 
 SERVICE_TYPE: Final = "_transientcam._tcp.local."
 WEB_TYPE: Final = "_http._tcp.local."
@@ -84,7 +84,8 @@ def discover(
         asked = list(interfaces) if interfaces else InterfaceChoice.All
         network = Zeroconf(interfaces=asked)
         try:
-            names = _Names(network, ends_s, found)
+            # its base class has nothing, and is not there where zeroconf is not installed
+            names = cast("ServiceListener", _Names(network, ends_s, found))
             browser = ServiceBrowser(network, SERVICE_TYPE, listener=names)
             time.sleep(timeout_s)
             browser.cancel()
@@ -110,8 +111,8 @@ class _Names:
         self._found = found
 
     def add_service(self, zc: "Zeroconf", type_: str, name: str) -> None:
-        left_ms = (self._ends_s - time.monotonic()) * 1e3
-        info = self._network.get_service_info(type_, name, timeout=max(1.0, left_ms))
+        left_ms = round((self._ends_s - time.monotonic()) * 1e3)
+        info = self._network.get_service_info(type_, name, timeout=max(1, left_ms))
         camera = None if info is None else read_announcement(info)
         if camera is not None:
             self._found[name] = camera

@@ -13,6 +13,7 @@ from transientcam_server.configuration import Configuration
 from transientcam_server.errors import ServerError, SettingsError, SettingsMistake
 from transientcam_server.recording import Recording
 from transientcam_server.recording.replay import PREFIX, parse_replay
+from transientcam_server.settings import Settings
 
 
 def require_usable(configuration: Configuration) -> None:
@@ -26,11 +27,11 @@ def require_usable(configuration: Configuration) -> None:
     settings = configuration.settings
     mistakes = []
     for name, value, read in (
-        ("camera", settings.camera, lambda: _read_camera(settings.camera)),
-        ("calibration", settings.calibration, lambda: _read_calibration(configuration)),
+        ("camera", settings.camera, _read_camera),
+        ("calibration", settings.calibration, _read_calibration),
     ):
         try:
-            read()
+            read(settings)
         except (DriverError, ServerError, OSError) as error:
             place = configuration.places.of((name,))
             mistakes.append(SettingsMistake(place, str(value), str(error)))
@@ -38,7 +39,8 @@ def require_usable(configuration: Configuration) -> None:
         raise SettingsError(mistakes)
 
 
-def _read_camera(spec: str) -> None:
+def _read_camera(settings: Settings) -> None:
+    spec = settings.camera
     if spec.startswith(PREFIX):
         Recording(parse_replay(spec).path).close()
         return
@@ -47,9 +49,9 @@ def _read_camera(spec: str) -> None:
         scene_of(wanted)
 
 
-def _read_calibration(configuration: Configuration) -> None:
-    if configuration.settings.calibration is not None:
-        load_calibration(configuration.settings.calibration)
+def _read_calibration(settings: Settings) -> None:
+    if settings.calibration is not None:
+        load_calibration(settings.calibration)
 
 
 def to_document(configuration: Configuration) -> dict[str, Any]:

@@ -18,13 +18,12 @@ def announced(
     server: str = "bench.local.",
     **txt: str,
 ) -> ServiceInfo:
-    properties: dict[str | bytes, Any] = dict(txt)
     return ServiceInfo(
         SERVICE_TYPE,
         f"{name}.{SERVICE_TYPE}",
         port=port,
         parsed_addresses=list(addresses),
-        properties=properties,
+        properties={**txt},
         server=server,
     )
 

@@ -91,7 +91,8 @@ class FakeAcquisition:
     def submit(self, command: Callable[[], None]) -> Future[None]:
         future: Future[None] = Future()
         if not self.stuck:
-            future.set_result(command())
+            command()
+            future.set_result(None)
         return future
 
 

@@ -25,8 +25,8 @@ def main() -> None:
     sys.exit(run(sys.argv[1:]))
 
 
-def run(arguments: Sequence[str]) -> int:
-    """Run one command line and return its exit code."""
+def app_for(arguments: Sequence[str]) -> typer.Typer:
+    """Return the command with the verb that ``arguments`` name, or all of them."""
     app = typer.Typer(
         name="transientcam",
         no_args_is_help=True,
@@ -34,7 +34,13 @@ def run(arguments: Sequence[str]) -> int:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback()(_top)
-    load_verbs(app, arguments or words_to_complete(os.environ))
+    load_verbs(app, arguments)
+    return app
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line and return its exit code."""
+    app = app_for(arguments or words_to_complete(os.environ))
     try:
         typer.main.get_command(app)(args=list(arguments), prog_name="transientcam")
     except SystemExit as end:

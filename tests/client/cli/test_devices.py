@@ -97,7 +97,12 @@ def test_the_network_is_asked_as_told_or_not_at_all(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     asked: list[dict[str, Any]] = []
-    monkeypatch.setattr(devices, "discover", lambda **how: asked.append(how) or ())
+
+    def heard(**how: Any) -> tuple[FoundCamera, ...]:
+        asked.append(how)
+        return ()
+
+    monkeypatch.setattr(devices, "discover", heard)
 
     listed(capsys, "--timeout-s", "0.5", "--interface", "127.0.0.1")
     words = told(capsys, "--no-network")
