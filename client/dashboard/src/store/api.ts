@@ -7,6 +7,9 @@ import type {
   CalibrationDocument,
   CalibrationRequest,
   CalibrationsDocument,
+  EffectChoice,
+  ExplanationDocument,
+  Fault,
   GrantedLease,
   JobDocument,
   LeaseDocument,
@@ -16,6 +19,7 @@ import type {
   RecordingDocument,
   RecordingRequest,
   RecordingsDocument,
+  SimulationDocument,
   TimelineDocument,
 } from "./documents";
 
@@ -217,6 +221,26 @@ export class Api {
 
   deleteCalibration(id: string): Promise<CalibrationDocument> {
     return this.#json("DELETE", calibrationPath(id)) as Promise<CalibrationDocument>;
+  }
+
+  // -- the simulated world -----------------------------------------------------------------------
+
+  simulation(): Promise<SimulationDocument> {
+    return this.#json("GET", "/simulation") as Promise<SimulationDocument>;
+  }
+
+  /** What the scene and the sequence call for. */
+  explanation(): Promise<ExplanationDocument> {
+    return this.#json("GET", "/simulation/explain") as Promise<ExplanationDocument>;
+  }
+
+  /** Answered once the scene is prepared. */
+  setSimulation(wanted: { scene?: string; effects?: Readonly<Record<string, EffectChoice>> }): Promise<SimulationDocument> {
+    return this.#json("PUT", "/simulation", { body: wanted }) as Promise<SimulationDocument>;
+  }
+
+  cause(fault: Fault): Promise<SimulationDocument> {
+    return this.#json("POST", "/simulation/faults", { body: { fault } }) as Promise<SimulationDocument>;
   }
 
   // -- jobs --------------------------------------------------------------------------------------

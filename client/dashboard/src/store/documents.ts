@@ -135,6 +135,36 @@ export interface CalibrationRequest {
   readonly activate: boolean;
 }
 
+export type EffectChoice = "auto" | "on" | "off";
+export type Fault = "unplug" | "replug" | "corrupt-image" | "drop-image";
+
+/** The world before a simulated camera. */
+export interface SimulationDocument {
+  readonly scene: string;
+  /** What was chosen in place of what the scene says. */
+  readonly effects: Readonly<Record<string, EffectChoice>>;
+  readonly scenes: readonly { readonly name: string; readonly description: string }[];
+  readonly plugged: boolean;
+  readonly faults: readonly Fault[];
+}
+
+/** One effect's answer for the scene and the sequence. */
+export interface EffectDocument {
+  readonly effect: string;
+  readonly choice: EffectChoice | "always";
+  readonly called_for: boolean;
+  readonly built: boolean;
+  readonly reason: string;
+  /** Its error in one moment over the noise floor. */
+  readonly relative: number;
+}
+
+export interface ExplanationDocument {
+  readonly noise_floor_dn: number;
+  readonly called_above: number;
+  readonly effects: readonly EffectDocument[];
+}
+
 /** Long work, and where it stands. */
 export interface JobDocument {
   readonly id: string;

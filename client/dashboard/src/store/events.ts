@@ -63,6 +63,10 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
     }
     case "reconstruction-changed":
       return { words: "The settings of the reconstruction changed.", tone: "plain" };
+    case "simulation-changed": {
+      const chosen = Object.entries(notice.effects).map(([effect, choice]) => `${effect.replaceAll("-", " ")} ${choice}`);
+      return { words: `The camera stands before ${notice.scene}${chosen.length > 0 ? `, with ${chosen.join(", ")}` : ""}.`, tone: "plain" };
+    }
     case "calibration-changed":
       return notice.calibration_id === "nominal"
         ? { words: `Nominal gains are used from now on.${notice.reason ? ` ${notice.reason}` : ""}`, tone: notice.reason ? "bad" : "plain" }

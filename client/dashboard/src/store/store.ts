@@ -17,6 +17,7 @@ import { VIEW_NAMES } from "../views/names";
 import { Reconstruction } from "./reconstruction";
 import { Recordings } from "./recordings";
 import { Replay } from "./replay";
+import { Simulation } from "./simulation";
 import { Status } from "./status";
 import { Details } from "./details";
 import { Theme } from "../ui/theme";
@@ -37,6 +38,7 @@ export class Store {
   readonly recordings: Recordings;
   readonly reconstruction: Reconstruction;
   readonly calibrations: Calibrations;
+  readonly simulation: Simulation;
   /** A recording in the place of the camera. */
   readonly replay: Replay;
   /** What happened. */
@@ -81,6 +83,7 @@ export class Store {
     this.recordings = new Recordings(api);
     this.reconstruction = new Reconstruction(api);
     this.calibrations = new Calibrations(api);
+    this.simulation = new Simulation(api);
     this.replay = new Replay(api, this.frames, this.status);
     api.onRefusal = (problem) => {
       this.lease.refused(kindOf(problem));

@@ -173,10 +173,12 @@ export class StreamClient {
         break;
       case "camera-lost":
         status.cameraIs("lost", this.#now_s(), notice.reason);
+        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.refresh();
         break;
       case "camera-back":
         status.cameraIs("streaming", this.#now_s());
         void this.#readCamera();
+        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.refresh();
         break;
       case "sequence-changed":
         this.#takeSequence(notice.sequence);
@@ -192,6 +194,9 @@ export class StreamClient {
         break;
       case "calibration-changed":
         if (this.#store.calibrations.document.peek() !== null) void this.#store.calibrations.refresh();
+        break;
+      case "simulation-changed":
+        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.refresh();
         break;
       case "recording-started":
       case "recording-stopped":

@@ -189,6 +189,7 @@ export type Notice =
     }
   | { readonly type: "notice"; readonly kind: "calibration-changed"; readonly calibration_id: string; readonly reason?: string | null }
   | { readonly type: "notice"; readonly kind: "reconstruction-changed" }
+  | { readonly type: "notice"; readonly kind: "simulation-changed"; readonly scene: string; readonly effects: Readonly<Record<string, string>> }
   | { readonly type: "notice"; readonly kind: "recording-started"; readonly recording: string }
   | { readonly type: "notice"; readonly kind: "recording-dropped"; readonly count: number; readonly total: number }
   | {

@@ -30,6 +30,7 @@ export const LAYOUTS: Readonly<Record<string, Layout>> = {
   "Six views": [row(1, ["map", 1], ["transient", 1], ["points", 1]), row(1, ["response", 2], ["streak", 1], ["validity", 1])],
   Steering: [row(3, ["map", 1], ["transient", 1]), row(2, ["accuracy", 2], ["sequence", 1])],
   Laboratory: [row(3, ["map", 1], ["transient", 1]), row(2, ["recordings", 5], ["calibration", 4], ["reconstruction", 3])],
+  Simulation: [row(1, ["map", 1], ["transient", 1]), row(1, ["simulation", 3], ["sequence", 2])],
   Projector: [row(1, ["map", 1], ["transient", 1])],
   "One pixel": [row(1, ["transient", 1], ["streak", 1]), row(1, ["response", 1])],
 };

@@ -9,6 +9,7 @@ import { ReconstructionView } from "./reconstruction/ReconstructionView";
 import { RecordingsView } from "./recordings/RecordingsView";
 import { ResponseView } from "./response/ResponseView";
 import { SequenceView } from "./sequence/SequenceView";
+import { SimulationView } from "./simulation/SimulationView";
 import { StreakView } from "./streak/StreakView";
 import { TransientView } from "./transient/TransientView";
 import { ValidityView } from "./validity/ValidityView";
@@ -30,5 +31,6 @@ export const VIEWS: readonly { readonly name: ViewName; readonly title: string; 
   { name: "recordings", title: "Recordings", view: RecordingsView },
   { name: "reconstruction", title: "Reconstruction", view: ReconstructionView },
   { name: "calibration", title: "Calibration", view: CalibrationView },
+  { name: "simulation", title: "Simulated scene", view: SimulationView },
   { name: "events", title: "What happened", view: EventsView },
 ];

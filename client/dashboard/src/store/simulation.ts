@@ -1,0 +1,53 @@
+import { signal } from "@preact/signals";
+
+import { type Api, RequestError } from "./api";
+import type { EffectChoice, ExplanationDocument, Fault, SimulationDocument } from "./documents";
+
+/** The world that a simulated camera stands before, and what it calls for. */
+export class Simulation {
+  /** Null before it was read, and for a real camera. */
+  readonly world = signal<SimulationDocument | null>(null);
+  readonly explanation = signal<ExplanationDocument | null>(null);
+  /** Why there is nothing to show. */
+  readonly trouble = signal<string | null>(null);
+  readonly #api: Api;
+
+  constructor(api: Api) {
+    this.#api = api;
+  }
+
+  async refresh(): Promise<void> {
+    try {
+      const [world, explanation] = await Promise.all([this.#api.simulation(), this.#api.explanation()]);
+      this.world.value = world;
+      this.explanation.value = explanation;
+      this.trouble.value = null;
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error;
+      this.trouble.value = error.message;
+    }
+  }
+
+  /** Puts the camera before another scene; effects that were chosen stay chosen. */
+  async stage(scene: string): Promise<void> {
+    await this.#api.setSimulation({ scene });
+    await this.refresh();
+  }
+
+  /** Forces an effect on or off, or leaves it to the scene. */
+  async choose(effect: string, choice: EffectChoice | null): Promise<void> {
+    const { [effect]: _, ...others } = this.world.peek()?.effects ?? {};
+    await this.#api.setSimulation({ effects: choice === null ? others : { ...others, [effect]: choice } });
+    await this.refresh();
+  }
+
+  /** Leaves all effects to the scene. */
+  async chooseNothing(): Promise<void> {
+    await this.#api.setSimulation({ effects: {} });
+    await this.refresh();
+  }
+
+  async cause(fault: Fault): Promise<void> {
+    this.world.value = await this.#api.cause(fault);
+  }
+}

@@ -1,0 +1,152 @@
+import { useEffect } from "preact/hooks";
+
+import type { EffectChoice, EffectDocument, Fault } from "../../store/documents";
+import { useStore } from "../../store/store";
+import { engineering } from "../../ui/format";
+import { Panel } from "../../ui/Panel";
+import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
+import { useTask, type Task } from "../../ui/useTask";
+import { effectWords, FAULTS, ordered, possible, sizeShare, sizeWords } from "./words";
+
+/** The scene of a simulated camera, which effects it calls for, and what can be made to go wrong. */
+export function SimulationView() {
+  const { simulation, sequence } = useStore();
+  const task = useTask();
+  // what a scene calls for depends on the sequence
+  useEffect(() => void simulation.refresh(), [simulation, sequence.value]);
+  const world = simulation.world.value;
+  const explanation = simulation.explanation.value;
+  return (
+    <Panel name="simulation" title={<h2>Simulated scene</h2>} tools={world !== null && <ScenePicker task={task} />}>
+      <div class="panel-body">
+        {simulation.trouble.value !== null && <p class="quiet">{simulation.trouble.value}</p>}
+        <Obstacle />
+        <TaskLine task={task} field="simulation-status" />
+        {world !== null && <p class="quiet">{world.scenes.find(({ name }) => name === world.scene)?.description}</p>}
+        {explanation !== null && <Effects task={task} />}
+        {world !== null && (
+          <fieldset class="faults">
+            <legend>Let something go wrong</legend>
+            {world.faults.map((fault) => (
+              <FaultButton key={fault} fault={fault} task={task} />
+            ))}
+          </fieldset>
+        )}
+      </div>
+    </Panel>
+  );
+}
+
+function ScenePicker({ task }: { task: Task }) {
+  const { simulation, lease } = useStore();
+  const world = simulation.world.value;
+  if (world === null) return null;
+  const known = world.scenes.some(({ name }) => name === world.scene);
+  return (
+    <label class="scene-picker">
+      <span class="quiet">Scene</span>
+      <select
+        name="scene"
+        value={world.scene}
+        disabled={task.busy.value !== null || lease.obstacle.value !== null}
+        onChange={(event) => {
+          const scene = event.currentTarget.value;
+          void task.run(`Preparing ${scene}…`, () => simulation.stage(scene));
+        }}
+      >
+        {!known && <option value={world.scene}>{world.scene}</option>}
+        {world.scenes.map(({ name }) => (
+          <option key={name} value={name}>
+            {name}
+          </option>
+        ))}
+      </select>
+    </label>
+  );
+}
+
+/** What each effect says of this scene and sequence; only what is called for is computed. */
+function Effects({ task }: { task: Task }) {
+  const { simulation } = useStore();
+  const explanation = simulation.explanation.value;
+  const chosen = Object.keys(simulation.world.value?.effects ?? {}).length > 0;
+  if (explanation === null) return null;
+  const built = explanation.effects.filter((effect) => effect.built).length;
+  return (
+    <div class="effects">
+      <table class="effect-table">
+        <caption>
+          <span data-field="effects-built">
+            {built} of {explanation.effects.length}
+          </span>{" "}
+          effects are computed: those above {explanation.called_above} of the noise floor, which is {engineering(explanation.noise_floor_dn, "DN")}.{" "}
+          {chosen && (
+            <Steer disabled={task.busy.value !== null} onClick={() => void task.run("Leaving all effects to the scene…", () => simulation.chooseNothing())}>
+              Leave all to the scene
+            </Steer>
+          )}
+        </caption>
+        <thead>
+          <tr>
+            <th scope="col">Effect</th>
+            <th scope="col">Size over noise</th>
+            <th scope="col">Computed</th>
+            <th scope="col">Why</th>
+          </tr>
+        </thead>
+        <tbody>
+          {ordered(explanation).map((effect) => (
+            <EffectRow key={effect.effect} effect={effect} calledAbove={explanation.called_above} task={task} />
+          ))}
+        </tbody>
+      </table>
+    </div>
+  );
+}
+
+function EffectRow({ effect, calledAbove, task }: { effect: EffectDocument; calledAbove: number; task: Task }) {
+  const { simulation, lease } = useStore();
+  const name = effectWords(effect.effect);
+  const mine = simulation.world.value?.effects[effect.effect];
+  return (
+    <tr data-effect={effect.effect} data-built={effect.built}>
+      <th scope="row">{name}</th>
+      <td class="effect-size">
+        <meter min={0} max={1} value={sizeShare(effect, calledAbove)} aria-label={`Size of ${name} over the noise floor`} /> {sizeWords(effect)}
+      </td>
+      <td>
+        {effect.choice === "always" ? (
+          <span class="quiet">always</span>
+        ) : (
+          <select
+            name={effect.effect}
+            aria-label={`Whether ${name} is computed`}
+            value={mine ?? ""}
+            disabled={task.busy.value !== null || lease.obstacle.value !== null}
+            onChange={(event) => {
+              const choice = event.currentTarget.value as EffectChoice | "";
+              void task.run(`Preparing ${name.toLowerCase()}…`, () => simulation.choose(effect.effect, choice === "" ? null : choice));
+            }}
+          >
+            <option value="">{effect.built ? "yes" : "no"}, by the scene</option>
+            <option value="auto">if called for</option>
+            <option value="on">on</option>
+            <option value="off">off</option>
+          </select>
+        )}
+      </td>
+      <td class="quiet">{effect.reason}</td>
+    </tr>
+  );
+}
+
+function FaultButton({ fault, task }: { fault: Fault; task: Task }) {
+  const { simulation } = useStore();
+  const { word, title } = FAULTS[fault];
+  const plugged = simulation.world.value?.plugged ?? true;
+  return (
+    <Steer title={title} disabled={task.busy.value !== null || !possible(fault, plugged)} onClick={() => void task.run(`${title}…`, () => simulation.cause(fault))}>
+      {word}
+    </Steer>
+  );
+}

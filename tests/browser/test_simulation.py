@@ -1,0 +1,81 @@
+"""The simulated scene, its effects and its faults, from the page."""
+
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.browser.dashboard import choose, map_pixels, open_page
+from tests.serving import Served
+
+PATIENCE_MS = 60_000
+
+
+@pytest.fixture
+def camera() -> str:
+    """A scene other than the usual one."""
+    return "sim:wall?noise=off"
+
+
+def simulated(served: Served) -> dict[str, Any]:
+    document: dict[str, Any] = httpx.get(f"{served.url}/api/v1/simulation").json()
+    return document
+
+
+def test_the_camera_is_put_before_another_scene(page: Page, served: Served) -> None:
+    open_page(page)
+    choose(page, "sequence", "Simulated scene")
+    panel = page.locator(".panel-simulation")
+    scene = panel.get_by_label("Scene")
+    expect(scene).to_have_value("wall")
+    wall = map_pixels(page)
+    scene.select_option("mirrors")
+    expect(page.locator(".toast").last).to_contain_text(
+        "stands before mirrors", timeout=PATIENCE_MS
+    )
+    expect(scene).to_have_value("mirrors")
+    mirrors = panel.locator("[data-effect=mirror-paths]")
+    expect(mirrors).to_have_attribute("data-built", "true")
+    assert simulated(served)["scene"] == "mirrors"
+    page.wait_for_function(  # the frame that both scenes may be in has passed
+        "(frame) => transientcam.store.frames.of('range').peek()?.meta.frame > frame + 1",
+        arg=page.evaluate("transientcam.store.frames.of('range').peek()?.meta.frame"),
+    )
+    assert np.mean(map_pixels(page) != wall) > 0.2
+
+
+def test_an_effect_is_forced_on_and_left_to_the_scene_again(page: Page, served: Served) -> None:
+    open_page(page)
+    choose(page, "sequence", "Simulated scene")
+    panel = page.locator(".panel-simulation")
+    ambient = panel.locator("[data-effect=ambient]")
+    expect(ambient).to_have_attribute("data-built", "false")
+    expect(ambient).to_contain_text("no")
+    ambient.get_by_role("combobox").select_option("on")
+    expect(ambient).to_have_attribute("data-built", "true", timeout=PATIENCE_MS)
+    assert simulated(served)["effects"] == {"ambient": "on"}
+    panel.get_by_role("button", name="Leave all to the scene").click()
+    expect(ambient).to_have_attribute("data-built", "false", timeout=PATIENCE_MS)
+    assert simulated(served)["effects"] == {}
+
+
+def test_the_cable_is_pulled_and_plugged_in_again(page: Page, served: Served) -> None:
+    open_page(page)
+    choose(page, "sequence", "Simulated scene")
+    panel = page.locator(".panel-simulation")
+    expect(panel.get_by_role("button", name="Plug in")).to_be_disabled()
+    panel.get_by_role("button", name="Unplug").click()
+    expect(page.locator(".toast").filter(has_text="The camera was lost")).to_be_visible()
+    expect(panel.get_by_role("button", name="Unplug")).to_be_disabled()
+    panel.get_by_role("button", name="Plug in").click()
+    expect(page.locator(".toast").filter(has_text="The camera is back")).to_be_visible()
+    expect(panel.get_by_role("button", name="Unplug")).to_be_enabled()
+
+
+def test_a_lost_image_is_told(page: Page, served: Served) -> None:
+    open_page(page)
+    choose(page, "sequence", "Simulated scene")
+    page.locator(".panel-simulation").get_by_role("button", name="Lose an image").click()
+    expect(page.locator(".toast").filter(has_text="did not arrive")).to_be_visible()
