@@ -49,7 +49,8 @@ class ComputingTime:
             return once
         # 2 takes are averaged plainly, more are searched for outliers
         few = 2 if sequence.takes == 2 else 3
-        averaging = max(0.0, self._measured(1, few) - self._measured(1, 1)) / (4 * few)
+        m = self._settings.least_harmonics
+        averaging = max(0.0, self._measured(m, few) - self._measured(m, 1)) / (4 * few * m)
         return once + averaging * 4 * sequence.harmonics * sequence.takes
 
     def _measured(self, harmonics: int, takes: int) -> float:

@@ -17,6 +17,7 @@ from typing import Any, Protocol, TypeVar
 
 from numpy.typing import NDArray
 
+import transientcam_moments as tm
 from transientcam_driver import (
     AppliedSequence,
     CalibrationMismatch,
@@ -335,8 +336,8 @@ class Frame:
                 self._over_time.popitem(last=False)
             while len(self._crops) > _REMEMBERED_CROPS:
                 self._crops.popitem(last=False)
-        # one who stops waiting must not stop it for the others
-        result: _T = await asyncio.shield(task)
+        # one who stops waiting must not stop it for the others; most find it done
+        result: _T = task.result() if task.done() else await asyncio.shield(task)
         return result
 
     async def _compute_stage(self, name: str) -> Any:
@@ -399,6 +400,15 @@ class Frame:
             yield
         except Problem:
             raise
+        except tm.ParameterError as error:
+            # started with another estimator than its sequence allows, or of a recording's sequence
+            raise Problem(
+                kinds.ESTIMATOR_MISFIT,
+                f"There is no {name} of frame {self.number}: {error}.",
+                field=error.field,
+                value=error.value,
+                limit=error.limit,
+            ) from error
         except Exception as error:
             self._pipeline.note_failure(name, self.number)
             raise Problem(

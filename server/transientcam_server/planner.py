@@ -266,6 +266,8 @@ def candidates(
             continue
         if predictor.scene.furthest_m >= applied.unambiguous_range_m:
             continue
+        if sequence.harmonics < predictor.least_harmonics:
+            continue
         separation = goal.separation_m
         range_std, bias_m = predictor.range_std(sequence), predictor.range_bias_m(sequence)
         chosen.append(

@@ -142,6 +142,11 @@ class Predictor:
         each = _interpolated(self._relative_noise(sequence), table, log=False)
         return float(np.median(each))
 
+    @property
+    def least_harmonics(self) -> int:
+        """The smallest number of harmonics that there is a range of."""
+        return self._settings.least_harmonics
+
     def _zeroth_of(self, sequence: Sequence) -> str:
         """How b_0 is measured, where that matters: Pisarenko's returns do not depend on it."""
         return sequence.zeroth if self._settings.estimator == "maximum-entropy" else "estimated"

@@ -154,6 +154,15 @@ CALIBRATION_MISFIT: Final = ProblemKind(
     "with. `field` names what differs, `value` what is there and `limit` what it is good for. "
     "Frames go on as they were.",
 )
+ESTIMATOR_MISFIT: Final = ProblemKind(
+    "estimator-misfit",
+    409,
+    "The estimator needs more harmonics",
+    "The estimator that the reconstruction takes the range from needs more harmonics than the "
+    "sequence has. `field` names what does not go together with the other, `value` what was asked "
+    "for and `limit` what would do. Frames go on as they were, but for the products that rest on "
+    "the estimator.",
+)
 CALIBRATION_IN_USE: Final = ProblemKind(
     "calibration-in-use",
     409,

@@ -44,7 +44,7 @@ from transientcam_server.lens import Intrinsics, known_intrinsics
 from transientcam_server.metrics import Metrics
 from transientcam_server.outbox import Channel, Goodbye
 from transientcam_server.pipeline import Pipeline
-from transientcam_server.reconstruction import Reconstruction
+from transientcam_server.reconstruction import Reconstruction, require_harmonics
 from transientcam_server.recording import Header
 from transientcam_server.recording.frames import RecordedFramesOf
 from transientcam_server.recording.library import Library, Wanted
@@ -108,9 +108,7 @@ class Service:
         self.recordings = Library(
             settings.recordings, header=self._recording_header, tell=self._tell_from_thread
         )
-        self.recorded_frames = RecordedFramesOf(
-            self.recordings, self.pipeline, lens=settings.lens
-        )
+        self.recorded_frames = RecordedFramesOf(self.recordings, self.pipeline, lens=settings.lens)
         self.metrics = Metrics(self)
         self.identity = {"name": "transientcam", "version": VERSION}
 
@@ -252,7 +250,14 @@ class Service:
         )
 
     def reconstruct_with(self, settings: ReconstructionSettings) -> Reconstruction:
-        """Compute frames from the next one on with other settings."""
+        """Compute frames from the next one on with other settings.
+
+        Raises
+        ------
+        Problem
+            ``estimator-misfit`` where the estimator needs more harmonics than there are.
+        """
+        require_harmonics(settings, self.applied.sequence.harmonics, field="estimator")
         before = self.pipeline.reconstruction
         now = self.pipeline.reconstruction = before.followed_by(settings)
         if now is not before:

@@ -19,6 +19,22 @@ class _Group(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
 
+# those whose computation keeps up with a camera; the others are for recordings, through the library
+Estimator = Literal[
+    "pisarenko",
+    "maximum-entropy",
+    "single-frequency",
+    "inverse-fourier",
+    "godbaz",
+    "spumic",
+    "sra-table",
+    "matrix-pencil",
+    "matching-pursuit",
+    "frequency-domain",
+    "high-frequency",
+]
+
+
 class ReconstructionSettings(_Group):
     """How images become moments and moments become returns."""
 
@@ -28,10 +44,15 @@ class ReconstructionSettings(_Group):
     """Smallest eigenvalue every pixel's moments are raised to, over its brightness (Sec. 4.3)."""
     return_threshold: _Finite = Field(default=_DEFAULTS.threshold, ge=0.0, le=1.0)
     """Weight from which a return counts as the first, over the pixel's strongest return."""
-    estimator: Literal["pisarenko", "maximum-entropy", "single-frequency"] = "pisarenko"
-    """What the range is taken from; the last one is the usual way, for comparison."""
+    estimator: Estimator = "pisarenko"
+    """What the range is taken from; all but the first two are there for comparison."""
     minimum_brightness_dn: _Finite = Field(default=0.0, ge=0.0)
     """Pixels with no more light than this have no range."""
+
+    @property
+    def least_harmonics(self) -> int:
+        """The smallest number of harmonics that the estimator gives a range of."""
+        return tm.comparisons.TECHNIQUES[self.estimator].least_harmonics
 
     def for_moments(self, **others: Any) -> tm.Settings:
         """Return these settings as the arithmetic calls them, together with its other ones."""

@@ -45,6 +45,8 @@ def capabilities(camera: Camera) -> Capabilities:
 class ClosedForm:
     """A predictor of one return and white noise, whose answers are formulas."""
 
+    least_harmonics = 1
+
     def __init__(self, *, far_m: float = 2.0) -> None:
         self.scene = statistic.given(1e6, [(far_m, 1.0)])
 

@@ -1,5 +1,6 @@
 """Three frequencies in real time: SRA looked up in a table of four dimensions."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -15,21 +16,24 @@ from transientcam_moments.comparisons.technique import Technique
 from transientcam_moments.errors import ParameterError
 from transientcam_moments.pisarenko import DIRECT_THRESHOLD
 
-NODES = 11
+NODES = 9
 _LEAST = 3
 _BINS = 128
+_SINGLE = 3**-0.5  # b_1, b_2 and b_3 of a single return, turned and divided
+_DENSER = 1.5  # power of the distance from there, by which nodes get closer to each other
 
 
-def sra_table(b: Array, *, nodes: int = NODES, epsilon: float = EPSILON) -> SparseEstimate:
+def sra_table(b: Array, *, nodes: int | None = None, epsilon: float = EPSILON) -> SparseEstimate:
     """Look up the first return that `sra` finds for b_1, b_2 and b_3.
 
     Parameters
     ----------
     b : array, shape (m + 1, ...)
         Moments, m >= 3; b_0 and those after b_3 are not looked at.
-    nodes : int
-        Of the table along each of its axes, odd and at least 3. The first call with a number builds
-        the table, a linear program for every second of its nodes, which takes seconds.
+    nodes : int, optional
+        Of the table along each of its axes, odd and at least 3; `NODES` when left out. The first
+        call with a number builds the table, a linear program for every second of its nodes, which
+        takes seconds.
     epsilon : float
         Tolerance, as of `sra`, above 0.
 
@@ -46,11 +50,13 @@ def sra_table(b: Array, *, nodes: int = NODES, epsilon: float = EPSILON) -> Spar
     Notes
     -----
     Turned by the phase of b_1 and divided by their 2-norm, three moments have four dimensions left:
-    b_2 and b_3, in the unit ball. The first return is the earliest within half a turn around the
+    b_2 and b_3, in the unit ball. Nodes are dense around the place of a single return, which is
+    one of them. The first return is the earliest within half a turn around the
     phase of b_1 that has a tenth of the strongest one's weight. Between nodes its weight times
     exp(i phi) is interpolated linearly. The tolerance of `sra`, in real and imaginary parts, does
     turn with the moments only by quarter turns; the table is that of a phase of 0.
     """
+    nodes = NODES if nodes is None else nodes
     if nodes < 3 or nodes % 2 == 0:
         raise ParameterError("nodes", nodes, "odd, at least 3")
     pixels = pixels_of(b, least=_LEAST, name="sra-table", last=_LEAST)
@@ -69,24 +75,35 @@ def _table(nodes: int, epsilon: float) -> Any:
     """Return the table as a function from places (P, 4) to weight exp(i phase) (P)."""
     from scipy.interpolate import RegularGridInterpolator  # heavy, like the solver
 
-    axis = np.linspace(-1, 1, nodes)
+    axes = (_axis(nodes, _SINGLE), _axis(nodes, 0.0)) * 2
     solve = program(_LEAST, bins=_BINS, epsilon=epsilon)
     values = np.zeros((nodes,) * 4, dtype=complex)
-    for place in np.argwhere(_needed(axis)):
+    for place in map(tuple, np.argwhere(_needed(axes))):
         mirror = (place[0], nodes - 1 - place[1], place[2], nodes - 1 - place[3])
-        if tuple(place) > mirror:
+        if place > mirror:
             continue  # conjugate moments have the mirrored response
-        light = solve(_moments(axis[place]))
-        values[tuple(place)] = _first(light)
+        where = np.array([axis[index] for axis, index in zip(axes, place, strict=True)])
+        light = solve(_moments(where))
+        values[place] = _first(light)
         values[mirror] = _first(None if light is None else np.roll(light[::-1], 1))
-    return RegularGridInterpolator((axis,) * 4, values)
+    return RegularGridInterpolator(axes, values)
 
 
-def _needed(axis: Real) -> NDArray[np.bool_]:
+def _axis(nodes: int, dense: float) -> Real:
+    """Return nodes from -1 to 1 that are closest to each other around a place."""
+    t = np.linspace(-1, 1, nodes)
+    axis: Real = dense + np.where(t < 0, -1 - dense, 1 - dense) * np.abs(t) ** _DENSER
+    return axis
+
+
+def _needed(axes: Sequence[Real]) -> NDArray[np.bool_]:
     """Say which nodes are corners of a cell that the unit ball reaches into."""
-    near = np.maximum(np.abs(axis) - (axis[1] - axis[0]), 0) ** 2  # of the nearest place around
-    squares = np.stack(np.meshgrid(near, near, near, near, indexing="ij"))
-    within: NDArray[np.bool_] = squares.sum(axis=0) < 1
+    squares = np.zeros(())
+    for axis in axes:
+        low, high = np.append(axis[0], axis[:-1]), np.append(axis[1:], axis[-1])
+        nearest = np.where(low * high < 0, 0, np.minimum(np.abs(low), np.abs(high)))
+        squares = squares[..., None] + nearest**2
+    within: NDArray[np.bool_] = squares < 1
     return within
 
 

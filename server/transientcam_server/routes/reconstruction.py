@@ -60,7 +60,12 @@ async def read_reconstruction(
 @router.put(
     "/reconstruction",
     summary="Change how frames are computed",
-    responses=documented(kinds.BAD_REQUEST, kinds.INVALID_REQUEST, kinds.RECONSTRUCTION_CHANGED)
+    responses=documented(
+        kinds.BAD_REQUEST,
+        kinds.INVALID_REQUEST,
+        kinds.ESTIMATOR_MISFIT,
+        kinds.RECONSTRUCTION_CHANGED,
+    )
     | etags.CHANGING,
 )
 async def change_reconstruction(

@@ -10,6 +10,7 @@ from transientcam_driver import AppliedSequence, Sequence
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.access import needs
 from transientcam_server.problems import documented
+from transientcam_server.reconstruction import require_harmonics
 from transientcam_server.routes import etags
 from transientcam_server.routes.sequence_models import AppliedDocument, SequenceDocument
 from transientcam_server.service import ServiceOf
@@ -72,6 +73,7 @@ async def read_sequence(
         kinds.INVALID_REQUEST,
         kinds.INVALID_SEQUENCE,
         kinds.SEQUENCE_CHANGED,
+        kinds.ESTIMATOR_MISFIT,
         kinds.CAMERA_BUSY,
         kinds.CAMERA_FAILED,
         kinds.CAMERA_LOST,
@@ -93,6 +95,8 @@ async def change_sequence(
 
     def check(running: AppliedSequence) -> None:
         etags.require(if_match, _tag(running), otherwise=kinds.SEQUENCE_CHANGED)
+        settings = service.pipeline.reconstruction.settings
+        require_harmonics(settings, wanted.harmonics, field="harmonics")
 
     applied = await asyncio.wrap_future(service.acquisition.configure(wanted, check=check))
     response.headers["ETag"] = _tag(applied)

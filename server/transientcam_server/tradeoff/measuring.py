@@ -11,9 +11,10 @@ import numpy as np
 import transientcam_moments as tm
 from transientcam_driver import Camera, Sequence, Truth, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
+from transientcam_moments.comparisons import Technique
 from transientcam_server.products import STAGES, Recipe
 from transientcam_server.settings import ReconstructionSettings
-from transientcam_server.tradeoff import capture, computing, transport
+from transientcam_server.tradeoff import capture, computing, estimating, transport
 from transientcam_server.tradeoff.grid import Grid
 from transientcam_server.tradeoff.records import Record, Records, key_of
 from transientcam_server.tradeoff.truth import Sample, sample_pixels
@@ -64,6 +65,18 @@ def points_of(grid: Grid, *, scene: str, repetitions: int, seed: int) -> list[Po
             ),
         )
 
+    def estimating_point(technique: Technique, settings: Mapping[str, Any]) -> Point:
+        return point(
+            "estimating",
+            settings,
+            lambda bench: estimating.measure(
+                technique,
+                bench.scene(settings["harmonics"]),
+                repetitions=repetitions,
+                seed=seed,
+            ),
+        )
+
     def transport_point(harmonics: int, coding: transport.Coding) -> Point:
         return point(
             "transport",
@@ -76,6 +89,7 @@ def points_of(grid: Grid, *, scene: str, repetitions: int, seed: int) -> list[Po
     points = [capture_point(sequence) for sequence in grid.sequences]
     for m in grid.harmonics:
         points += [computing_point(m, task) for task in computing.tasks(m, grid)]
+        points += [estimating_point(*each) for each in estimating.points(m)]
         points += [transport_point(m, coding) for coding in transport.codings(m)]
     return points
 
@@ -145,7 +159,7 @@ class _Bench:
         self._spec = spec
         self._seed = seed
         self._settings = ReconstructionSettings()
-        self._moments: dict[int, Any] = {}
+        self._scenes: dict[int, estimating.Scene] = {}
         self._sampled: tuple[Truth, Sample] | None = None
 
     def capture(self, sequence: Sequence, repetitions: int) -> _Summary:
@@ -175,7 +189,11 @@ class _Bench:
 
     def moments(self, harmonics: int) -> Any:
         """Return the scene's moments in double precision, of one frame, fit for reconstruction."""
-        if harmonics not in self._moments:
+        return self.scene(harmonics).moments
+
+    def scene(self, harmonics: int) -> estimating.Scene:
+        """Return those moments and the truth of the same frame."""
+        if harmonics not in self._scenes:
             with self._camera() as camera:
                 most_hz = camera.capabilities.max_frequency_hz / harmonics
                 sequence = replace(
@@ -186,8 +204,12 @@ class _Bench:
                 recipe = Recipe(applied, self._settings, 2.0**camera.capabilities.bits - 1.0)
             b = STAGES["moments"].compute(recipe, shot.frame).moments.astype(np.complex128)
             # rounding to single precision took from what biasing had given
-            self._moments[harmonics] = tm.bias(b, self._settings.bias).moments
-        return self._moments[harmonics]
+            biased = tm.bias(b, self._settings.bias).moments
+            truth = shot.truth
+            truth_m = np.where(truth.brightness > 0, truth.range_m, np.nan)
+            base_hz = applied.sequence.base_frequency_hz
+            self._scenes[harmonics] = estimating.Scene(biased, base_hz, truth_m)
+        return self._scenes[harmonics]
 
     def range_m(self, harmonics: int) -> Any:
         """Return the range image of those moments, at a base frequency of 23 MHz."""

@@ -5,18 +5,20 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-from transientcam_server.tradeoff import capture, computing, transport
+from transientcam_server.tradeoff import capture, computing, estimating, transport
 from transientcam_server.tradeoff.plots import PLOTS, point_id
 from transientcam_server.tradeoff.records import Record
 
 _QUANTITIES: Final = {
     "capture": capture.QUANTITIES,
     "computing": computing.QUANTITIES,
+    "estimating": estimating.QUANTITIES,
     "transport": transport.QUANTITIES,
 }
 _TITLES: Final = {
     "capture": "Capture time",
     "computing": "Computing time",
+    "estimating": "Estimators of range",
     "transport": "Transport",
 }
 

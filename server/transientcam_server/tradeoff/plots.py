@@ -69,6 +69,16 @@ PLOTS: Final[dict[str, Axes]] = {
         "method",
         {"task": "density"},
     ),
+    "estimating": Axes(
+        "estimating",
+        "Estimators of range",
+        "seconds",
+        "computing time of a frame / s",
+        "range_median_m",
+        "median error / m",
+        "estimator",
+        {},
+    ),
     "transport": Axes(
         "transport",
         "Transport: density",

@@ -11,10 +11,10 @@ from transientcam_moments.comparisons.regularised import Problem, regularised
 
 
 def image(*, noise: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Moments (5, 12, 16) of a slanted wall with a second return on one half, and its phase."""
-    y, x = np.mgrid[:8, :12]
+    """Moments (5, 6, 8) of a slanted wall with a second return on one half, and its phase."""
+    y, x = np.mgrid[:6, :8]
     phase = np.stack([1 + 0.02 * x, 3 + 0.01 * y])
-    weight = np.stack([1 + 0 * x, 0.5 * (x > 5)])
+    weight = np.stack([1 + 0 * x, 0.5 * (x > 3)])
     b = oracles.moments_of_returns(phase, weight, 4)
     rng = np.random.default_rng(seed)
     return b + noise * (rng.normal(size=b.shape) + 1j * rng.normal(size=b.shape)), phase[0]
@@ -68,12 +68,12 @@ def test_priors_over_time_lose_what_is_sharp() -> None:
 
 def test_a_pixel_that_cannot_be_used_is_no_neighbour() -> None:
     b, phase = image(noise=0.0)
-    b[1, 5, 5] = np.inf
-    b[:, 6, 5] = 0
+    b[1, 3, 5] = np.inf
+    b[:, 4, 5] = 0
 
     found = regularised(b).first_phase_rad()
 
-    assert np.isnan(found[[5, 6], [5, 5]]).all()
+    assert np.isnan(found[[3, 4], [5, 5]]).all()
     seen = np.isfinite(found)
     assert seen.sum() == found.size - 2
     assert np.abs(found - phase)[seen].max() < 0.1

@@ -8,6 +8,7 @@ import pytest
 import transientcam_moments as tm
 from tests.moments import oracles
 from tests.moments.comparisons import signals
+from transientcam_moments.comparisons import sra_table as sra_table_module
 from transientcam_moments.comparisons.logarithmic import logarithmic
 from transientcam_moments.comparisons.sra import program, sra
 from transientcam_moments.comparisons.sra_table import sra_table
@@ -95,7 +96,8 @@ def test_arguments_that_it_cannot_work_with_are_refused(
 def test_the_table_says_what_the_program_says_at_its_nodes() -> None:
     # the unit vector of a node of the coarse table, as moments; a quarter turn leaves their 1-norm
     turn = np.pi / 2
-    second, third = -0.5 + 0.0j, 0.0 + 0.5j
+    real, imag = sra_table_module._axis(5, 3**-0.5), sra_table_module._axis(5, 0.0)
+    second, third = complex(real[1], imag[3]), complex(real[3], imag[2])
     first = np.sqrt(1 - abs(second) ** 2 - abs(third) ** 2)
     b = np.array([0, first, second, third]) * np.exp(1j * turn * np.arange(4)) * 7
 
@@ -113,10 +115,10 @@ def test_the_table_is_closer_to_the_first_return_than_a_single_frequency() -> No
     phase, weight = 0.5 * phase, weight + np.array([[1.0], [0.0]])
     b = oracles.moments_of_returns(phase, weight, 3)
 
-    error = oracles.around(sra_table(b, nodes=9).phase_rad[0] - phase[0])
+    error = oracles.around(sra_table(b, nodes=7).phase_rad[0] - phase[0])
 
     single = oracles.around(np.angle(b[1]) - phase[0])
-    assert np.median(error) < 0.8 * np.median(single)
+    assert np.median(error) < 0.5 * np.median(single)
 
 
 def test_the_table_refuses_an_even_number_of_nodes() -> None:
