@@ -108,11 +108,11 @@ class Calibrations:
             ``calibration-not-stored``.
         """
         self.require_room()
-        with self.receiving() as part:
+        with self._part() as part:
             try:
                 capture.save(part)
             except OSError as error:
-                raise self._not_stored(error) from error
+                raise self.not_stored(error) from error
             return self._take(part, capture)
 
     def take_in(self, part: Path) -> Stored:
@@ -159,7 +159,7 @@ class Calibrations:
         try:
             stored.path.unlink(missing_ok=True)
         except OSError as error:
-            raise self._not_stored(error) from error
+            raise self.not_stored(error) from error
         return stored
 
     @property
@@ -177,7 +177,7 @@ class Calibrations:
     def remember_active(self, calibration_id: str) -> None:
         """Let the next start of the service know; a disk that does not take it is no problem."""
         try:
-            with self.receiving() as part:
+            with self._part() as part:
                 part.write_text(json.dumps({"id": calibration_id}), encoding="utf-8")
                 part.replace(self.directory / _ACTIVE)
         except (Problem, OSError) as error:
@@ -200,8 +200,15 @@ class Calibrations:
             )
 
     @contextmanager
-    def receiving(self) -> Iterator[Path]:
-        """Lend a path in the directory for a file that is not complete yet.
+    def _part(self) -> Iterator[Path]:
+        part = self.new_part()
+        try:
+            yield part
+        finally:
+            part.unlink(missing_ok=True)
+
+    def new_part(self) -> Path:
+        """Make a file in the directory for what is not complete yet; who asks removes it.
 
         Raises
         ------
@@ -212,13 +219,15 @@ class Calibrations:
             self.directory.mkdir(parents=True, exist_ok=True)
             descriptor, name = tempfile.mkstemp(suffix=".part", dir=self.directory)
         except OSError as error:
-            raise self._not_stored(error) from error
+            raise self.not_stored(error) from error
         os.close(descriptor)
-        part = Path(name)
-        try:
-            yield part
-        finally:
-            part.unlink(missing_ok=True)
+        return Path(name)
+
+    def not_stored(self, error: OSError) -> Problem:
+        """Say that the disk does not take a calibration, and log where."""
+        _log.warning("storing a calibration in %s failed: %s", self.directory, error)
+        reason = error.strerror or "no reason is given"
+        return Problem(kinds.CALIBRATION_NOT_STORED, f"The disk does not take it: {reason}.")
 
     def _take(self, part: Path, capture: CalibrationCapture) -> Stored:
         path = self.directory / (capture.id + SUFFIX)
@@ -227,7 +236,7 @@ class Calibrations:
                 os.fsync(file.fileno())
             part.replace(path)
         except OSError as error:
-            raise self._not_stored(error) from error
+            raise self.not_stored(error) from error
         return self.get(capture.id)
 
     def _paths(self) -> list[Path]:
@@ -248,11 +257,6 @@ class Calibrations:
         if known is None or known[0] != stamp:
             known = self._known[path] = stamp, _read(path, status.st_size)
         return known[1]
-
-    def _not_stored(self, error: OSError) -> Problem:
-        _log.warning("storing a calibration in %s failed: %s", self.directory, error)
-        reason = error.strerror or "no reason is given"
-        return Problem(kinds.CALIBRATION_NOT_STORED, f"The disk does not take it: {reason}.")
 
 
 def _read(path: Path, size_bytes: int) -> Stored | None:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Path, Request, Response, status
 from fastapi.responses import FileResponse
+from starlette.requests import ClientDisconnect
 
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.access import needs
@@ -31,6 +32,7 @@ from transientcam_server.tokens import Role
 router = APIRouter(tags=["calibrations"])
 
 IMPORT: Final = "/calibrations/import"
+_PIECE_BYTES: Final = 1024 * 1024
 NPZ: Final = "application/octet-stream"
 _Calibration = Annotated[
     str,
@@ -130,6 +132,7 @@ async def activate_calibration(service: ServiceOf, wanted: ActivationRequest) ->
     summary="Take a calibration in",
     openapi_extra=_FILE,
     responses=documented(
+        kinds.BAD_REQUEST,
         kinds.INVALID_REQUEST,
         kinds.TOO_LARGE,
         kinds.INVALID_CALIBRATION,
@@ -143,13 +146,16 @@ async def import_calibration(service: ServiceOf, request: Request) -> Calibratio
     It may be of another camera or for another sequence; whether it can be used, `fits` says.
     """
     kept = service.calibrations.kept
-    lent = kept.receiving()
-    part = await asyncio.to_thread(lent.__enter__)
+    part = await asyncio.to_thread(kept.new_part)
     try:
         await _receive(request, part, limit=service.settings.calibrations.max_bytes)
         stored = await asyncio.to_thread(kept.take_in, part)
+    except OSError as error:
+        raise kept.not_stored(error) from error
+    except ClientDisconnect as error:
+        raise Problem(kinds.BAD_REQUEST, "The body ended early.") from error
     finally:
-        await asyncio.to_thread(lent.__exit__, None, None, None)
+        await asyncio.to_thread(part.unlink, missing_ok=True)
     return _document(service, stored, None)
 
 
@@ -196,14 +202,18 @@ async def read_calibration_file(
 
 
 async def _receive(request: Request, part: FilePath, *, limit: int) -> None:
-    received = 0
-    with part.open("wb") as file:  # the pieces are small, and the disk's cache takes them
+    received, waiting = 0, bytearray()
+    with part.open("wb") as file:
         async for piece in request.stream():
             received += len(piece)
             if received > limit:
                 detail = f"The body is longer than {limit} bytes."
                 raise Problem(kinds.TOO_LARGE, detail, field="body", limit=limit)
-            file.write(piece)
+            waiting += piece
+            if len(waiting) >= _PIECE_BYTES:
+                await asyncio.to_thread(file.write, bytes(waiting))
+                waiting.clear()
+        await asyncio.to_thread(file.write, bytes(waiting))
 
 
 def _active(service: Service) -> ActiveDocument:

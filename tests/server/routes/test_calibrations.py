@@ -172,6 +172,24 @@ def test_what_is_no_calibration_is_not_taken_in(
     assert list(bench.settings.calibrations.directory.glob("*")) == []
 
 
+def test_a_disk_that_takes_nothing_is_a_problem_and_no_more(tmp_path: Path) -> None:
+    occupied = tmp_path / "file"
+    occupied.write_text("no directory")
+    with (
+        serving("sim:calibration", calibrations={"directory": occupied / "kept"}) as daemon,
+        httpx.Client(base_url=daemon.url, timeout=60) as http,
+    ):
+        hold_to_contract(http, daemon.app.openapi())
+        sent = http.post(f"{CALIBRATIONS}/import", content=b"PK")
+        job = measured(http)
+        assert next_meta(http)["calibration_id"] == "nominal"
+
+    assert sent.status_code == 507
+    assert sent.json()["type"] == "/problems/calibration-not-stored"
+    assert job["problem"]["type"] == "/problems/calibration-not-stored"
+    assert str(occupied) not in sent.text
+
+
 def test_a_file_beyond_the_limit_is_refused(tmp_path: Path) -> None:
     limits = {"directory": tmp_path, "max_bytes": 2048}
     with (
