@@ -62,9 +62,12 @@ class Parameter:
 
 
 def of_sequence(
-    sequence: Sequence, capabilities: Capabilities, *, access: Access
+    sequence: Sequence, capabilities: Capabilities, *, least_harmonics: int, access: Access
 ) -> Iterator[Parameter]:
-    """Describe what a camera may be set to, one value at a time from the present sequence."""
+    """Describe what a camera may be set to, one value at a time from the present sequence.
+
+    ``least_harmonics`` are those that the reconstruction needs.
+    """
 
     def accepts(changed: Callable[[], Sequence]) -> bool:
         try:
@@ -84,7 +87,7 @@ def of_sequence(
     word = capabilities.tuning_word(capabilities.max_frequency_hz) // sequence.harmonics
     ranges: dict[str, tuple[float, float]] = {
         "base_frequency_hz": (capabilities.min_frequency_hz, capabilities.frequency_hz(word)),
-        "harmonics": (1, most_harmonics),
+        "harmonics": (least_harmonics, most_harmonics),
         "exposure_s": (capabilities.min_exposure_s, capabilities.max_exposure_s),
         "takes": (
             1,
@@ -128,11 +131,21 @@ def of_sequence(
         )
 
 
-def of_reconstruction(settings: ReconstructionSettings) -> Iterator[Parameter]:
-    """Describe the settings of the reconstruction."""
-    return _of_model(
+def of_reconstruction(settings: ReconstructionSettings, *, harmonics: int) -> Iterator[Parameter]:
+    """Describe the settings of the reconstruction, while there are so many harmonics."""
+    described = _of_model(
         "reconstruction", "/api/v1/reconstruction", ReconstructionSettings, settings.model_dump()
     )
+    for each in described:
+        if each.name == "reconstruction.estimator" and each.allowed is not None:
+            allowed = tuple(
+                estimator
+                for estimator in each.allowed
+                if settings.model_copy(update={"estimator": estimator}).least_harmonics <= harmonics
+            )
+            yield replace(each, allowed=allowed)
+        else:
+            yield each
 
 
 def of_acquisition(*, running: bool) -> Iterator[Parameter]:
@@ -199,7 +212,9 @@ def _described(model: type[BaseModel], *, leave_out: Iterable[str] = ()) -> dict
     for name, schema in model.model_json_schema()["properties"].items():
         if name in leave_out:
             continue
-        inner = next((each for each in schema.get("anyOf", ()) if each["type"] != "null"), {})
+        inner: dict[str, Any] = next(
+            (each for each in schema.get("anyOf", ()) if each["type"] != "null"), {}
+        )
         fields[name] = {"description": "", **schema, **inner}
     return fields
 

@@ -39,9 +39,9 @@ class ParameterDocument(Document):
     value: Any = None
     type: Literal["number", "integer", "boolean", "string"]
     unit: str | None = None
-    min: float | None = None
+    min: int | float | None = None
     """The least that is accepted; null without such a limit."""
-    max: float | None = None
+    max: int | float | None = None
     """The most that is accepted; null without such a limit."""
     allowed: list[Any] | None = None
     """Every value that is accepted; null where they are not counted."""
@@ -62,13 +62,15 @@ class ParametersDocument(Document):
 async def read_parameters(service: ServiceOf) -> ParametersDocument:
     """Describe everything that can be set, with its present value and the limits of validation."""
     fixed = isinstance(service.camera, ReplayCamera)
+    sequence, settings = service.applied.sequence, service.pipeline.reconstruction.settings
     found = (
         *parameters.of_sequence(
-            service.applied.sequence,
+            sequence,
             service.camera.capabilities,
+            least_harmonics=settings.least_harmonics,
             access="read-only" if fixed else "read-write",
         ),
-        *parameters.of_reconstruction(service.pipeline.reconstruction.settings),
+        *parameters.of_reconstruction(settings, harmonics=sequence.harmonics),
         *parameters.of_acquisition(running=service.acquisition.status().running),
         *parameters.of_history(service.settings.history),
         *parameters.of_recordings(service.settings.recordings),

@@ -122,6 +122,23 @@ def test_limits_follow_the_sequence(http: httpx.Client, sequence: dict[str, Any]
         assert after[name]["max"] < before[name]["max"]
 
 
+def test_estimators_and_harmonics_that_do_not_go_together_are_not_allowed(
+    http: httpx.Client,
+) -> None:
+    http.put("/api/v1/sequence", json={"harmonics": 1}).raise_for_status()
+    few = parameters(http)["reconstruction.estimator"]["allowed"]
+    http.put("/api/v1/sequence", json={"harmonics": 4}).raise_for_status()
+    many = parameters(http)["reconstruction.estimator"]["allowed"]
+    only_many = next(each for each in many if each not in few)
+
+    http.put("/api/v1/reconstruction", json={"estimator": only_many}).raise_for_status()
+
+    least = parameters(http)["sequence.harmonics"]["min"]
+    assert least > 1
+    fewer = http.put("/api/v1/sequence", json={"harmonics": int(least) - 1})
+    assert fewer.json()["type"] == "/problems/estimator-misfit"
+
+
 def test_a_recording_has_a_sequence_that_can_only_be_read(tmp_path: Path) -> None:
     kept = {"directory": tmp_path, "min_free_bytes": 0}
     with (
