@@ -109,22 +109,27 @@ class Bench:
         options
             Further options of the camera's name, as in ``outliers="off"``.
         """
-        if self.quick:
-            sequence = replace(sequence, takes=min(sequence.takes, _QUICK_TAKES))
+        sequence = self.sequence(sequence)
         key = (scene, sequence, frames, at_s, *sorted(options.items()))
         if key not in self._shots:
             self._shots[key] = self._captured(scene, sequence, frames, at_s, options)
         return self._shots[key]
 
-    def raw(self, scene: str, sequence: Sequence) -> tuple[_Array, AppliedSequence]:
-        """Return uncalibrated images (N, H, W) of a scene with a device of its own."""
+    def sequence(self, sequence: Sequence) -> Sequence:
+        """Return what is captured in the place of a sequence: with few takes where it is quick."""
+        takes = sequence.takes
+        return replace(sequence, takes=min(takes, _QUICK_TAKES) if self.quick else takes)
+
+    def raw(self, scene: str, sequence: Sequence) -> tuple[_Array, Truth]:
+        """Return uncalibrated images (N, H, W) of a scene with its own device, and the truth."""
         with ExitStack() as stack:
             camera = stack.enter_context(open_camera(f"sim:{scene}", clock=VirtualClock()))
-            applied = camera.configure(sequence)
+            camera.configure(sequence)
+            assert camera.simulation is not None  # noqa: S101 - only simulated ones are opened
             camera.start()
             images = camera.read_frame().images
             camera.stop()
-        return images, applied
+            return images, camera.simulation.truth()
 
     def calibration(self, sequence: Sequence, **options: str) -> Calibration:
         """Return the calibration of a sequence: filter and diffusor before the lens (Fig. 4)."""

@@ -55,7 +55,7 @@ def make(bench: Bench) -> Made:
     schemes += [Steps("arccos", n) for n in steps]
     schemes += [Steps("harmonic-cancellation", n) for n in ((3,) if bench.quick else (1, 2, 3, 4))]
     curves = {
-        name: {scheme: _measured(bench, wave, scheme) for scheme in schemes}
+        name: {scheme: measured(bench, wave, scheme) for scheme in schemes}
         for name, wave in _waveforms(bench).items()
     }
     tables = [_table(name, each) for name, each in curves.items()]
@@ -74,7 +74,7 @@ def _waveforms(bench: Bench) -> dict[str, _Array]:
     return waveforms
 
 
-def _measured(bench: Bench, wave: _Array, scheme: Steps) -> _Array:
+def measured(bench: Bench, wave: _Array, scheme: Steps) -> _Array:
     """Return the effective modulation over one period of delays, measured over USB: (W).
 
     The difference of opposite images, which is what four-bucket sampling uses.

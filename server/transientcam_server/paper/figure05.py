@@ -28,7 +28,7 @@ def make(bench: Bench) -> Made:
     """Reconstruct the same b_1 to b_5 with different b_0."""
     phase = 2 * np.pi * np.arange(bench.few(20_000, 4000)) / bench.few(20_000, 4000)
     b = PIXEL.moments(_F_HZ, _M)
-    singular = PIXEL.brightness - float(tm.smallest_eigenvalue(b[:, None])[0])
+    singular = singular_brightness(b)
     sparsest = singular + _NEAR * PIXEL.brightness
     truth = PIXEL.density(phase / (2 * np.pi * _F_HZ)) / (2 * np.pi * _F_HZ)
     shown = (sparsest, singular + 0.4, PIXEL.brightness, 72.0, 85.0)
@@ -48,6 +48,11 @@ def make(bench: Bench) -> Made:
             "theirs is nearly so at 61.",
         ),
     )
+
+
+def singular_brightness(b: _Array) -> float:
+    """Return the b_0 at which the Toeplitz matrix of moments (m + 1) becomes singular."""
+    return float(b[0].real - tm.smallest_eigenvalue(b[:, None])[0])
 
 
 def _density(b: _Array, b_0: float, phase: _Array) -> _Array:

@@ -25,7 +25,7 @@ def make(bench: Bench) -> Made:
     b = CONTINUOUS.moments(_F_HZ, _M)
     phase = 2 * np.pi * np.arange(_RING) / _RING
     lower, upper = (each[:, 0] for each in tm.bounds(b[:, None], phase, _RADIUS))
-    smoothed = _candidates(b, phase, bench.few(40, 5), np.random.default_rng(bench.seed))
+    smoothed = candidates(b, phase, bench.few(40, 5), np.random.default_rng(bench.seed))
     widths = [(m, *_width(CONTINUOUS, m, phase)) for m in (3, 4, 5, 6, 8)]
     sharper = [
         (scale, *_width(_sharper(scale), _M, phase)) for scale in (1.0, 0.5, 0.25, 0.125, 0.0625)
@@ -71,7 +71,7 @@ def _truth(phase: _Array) -> _Array:
     return CONTINUOUS.density(phase / turn) / turn
 
 
-def _candidates(b: _Array, phase: _Array, several: int, rng: np.random.Generator) -> _Array:
+def candidates(b: _Array, phase: _Array, several: int, rng: np.random.Generator) -> _Array:
     """Return smoothed densities (N, T) that share all moments: the truth, the estimates, others.
 
     A positive measure for b less a small positive one exists where the matrix stays positive:
@@ -125,7 +125,7 @@ def _smooth(density: _Array) -> _Array:
     return smoothed
 
 
-def _must_peak(phase: _Array, lower: _Array, upper: _Array) -> tuple[float, float]:
+def must_peak(phase: _Array, lower: _Array, upper: _Array) -> tuple[float, float]:
     """Return where a maximum must be: what is compatible is lower on both sides."""
     top = int(lower.argmax())
     below = upper < lower[top]
@@ -148,7 +148,7 @@ def _statements(
     widths: list[tuple[int, float, float]],
 ) -> list[Statement]:
     truth = smoothed[0]
-    begin, end = _must_peak(phase, lower, upper)
+    begin, end = must_peak(phase, lower, upper)
     slack = 1e-6  # of the density's wrapped tail
     of_five = {m: greatest for m, _, greatest in widths}[_M]
     return [

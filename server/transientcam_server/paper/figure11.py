@@ -267,11 +267,11 @@ def _remarks(outcomes: _Outcomes) -> list[str]:
     for case in _CASES:
         for name, of in (("without noise", "clean_error"), ("at 70 : 1", "noisy_error")):
             errors = {each.name: getattr(outcomes[each.name, case.name], of) for each in CONTENDERS}
-            remarks.append(_ranked(f"{case.name.capitalize()} case {name}", errors))
+            remarks.append(ranked(f"{case.name.capitalize()} case {name}", errors))
     return remarks
 
 
-def _ranked(title: str, errors: dict[str, float]) -> str:
+def ranked(title: str, errors: dict[str, float]) -> str:
     """Say which rivals are better than the paper's methods."""
     labels = {each.name: f"{each.label} ({each.frequencies} MHz)" for each in CONTENDERS}
     rivals = sorted((name for name in errors if name not in OURS), key=lambda name: errors[name])

@@ -1,0 +1,43 @@
+"""`transientcam paper`, through the command line of the client."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from transientcam.cli import run
+
+
+def test_figures_are_made_checked_and_put_on_a_page(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["paper", "7", "5", "-o", str(tmp_path / "out"), "--quick"]) == 0
+
+    page = (tmp_path / "out" / "paper.md").read_text(encoding="utf-8")
+    assert page.index("## Figure 5") < page.index("## Figure 7")
+    for name in ("figure-05.png", "figure-07.png"):
+        picture = (tmp_path / "out" / "figures" / "paper" / name).read_bytes()
+        assert picture.startswith(b"\x89PNG")
+    said = capfd.readouterr().err
+    assert "Figure 7, Error bounds on smoothed densities:" in said
+    assert "statements hold" in said
+
+
+def test_json_holds_every_number(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["paper", "7", "-o", str(tmp_path), "--quick", "--json", "--seed", "5"]) == 0
+
+    (document,) = json.loads(capfd.readouterr().out)
+    assert (document["figure"], document["quick"], document["seed"]) == (7, True, 5)
+    assert all({"says", "value", "passes"} <= set(each) for each in document["statements"])
+    known = json.loads((tmp_path / "figures" / "paper" / "paper.json").read_text(encoding="utf-8"))
+    assert known == [document]
+
+
+def test_an_unknown_figure_is_refused_before_anything_is_made(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["paper", "7", "4", "-o", str(tmp_path / "out"), "--quick"]) == 2
+
+    said = " ".join(capfd.readouterr().err.split())
+    assert "4 is none of 2, 3, 5" in said
+    assert not (tmp_path / "out").exists()
