@@ -1,6 +1,7 @@
 /** A recording on the page: its frames take the place of the camera's, for all views alike. */
 import { batch, computed, effect, signal, untracked } from "@preact/signals";
 
+import { LEAST_PRODUCTS } from "../stream/protocol";
 import type { FrameReport } from "../stream/summary";
 import { type Api, recordingPath, RequestError } from "./api";
 import type { RecordingDocument, TimelineDocument } from "./documents";
@@ -149,8 +150,9 @@ export class Replay {
   /** One frame at a time: what is wanted meanwhile replaces what was. */
   async #load(): Promise<void> {
     const recording = this.recording.peek();
-    const products = this.#frames.wanted.peek();
-    if (recording === null || this.loader === null || this.#loading || products.length === 0) return;
+    const wantedByViews = this.#frames.wanted.peek();
+    const products = wantedByViews.length === 0 ? LEAST_PRODUCTS : wantedByViews;
+    if (recording === null || this.loader === null || this.#loading) return;
     const frame = this.frame.peek();
     const path = `${recordingPath(recording.id)}/frames/${frame}${this.settings.peek() === "current" ? "?reconstruction=current" : ""}`;
     const wanted = [path, ...products, this.#recomputed].join();

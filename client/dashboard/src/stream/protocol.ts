@@ -248,13 +248,17 @@ export function decodeMessage(buffer: ArrayBuffer): ServerMessage | null {
   }
 }
 
+/** What is asked for where nothing is looked at, so that frames and their figures come all the same: the smallest. */
+export const LEAST_PRODUCTS: readonly string[] = ["flags"];
+
 /** The first message of a client, and every later change of what it wants: frames from the next one on. */
 export function encodeSubscribe(products: readonly string[], credits: number, token: string | null = null): Uint8Array<ArrayBuffer> {
+  const wanted = products.length === 0 ? LEAST_PRODUCTS : products;
   return encode({
     type: "subscribe",
     v: 1,
     token,
-    subscriptions: products.map((product) => ({ product, max_rate_hz: null })),
+    subscriptions: wanted.map((product) => ({ product, max_rate_hz: null })),
     credits,
     start: null,
   }) as Uint8Array<ArrayBuffer>;

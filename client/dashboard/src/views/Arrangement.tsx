@@ -67,7 +67,7 @@ function Place({ view, share }: { view: string; share: number }) {
   const free = VIEWS.filter(({ name }) => !viewsOf(layout).includes(name));
   const room = (made: (wanted: string) => Layout | null) => free.filter(({ name }) => made(name) !== null);
   const groups = [
-    { title: "Show here", actions: VIEWS.filter(({ name }) => name !== view).map(({ name, title }) => ({ text: title, run: set(replaced(layout, view, name)) })) },
+    { title: "Show here", actions: VIEWS.filter(({ name }) => name !== view).map(({ name, title }) => ({ text: title, run: store.alone.value === null ? set(replaced(layout, view, name)) : () => (store.alone.value = name) })) },
     { title: "Add to the right", actions: room((name) => beside(layout, view, name)).map(({ name, title }) => ({ text: `${title} →`, run: set(beside(layout, view, name)) })) },
     { title: "Add below", actions: room((name) => below(layout, view, name)).map(({ name, title }) => ({ text: `${title} ↓`, run: set(below(layout, view, name)) })) },
     {

@@ -80,7 +80,7 @@ export function beside(layout: Layout, view: string, wanted: string): Layout | n
 
 /** `wanted` in a row of its own below that of `view`; null where there is no room for a row. */
 export function below(layout: Layout, view: string, wanted: string): Layout | null {
-  if (layout.length >= MOST_ROWS) return null;
+  if (layout.length >= MOST_ROWS || !viewsOf(layout).includes(view)) return null;
   return layout.flatMap((each) =>
     each.slots.some((slot) => slot.view === view)
       ? [{ ...each, share: each.share * 0.6 }, { share: each.share * 0.4, slots: [{ view: wanted, share: 1 }] }]

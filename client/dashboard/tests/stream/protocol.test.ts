@@ -93,4 +93,8 @@ describe("messages to the service", () => {
     const subscriptions = form.subscriptions.map(({ product }) => ({ product, max_rate_hz: null }));
     expect(sent).toEqual({ ...form, subscriptions });
   });
+
+  test("a page that looks at nothing subscribes to something all the same: nothing would be refused", () => {
+    expect(decode(encodeSubscribe([], 2))).toMatchObject({ subscriptions: [{ product: "flags" }] });
+  });
 });

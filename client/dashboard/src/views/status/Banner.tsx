@@ -23,7 +23,7 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
     return (
       <div class="banner" role="alert" data-banner="connection">
         <p>
-          <strong>No connection to the service.</strong> {connection.reason} <Countdown until_s={connection.retryAt_s} />
+          <strong>No connection to the service.</strong> {sentence(connection.reason)} <Countdown until_s={connection.retryAt_s} />
         </p>
         <button type="button" onClick={onRetry}>
           Try now
@@ -56,6 +56,11 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
     );
   }
   return <Unreadable />;
+}
+
+/** What is told by a title, as a sentence. */
+function sentence(words: string): string {
+  return /[.!?]$/.test(words) ? words : `${words}.`;
 }
 
 function Unreadable() {
