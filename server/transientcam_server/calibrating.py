@@ -33,9 +33,10 @@ from transientcam_server.calibrations import Calibrations, Stored
 from transientcam_server.cameras import Camera
 from transientcam_server.drift import invalid_share
 from transientcam_server.errors import Problem
+from transientcam_server.frame import Frame
 from transientcam_server.history import History
 from transientcam_server.jobs import Job, JobDesk
-from transientcam_server.pipeline import Frame, Pipeline
+from transientcam_server.pipeline import Pipeline
 from transientcam_server.products import STAGES, Recipe
 
 _log = logging.getLogger(__name__)

@@ -8,7 +8,8 @@ from typing import Any, Final
 
 from transientcam_driver import AppliedSequence
 from transientcam_server.accuracy import Accuracy, range_error
-from transientcam_server.pipeline import Frame, Pipeline
+from transientcam_server.frame import Frame
+from transientcam_server.pipeline import Pipeline
 from transientcam_server.planner import Choice, Goal
 
 REMEMBERED_S: Final = 10.0

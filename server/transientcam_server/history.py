@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import Problem
-from transientcam_server.pipeline import Frame
+from transientcam_server.frame import Frame
 from transientcam_server.settings import HistorySettings
 
 _OPENED: Final = 2

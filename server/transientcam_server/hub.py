@@ -12,8 +12,8 @@ from transientcam import wire
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.channel_numbers import ChannelNumbers
 from transientcam_server.errors import Problem
+from transientcam_server.frame import Frame
 from transientcam_server.outbox import Channel, Goodbye, Outbox
-from transientcam_server.pipeline import Frame
 
 
 class Hub:

@@ -12,7 +12,7 @@ from transientcam import wire
 from transientcam_server.auth import ANYBODY
 from transientcam_server.cropping import WHOLE, Crop
 from transientcam_server.encoding import MSGPACK, Encoding
-from transientcam_server.pipeline import Frame
+from transientcam_server.frame import Frame
 from transientcam_server.products import Product
 
 MAX_WAITING_MESSAGES: Final = 64

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 from typing import cast
 
 from transientcam import wire
+from transientcam_server.frame import Frame
 from transientcam_server.outbox import Channel
-from transientcam_server.pipeline import Frame
 from transientcam_server.products import PRODUCTS
 
 

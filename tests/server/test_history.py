@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from transientcam_server.errors import Problem
+from transientcam_server.frame import Frame
 from transientcam_server.history import History
-from transientcam_server.pipeline import Frame
 from transientcam_server.settings import HistorySettings
 
 

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from tests.server.fakes import NOTICE, channel, fake_frame
 from transientcam import wire
+from transientcam_server.frame import Frame
 from transientcam_server.outbox import (
     MAX_WAITING_MESSAGES,
     Delivery,
@@ -15,7 +16,6 @@ from transientcam_server.outbox import (
     Item,
     Outbox,
 )
-from transientcam_server.pipeline import Frame
 
 
 def run(test: Callable[[], object]) -> None:

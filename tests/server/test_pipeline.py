@@ -12,11 +12,12 @@ import pytest
 
 from transientcam import wire
 from transientcam_driver import Camera, RawFrame, open_camera
-from transientcam_server import pipeline as module
+from transientcam_server import frame as module
 from transientcam_server import products
 from transientcam_server.encoding import MSGPACK, NPY
 from transientcam_server.errors import Problem
-from transientcam_server.pipeline import Frame, Pipeline
+from transientcam_server.frame import Frame
+from transientcam_server.pipeline import Pipeline
 from transientcam_server.products import View
 from transientcam_server.settings import ReconstructionSettings
 

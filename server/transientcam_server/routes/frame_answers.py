@@ -19,7 +19,7 @@ from transientcam_server.encoding import (
     negotiate,
 )
 from transientcam_server.errors import Problem
-from transientcam_server.pipeline import Frame
+from transientcam_server.frame import Frame
 from transientcam_server.pixel import pixel_csv, pixel_json
 from transientcam_server.products import Product, View
 

@@ -5,7 +5,7 @@ from typing import Annotated, Final
 from fastapi import APIRouter, Depends, Query, Response
 
 from transientcam_server import problem_kinds as kinds
-from transientcam_server.pipeline import Frame
+from transientcam_server.frame import Frame
 from transientcam_server.problems import documented
 from transientcam_server.routes.frame_answers import (
     CSV_RESPONSES,

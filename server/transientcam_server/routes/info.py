@@ -6,6 +6,7 @@ import transientcam_moments as tm
 from transientcam import wire
 from transientcam_server.encoding import ENCODINGS
 from transientcam_server.products import Product
+from transientcam_server.routes.frame_models import HistoryDocument
 from transientcam_server.routes.service_models import InfoDocument, VersionsDocument
 from transientcam_server.service import VERSION, ServiceOf
 
@@ -29,6 +30,7 @@ async def read_info(service: ServiceOf) -> InfoDocument:
         api="v1",
         stream=InfoDocument.StreamDocument(path="/api/v1/stream", subprotocol=wire.SUBPROTOCOL),
         products=[_product(product) for product in service.pipeline.products.values()],
+        history=HistoryDocument(**service.history.to_document()),
         clients=service.hub.clients,
         kernels=dict(tm.kernels.state()),
         reconstruction=service.pipeline.reconstruction.settings.model_dump(),

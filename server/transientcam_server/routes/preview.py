@@ -10,8 +10,8 @@ from starlette.types import Receive, Scope, Send
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.encoding import COLOUR_JPEG
 from transientcam_server.errors import Problem
+from transientcam_server.frame import Frame
 from transientcam_server.outbox import Channel
-from transientcam_server.pipeline import Frame
 from transientcam_server.problems import documented
 from transientcam_server.requests import asks_for_head
 from transientcam_server.service import Service, ServiceOf

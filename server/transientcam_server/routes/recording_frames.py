@@ -5,7 +5,8 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Path, Query, Response
 
 from transientcam_server import problem_kinds as kinds
-from transientcam_server.pipeline import Frame, Pipeline
+from transientcam_server.frame import Frame
+from transientcam_server.pipeline import Pipeline
 from transientcam_server.problems import documented
 from transientcam_server.recording.frames import Settings, timeline
 from transientcam_server.routes.frame_answers import (

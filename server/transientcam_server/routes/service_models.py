@@ -5,6 +5,7 @@ from typing import Any, Literal
 from pydantic import ConfigDict
 
 from transientcam_server.routes.document import Document
+from transientcam_server.routes.frame_models import HistoryDocument
 
 
 class InfoDocument(Document):
@@ -25,11 +26,20 @@ class InfoDocument(Document):
                             "axes": ["y", "x"],
                             "dtype": "<f4",
                             "summary": "range of the first return; NaN without one",
-                            "formats": ["msgpack", "npy", "png"],
+                            "formats": ["msgpack", "npy", "npz", "png", "tiff", "csv"],
                             "over_time": False,
                             "streamed": True,
                         }
                     ],
+                    "history": {
+                        "first": 1099,
+                        "last": 1204,
+                        "count": 106,
+                        "bytes": 66347520,
+                        "seconds": 9.94,
+                        "limit_bytes": 268435456,
+                        "limit_seconds": 10.0,
+                    },
                     "clients": 1,
                     "kernels": {"enabled": True, "compiled": [], "compiling": None, "failed": []},
                     "reconstruction": {
@@ -70,6 +80,8 @@ class InfoDocument(Document):
     api: str
     stream: StreamDocument
     products: list[ProductDocument]
+    history: HistoryDocument
+    """Which frames can be had, as `GET /frames` says."""
     clients: int
     """Streams open now."""
     kernels: dict[str, Any]

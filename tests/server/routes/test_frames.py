@@ -10,7 +10,7 @@ from PIL import Image
 
 from tests.serving import Served, serving
 from transientcam import Frame, wire
-from transientcam_server import pipeline
+from transientcam_server import frame as frames
 
 LATEST = "/api/v1/frames/latest"
 
@@ -443,7 +443,7 @@ def test_an_unsupported_format_is_answered_with_the_supported_ones(steady: httpx
 def test_an_answer_too_large_for_memory_is_refused_before_it_is_computed(
     steady: httpx.Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pipeline, "MAX_ANSWER_BYTES", 10 * 163 * 120 * 4)
+    monkeypatch.setattr(frames, "MAX_ANSWER_BYTES", 10 * 163 * 120 * 4)
 
     problem = steady.get(f"{LATEST}/transient", params={"bins": 11}).json()
 

@@ -4,6 +4,7 @@ from transientcam import wire
 
 
 def test_the_service_says_what_it_is_and_what_its_frames_have(http: httpx.Client) -> None:
+    http.put("/api/v1/acquisition", json={"running": False})
     info = http.get("/api/v1/info").json()
 
     assert info["name"] == "transientcam"
@@ -11,8 +12,11 @@ def test_the_service_says_what_it_is_and_what_its_frames_have(http: httpx.Client
     assert info["stream"] == {"path": "/api/v1/stream", "subprotocol": wire.SUBPROTOCOL}
     products = {product["name"]: product for product in info["products"]}
     assert set(products) == set(wire.PRODUCTS)
-    assert products["range"]["formats"] == ["msgpack", "npy", "png"]
-    assert products["moments"]["formats"] == ["msgpack", "npy"]
+    images = ["msgpack", "npy", "npz", "png", "tiff", "csv"]
+    assert products["range"]["formats"] == images
+    assert products["moments"]["formats"] == ["msgpack", "npy", "npz"]
+    assert products["pointcloud"]["formats"] == ["msgpack", "npy", "npz", "tiff", "ply"]
+    assert info["history"] == http.get("/api/v1/frames").json()
     assert products["transient"]["over_time"]
     assert not products["transient"]["streamed"]
 
