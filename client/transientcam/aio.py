@@ -14,7 +14,14 @@ from websockets.typing import Data
 from transientcam import frame_requests, rest
 from transientcam.address import parse_address
 from transientcam.calibrations import Calibrations
-from transientcam.connection import answer, http_options, request_options, stream_options
+from transientcam.connection import (
+    Progress,
+    Told,
+    answer,
+    http_options,
+    request_options,
+    stream_options,
+)
 from transientcam.deadline import Deadline
 from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamError
 from transientcam.frame import Frame
@@ -325,8 +332,13 @@ class AsyncCamera:
         stop = rest.recording(recording_id, method="POST", part="/stop", patience_s=60.0)
         return await self._ask(stop)
 
-    async def download_recording(self, recording_id: str, output: Path) -> None:
+    async def download_recording(
+        self, recording_id: str, output: Path, *, progress: Progress | None = None
+    ) -> None:
         """Fetch a recording's file; until it is whole it is called ``<output>.part``.
+
+        ``progress`` is called with the bytes that came and with how many there are, if that is
+        known.
 
         Raises
         ------
@@ -340,9 +352,10 @@ class AsyncCamera:
                 if response.status_code != httpx.codes.OK:
                     await response.aread()
                     raise rest.problem(answer(response))
+                told = Told(response, progress)
                 with part.open("wb") as file:
                     async for piece in response.aiter_bytes():
-                        file.write(piece)
+                        told.wrote(file.write(piece))
         part.rename(output)
 
     def stream(

@@ -10,7 +10,7 @@ import httpx
 from transientcam import frame_requests, rest
 from transientcam.address import parse_address
 from transientcam.calibrations import Calibrations
-from transientcam.connection import answer, http_options, request_options
+from transientcam.connection import Progress, Told, answer, http_options, request_options
 from transientcam.frame import Frame
 from transientcam.frame_requests import Part, Which
 from transientcam.jobs import PROGRESS_EVERY_S, WAIT_S, Jobs, OnProgress, ended
@@ -376,8 +376,13 @@ class Camera:
         stop = rest.recording(recording_id, method="POST", part="/stop", patience_s=60.0)
         return self._ask(stop)
 
-    def download_recording(self, recording_id: str, output: Path) -> None:
+    def download_recording(
+        self, recording_id: str, output: Path, *, progress: Progress | None = None
+    ) -> None:
         """Fetch a recording's file; until it is whole it is called ``<output>.part``.
+
+        ``progress`` is called with the bytes that came and with how many there are, if that is
+        known.
 
         Raises
         ------
@@ -390,9 +395,10 @@ class Camera:
             if response.status_code != httpx.codes.OK:
                 response.read()
                 raise rest.problem(answer(response))
+            told = Told(response, progress)
             with part.open("wb") as file:
                 for piece in response.iter_bytes():
-                    file.write(piece)
+                    told.wrote(file.write(piece))
         part.rename(output)
 
     def stream(

@@ -1,5 +1,6 @@
 """What the synchronous and the asynchronous client tell httpx and websockets, said once."""
 
+from collections.abc import Callable
 from importlib.metadata import version
 from typing import Any, Final
 
@@ -41,6 +42,28 @@ def answer(response: httpx.Response) -> Answer:
         response.content,
         response.reason_phrase,
     )
+
+
+Progress = Callable[[int, int | None], object]
+"""Takes the bytes that came, and how many there are; None where that is not known."""
+
+
+class Told:
+    """How far a download has come, told to whoever wants to know."""
+
+    def __init__(self, response: httpx.Response, progress: Progress | None) -> None:
+        length = response.headers.get("content-length", "")
+        # what was packed for the way has another length here
+        plain = length.isdecimal() and "content-encoding" not in response.headers
+        self._total = int(length) if plain else None
+        self._progress = progress
+        self._done = 0
+
+    def wrote(self, count: int) -> None:
+        """Tell of some more bytes."""
+        self._done += count
+        if self._progress is not None:
+            self._progress(self._done, self._total)
 
 
 def stream_options(*, timeout_s: float) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from transientcam.camera import Camera
 from transientcam.cli.options import JsonOption, TokenOption, UrlArgument
@@ -35,8 +36,7 @@ def record(
 ) -> None:
     """Record raw frames where the daemon runs, until the time is over or Ctrl-C."""
     annotations = None if note is None else {"note": note}
-    console = Console(stderr=True)
-    with Camera(url, token=token) as camera:
+    with Camera(url, token=token) as camera, _bars() as bars:
         running = camera.record(
             name=name,
             duration_s=duration_s,
@@ -45,15 +45,21 @@ def record(
             annotations=annotations,
         )
         try:
-            with console.status("recording") as status:
-                while running["state"] in ("recording", "finishing"):
-                    status.update(_line(running))
-                    time.sleep(_LOOK_S)
-                    running = camera.recording(running["id"])
+            bar = bars.add_task("recording", total=frames or duration_s)
+            while running["state"] in ("recording", "finishing"):
+                done = running["frames" if frames else "duration_s"]
+                bars.update(bar, completed=done, description=_line(running))
+                time.sleep(_LOOK_S)
+                running = camera.recording(running["id"])
         except KeyboardInterrupt:  # the way to end it, not a failure
             running = camera.stop_recording(running["id"])
         if output is not None:
-            camera.download_recording(running["id"], output)
+            bar = bars.add_task("downloading", total=None)
+            camera.download_recording(
+                running["id"],
+                output,
+                progress=lambda done, total: bars.update(bar, completed=done, total=total),
+            )
     if as_json:
         typer.echo(json.dumps(running))
     else:
@@ -62,6 +68,11 @@ def record(
     if running["problem"] is not None:
         typer.echo(f"transientcam: {running['problem']}", err=True)
         raise typer.Exit(code=1)
+
+
+def _bars() -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    return Progress(*columns, console=Console(stderr=True), transient=True)
 
 
 def _line(recording: dict[str, Any]) -> str:
