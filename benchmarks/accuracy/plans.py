@@ -9,7 +9,7 @@ from benchmarks.accuracy.capturing import SEED, SETTINGS, captured, known_scenes
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
 from transientcam_server.accuracy import Accuracy
-from transientcam_server.planner import Goal, plan
+from transientcam_server.planning import Goal, plan
 from transientcam_server.prediction import Predictor
 from transientcam_server.settings import SensorSettings
 from transientcam_server.tradeoff.capture import repeatability

@@ -12,7 +12,7 @@ from transientcam_server import problem_kinds as kinds
 from transientcam_server.cameras import Camera
 from transientcam_server.computing_time import ComputingTime
 from transientcam_server.errors import Problem
-from transientcam_server.planner import Choice, Goal, Plan, candidates, choices_on_front, plan
+from transientcam_server.planning import Choice, Goal, Plan, candidates, choices_on_front, plan
 from transientcam_server.prediction import Predictor
 from transientcam_server.products import Recipe
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
@@ -163,7 +163,7 @@ class Accuracy:
         return statistic
 
     def plan(self, goal: Goal, scene: SceneStatistic) -> Plan:
-        """Recommend a sequence; see `planner.plan`."""
+        """Recommend a sequence; see `planning.plan`."""
         return plan(goal, self._predictor(scene), self._capabilities, reconstruct_s=self._computing)
 
     def front(self, goal: Goal, scene: SceneStatistic) -> list[Choice]:

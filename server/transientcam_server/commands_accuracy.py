@@ -159,7 +159,7 @@ def plan(
     from transientcam_driver import Sequence, open_camera
     from transientcam_server.accuracy import Accuracy
     from transientcam_server.errors import Problem
-    from transientcam_server.planner import Goal
+    from transientcam_server.planning import Goal
     from transientcam_server.settings import ReconstructionSettings, SensorSettings
     from transientcam_server.statistic import given
 

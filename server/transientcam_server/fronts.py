@@ -10,7 +10,7 @@ from transientcam_driver import AppliedSequence
 from transientcam_server.accuracy import Accuracy, range_error
 from transientcam_server.frame import Frame
 from transientcam_server.pipeline import Pipeline
-from transientcam_server.planner import Choice, Goal
+from transientcam_server.planning import Choice, Goal
 
 REMEMBERED_S: Final = 10.0
 _WIDE_BOUNDS: Final = 1e9  # a target that anything reaches: it only has the bounds predicted

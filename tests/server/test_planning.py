@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Camera, Capabilities, Sequence, open_camera
 from transientcam_driver.simulation.clock import VirtualClock
-from transientcam_server import commands_accuracy, planner, statistic
+from transientcam_server import commands_accuracy, planning, statistic
 from transientcam_server.accuracy import Accuracy
 from transientcam_server.computing_time import ComputingTime
 from transientcam_server.errors import Problem
-from transientcam_server.planner import Goal, plan
+from transientcam_server.planning import Goal, plan
 from transientcam_server.prediction import Deviation, Predictor, both_found
 from transientcam_server.products import STAGES, Recipe
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
@@ -75,14 +75,14 @@ class ClosedForm:
         return 1.0 - float(0.5 ** (sequence.harmonics * distance_m))
 
 
-def planned(goal: Goal, capabilities: Capabilities, *, seconds: float = 1e-3) -> planner.Plan:
+def planned(goal: Goal, capabilities: Capabilities, *, seconds: float = 1e-3) -> planning.Plan:
     predictor = cast(Predictor, ClosedForm())
     return plan(goal, predictor, capabilities, reconstruct_s=lambda _: seconds)
 
 
-def everything(goal: Goal, capabilities: Capabilities) -> list[planner.Choice]:
+def everything(goal: Goal, capabilities: Capabilities) -> list[planning.Choice]:
     predictor = cast(Predictor, ClosedForm())
-    return planner.candidates(goal, predictor, capabilities, reconstruct_s=lambda _: 1e-3)
+    return planning.candidates(goal, predictor, capabilities, reconstruct_s=lambda _: 1e-3)
 
 
 def test_a_target_gets_the_quickest_sequence_that_reaches_it(capabilities: Capabilities) -> None:
@@ -119,7 +119,7 @@ def test_neighbours_take_half_the_time_and_have_half_the_error(capabilities: Cap
     assert document["half_time"]["error_factor"] > 1.0
     assert document["twice_accuracy"]["error_factor"] <= 0.5
     assert document["twice_accuracy"]["time_factor"] > 1.0
-    on_front = planner.choices_on_front(everything(Goal(capture_s=0.5), capabilities))
+    on_front = planning.choices_on_front(everything(Goal(capture_s=0.5), capabilities))
     assert made.half_time in on_front
     assert made.twice_accuracy.applied.capture_s in [each.applied.capture_s for each in on_front]
 
@@ -174,7 +174,7 @@ def test_bounds_and_separation_are_targets_too(capabilities: Capabilities) -> No
 def test_no_exposure_saturates_and_no_range_is_ambiguous(capabilities: Capabilities) -> None:
     choices = everything(Goal(capture_s=1.0), capabilities)
     far = cast(Predictor, ClosedForm(far_m=9.0))
-    wide = planner.candidates(Goal(capture_s=1.0), far, capabilities, reconstruct_s=lambda _: 1e-3)
+    wide = planning.candidates(Goal(capture_s=1.0), far, capabilities, reconstruct_s=lambda _: 1e-3)
 
     assert max(choice.applied.sequence.exposure_s for choice in choices) <= 0.9 * 0.004 + 1e-9
     assert {choice.applied.sequence.base_frequency_hz for choice in wide} == {11.5e6}

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Query
 from transientcam_driver import Sequence
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.access import needs
-from transientcam_server.planner import Goal
+from transientcam_server.planning import Goal
 from transientcam_server.problems import documented
 from transientcam_server.routes.plan_models import PlanDocument, PlanRequest, TradeoffDocument
 from transientcam_server.service import Service, ServiceOf

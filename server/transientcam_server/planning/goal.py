@@ -1,0 +1,115 @@
+"""What is wanted of a sequence: targets of accuracy, budgets of time."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Final
+
+from transientcam_driver import Sequence
+from transientcam_server import problem_kinds as kinds
+from transientcam_server.errors import Problem
+from transientcam_server.planning.choice import TARGETS, Choice
+
+BUDGETS: Final = ("capture_s", "frame_rate_hz", "computing_share")
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """What is wanted.
+
+    Attributes
+    ----------
+    range_std_m
+        Standard deviation of the range of a typical pixel, at most.
+    separation_m
+        Distance at which two equal returns are both to be found in `separation_share` of all
+        captures.
+    bound_width
+        Width of the bounds on the density over the mean density, at most.
+    capture_s
+        Time of one capture, at most.
+    frame_rate_hz
+        Frames a second back to back, at least.
+    computing_share
+        Share of the time between two frames that reconstruction may take on this machine.
+    base
+        Sequence whose base frequency, or half of it, is used, and its sub-phases.
+    fixed
+        Names of its fields that are not to be chosen either.
+    """
+
+    range_std_m: float | None = None
+    separation_m: float | None = None
+    separation_share: float = 0.9
+    bound_width: float | None = None
+    capture_s: float | None = None
+    frame_rate_hz: float | None = None
+    computing_share: float | None = None
+    base: Sequence = field(default_factory=Sequence)
+    fixed: frozenset[str] = frozenset()
+
+    @property
+    def empty(self) -> bool:
+        """Whether neither a target nor a budget is given."""
+        return all(getattr(self, name) is None for name in (*TARGETS, *BUDGETS))
+
+    @property
+    def leading(self) -> str:
+        """The target that neighbours are compared by."""
+        return next((name for name in TARGETS if getattr(self, name) is not None), TARGETS[0])
+
+    def limit(self, target: str) -> float:
+        """Return the largest error that a target allows."""
+        if target == "separation_m":
+            return 1.0 - self.separation_share
+        return float(getattr(self, target))
+
+    def affords(self, choice: Choice) -> bool:
+        """Return whether a sequence is within the budgets."""
+        return (
+            (self.capture_s is None or choice.applied.capture_s <= self.capture_s)
+            and (self.frame_rate_hz is None or choice.applied.frame_rate_hz >= self.frame_rate_hz)
+            and (self.computing_share is None or choice.computing_share <= self.computing_share)
+        )
+
+    def reached_by(self, choice: Choice) -> bool:
+        """Return whether a sequence reaches all targets."""
+        return all(
+            choice.error(target) <= self.limit(target)
+            for target in TARGETS
+            if getattr(self, target) is not None
+        )
+
+    def require_sensible(self) -> None:
+        """Refuse a goal that asks for nothing, or for what cannot be meant.
+
+        Raises
+        ------
+        Problem
+            ``invalid-request``.
+        """
+        if self.empty:
+            raise Problem(
+                kinds.INVALID_REQUEST,
+                "Give a target or a budget.",
+                field="target",
+                value=None,
+                limit=f"at least one of {', '.join((*TARGETS, *BUDGETS))}",
+            )
+        for name in (*TARGETS, *BUDGETS):
+            value = getattr(self, name)
+            if value is not None and not 0 < value < math.inf:
+                raise Problem(
+                    kinds.INVALID_REQUEST,
+                    f"{name} = {value!r} must be a number above 0.",
+                    field=name,
+                    value=value,
+                    limit="a number above 0",
+                )
+        if not 0 < self.separation_share < 1:
+            raise Problem(
+                kinds.INVALID_REQUEST,
+                f"separation_share = {self.separation_share!r} must be between 0 and 1.",
+                field="separation_share",
+                value=self.separation_share,
+                limit="between 0 and 1",
+            )
