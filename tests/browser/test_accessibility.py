@@ -1,0 +1,78 @@
+"""Every view, light and dark, on a desk and on a phone, held to the rules of WCAG by axe-core."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page
+
+from tests.browser.dashboard import choose, open_page
+
+_ROOT = Path(__file__).resolve().parents[2]
+_AXE = _ROOT / "client" / "dashboard" / "node_modules" / "axe-core" / "axe.min.js"
+_RULES = {
+    "runOnly": {
+        "type": "tag",
+        "values": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"],
+    }
+}
+VIEWS = (
+    "Validity",
+    "Accuracy against time",
+    "Recordings",
+    "Reconstruction",
+    "Calibration",
+    "Simulated scene",
+    "What happened",
+    "Points in space",
+    "Streak",
+)
+
+
+def _offences(page: Page) -> list[str]:
+    # the page's own content security policy lets no script in but its own: evaluated, not linked
+    page.evaluate(_AXE.read_text(encoding="utf-8"))
+    found: dict[str, Any] = page.evaluate("(rules) => axe.run(document, rules)", _RULES)
+    return [
+        f"{each['id']} ({each['impact']}): {node['html'][:160]}: {node.get('failureSummary', '')}"
+        for each in found["violations"]
+        for node in each["nodes"]
+    ]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_as_it_opens_offends_no_rule(page: Page, scheme: str) -> None:
+    page.emulate_media(color_scheme="dark" if scheme == "dark" else "light")
+    open_page(page)
+    assert _offences(page) == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_view_offends_a_rule(page: Page, scheme: str) -> None:
+    page.emulate_media(color_scheme="dark" if scheme == "dark" else "light")
+    open_page(page)
+    shown = "sequence"
+    offences: dict[str, list[str]] = {}
+    for title in VIEWS:
+        choose(page, shown, title)
+        panel = page.locator("[data-view]", has=page.get_by_role("heading", name=title))
+        shown = str(panel.get_attribute("data-view"))
+        if found := _offences(page):
+            offences[title] = found
+    assert offences == {}
+
+
+def test_the_page_on_a_phone_offends_no_rule(page: Page) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    open_page(page)
+    assert _offences(page) == []
+
+
+def test_the_page_with_a_pixel_chosen_and_the_keys_listed_offends_no_rule(page: Page) -> None:
+    open_page(page)
+    page.locator(".panel-map .stage canvas").click(position={"x": 60, "y": 60})
+    page.locator(".panel-response .listing").first.wait_for()
+    assert _offences(page) == []
+    page.keyboard.press("?")
+    page.locator("dialog[open]").wait_for()
+    assert _offences(page) == []
