@@ -22,9 +22,10 @@ _OF_PROMETHEUS = {"instance", "job", "le"}
 
 @pytest.fixture(scope="module")
 def exposed() -> Iterator[dict[str, set[str]]]:
-    """Every sample's name and the labels it has, of a daemon that has computed a frame."""
+    """Every sample's name and the labels it has, of a daemon that computes and records."""
     with serving("sim:wall?noise=off") as served, httpx.Client(base_url=served.url) as http:
         http.get("/api/v1/frames/latest/range.npy", params={"wait_s": 10}, timeout=60)
+        http.post("/api/v1/recordings", json={"frames": 1}).raise_for_status()
         found: dict[str, set[str]] = {}
         for family in text_string_to_metric_families(http.get("/metrics").text):
             for sample in family.samples:
