@@ -9,13 +9,17 @@ from typing import Any, cast
 
 from starlette.responses import Response
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+from uvicorn.protocols.utils import ClientDisconnected
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.protocol import State
 
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import Problem
 from transientcam_server.patience import Patience
 from transientcam_server.problems import problem_response
 from transientcam_server.settings import LimitSettings
+
+_LARGE_BYTES = 1 << 16
 
 
 class BoundedConnection(HttpToolsProtocol):
@@ -143,6 +147,7 @@ class BoundedStream(WebSocketsSansIOProtocol):
     """One WebSocket, which is cut where its client reads nothing any more.
 
     uvicorn's own end of one without pongs waits until everything is written, which is never.
+    Large messages are written as they are: what goes to many clients is not copied for each.
     """
 
     def __init__(self, *arguments: Any, limits: LimitSettings, **options: Any) -> None:
@@ -172,6 +177,36 @@ class BoundedStream(WebSocketsSansIOProtocol):
         if self._patience is not None:
             self._patience.end()
         super().resume_writing()
+
+    async def send(self, message: Any) -> None:
+        """Send a message of the application."""
+        data = message.get("bytes")
+        if data is None or len(data) < _LARGE_BYTES or not self._is_open:
+            await super().send(message)
+            return
+        await self.writable.wait()
+        if self.transport.is_closing():  # before uvicorn hears of it
+            raise ClientDisconnected
+        if self._is_open:
+            self.transport.writelines((_frame_head(len(data)), data))
+        else:  # it ended while this waited
+            await super().send(message)
+
+    @property
+    def _is_open(self) -> bool:
+        return (
+            self.handshake_complete
+            and not (self.disconnected or self.close_sent)
+            and self.conn.state is State.OPEN
+        )
+
+
+def _frame_head(length: int) -> bytes:
+    """Return what precedes an unmasked binary message of at least 2^16 bytes.
+
+    RFC 6455, Sec. 5.2: the bit FIN, the opcode 2, and 127 for a length of 64 bits.
+    """
+    return b"\x82\x7f" + length.to_bytes(8, "big")
 
 
 def _bytes(response: Response) -> bytes:

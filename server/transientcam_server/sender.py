@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from collections.abc import Awaitable
 from typing import Any
 
 from fastapi import WebSocket
@@ -13,6 +14,9 @@ from transientcam_server.metrics import Metrics
 from transientcam_server.outbox import Channel, Delivery, Goodbye, Outbox
 from transientcam_server.problems import problem_document
 from transientcam_server.products import View
+
+_AT_ONCE = 4
+"""Deliveries after which others have their turn."""
 
 
 class Sender:
@@ -29,6 +33,7 @@ class Sender:
 
     async def send_all(self) -> None:
         """Send until the client is gone or was told goodbye."""
+        delivered = 0
         while True:
             item = await self._outbox.next()
             if isinstance(item, Goodbye):
@@ -36,28 +41,37 @@ class Sender:
                 return
             if isinstance(item, Delivery):
                 await self._deliver(item)
+                delivered += 1
+                if delivered % _AT_ONCE == 0:
+                    # nothing above has to wait where all is computed and the network takes it
+                    await asyncio.sleep(0)
             else:
                 await self._websocket.send_bytes(wire.encode(item))
 
     async def _deliver(self, delivery: Delivery) -> None:
+        first, *others = delivery.channels
         # all products of the frame are under way at once; each is sent as soon as those before
-        work = [self._encoded(delivery, channel) for channel in delivery.channels]
-        tasks = [asyncio.ensure_future(each) for each in work]
+        tasks = [asyncio.ensure_future(self._encoded(delivery, each)) for each in others]
         try:
-            for channel, task in zip(delivery.channels, tasks, strict=True):
-                await self._tell_dropped(channel)
-                try:
-                    data = await task
-                except Problem as problem:
-                    await self._tell_failed(channel, problem)
-                else:
-                    self._failing.discard(channel.product.name)
-                    self._allowance.earn()  # for its acknowledgement
-                    await self._websocket.send_bytes(data)
-                    self._metrics.sent(time.time() - delivery.frame.raw.host_time_s)
+            await self._send(delivery, first, self._encoded(delivery, first))
+            for channel, task in zip(others, tasks, strict=True):
+                await self._send(delivery, channel, task)
         finally:
             for task in tasks:
                 task.cancel()
+
+    async def _send(self, delivery: Delivery, channel: Channel, encoding: Awaitable[bytes]) -> None:
+        if channel.dropped:
+            await self._tell_dropped(channel)
+        try:
+            data = await encoding
+        except Problem as problem:
+            await self._tell_failed(channel, problem)
+            return
+        self._failing.discard(channel.product.name)
+        self._allowance.earn()  # for its acknowledgement
+        await self._websocket.send_bytes(data)
+        self._metrics.sent(time.time() - delivery.frame.raw.host_time_s)
 
     async def _encoded(self, delivery: Delivery, channel: Channel) -> bytes:
         return await delivery.frame.encoded(
@@ -65,11 +79,10 @@ class Sender:
         )
 
     async def _tell_dropped(self, channel: Channel) -> None:
-        if channel.dropped:
-            count, channel.dropped = channel.dropped, 0
-            channel.dropped_total += count
-            details = {"channel": channel.number, "count": count, "total": channel.dropped_total}
-            await self._websocket.send_bytes(wire.encode(wire.Notice("dropped", details)))
+        count, channel.dropped = channel.dropped, 0
+        channel.dropped_total += count
+        details = {"channel": channel.number, "count": count, "total": channel.dropped_total}
+        await self._websocket.send_bytes(wire.encode(wire.Notice("dropped", details)))
 
     async def _tell_failed(self, channel: Channel, problem: Problem) -> None:
         """Tell a failure once, not with every frame until it is mended."""
