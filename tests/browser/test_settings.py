@@ -79,14 +79,17 @@ class TestCalibrations:
         choose(page, "response", "Calibration")
         panel = page.locator(".panel-calibration")
         panel.get_by_label("Name", exact=True).fill("after warm-up")
-        panel.get_by_label("Frames, with and without light").fill("3")
+        panel.get_by_label("Frames, with and without light").fill("8")
         panel.get_by_role("button", name="Measure").click()
         expect(panel.locator("progress")).to_be_visible()
+        expect(page.locator("[data-field=state]")).to_have_text("Calibrating")
+        expect(page.get_by_role("button", name="Stop", exact=True)).to_be_disabled()
         outcome = panel.locator("[data-field=calibration-outcome]")
         expect(outcome).to_contain_text("Measured", timeout=PATIENCE_MS)
         row = panel.locator("[data-calibration]").last
         expect(row).to_contain_text("after warm-up")
         expect(row).to_contain_text("in use")
+        expect(page.locator("[data-field=state]")).to_have_text("Live")
         listed = httpx.get(f"{served.url}/api/v1/calibrations").json()
         assert listed["active"] == listed["calibrations"][0]["id"]
         page.wait_for_function(

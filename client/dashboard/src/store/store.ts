@@ -60,6 +60,8 @@ export class Store {
     return 1 / (shown ?? this.sequence.value?.base_frequency_hz ?? 23e6);
   });
   readonly player = new Player(this.period_s);
+  /** A calibration has the camera for itself, so that no frames come. */
+  readonly calibrating = computed(() => this.status.cameraState.value === "calibrating" || this.calibrations.job.value?.state === "running");
   /** What only the service knows of the selected pixel. */
   readonly details: Details;
   readonly theme: Theme;

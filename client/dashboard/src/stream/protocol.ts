@@ -65,7 +65,7 @@ export interface SequenceDocument {
 }
 
 /** What the camera is doing, in the service's words. */
-export type CameraState = "starting" | "streaming" | "stopped" | "lost";
+export type CameraState = "starting" | "streaming" | "stopped" | "calibrating" | "lost";
 
 /** What `GET /api/v1/camera` answers. */
 export interface CameraDocument {

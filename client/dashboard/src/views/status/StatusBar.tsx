@@ -23,13 +23,14 @@ export function StatusBar() {
 type Tone = "good" | "waiting" | "bad" | "still";
 
 function StateChip() {
-  const { status, held, replay } = useStore();
+  const { status, held, replay, calibrating } = useStore();
   const state = useComputed((): { tone: Tone; word: string } => {
     if (status.connection.value.kind === "connecting") return { tone: "waiting", word: "Connecting" };
     if (status.connection.value.kind === "waiting") return { tone: "bad", word: "Reconnecting" };
     if (status.connection.value.kind === "refused") return { tone: "bad", word: "Not let in" };
     if (replay.active.value) return { tone: "still", word: "Replay" };
     if (status.cameraLoss.value !== null) return { tone: "bad", word: "Camera lost" };
+    if (calibrating.value) return { tone: "waiting", word: "Calibrating" };
     if (held.value) return { tone: "still", word: "Held" };
     if (status.running.value === false) return { tone: "still", word: "Stopped" };
     if (status.newest.value === null) return { tone: "waiting", word: "Waiting" };

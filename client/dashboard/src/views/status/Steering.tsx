@@ -47,13 +47,14 @@ function Capture() {
       store.status.cameraIs("stopped", Date.now() / 1000);
     });
   if (running === null) return null;
-  const busy = task.busy.value !== null;
+  const occupied = store.calibrating.value ? "A calibration is being measured" : null;
+  const busy = task.busy.value !== null || occupied !== null;
   return (
     <>
-      <Steer title="Stop the camera, capture one frame and look at it" disabled={busy} onClick={() => void single()}>
+      <Steer title={occupied ?? "Stop the camera, capture one frame and look at it"} disabled={busy} onClick={() => void single()}>
         <SingleIcon /> <span class="wide">Single</span>
       </Steer>
-      <Steer title={running ? "Stop the camera; its light goes off" : "Start the camera"} disabled={busy} onClick={() => void toggle()}>
+      <Steer title={occupied ?? (running ? "Stop the camera; its light goes off" : "Start the camera")} disabled={busy} onClick={() => void toggle()}>
         {running ? <PauseIcon /> : <PlayIcon />} {running ? "Stop" : "Start"}
       </Steer>
     </>
