@@ -419,10 +419,12 @@ def test_streams_are_told_of_recordings(daemon: Served, http: httpx.Client) -> N
     ):
         stream.receive()
         recording = recorded(http, frames=2)["id"]
+        told: list[wire.Notice] = []
         until_s = time.monotonic() + PATIENCE_S
-        while len(stream.notices) < 2 and time.monotonic() < until_s:
+        while len(told) < 2 and time.monotonic() < until_s:
             stream.receive()
-    told = [each for each in stream.notices if each.kind.startswith("recording-")]
+            # a busy machine drops frames, and is told so between
+            told = [each for each in stream.notices if each.kind.startswith("recording-")]
     assert told[0] == wire.Notice("recording-started", {"recording": recording})
     assert told[1].kind == "recording-stopped"
     assert told[1].details["reason"] == "frames"
