@@ -28,7 +28,7 @@ class Encoding:
     """A way to write a product: its name (also the suffix of a path) and media type.
 
     ``fits`` says whether a product can be written so. ``beside`` names products of the same frame
-    that the writer finds in ``extra``.
+    that the writer finds in ``extra``. ``slow`` is one that takes as long as much computing.
     """
 
     name: str
@@ -36,6 +36,7 @@ class Encoding:
     encode: _Encode
     fits: Callable[[Product], bool] = lambda product: True
     beside: tuple[str, ...] = ()
+    slow: bool = False
 
 
 def _msgpack(
@@ -99,7 +100,7 @@ TIFF: Final = Encoding("tiff", "image/tiff", files.tiff, _is_real)
 PLY: Final = Encoding(
     "ply", "application/x-ply", files.ply, _is_cloud, ("range", "direct", "flags")
 )
-CSV: Final = Encoding("csv", "text/csv", files.csv, _is_image)
+CSV: Final = Encoding("csv", "text/csv", files.csv, _is_image, slow=True)
 ENCODINGS: Final = {each.name: each for each in (MSGPACK, NPY, NPZ, PNG, TIFF, PLY, CSV)}
 """What a path may end in."""
 

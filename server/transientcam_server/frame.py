@@ -222,7 +222,8 @@ class Frame:
     ) -> bytes:
         beside = (self.product(self._pipeline.product(name)) for name in encoding.beside)
         array, *others = await asyncio.gather(self.product(product, view), *beside)
-        run = self._pipeline.run_long if product.over_time else self._pipeline.run
+        long = product.over_time or encoding.slow
+        run = self._pipeline.run_long if long else self._pipeline.run
         meta = self.meta() | view.crop.to_meta(*self.shape)
         extra = self._extra(product, view) | dict(zip(encoding.beside, others, strict=True))
         with self._failure_of(product.name):

@@ -23,6 +23,7 @@ from transientcam_server.settings import ReconstructionSettings
 _Array = NDArray[Any]
 BOUNDS_RADIUS: Final = 0.93
 """Of the Poisson kernel that densities between `bounds` are smoothed with: the paper's (Fig. 7)."""
+_BOUNDS_BLOCK: Final = 2**20
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,9 +223,17 @@ def _streak(recipe: Recipe, view: View, coefficients: tm.Coefficients) -> _Array
 def _bounds(recipe: Recipe, view: View, reconstruction: tm.Reconstruction) -> _Array:
     """Return what every smoothed density with these moments lies between (2, T, H, W)."""
     rad_s = 2.0 * np.pi * recipe.base_frequency_hz
+    phase_rad = rad_s * np.array(view.time_s)
     moments = view.crop.apply(reconstruction.moments)
-    between = tm.bounds(moments, rad_s * np.array(view.time_s), radius=BOUNDS_RADIUS)
-    return np.float32(rad_s) * np.stack(between)
+    planes = moments.reshape(len(moments), -1)
+    between = np.empty((2, len(phase_rad), planes.shape[1]), dtype=np.float32)
+    # pixel by pixel they need several arrays as large as the answer
+    step = max(1, _BOUNDS_BLOCK // max(1, len(phase_rad)))
+    for first in range(0, planes.shape[1], step):
+        block = slice(first, first + step)
+        between[:, :, block] = tm.bounds(planes[:, block], phase_rad, radius=BOUNDS_RADIUS)
+    between *= np.float32(rad_s)
+    return between.reshape(2, len(phase_rad), *moments.shape[1:])
 
 
 def _pointcloud(recipe: Recipe, found: tm.Reconstruction) -> _Array:
