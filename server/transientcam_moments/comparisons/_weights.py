@@ -32,7 +32,7 @@ def nonnegative_weights(b: Complex, orders: Real, phase_rad: Real) -> Real:
 def _weights(b: Complex, orders: Real, phase_rad: Real) -> Real:
     there = np.isfinite(phase_rad)
     angles = orders[:, None, None] * np.where(there, phase_rad, 0)
-    waves = np.where(there, np.exp(1j * angles), 0)  # (N, K, P)
+    waves: Complex = np.where(there, np.exp(1j * angles), 0)  # (N, K, P)
     matrix = np.moveaxis(np.concatenate([waves.real, waves.imag]), -1, 0)  # (P, 2 N, K)
     right = np.concatenate([b.real, b.imag]).T  # (P, 2 N)
     # a pseudo-inverse: equal phases share their weight instead of failing

@@ -1,5 +1,7 @@
 """Two returns from two frequencies by non-linear least squares."""
 
+from typing import Any
+
 import numpy as np
 
 from transientcam_moments._arrays import Array
@@ -33,6 +35,7 @@ def dorrington(b: Array) -> SparseEstimate:
     """
     from scipy.optimize import least_squares  # heavy, and not needed by those who don't compare
 
+    solve: Any = least_squares
     pixels = pixels_of(b, least=_LEAST, name="dorrington", last=_LEAST)
     c = pixels.b[1 : _LEAST + 1]
     phase = np.full((2, c.shape[1]), np.nan)
@@ -42,7 +45,7 @@ def dorrington(b: Array) -> SparseEstimate:
         wanted = _real(c[:, pixel])
         best = np.inf
         for start in _starts(wanted):
-            found = least_squares(
+            found = solve(
                 _residual, start, _jacobian, bounds, args=(wanted,), xtol=1e-12, ftol=1e-12
             )
             if found.cost < best:
@@ -74,7 +77,7 @@ def _grid() -> tuple[Real, Real]:
     """Return pairs of phases (pairs, 2) and their waves (pairs, 4, 2)."""
     phases = np.arange(_STARTS) * (2 * np.pi / _STARTS)
     pairs = np.stack(np.triu_indices(_STARTS, k=1), axis=1)
-    waves = np.exp(1j * _ORDERS[:, None] * phases[pairs][:, None, :])
+    waves: Complex = np.exp(1j * _ORDERS[:, None] * phases[pairs][:, None, :])
     return phases[pairs], np.concatenate([waves.real, waves.imag], axis=1)
 
 
