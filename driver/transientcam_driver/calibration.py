@@ -6,7 +6,9 @@ What follows from them is arithmetic, and left to others.
 import hashlib
 import io
 import json
+import math
 import re
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -30,6 +32,10 @@ DEVICE_FIELDS = ("serial", "width", "height")
 FORMAT = 1
 MAX_BYTES = 1024**3
 """Of the content of a file, unpacked."""
+MAX_DN = 65535
+"""Largest value of an image."""
+MAX_TEXT = 200
+"""Characters of a name or number in one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,12 +178,10 @@ class CalibrationCapture:
                         path, "the file", f"{size} bytes unpacked", f"at most {max_bytes}"
                     )
                 content = {
-                    name.removesuffix(".npy"): np.load(
-                        io.BytesIO(archive.read(name)), allow_pickle=False
-                    )
+                    name.removesuffix(".npy"): _unpacked(archive.read(name))
                     for name in archive.namelist()
                 }
-        except (OSError, ValueError, EOFError, zlib.error, zipfile.BadZipFile) as error:
+        except _UNREADABLE as error:
             raise CalibrationFileError(path, "the file", str(error), "an .npz") from error
         return _checked(path, content)
 
@@ -199,19 +203,57 @@ class CalibrationCapture:
         }
 
 
+_UNREADABLE = (
+    *(OSError, ValueError, EOFError, zlib.error, zipfile.BadZipFile),
+    *(NotImplementedError, RuntimeError),  # ways to pack or encrypt that nothing here uses
+    *(SyntaxError, tokenize.TokenError),  # an array's header is Python
+)
+"""What files raise that hold something else."""
+
+
+def _unpacked(data: bytes) -> NDArray[Any]:
+    """Return the array in an .npy, whose header is not believed."""
+    stream = io.BytesIO(data)
+    read_header = {
+        (1, 0): np.lib.format.read_array_header_1_0,
+        (2, 0): np.lib.format.read_array_header_2_0,
+    }.get(np.lib.format.read_magic(stream))
+    if read_header is None:
+        raise ValueError("an array of another version")
+    shape, _, dtype = read_header(stream)
+    if math.prod(shape) * dtype.itemsize != len(data) - stream.tell():
+        raise ValueError(f"{len(data)} bytes for an array of shape {shape}")
+    array: NDArray[Any] = np.load(io.BytesIO(data), allow_pickle=False)
+    return array
+
+
+def _text(value: object) -> str:
+    text = str(value)
+    if len(text) > MAX_TEXT or not text.isprintable():
+        raise ValueError(f"no text of up to {MAX_TEXT} characters: {text[:MAX_TEXT]!r}")
+    return text
+
+
+def _number(value: Any) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(f"no number: {number}")
+    return number
+
+
 def _checked(path: Path, content: Mapping[str, NDArray[Any]]) -> CalibrationCapture:
     document = _document_in(path, content)
     try:
         sequence = Sequence.from_document(document["sequence"])
         fields: dict[str, Any] = {
-            name: str(document[name]) for name in ("serial", "model", "firmware")
+            name: _text(document[name]) for name in ("serial", "model", "firmware")
         }
         for name in ("low_frequency_hz", "temperature_c", "captured_unix_s"):
-            fields[name] = float(document[name])
+            fields[name] = _number(document[name])
         fields["notes"] = dict(document.get("notes", {}))
     except KeyError as error:
         raise CalibrationFileError(path, "document", f"without {error}", "complete") from error
-    except (DriverError, TypeError, ValueError) as error:
+    except (DriverError, TypeError, ValueError, OverflowError) as error:
         raise CalibrationFileError(path, "document", str(error), "as it was written") from error
     images = _array(path, content, "images", np.float32, (sequence.images, None, None))
     kept = _array(path, content, "kept", np.bool_, (None, sequence.images))
@@ -235,7 +277,7 @@ def _document_in(path: Path, content: Mapping[str, NDArray[Any]]) -> dict[str, A
         raise CalibrationFileError(path, "document", "absent", expected)
     try:
         document = json.loads(str(content["document"]))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise CalibrationFileError(path, "document", str(error), "JSON") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         found = document.get("format") if isinstance(document, dict) else type(document).__name__
@@ -260,4 +302,8 @@ def _array(
     )
     if array.dtype != dtype or not fits or not array.size:
         raise CalibrationFileError(path, name, f"{array.dtype} of shape {array.shape}", wanted)
+    # means and deviations of what a converter gives; a comparison with NaN is false
+    if not (array.min() >= 0 and array.max() <= MAX_DN):
+        found = f"from {array.min()} to {array.max()}"
+        raise CalibrationFileError(path, name, found, f"from 0 to {MAX_DN}")
     return array

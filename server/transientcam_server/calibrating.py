@@ -252,7 +252,7 @@ class CalibrationDesk:
                     shares.append(share)
         if not shares:
             return None
-        return Drift(min(shares), calibration.capture.notes.get("invalid_share"), last)
+        return Drift(min(shares), _share_in(calibration.capture.notes), last)
 
     async def _share_of(self, frame: Frame) -> float | None:
         try:
@@ -283,6 +283,12 @@ class CalibrationDesk:
     def _require_fit(self, misfit: CalibrationMismatch | None) -> None:
         if misfit is not None:
             raise misfit
+
+
+def _share_in(notes: Mapping[str, Any]) -> float | None:
+    """Return the share that notes hold, which may come from anywhere."""
+    share = notes.get("invalid_share")
+    return float(share) if isinstance(share, int | float) and 0 <= share <= 1 else None
 
 
 class _Takes:

@@ -1,6 +1,9 @@
 """A calibration measurement: what it holds, what it is good for, and how it is kept."""
 
+import contextlib
+import io
 import json
+import zipfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -8,6 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from transientcam_driver import (
     CalibrationCapture,
@@ -316,3 +321,86 @@ def test_one_who_ends_it_is_heard_while_no_frame_comes(
         capture_calibration(camera, takes=TAKES, progress=lose_patience)
     assert told == [(0, 2 * TAKES)] * 3
     assert camera.applied.sequence == SEQUENCE
+
+
+def with_members(path: Path, **changed: Any) -> None:
+    """Change members of a file: an array, or bytes as they are."""
+    with np.load(path) as file:
+        content = dict(file)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, value in {**content, **changed}.items():
+            packed = io.BytesIO()
+            if isinstance(value, bytes):
+                packed.write(value)
+            else:
+                np.save(packed, value)
+            archive.writestr(f"{name}.npy", packed.getvalue())
+
+
+HUGE = b"{'descr': '<f4', 'fortran_order': False, 'shape': (1000000000000, 2, 2), }"
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"images": np.full((12, 3, 4), np.nan, np.float32)}, "images is from nan to nan"),
+        ({"images": np.full((12, 3, 4), -1, np.float32)}, "images is from -1.0 to -1.0"),
+        ({"images": b"\x93NUMPY\x01\x00\x4b\x00" + HUGE + b"\n"}, "an array of shape"),
+        ({"images": b"\x93NUMPY\x01\x00\x05\x00((((\n"}, "must be an .npz"),
+        ({"images": b"\x93NUMPY\x09\x00\x05\x00"}, "must be an .npz"),
+    ],
+)
+def test_arrays_that_no_camera_captured_are_refused_whatever_they_say(
+    capture: CalibrationCapture, tmp_path: Path, changed: dict[str, Any], message: str
+) -> None:
+    path = tmp_path / "odd.npz"
+    capture.save(path)
+    if isinstance(changed["images"], np.ndarray):
+        shape = (len(capture.images), *capture.images.shape[1:])
+        changed = {"images": np.broadcast_to(changed["images"][0, 0, 0], shape).copy()}
+    with_members(path, **changed)
+
+    with pytest.raises(CalibrationFileError, match=message):
+        CalibrationCapture.load(path)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("serial", "9" * 5000),
+        ("model", "line\nbreak"),
+        ("temperature_c", float("nan")),
+        ("captured_unix_s", 10**400),
+        ("notes", 7),
+    ],
+)
+def test_figures_and_names_that_cannot_be_are_refused(
+    capture: CalibrationCapture, tmp_path: Path, field: str, value: Any
+) -> None:
+    path = tmp_path / "odd.npz"
+    capture.save(path)
+    with np.load(path) as file:
+        document = json.loads(str(file["document"]))
+    with_members(path, document=np.array(json.dumps({**document, field: value})))
+
+    with pytest.raises(CalibrationFileError, match="document"):
+        CalibrationCapture.load(path)
+
+
+@settings(
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(data=st.data())
+def test_no_change_of_bytes_raises_anything_else(
+    data: st.DataObject, capture: CalibrationCapture, tmp_path: Path
+) -> None:
+    path = tmp_path / "bent.npz"
+    capture.save(path)
+    content = bytearray(path.read_bytes())
+    places = st.lists(st.integers(0, len(content) - 1), min_size=1, max_size=8)
+    for place in data.draw(places):
+        content[place] = data.draw(st.integers(0, 255))
+    path.write_bytes(content[: data.draw(st.integers(0, len(content)))])
+
+    with contextlib.suppress(CalibrationFileError):
+        CalibrationCapture.load(path)

@@ -8,6 +8,7 @@ from transientcam_driver.calibrating import DEFAULT_TAKES
 from transientcam_server.routes.document import Document
 from transientcam_server.routes.sequence_models import SEQUENCE_EXAMPLE
 
+MAX_NAME: Final = 200
 _EXAMPLE: Final[dict[str, JsonValue]] = {
     "id": "SIM-prototype-0-3f9c2a71b04e",
     "name": "after warm-up",
@@ -132,7 +133,7 @@ class CalibrationRequest(Document):
         json_schema_extra={"examples": [{"name": "after warm-up", "frames": 40}]},
     )
 
-    name: str = Field(default="", max_length=200)
+    name: str = Field(default="", max_length=MAX_NAME)
     frames: int = Field(default=DEFAULT_TAKES, ge=2, le=10_000)
     """Captured with the light on, and as many in the dark; averaged without outliers."""
     activate: bool = False

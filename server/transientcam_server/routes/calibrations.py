@@ -17,6 +17,7 @@ from transientcam_server.errors import Problem
 from transientcam_server.problems import documented
 from transientcam_server.routes import files, jobs
 from transientcam_server.routes.calibration_models import (
+    MAX_NAME,
     ActivationRequest,
     ActiveDocument,
     CalibrationDocument,
@@ -227,7 +228,7 @@ def _document(service: Service, stored: Stored, drift: Drift | None) -> Calibrat
     active = stored.id == service.calibrations.active_id
     return CalibrationDocument(
         id=stored.id,
-        name=str(stored.notes.get("name", "")),
+        name=str(stored.notes.get("name", ""))[:MAX_NAME],
         created_at=stored.captured_unix_s,
         age_s=max(0.0, time.time() - stored.captured_unix_s),
         device=DeviceDocument(
