@@ -44,6 +44,9 @@ def checks(config: Path | None = None) -> Iterator[Reported]:
             yield "fault", "settings", str(mistake), "docs/settings.md lists all of them"
         return
     yield "ok", "settings", f"valid; the camera is {settings.camera}", None
+    if not (settings.needs_token or settings.on_loopback):
+        message = f"whoever reaches {settings.host}, port {settings.port}, controls the camera"
+        yield "warning", "access", message, "make tokens, and leave insecure out"
     yield from _directories(settings)
     yield _disk(settings)
     yield _descriptors(settings)

@@ -58,6 +58,14 @@ def test_every_mistake_in_the_settings_is_a_fault_with_its_place(tmp_path: Path)
     assert "stream.queue_frames" in told
 
 
+def test_a_service_that_lets_everybody_in_is_warned_of(tmp_path: Path) -> None:
+    everybody = found(settings(tmp_path, 'host = "0.0.0.0"\nport = 0\ninsecure = true\n'))
+    nobody = found(settings(tmp_path, "port = 0\ninsecure = true\n"))
+
+    assert everybody["access"][0] == "warning"
+    assert "access" not in nobody
+
+
 def test_kernels_are_counted_where_they_are_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,8 +1,9 @@
 """What ``transientcam doctor URL`` looks at: a daemon, as a client sees it."""
 
+import ssl
 import time
 from collections.abc import Iterator
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from email.utils import parsedate_to_datetime
 from importlib.metadata import version
 from statistics import median
@@ -21,6 +22,8 @@ CLOCKS_WITHIN_S: Final = 1.5
 """The daemon's ``Date`` has whole seconds, so that nothing finer can be said."""
 KEEPS_UP: Final = 0.9
 """Share of the camera's frames that should arrive."""
+CERTIFICATE_RENEWED: Final = timedelta(days=14)
+"""How long before its end a certificate should have been renewed."""
 _PRODUCT = "range"
 _FIRST_FRAME_S = 10.0
 
@@ -34,7 +37,10 @@ def of_daemon(
         try:
             with translated(base):
                 asked_s = time.time()
-                response = http.get(f"{base}/api/versions")
+                with http.stream("GET", f"{base}/api/versions") as response:
+                    response.read()
+                    # the connection is to be had only while the answer is open
+                    ends = _certificate_ends(response)
                 answered_s = time.time()
             found = response.json() if response.status_code == httpx.codes.OK else None
         except (TransientcamError, ValueError) as error:
@@ -47,6 +53,8 @@ def of_daemon(
             return
         took_ms = (answered_s - asked_s) * 1e3
         yield Finding("ok", "reachable", f"{base} answered within {took_ms:.0f} ms")
+        if ends is not None:
+            yield _certificate(ends, now=datetime.now(UTC))
         yield _versions(found)
         yield _ready(http, base)
         yield _clock(response.headers.get("date"), asked_s, answered_s)
@@ -57,6 +65,24 @@ def of_daemon(
         yield Finding("fault", "access", str(error), _remedy_of(error))
     except TransientcamError as error:
         yield Finding("fault", "stream", str(error), "look into the daemon's log")
+
+
+def _certificate_ends(response: httpx.Response) -> datetime | None:
+    """Return until when the daemon's certificate is valid; None without TLS."""
+    connection = response.extensions.get("network_stream")
+    encrypted = None if connection is None else connection.get_extra_info("ssl_object")
+    certificate = None if encrypted is None else encrypted.getpeercert()
+    if not certificate:
+        return None
+    return datetime.fromtimestamp(ssl.cert_time_to_seconds(certificate["notAfter"]), UTC)
+
+
+def _certificate(ends: datetime, *, now: datetime) -> Finding:
+    left = ends - now
+    message = f"trusted, and valid until {ends:%Y-%m-%d}"
+    if left < CERTIFICATE_RENEWED:
+        return Finding("warning", "certificate", message, f"renew it: {left.days} days are left")
+    return Finding("ok", "certificate", message)
 
 
 def _versions(found: dict[str, Any]) -> Finding:

@@ -4,12 +4,14 @@ import json
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
+from datetime import UTC, datetime, timedelta
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+import trustme
 from websockets.http11 import Response
 from websockets.sync.server import ServerConnection
 
@@ -202,6 +204,26 @@ def test_another_program_at_the_address_is_told(
 
     assert code == 1
     assert "no transientcam (status 404)" in document["findings"][-1]["message"]
+
+
+@pytest.mark.parametrize(("days", "level"), [(60, "ok"), (5, "warning")])
+def test_a_certificate_that_ends_soon_is_a_warning(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    days: int,
+    level: str,
+) -> None:
+    authority = trustme.CA()
+    issued = authority.issue_cert("127.0.0.1", not_after=datetime.now(UTC) + timedelta(days=days))
+    authority.cert_pem.write_to_path(tmp_path / "authority.pem")
+    issued.private_key_and_cert_chain_pem.write_to_path(tmp_path / "both.pem")
+    monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "authority.pem"))
+    with serving("sim:wall?noise=off", tls_certificate=tmp_path / "both.pem") as served:
+        _, document = told(capsys, served.url, "--seconds", "0.2")
+
+    assert of(document, "reachable")["level"] == "ok"
+    assert of(document, "certificate")["level"] == level
 
 
 @pytest.mark.parametrize(
