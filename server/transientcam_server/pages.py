@@ -5,10 +5,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Final
 
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, FastAPI, Request
 from fastapi import Path as PathParameter
-from fastapi.responses import FileResponse, HTMLResponse, Response
+from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, Response
 
+from transientcam_server import asyncapi
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.errors import Problem
 
@@ -20,7 +21,8 @@ frame is computed when it is asked for, once for all who ask.
 
 All quantities are in SI units, named in the name of each field; DN are digital numbers of the
 sensor. Every error is a problem document (RFC 9457). The stream of frames is the WebSocket
-`/api/v1/stream`, subprotocol `transientcam.v1.msgpack`.
+`/api/v1/stream`, subprotocol `transientcam.v1.msgpack`; [asyncapi.json](/asyncapi.json) describes
+its messages.
 """
 
 router = APIRouter(include_in_schema=False)
@@ -67,8 +69,19 @@ async def interface() -> HTMLResponse:
     return HTMLResponse(
         "<!doctype html><html lang=en><meta charset=utf-8><title>transientcam interface</title>"
         '<link rel=icon href="data:,"><link rel=stylesheet href="/docs/swagger-ui.css">'
+        f'<p><a href="{asyncapi.PATH}">The stream, as AsyncAPI</a></p>'
         '<div id=interface></div><script src="/docs/swagger-ui-bundle.js"></script>'
         '<script src="/docs/start.js"></script></html>'
+    )
+
+
+@router.get(asyncapi.PATH)
+async def stream_interface(request: Request) -> JSONResponse:
+    """Describe the stream, which OpenAPI cannot."""
+    url = request.url
+    version = request.app.version
+    return JSONResponse(
+        asyncapi.asyncapi(version=version, host=url.netloc, secure=url.scheme == "https")
     )
 
 

@@ -302,3 +302,13 @@ def test_every_close_code_is_in_the_specification() -> None:
     never_sent = {wire.CloseCode.ABNORMAL, wire.CloseCode.INTERNAL_ERROR}
     for code in set(wire.CloseCode) - never_sent:
         assert f"| {code} |" in text
+
+
+def test_every_kind_of_notice_is_in_the_specification_with_its_keys() -> None:
+    text = SPECIFICATION.read_text("utf-8")
+
+    for kind in wire.NOTICES.values():
+        keys = ", ".join(f"`{key}`" for key in kind.keys)
+        assert f"| `{kind.name}` | {keys} |".replace("|  |", "| |") in text
+    table = text.partition("### notice")[2].partition("```")[0]
+    assert table.count("\n| `") == len(wire.NOTICES)

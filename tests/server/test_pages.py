@@ -25,7 +25,7 @@ def test_the_documentation_needs_no_other_host(http: httpx.Client) -> None:
 
     assert "//" not in re.sub(r"<!--.*?-->", "", page)
     scripts = re.findall(r'(?:src|href)="(/[^"]+)"', page)
-    assert len(scripts) == 3
+    assert len(scripts) == 4
     for path in scripts:
         assert http.get(path).status_code == 200
 

@@ -47,6 +47,7 @@ from transientcam.wire.messages import (
     encode,
     encode_frame,
 )
+from transientcam.wire.notices import NOTICES, NoticeKind
 from transientcam.wire.parsing import (
     parse_channels,
     parse_client_message,
@@ -68,6 +69,7 @@ __all__ = [
     "MAX_SUBSCRIPTIONS",
     "MEDIA_TYPE",
     "MEDIA_TYPE_ALIASES",
+    "NOTICES",
     "PROBLEM_MEDIA_TYPE",
     "PRODUCTS",
     "REFLECTION16",
@@ -84,6 +86,7 @@ __all__ = [
     "FrameMeta",
     "Hello",
     "Notice",
+    "NoticeKind",
     "PixelCounts",
     "PredictedStd",
     "Product",

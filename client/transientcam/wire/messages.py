@@ -195,10 +195,7 @@ class Hello:
 class Notice:
     """Something a client should know: ``kind``, and what more there is to it in ``details``.
 
-    Known kinds: ``dropped``, ``lost-images``, ``camera-lost``, ``camera-back``,
-    ``sequence-changed``, ``calibration-changed``, ``reconstruction-changed``, ``lease-changed``,
-    ``recording-started``, ``recording-dropped``, ``recording-stopped``, ``job-changed``. A client
-    passes over kinds it does not know.
+    `NOTICES` lists the kinds there are. A client passes over kinds it does not know.
     """
 
     kind: str

@@ -4,6 +4,7 @@ from fastapi import APIRouter
 
 import transientcam_moments as tm
 from transientcam import wire
+from transientcam_server import asyncapi
 from transientcam_server.encoding import ENCODINGS
 from transientcam_server.products import Product
 from transientcam_server.routes.frame_models import HistoryDocument
@@ -28,7 +29,12 @@ async def read_info(service: ServiceOf) -> InfoDocument:
         name=service.identity["name"],
         version=service.identity["version"],
         api="v1",
-        stream=InfoDocument.StreamDocument(path="/api/v1/stream", subprotocol=wire.SUBPROTOCOL),
+        stream=InfoDocument.StreamDocument(
+            path="/api/v1/stream",
+            subprotocol=wire.SUBPROTOCOL,
+            asyncapi=asyncapi.PATH,
+            encodings=list(wire.ENCODINGS),
+        ),
         products=[_product(product) for product in service.pipeline.products.values()],
         history=HistoryDocument(**service.history.to_document()),
         clients=service.hub.clients,

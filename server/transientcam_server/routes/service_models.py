@@ -2,7 +2,7 @@
 
 from typing import Any, Literal
 
-from pydantic import ConfigDict
+from pydantic import ConfigDict, Field
 
 from transientcam_server.routes.document import Document
 from transientcam_server.routes.frame_models import HistoryDocument
@@ -74,6 +74,8 @@ class InfoDocument(Document):
 
         path: str
         subprotocol: str
+        asyncapi: str = Field(description="where its messages are described, as AsyncAPI 3")
+        encodings: list[str] = Field(description="which a subscription may ask for")
 
     name: str
     version: str

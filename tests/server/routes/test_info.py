@@ -9,7 +9,12 @@ def test_the_service_says_what_it_is_and_what_its_frames_have(http: httpx.Client
 
     assert info["name"] == "transientcam"
     assert info["api"] == "v1"
-    assert info["stream"] == {"path": "/api/v1/stream", "subprotocol": wire.SUBPROTOCOL}
+    assert info["stream"] == {
+        "path": "/api/v1/stream",
+        "subprotocol": wire.SUBPROTOCOL,
+        "asyncapi": "/asyncapi.json",
+        "encodings": list(wire.ENCODINGS),
+    }
     products = {product["name"]: product for product in info["products"]}
     assert set(products) == set(wire.PRODUCTS)
     images = ["msgpack", "npy", "npz", "png", "tiff", "csv"]

@@ -1,0 +1,96 @@
+"""The kinds of notices, and what each carries beside its kind."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+_Types = str | tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NoticeKind:
+    """One kind of notice.
+
+    Attributes
+    ----------
+    keys
+        What it carries: the names of JSON types by key; several where it may be either.
+    optional
+        Those of them that may be left out.
+    """
+
+    name: str
+    summary: str
+    keys: Mapping[str, _Types] = field(default_factory=dict)
+    optional: tuple[str, ...] = ()
+
+
+_OR_NIL = ("string", "null")
+
+NOTICES: Final[dict[str, NoticeKind]] = {
+    kind.name: kind
+    for kind in (
+        NoticeKind(
+            "dropped",
+            "this client was too slow for frames of a channel",
+            {"channel": "integer", "count": "integer", "total": "integer"},
+        ),
+        NoticeKind(
+            "gap",
+            "frames that were asked for and cannot be had",
+            {"from": "integer", "to": "integer", "reason": "string"},
+        ),
+        NoticeKind(
+            "lost-images",
+            "images were lost or corrupt between camera and daemon",
+            {"count": "integer", "frame": "integer"},
+        ),
+        NoticeKind("camera-lost", "the camera does not answer", {"reason": "string"}),
+        NoticeKind("camera-back", "the camera answers again"),
+        NoticeKind(
+            "sequence-changed",
+            "what is captured from now on",
+            {"sequence": "object", "channels": "array"},
+        ),
+        NoticeKind("recording-started", "a recording began", {"recording": "string"}),
+        NoticeKind(
+            "recording-dropped",
+            "frames that the disk was too slow for",
+            {"count": "integer", "total": "integer"},
+        ),
+        NoticeKind(
+            "recording-stopped",
+            "a recording ended",
+            {
+                "recording": "string",
+                "reason": "string",
+                "problem": _OR_NIL,
+                "frames": "integer",
+                "dropped_frames": "integer",
+            },
+        ),
+        NoticeKind(
+            "lease-changed",
+            "who controls the camera",
+            {"change": "string", "holder": "string", "from": "string"},
+            optional=("from",),
+        ),
+        NoticeKind(
+            "calibration-changed",
+            "which gains frames are computed with from now on",
+            {"calibration_id": "string", "reason": _OR_NIL},
+        ),
+        NoticeKind(
+            "reconstruction-changed",
+            "how frames are computed from now on",
+            {"reconstruction": "object"},
+        ),
+        NoticeKind(
+            "simulation-changed",
+            "the simulated camera stands before another scene, or with other effects",
+            {"scene": "string", "effects": "object"},
+        ),
+        NoticeKind("job-changed", "a job began or ended", {"job": "object"}),
+    )
+}
+"""Every kind by its name; a client passes over those it does not know."""
