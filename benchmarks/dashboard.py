@@ -1,17 +1,23 @@
 """Measure the page: pictures a second, processor time, memory. ``python -m benchmarks.dashboard``.
 
 The light plays, first with the camera stopped and then while frames stream, in Chromium's software
-renderer; daemon, simulation and page share the machine. Prints a Markdown table.
+renderer; daemon, simulation and page share the machine. ``--hours 1`` lets it play for as many
+frames as the video setting gives in that time, as fast as the camera can, and follows its memory.
+``--write`` writes docs/dashboard.md.
 """
 
 import argparse
 import os
 import shutil
+import sys
+import time
 from pathlib import Path
 
 import httpx
+import numpy as np
 from playwright.sync_api import Page, sync_playwright
 
+from benchmarks.machine import machine
 from tests.browser.dashboard import open_page
 from tests.serving import serving
 
@@ -28,6 +34,9 @@ _COUNT_PICTURES = """
   requestAnimationFrame(count);
 })
 """
+PAGE = Path(__file__).parents[1] / "docs" / "dashboard.md"
+_VIDEO_HZ = 18.6  # the paper's video setting
+_LOOK_EVERY_MS = 15_000
 _TICKS_S = os.sysconf("SC_CLK_TCK")
 
 
@@ -114,22 +123,78 @@ def measure(page: Page, url: str, *, harmonics: int, span_s: float) -> str:
 _NEWEST = "() => transientcam.store.status.newest.peek().frame"
 
 
+def endurance(page: Page, url: str, *, frames: int) -> list[str]:
+    """Return a table of the page's memory over so many frames."""
+    quickest = {"harmonics": 1, "zeroth": "estimated", "exposure_s": 0.0001}
+    applied = httpx.put(f"{url}/api/v1/sequence", json=quickest).raise_for_status().json()
+    open_page(page, f"{url}/?debug")
+    page.evaluate("() => { transientcam.store.player.playing.value = true; }")
+    first, begin_s = page.evaluate(_NEWEST), time.monotonic()
+    seen: list[tuple[int, float]] = []
+    while not seen or seen[-1][0] < frames:
+        page.wait_for_timeout(_LOOK_EVERY_MS)
+        seen.append((page.evaluate(_NEWEST) - first, _heap_mb(page)))
+        print(f"{seen[-1][0]} frames, {seen[-1][1]:.1f} MB", flush=True)
+    settled = np.array(seen[len(seen) // 4 :])  # caches fill at first
+    slope_mb, _ = np.polyfit(settled[:, 0], settled[:, 1], 1)
+    marks = [seen[round(share * (len(seen) - 1))] for share in (0, 0.25, 0.5, 0.75, 1)]
+    rate_hz = seen[-1][0] / (time.monotonic() - begin_s)
+    return [
+        "| after frames | " + " | ".join(str(count) for count, _ in marks) + " |",
+        "|---|" + "---:|" * len(marks),
+        "| heap after collecting | " + " | ".join(f"{mb:.2f} MB" for _, mb in marks) + " |",
+        "",
+        f"{seen[-1][0]} frames, of which an hour has {_VIDEO_HZ * 3600:.0f} at the video setting, "
+        f"captured at {applied['frame_rate_hz']:.1f} Hz and shown from a stream of {rate_hz:.1f} "
+        f"Hz. Slope over the last three quarters: {1e3 * slope_mb * _VIDEO_HZ * 3.6:+.3f} MB "
+        "in as many frames as an hour has.",
+    ]
+
+
 def main() -> None:
-    """Measure every size and order, and print the table."""
+    """Measure every size and order, and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--span-s", type=float, default=8.0, help="length of each measurement")
-    span_s = parser.parse_args().span_s
-    print("| sensor | m | pictures/s, still | streaming | frames/s | cores of the browser | heap |")
-    print("|---|---|---|---|---|---|---|")
+    parser.add_argument("--hours", type=float, default=0.0, help="of video, to follow the memory")
+    parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name} anew")
+    arguments = parser.parse_args()
+    lines = [
+        "| sensor | m | pictures/s, still | streaming | frames/s | cores of the browser | heap |",
+        "|---|---|---|---|---|---|---|",
+    ]
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=shutil.which("chromium"))
         page = chromium.new_page(viewport={"width": 1280, "height": 800})
         for width, height in ((163, 120), (640, 480)):
             with serving(f"sim:mirrors?width={width}&height={height}") as served:
                 for harmonics in (3, 4, 8):
-                    print(measure(page, served.url, harmonics=harmonics, span_s=span_s), flush=True)
+                    row = measure(page, served.url, harmonics=harmonics, span_s=arguments.span_s)
+                    lines.append(row)
+                    print(row, flush=True)
+                page.goto("about:blank")
+        if arguments.hours:
+            with serving("sim:mirrors") as served:
+                frames = round(arguments.hours * _VIDEO_HZ * 3600)
+                lines += ["", "## Memory", "", *endurance(page, served.url, frames=frames)]
                 page.goto("about:blank")
         chromium.close()
+    print("\n".join(lines))
+    if arguments.write:
+        command = " ".join(["python -m benchmarks.dashboard", *sys.argv[1:]])
+        PAGE.write_text("\n".join([*_head(command), *lines, ""]), encoding="utf-8")
+
+
+def _head(command: str) -> list[str]:
+    return [
+        "# What the dashboard takes",
+        "",
+        f"Written by `{command}` on: {machine()}.",
+        "",
+        "Light in flight plays in Chromium's software renderer (no GPU), first with the camera",
+        "stopped, then while frames of 12, 16 or 32 images stream; daemon, simulation and page",
+        "share the machine. The heap is that of the page's scripts after collecting.",
+        "",
+    ]
 
 
 if __name__ == "__main__":
