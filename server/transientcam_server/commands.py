@@ -94,11 +94,11 @@ def serve(
 
     run.configure_logging(settings)
     # the address first: where another daemon has it, the camera is not touched
-    with run.listen(settings.host, settings.port) as listener:
+    with run.ending_without() as leave, run.listen(settings.host, settings.port) as listener:
         url = run.address(listener, tls=settings.tls_certificate is not None)
         with open_camera(settings.camera) as opened:
             # NumPy serves until the compiled kernels are ready
-            tm.kernels.compile_in_background()
+            leave(tm.kernels.compile_in_background())
             app = build_app(opened, settings)
             run.serve(
                 app,

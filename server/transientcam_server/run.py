@@ -1,8 +1,10 @@
 """The service as a process: its socket, its server, its signals."""
 
+import logging
 import os
 import signal
 import socket
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AsyncExitStack, contextmanager
@@ -12,6 +14,7 @@ from typing import Final
 import uvicorn
 from fastapi import FastAPI
 
+from transientcam.cli import INTERRUPTED
 from transientcam.wire import MAX_CLIENT_MESSAGE_BYTES
 from transientcam_server import logs
 from transientcam_server.announcement import announced
@@ -169,6 +172,29 @@ def serve(
     server.run(sockets=[listener])
     if signal.SIGINT in server.signals:
         raise KeyboardInterrupt
+
+
+@contextmanager
+def ending_without() -> Iterator[Callable[[threading.Thread], None]]:
+    """Do not wait, at the end of the block and of the process, for what is handed to its value.
+
+    A compiler that is at work cannot be interrupted, and takes longer for one kernel than those
+    wait who have asked the process to end. What it has finished is on the disk; what it has not
+    is lost in any case. Where nothing is at work the process ends as any other.
+    """
+    at_work: list[threading.Thread] = []
+    code = 0
+    try:
+        yield at_work.append
+    except KeyboardInterrupt:
+        if not any(each.is_alive() for each in at_work):
+            raise
+        code = INTERRUPTED
+    if any(each.is_alive() for each in at_work):
+        logging.shutdown()
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        os._exit(code)
 
 
 def configure_logging(settings: Settings) -> None:

@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,8 +17,18 @@ import pytest
 from tests.server.streaming import streaming
 from transientcam import wire
 from transientcam_server.configuration import ENVIRONMENT_PREFIX
+from transientcam_server.app import build_app
+from transientcam_server.cameras import open_camera
 from transientcam_server.errors import AddressUnavailable
-from transientcam_server.run import NOTSENT_LOWAT_BYTES, USER_TIMEOUT_MS, address, listen
+from transientcam_server.recording import Recording
+from transientcam_server.run import (
+    NOTSENT_LOWAT_BYTES,
+    USER_TIMEOUT_MS,
+    Server,
+    address,
+    ending_without,
+    listen,
+)
 
 PATIENCE_S = 60.0
 
@@ -165,3 +176,78 @@ def test_an_address_is_a_url_that_can_be_opened() -> None:
 def test_an_address_that_is_not_of_this_machine_leaves_no_socket_behind() -> None:
     with pytest.raises(AddressUnavailable, match=r"192\.0\.2\.1"):
         listen("192.0.2.1", 0)
+
+
+def test_the_end_does_not_wait_for_a_compiler() -> None:
+    program = """
+import threading
+from transientcam_server.run import ending_without
+
+with ending_without() as leave:
+    compiler = threading.Thread(target=threading.Event().wait)  # for ever
+    compiler.start()
+    leave(compiler)
+    print("closed")
+    {how}
+"""
+    for how, code in (("pass", 0), ("raise KeyboardInterrupt", 130)):
+        result = subprocess.run(
+            [sys.executable, "-c", program.format(how=how)],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE_S,
+        )
+
+        assert (result.returncode, result.stdout, result.stderr) == (code, "closed\n", "")
+
+
+def test_what_is_not_at_work_changes_nothing_at_the_end() -> None:
+    idle = threading.Thread(target=str)
+    with ending_without() as leave:
+        leave(idle)
+
+    with pytest.raises(KeyboardInterrupt), ending_without() as leave:  # noqa: PT012 - that is it
+        leave(idle)
+        raise KeyboardInterrupt
+
+
+def test_the_light_is_off_after_the_service() -> None:
+    settings = Settings(camera="sim:wall", port=0, log_level="warning")
+    with open_camera(settings.camera) as camera:
+        app = build_app(camera, settings)
+        with listen("127.0.0.1", 0) as listener:
+
+            def end() -> None:
+                server.should_exit = True
+
+            server = Server(app, settings, on_listening=end)
+            server.run([listener])
+        service: Service = app.state.service
+
+        assert service.acquisition.status().running  # nobody asked for a pause
+        assert not camera.status().light_on
+
+
+def test_sigterm_while_kernels_are_compiled_closes_streams_and_recordings(tmp_path: Path) -> None:
+    compiling = {"TRANSIENTCAM_KERNELS": "on", "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    recordings = tmp_path / "recordings"
+    kept = {"DIRECTORY": str(recordings), "MIN_FREE_BYTES": "0"}
+    settings = {f"TRANSIENTCAM_RECORDINGS__{name}": value for name, value in kept.items()}
+    with daemon(tmp_path, **compiling, **settings) as (process, url):
+        with streaming(url.replace("http", "ws") + "/api/v1/stream") as client:
+            client.subscribe("flags")
+            running = httpx.post(f"{url}/api/v1/recordings", json={}).json()["id"]
+            client.frame()
+            compiling_now = httpx.get(f"{url}/api/v1/info").json()["kernels"]["compiling"]
+            process.send_signal(signal.SIGTERM)
+            code = client.close_code()
+        _, errors = process.communicate(timeout=PATIENCE_S)
+
+    assert compiling_now is not None
+    assert code == wire.CloseCode.GOING_AWAY
+    assert process.returncode == 0
+    assert "Traceback" not in errors
+    assert [path.name for path in recordings.iterdir()] == [f"{running}.h5"]
+    with Recording(recordings / f"{running}.h5") as recording:
+        assert recording.end["reason"] == "shutdown"
+        assert recording.frames >= 1
