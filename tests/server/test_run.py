@@ -16,9 +16,9 @@ import pytest
 
 from tests.server.streaming import streaming
 from transientcam import wire
-from transientcam_server.configuration import ENVIRONMENT_PREFIX
 from transientcam_server.app import build_app
 from transientcam_server.cameras import open_camera
+from transientcam_server.configuration import ENVIRONMENT_PREFIX
 from transientcam_server.errors import AddressUnavailable
 from transientcam_server.recording import Recording
 from transientcam_server.run import (
@@ -29,6 +29,8 @@ from transientcam_server.run import (
     ending_without,
     listen,
 )
+from transientcam_server.service import Service
+from transientcam_server.settings import Settings
 
 PATIENCE_S = 60.0
 
