@@ -2,7 +2,6 @@
 
 import asyncio
 import time
-from collections.abc import Awaitable
 from typing import Any
 
 from fastapi import WebSocket
@@ -53,18 +52,20 @@ class Sender:
         # all products of the frame are under way at once; each is sent as soon as those before
         tasks = [asyncio.ensure_future(self._encoded(delivery, each)) for each in others]
         try:
-            await self._send(delivery, first, self._encoded(delivery, first))
+            await self._send(delivery, first, None)
             for channel, task in zip(others, tasks, strict=True):
                 await self._send(delivery, channel, task)
         finally:
             for task in tasks:
                 task.cancel()
 
-    async def _send(self, delivery: Delivery, channel: Channel, encoding: Awaitable[bytes]) -> None:
+    async def _send(
+        self, delivery: Delivery, channel: Channel, task: asyncio.Task[bytes] | None
+    ) -> None:
         if channel.dropped:
             await self._tell_dropped(channel)
         try:
-            data = await encoding
+            data = await (self._encoded(delivery, channel) if task is None else task)
         except Problem as problem:
             await self._tell_failed(channel, problem)
             return
