@@ -12,19 +12,19 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Final, Literal, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
 from transientcam_driver import (
     AppliedSequence,
     CameraError,
     FrameTimeout,
-    RawFrame,
     Sequence,
     Status,
 )
 from transientcam_server import problem_kinds as kinds
 from transientcam_server.cameras import Camera
 from transientcam_server.errors import JobCancelled, Problem
+from transientcam_server.events import Back, Captured, Event, Lost, SequenceChanged
 
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
@@ -40,36 +40,6 @@ STALLED_MIN_S: Final = 2.0
 _RATE_FRAMES = 32
 
 State = Literal["starting", "streaming", "stopped", "calibrating", "lost"]
-
-
-@dataclass(frozen=True, slots=True)
-class Captured:
-    """A frame arrived, captured with this sequence."""
-
-    raw: RawFrame
-    applied: AppliedSequence
-
-
-@dataclass(frozen=True, slots=True)
-class Lost:
-    """The camera is gone, or does not answer."""
-
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class Back:
-    """The camera is there again."""
-
-
-@dataclass(frozen=True, slots=True)
-class SequenceChanged:
-    """Frames from now on are captured with another sequence."""
-
-    applied: AppliedSequence
-
-
-Event = Captured | Lost | Back | SequenceChanged
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,7 +170,9 @@ class Acquisition:
             self.require_free()
             self._occupant = job_id
             self._interrupted.clear()
-            return self.submit(lambda: self._occupy(job_id, work))
+            occupied = self.submit(lambda: self._occupy(job_id, work))
+        occupied.add_done_callback(self._occupied_no_more)  # also where it was taken back
+        return occupied
 
     def require_free(self) -> None:
         """Refuse what would disturb somebody who has the camera for itself.
@@ -330,6 +302,10 @@ class Acquisition:
             if not running and self._started:
                 self._started = False
                 self._camera.stop()
+
+    def _occupied_no_more(self, occupied: "Future[Any]") -> None:
+        if occupied.cancelled():
+            self._occupant = None
 
     def _occupy(self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T]) -> _T:
         def go_on() -> None:

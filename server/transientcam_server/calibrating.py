@@ -314,6 +314,9 @@ def _capture(
         job.report(_EVALUATING * done / total, "capturing")
         go_on()
 
-    return capture_calibration(
-        camera, takes=wanted.frames, average=takes.average, progress=progress
-    )
+    def average(of_one_image: _Array) -> tuple[_Array, _Array]:
+        job.report(_EVALUATING, "averaging")
+        go_on()
+        return takes.average(of_one_image)
+
+    return capture_calibration(camera, takes=wanted.frames, average=average, progress=progress)

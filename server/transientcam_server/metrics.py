@@ -13,8 +13,8 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, InfoM
 from prometheus_client.registry import Collector
 
 import transientcam_moments as tm
-from transientcam_server.acquisition import Back, Captured, Event, Lost
 from transientcam_server.calibration import NOMINAL_ID
+from transientcam_server.events import Back, Captured, Event, Lost
 from transientcam_server.recording.metrics import RecordingCollector
 
 if TYPE_CHECKING:  # it makes its metrics

@@ -16,14 +16,7 @@ from transientcam import wire
 from transientcam_driver import AppliedSequence, CalibrationError
 from transientcam_driver.calibration import DEVICE_FIELDS
 from transientcam_server.accuracy import Accuracy
-from transientcam_server.acquisition import (
-    Acquisition,
-    Back,
-    Captured,
-    Event,
-    Lost,
-    SequenceChanged,
-)
+from transientcam_server.acquisition import Acquisition
 from transientcam_server.auth import Guard
 from transientcam_server.calibrating import CalibrationDesk
 from transientcam_server.calibration import (
@@ -35,6 +28,7 @@ from transientcam_server.calibration import (
 from transientcam_server.calibrations import Calibrations
 from transientcam_server.cameras import Camera
 from transientcam_server.errors import Problem
+from transientcam_server.events import Back, Captured, Event, Lost, SequenceChanged
 from transientcam_server.fronts import Fronts
 from transientcam_server.history import History
 from transientcam_server.hub import Hub

@@ -125,6 +125,8 @@ def status_line(status: AcquisitionStatus) -> str:
             return f"the camera is lost: {status.reason}"
         case "stopped":
             return "the capture is stopped"
+        case "calibrating":
+            return "a calibration is being measured"
         case _ if status.stalled:
             return f"no frame for {status.frame_age_s:.0f} s"
         case "starting":

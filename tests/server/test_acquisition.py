@@ -2,7 +2,7 @@
 
 import queue
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from types import SimpleNamespace
@@ -21,15 +21,10 @@ from transientcam_driver import (
     Sequence,
     SequenceError,
 )
-from transientcam_server.acquisition import (
-    STALLED_MIN_S,
-    Acquisition,
-    Back,
-    Captured,
-    Event,
-    Lost,
-    SequenceChanged,
-)
+from transientcam_server import problem_kinds as kinds
+from transientcam_server.acquisition import STALLED_MIN_S, Acquisition
+from transientcam_server.errors import JobCancelled, Problem
+from transientcam_server.events import Back, Captured, Event, Lost, SequenceChanged
 
 PATIENCE_S = 60.0
 APPLIED = AppliedSequence(
@@ -240,6 +235,97 @@ def test_a_command_that_was_taken_back_is_not_run() -> None:
     one.acquisition.stop()
 
     assert not ran
+
+
+# -- while something has the camera for itself ---------------------------------------------------
+
+
+def until(told: threading.Event, go_on: Callable[[], None]) -> None:
+    """Work that lasts until it is told to end, or broken off."""
+    while not told.wait(0.001):
+        go_on()
+
+
+def test_meanwhile_nothing_is_read_and_what_would_disturb_it_is_refused() -> None:
+    with running() as one:
+        begun, end = threading.Event(), threading.Event()
+
+        def work(camera: Any, go_on: Callable[[], None]) -> None:
+            begun.set()
+            until(end, go_on)
+
+        occupied = one.acquisition.occupy("job-1", work)
+        assert begun.wait(PATIENCE_S)
+        one.camera.deliver(1)
+        for disturb in (
+            lambda: one.acquisition.configure(Sequence()),
+            lambda: one.acquisition.set_running(True),
+            lambda: one.acquisition.occupy("job-2", lambda camera, go_on: None),
+        ):
+            with pytest.raises(Problem) as caught:
+                disturb()
+            assert caught.value.kind is kinds.CAMERA_BUSY
+            assert caught.value.extensions["job"] == "job-1"
+        assert one.acquisition.status().state == "calibrating"
+        assert one.acquisition.device_status().result(PATIENCE_S) == "fine"
+        assert one.events.empty()
+        end.set()
+        occupied.result(PATIENCE_S)
+
+        assert numbers(one.event()) == [1]
+        assert one.acquisition.status().state == "streaming"
+
+
+@pytest.mark.parametrize("command", ["safe_off", "stop"])
+def test_switching_the_light_off_breaks_it_off(command: str) -> None:
+    with running() as one:
+        occupied = one.acquisition.occupy(
+            "job-1", lambda camera, go_on: until(threading.Event(), go_on)
+        )
+        if command == "safe_off":
+            one.acquisition.safe_off().result(PATIENCE_S)
+        else:
+            one.acquisition.set_running(False).result(PATIENCE_S)
+
+        with pytest.raises(JobCancelled):
+            occupied.result(PATIENCE_S)
+        assert one.acquisition.status().state == "stopped"
+
+
+def test_what_it_counted_anew_is_reported_and_frames_of_it_are_known() -> None:
+    with running() as one:
+        one.acquisition.occupy(
+            "job-1", lambda camera, go_on: camera.configure(APPLIED.sequence)
+        ).result(PATIENCE_S)
+        changed = one.event()
+        one.camera.deliver(1, epoch=2)
+
+        assert changed == SequenceChanged(one.camera.applied)
+        assert numbers(one.event()) == [1]
+
+
+def test_a_sequence_that_it_left_behind_is_put_back() -> None:
+    """As where the camera was lost meanwhile, and could not be told."""
+
+    def leave(camera: Any, go_on: Callable[[], None]) -> None:
+        camera.configure(Sequence(harmonics=7))
+        raise CameraLost("unplugged")
+
+    with running() as one:
+        with pytest.raises(CameraLost):
+            one.acquisition.occupy("job-1", leave).result(PATIENCE_S)
+        changed = one.event()
+
+    assert isinstance(changed, SequenceChanged)
+    assert changed.applied.sequence == APPLIED.sequence
+
+
+def test_one_that_was_taken_back_has_the_camera_no_more() -> None:
+    one = Running()
+    occupied = one.acquisition.occupy("job-1", lambda camera, go_on: None)
+    assert occupied.cancel()
+
+    one.acquisition.require_free()
 
 
 def test_the_rate_is_measured_over_the_last_frames() -> None:

@@ -13,7 +13,7 @@ from tests.server.streaming import streaming
 from tests.serving import Served, serving
 from transientcam import wire
 from transientcam_driver import RawFrame
-from transientcam_server.acquisition import Captured, Lost
+from transientcam_server.events import Captured, Lost
 from transientcam_server.metrics import Metrics
 
 Samples = dict[str, float]

@@ -200,6 +200,7 @@ def test_a_watchdog_hears_of_us_several_times_before_it_bites() -> None:
         (FakeAcquisition("starting"), "the camera is starting"),
         (FakeAcquisition("lost"), "the camera is lost: unplugged"),
         (FakeAcquisition("stopped"), "the capture is stopped"),
+        (FakeAcquisition("calibrating"), "a calibration is being measured"),
         (FakeAcquisition("starting", stalled=True), "no frame for 7 s"),
     ],
 )

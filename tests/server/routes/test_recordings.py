@@ -16,7 +16,7 @@ from tests.server.recording.test_recovery import abandoned
 from tests.serving import Served, serving
 from transientcam import wire
 from transientcam_driver import RawFrame
-from transientcam_server.acquisition import Captured
+from transientcam_server.events import Captured
 from transientcam_server.recording import Recording
 
 RECORDINGS = "/api/v1/recordings"
