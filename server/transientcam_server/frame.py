@@ -54,13 +54,25 @@ class Frame:
         The labelled images.
     recipe
         Sequence and settings that its products are computed with.
+    past
+        Whether it is a former or a recorded one, whose computation delays no new one.
     """
 
-    def __init__(self, pipeline: "Pipeline", number: int, raw: RawFrame, recipe: Recipe) -> None:
+    def __init__(
+        self,
+        pipeline: "Pipeline",
+        number: int,
+        raw: RawFrame,
+        recipe: Recipe,
+        *,
+        past: bool = False,
+    ) -> None:
         self.number = number
         self.raw = raw
         self.recipe = recipe
+        self.past = past
         self._pipeline = pipeline
+        self._run = pipeline.run_long if past else pipeline.run
         self._reconstruct_s: float | None = None
         self._pixels: dict[str, int] | None = None
         self._rejected_images: int | None = None
@@ -71,7 +83,7 @@ class Frame:
 
     def bare(self) -> "Frame":
         """Return the same frame with nothing computed: what is kept of one that is history."""
-        return Frame(self._pipeline, self.number, self.raw, self.recipe)
+        return Frame(self._pipeline, self.number, self.raw, self.recipe, past=True)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -154,9 +166,7 @@ class Frame:
         """
         with self._failure_of("moments"):
             moments = await self.stage("moments")
-            value, _ = await self._pipeline.run(
-                compute, self.recipe, moments, self.meta(), *arguments
-            )
+            value, _ = await self._run(compute, self.recipe, moments, self.meta(), *arguments)
         return value
 
     async def _once(
@@ -181,25 +191,29 @@ class Frame:
         if name == "raw":
             return self.raw
         if name == "truth":
-            result, _ = await self._pipeline.run(self._pipeline.truth)
+            result, _ = await self._run(self._pipeline.truth, self._middle_s())
             return result
         stage = STAGES[name]
         needs = await asyncio.gather(*map(self.stage, stage.needs))
-        result, elapsed_s = await self._pipeline.run(stage.compute, self.recipe, *needs)
+        result, elapsed_s = await self._run(stage.compute, self.recipe, *needs)
         self._reconstruct_s = (self._reconstruct_s or 0.0) + elapsed_s
         if name == "moments":
-            self._pixels, _ = await self._pipeline.run(pixel_counts, result)
+            self._pixels, _ = await self._run(pixel_counts, result)
             self._rejected_images = result.rejected_images
         if name == "returns":
             self._deviation = await self._judged(result)
         return result
+
+    def _middle_s(self) -> float | None:
+        """Return when a former frame was captured; of the newest, now is near enough."""
+        return self.raw.device_time_s + 0.5 * self.raw.capture_s if self.past else None
 
     async def _judged(self, found: Any) -> dict[str, float] | None:
         """Return the predicted deviation of the range; a failure of that spoils no range."""
         if self._pipeline.judge is None:
             return None
         try:
-            deviation, _ = await self._pipeline.run(self._pipeline.judge, self.recipe, found)
+            deviation, _ = await self._run(self._pipeline.judge, self.recipe, found)
         except Exception:
             _log.exception("frame %d: predicting the range's deviation failed", self.number)
             return None
@@ -213,7 +227,7 @@ class Frame:
             if product.over_time:
                 work = self._pipeline.run_long(product.compute, self.recipe, view, *needs)
             else:
-                work = self._pipeline.run(product.compute, self.recipe, *needs)
+                work = self._run(product.compute, self.recipe, *needs)
             array, _ = await work
         return array
 
@@ -223,7 +237,7 @@ class Frame:
         beside = (self.product(self._pipeline.product(name)) for name in encoding.beside)
         array, *others = await asyncio.gather(self.product(product, view), *beside)
         long = product.over_time or encoding.slow
-        run = self._pipeline.run_long if long else self._pipeline.run
+        run = self._pipeline.run_long if long else self._run
         meta = self.meta() | view.crop.to_meta(*self.shape)
         extra = self._extra(product, view) | dict(zip(encoding.beside, others, strict=True))
         with self._failure_of(product.name):

@@ -177,10 +177,10 @@ class Pipeline:
         """Note that a product works, so that its next failure is logged again."""
         self._failing.discard(name)
 
-    def truth(self) -> Any:
-        """Return the ground truth of the simulated scene; runs on a worker."""
+    def truth(self, device_time_s: float | None = None) -> Any:
+        """Return the ground truth of the simulated scene, now or at a time; runs on a worker."""
         assert self._truth is not None  # noqa: S101 - such a camera has no product that asks
-        return self._truth()
+        return self._truth(device_time_s=device_time_s)
 
     def _finished(self, task: "asyncio.Task[Any]") -> None:
         self._tasks.discard(task)

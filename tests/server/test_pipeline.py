@@ -193,6 +193,41 @@ def test_long_answers_leave_a_worker_to_everything_else(camera: Camera, raw: Raw
     with_frame(camera, raw, test)
 
 
+def test_former_frames_leave_a_worker_to_the_newest(camera: Camera, raw: RawFrame) -> None:
+    gate = threading.Event()
+
+    def wait_at_the_gate(*_: Any) -> Any:
+        assert gate.wait(20.0)
+        return np.zeros((120, 163), dtype=np.float32)
+
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        endless = replace(pipeline.product("range"), needs=("raw",), compute=wait_at_the_gate)
+        former = [
+            asyncio.ensure_future(frame.bare().encoded(endless, MSGPACK, channel=index))
+            for index in range(5)
+        ]
+        # with both workers at the gate this would never end
+        assert (await frame.product(pipeline.product("range"))).shape == (120, 163)
+        gate.set()
+        await asyncio.gather(*former)
+
+    with_frame(camera, raw, test)
+
+
+def test_a_bare_frame_is_the_same_with_nothing_computed(
+    camera: Camera, raw: RawFrame, calls: list[str]
+) -> None:
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        first = await frame.product(pipeline.product("range"))
+        bare = frame.bare()
+        assert (bare.number, bare.raw, bare.recipe) == (frame.number, frame.raw, frame.recipe)
+        assert bare.meta()["reconstruct_s"] is None
+        np.testing.assert_array_equal(await bare.product(pipeline.product("range")), first)
+        assert calls == ["moments", "returns"] * 2
+
+    with_frame(camera, raw, test)
+
+
 def test_too_many_times_of_flight_are_refused_before_anything_is_computed(
     camera: Camera, raw: RawFrame, calls: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -88,12 +88,13 @@ class RecordedFrames:
         return times
 
     async def _read(self, number: int, reconstruction: Reconstruction) -> Frame:
-        raw, _ = await self.pipeline.run(_read_frame, self._find, number)
+        raw, _ = await self.pipeline.run_long(_read_frame, self._find, number)
         return Frame(
             self.pipeline,
             number,
             raw,
             recorded_recipe(self._header, reconstruction, lens=self._lens),
+            past=True,
         )
 
     def _reconstruction(self, settings: Settings) -> Reconstruction:

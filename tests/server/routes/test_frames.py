@@ -189,6 +189,44 @@ def test_a_former_frame_is_computed_as_it_was_when_it_was_the_latest(http: httpx
     np.testing.assert_array_equal(now, then)
 
 
+def test_a_former_frame_keeps_the_settings_it_was_captured_under(http: httpx.Client) -> None:
+    number = wait_for_frame(http)["frame"]
+    then = wire.parse_frame(http.get(f"/api/v1/frames/{number}/range").content)
+    http.put("/api/v1/reconstruction", json={"smoothing_px": 3.0})
+    later = http.get(f"/api/v1/frames/{number + 3}", params={"wait_s": 10.0}).json()
+
+    now = wire.parse_frame(http.get(f"/api/v1/frames/{number}/range").content)
+
+    assert later["reconstruction_id"] == then.meta["reconstruction_id"] + 1
+    assert now.meta["reconstruction_id"] == then.meta["reconstruction_id"]
+    np.testing.assert_array_equal(now.array, then.array)
+
+
+def test_the_truth_of_a_former_frame_is_that_of_its_time() -> None:
+    with (
+        serving("sim:visitor?noise=off", history={"seconds": 600.0}) as daemon,
+        httpx.Client(base_url=daemon.url, timeout=60.0) as http,
+    ):
+        first = http.get("/api/v1/frames/2", params={"wait_s": 10.0}).json()["frame"]
+        http.get("/api/v1/frames/12", params={"wait_s": 10.0})
+        truths = {
+            number: wire.parse_frame(http.get(f"/api/v1/frames/{number}/truth").content).array
+            for number in (first, first + 8)
+        }
+        ranges = {
+            number: wire.parse_frame(http.get(f"/api/v1/frames/{number}/range").content).array
+            for number in truths
+        }
+
+    early, late = truths.values()
+    moved = np.abs(late - early) > 0.2
+    assert moved.any()
+    for number, truth in truths.items():
+        own = np.nanmedian(np.abs(ranges[number] - truth)[moved])
+        other = truths[first + 8 if number == first else first]
+        assert own < np.nanmedian(np.abs(ranges[number] - other)[moved])
+
+
 def test_a_frame_that_is_still_to_come_can_be_waited_for(http: httpx.Client) -> None:
     number = wait_for_frame(http)["frame"]
 
