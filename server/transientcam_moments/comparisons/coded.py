@@ -148,10 +148,11 @@ def coded(
     copies = _dictionary(code or maximum_length_code(), shifts, harmonics, bins)
     size = float(np.linalg.norm(copies, axis=0).max())
     rows = np.concatenate([copies / size, np.full((1, bins), sparsity)])
+    gap = bins // (len(y) * int(np.max(harmonics)))
     found: list[tuple[Real, Real] | None] = []
     for pixel, usable in enumerate(pixels.usable):
         light = _solved(rows, np.append(y[:, pixel], 0.0)) if usable else None
-        found.append(cluster(light, gap=bins // len(y)))
+        found.append(cluster(light, gap=gap))
     phase, weight = stacked(found)
     return pixels.sparse(phase, weight / size)
 

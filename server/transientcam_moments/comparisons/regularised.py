@@ -86,10 +86,7 @@ class Problem:
 
     def solve(self, iterations: int) -> Real:
         """Return the light (bins, P)."""
-        from scipy.optimize import (
-            Bounds,
-            minimize,
-        )  # heavy, and not needed by those who don't compare
+        from scipy.optimize import minimize  # heavy, and not needed by those who don't compare
 
         shape = (self.phi.shape[1], self.v.shape[1])
         # where the squares alone would lead, as far as it is positive
@@ -104,7 +101,7 @@ class Problem:
             start.ravel(),
             jac=True,
             method="L-BFGS-B",
-            bounds=Bounds(np.zeros(start.size), np.full(start.size, np.inf)),
+            bounds=[(0.0, None)] * start.size,
             options={"maxiter": iterations, "maxfun": 2 * iterations, "ftol": 1e-12, "gtol": 1e-9},
         )
         light: Real = found.x.reshape(shape)
