@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from transientcam.errors import ParameterError
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Frame:
@@ -17,11 +19,12 @@ class Frame:
     product
         Its name: ``range``, ``coefficients`` and so on.
     unit
-        Of the values: ``m``, ``DN``, ``DN/s`` or ``1``.
+        Of the values: ``m``, ``DN``, ``DN/s`` or ``1``; ``s,DN`` where planes take turns.
     axes
         Name of each axis of `array`, slowest first; pixels are ``y``, ``x``.
     meta
-        What is known of the frame: its number, times, sequence, lost images, pixel counts.
+        What is known of the frame: its number, times, sequence, lost images, pixel counts; and
+        the ``region`` and ``decimation`` of its pixels.
     array
         The values, read-only; NaN where a pixel has none.
     encode_s
@@ -29,7 +32,8 @@ class Frame:
     channel
         Which subscription of a stream it answers; None outside a stream.
     extra
-        What only some products have: ``labels`` of raw, ``time_s`` of transient and cumulative.
+        What only some products have: ``labels`` of raw, ``time_s`` of those over time, ``y`` of
+        streak, ``radius`` of bounds, ``intrinsics`` of pointcloud.
     """
 
     product: str
@@ -56,6 +60,21 @@ class Frame:
     def labels(self) -> Sequence[Mapping[str, Any]]:
         """What each image of ``raw`` was taken with, in the order of its first axis; else empty."""
         return tuple(self.extra.get("labels", ()))
+
+    @property
+    def points(self) -> NDArray[np.float32]:
+        """The points (N, 3) of a ``pointcloud`` that have a range, in m, row by row.
+
+        Raises
+        ------
+        ParameterError
+            If it is another product.
+        """
+        if self.product != "pointcloud":
+            raise ParameterError("product", self.product, "pointcloud")
+        flat = self.array.reshape(3, -1)
+        points: NDArray[np.float32] = flat[:, np.isfinite(flat[2])].T.copy()
+        return points
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         return np.array(self.array, dtype=dtype, copy=copy)

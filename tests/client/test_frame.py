@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from transientcam import Frame
+from transientcam.errors import ParameterError
 
 
 def _frame(array: NDArray[Any], product: str = "range", unit: str = "m", **extra: object) -> Frame:
@@ -60,3 +61,14 @@ def test_times_and_labels_are_there_only_where_the_product_has_them() -> None:
     assert transient.time_s.tolist() == [1e-9]
     assert raw.labels == ({"harmonic": 1},)
     assert plain.frame == 7
+
+
+def test_a_pointcloud_gives_the_points_that_there_are_one_a_row() -> None:
+    planes = np.arange(12, dtype=np.float32).reshape(3, 2, 2)
+    planes[:, 0, 1] = np.nan
+    cloud = Frame("pointcloud", "m", ("coordinate", "y", "x"), {"frame": 7}, planes)
+
+    assert cloud.points.tolist() == [[0, 4, 8], [2, 6, 10], [3, 7, 11]]
+    assert cloud.points.flags.c_contiguous
+    with pytest.raises(ParameterError, match="product is 'range'"):
+        _ = _frame(np.ones((1, 1))).points
