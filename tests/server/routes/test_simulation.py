@@ -67,7 +67,8 @@ def test_the_camera_is_put_before_another_scene_while_it_captures(
         try:
             both = camera.frame("range", after=camera.frame("range").frame, wait_s=10)
             seen = camera.frame("range", after=both.frame, wait_s=10)
-            true_m = wall.simulation.truth().range_m if wall.simulation else None
+            assert wall.simulation is not None
+            true_m = wall.simulation.truth().range_m
 
             assert seen.frame > first
             np.testing.assert_allclose(camera.frame("truth").array, true_m, atol=1e-6)
