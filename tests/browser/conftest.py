@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
@@ -82,7 +83,7 @@ def camera() -> str:
 @pytest.fixture
 def served(camera: str, tmp_path: Path) -> Iterator[Served]:
     """A daemon that keeps what it stores where nobody else does."""
-    stored = {
+    stored: dict[str, Any] = {
         "recordings": {"directory": tmp_path / "recordings", "min_free_bytes": 0},
         "calibrations": {"directory": tmp_path / "calibrations"},
     }

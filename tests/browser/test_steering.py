@@ -15,8 +15,8 @@ from transientcam_server.tokens import Role, TokenFile, utc_now
 def lease(served: Served, method: str, **document: Any) -> httpx.Response:
     lease_id = document.pop("lease_id", None)
     headers = {} if lease_id is None else {"Transientcam-Lease": lease_id}
-    body = {} if method == "DELETE" else {"json": document}
-    return httpx.request(method, f"{served.url}/api/v1/lease", headers=headers, **body)
+    body = None if method == "DELETE" else document
+    return httpx.request(method, f"{served.url}/api/v1/lease", headers=headers, json=body)
 
 
 def control(page: Page, button: str, name: str | None = None) -> None:
