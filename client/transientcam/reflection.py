@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_Planes = NDArray[Any]
+_Complex = NDArray[np.complexfloating[Any, Any]]
 
 
-def step_down(coefficients: NDArray[np.floating[Any]]) -> tuple[_Planes, _Planes]:
+def step_down(coefficients: NDArray[np.floating[Any]]) -> tuple[NDArray[np.float64], _Complex]:
     """Return brightness and reflection coefficients of some densities.
 
     Parameters
@@ -45,7 +45,7 @@ def step_down(coefficients: NDArray[np.floating[Any]]) -> tuple[_Planes, _Planes
     return brightness, reflection
 
 
-def step_up(brightness: _Planes, reflection: _Planes) -> _Planes:
+def step_up(brightness: NDArray[Any], reflection: _Complex) -> NDArray[np.float64]:
     """Return the product ``coefficients`` for reflection coefficients: undo `step_down`.
 
     Parameters
@@ -61,7 +61,7 @@ def step_up(brightness: _Planes, reflection: _Planes) -> _Planes:
         E, Re a_1, Im a_1 to Re a_m, Im a_m, float64; NaN where the brightness is.
     """
     error = np.array(brightness, dtype=np.float64)
-    a: list[_Planes] = []
+    a: list[_Complex] = []
     for g in reflection:
         # a_j of order k is a_j + g_k conj(a_{k-j}), and a_k = g_k
         a = [each + g * np.conj(mirror) for each, mirror in zip(a, a[::-1], strict=True)] + [g]
@@ -75,6 +75,6 @@ def step_up(brightness: _Planes, reflection: _Planes) -> _Planes:
     return planes
 
 
-def _squared(value: _Planes) -> _Planes:
-    squared: _Planes = value.real**2 + value.imag**2
+def _squared(value: _Complex) -> NDArray[np.floating[Any]]:
+    squared: NDArray[np.floating[Any]] = value.real**2 + value.imag**2
     return squared

@@ -154,7 +154,8 @@ def _schemas() -> dict[str, _Schema]:
     meta = FrameDocument.model_json_schema(ref_template=_SCHEMAS + "{model}")
     meta["properties"] |= {"region": _REGION, "decimation": _integer(1, wire.MAX_DECIMATION)}
     meta["required"] = sorted(meta["properties"])
-    return schemas | meta.pop("$defs", {}) | {"meta": meta}
+    schemas |= meta.pop("$defs", {})
+    return schemas | {"meta": meta}
 
 
 _REGION: Final[_Schema] = {

@@ -181,19 +181,18 @@ class BoundedStream(WebSocketsSansIOProtocol):
     async def send(self, message: Any) -> None:
         """Send a message of the application."""
         data = message.get("bytes")
-        if data is None or len(data) < _LARGE_BYTES or not self._is_open:
+        if data is None or len(data) < _LARGE_BYTES or not self._open():
             await super().send(message)
             return
         await self.writable.wait()
         if self.transport.is_closing():  # before uvicorn hears of it
             raise ClientDisconnected
-        if self._is_open:
+        if self._open():
             self.transport.writelines((_frame_head(len(data)), data))
         else:  # it ended while this waited
             await super().send(message)
 
-    @property
-    def _is_open(self) -> bool:
+    def _open(self) -> bool:
         return (
             self.handshake_complete
             and not (self.disconnected or self.close_sent)

@@ -94,8 +94,8 @@ class Crop:
         if self.is_whole:
             return array
         cuts = self._slices()
-        last = tuple(cuts.get(axis, slice(None)) for axis in axes)
-        return np.ascontiguousarray(array[(..., *last)])
+        kept: tuple[Any, ...] = (..., *(cuts.get(axis, slice(None)) for axis in axes))
+        return np.ascontiguousarray(array[kept])
 
     def shape(self, height: int, width: int) -> tuple[int, int]:
         """Return rows and columns that stay of a frame of ``height`` x ``width`` pixels."""

@@ -28,13 +28,16 @@ class Past(Protocol):
     @property
     def first(self) -> int | None:
         """Number of the oldest frame that can be had."""
+        ...
 
     @property
     def last(self) -> int | None:
         """Number of the newest frame; None before there is any."""
+        ...
 
     def frame(self, number: int) -> Frame:
         """Return a frame from the first to the last."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import httpx
-import jsonschema
+import jsonschema  # type: ignore[import-untyped]  # its stubs are another package
 import pytest
 from pydantic_asyncapi import AsyncAPI
 
@@ -47,7 +47,8 @@ def check(name: str, document: dict[str, Any]) -> None:
 def unpacked(data: str | bytes) -> dict[str, Any]:
     """A message as JSON Schema sees it: binary as text."""
     document = wire.unpack(data, max_bytes=2**26)
-    return json.loads(json.dumps(document, default=lambda value: value.hex()))
+    seen: dict[str, Any] = json.loads(json.dumps(document, default=lambda value: value.hex()))
+    return seen
 
 
 def test_it_is_an_asyncapi_document_whose_references_lead_somewhere() -> None:
