@@ -8,28 +8,24 @@ then with the cache that run left, and streams range and coefficients at the pap
 
 import argparse
 import os
-import re
-import signal
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
 import transientcam
+from benchmarks.daemon import daemon
 from benchmarks.machine import machine
 
 VIDEO = {"base_frequency_hz": 23e6, "harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}
 PAGE = Path(__file__).parents[1] / "docs" / "first-light.md"
 SETTLE_S = 5.0
 """Before the measurement: until the kernels are loaded and the new sequence's frames come."""
-CLOCK_TICKS_S = 1 / os.sysconf("SC_CLK_TCK")
 
 
 @dataclass(frozen=True)
@@ -58,59 +54,12 @@ class Streamed:
         return self.frames / self.duration_s
 
 
-class Daemon:
-    """``transientcam serve`` in a process of its own, on a port the system chose."""
-
-    def __init__(self, cache: Path) -> None:
-        self.started_s = time.perf_counter()
-        self._process = subprocess.Popen(
-            [Path(sys.executable).with_name("transientcam"), "serve", "--port", "0"],
-            env=os.environ | {"NUMBA_CACHE_DIR": str(cache), "PYTHONUNBUFFERED": "1"},
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        assert self._process.stdout is not None
-        found = None
-        while found is None:
-            line = self._process.stdout.readline()
-            if not line:
-                raise RuntimeError("the daemon ended before it said where it serves")
-            found = re.search(r"http://\S+", line)
-        self.url = found.group()
-        self.address_s = self.age_s()
-
-    def age_s(self) -> float:
-        """Return the time since the process was started, in s."""
-        return time.perf_counter() - self.started_s
-
-    def cpu_s(self) -> float:
-        """Return the processor time spent so far, in s."""
-        stat = Path(f"/proc/{self._process.pid}/stat").read_text(encoding="utf-8")
-        fields = stat.rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) * CLOCK_TICKS_S
-
-    def end(self) -> None:
-        """Ask it to end, and wait until it has."""
-        self._process.send_signal(signal.SIGTERM)
-        self._process.communicate(timeout=15)
-
-
-@contextmanager
-def daemon(cache: Path) -> Iterator[Daemon]:
-    """Run a daemon until the block ends."""
-    running = Daemon(cache)
-    try:
-        yield running
-    finally:
-        running.end()
-
-
 def measure_start(cache: Path) -> Start:
     """Return when address, range map and picture were there; the browser itself already runs."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium")
         page = browser.new_page()
-        with daemon(cache) as running:
+        with daemon(environment={"NUMBA_CACHE_DIR": str(cache)}) as running:
             with transientcam.Camera(running.url) as camera:
                 camera.frame("range", wait_s=10.0)
                 range_map_s = running.age_s()
@@ -123,7 +72,11 @@ def measure_start(cache: Path) -> Start:
 
 def measure_stream(cache: Path, *, duration_s: float) -> Streamed:
     """Return what a client gets that takes range and coefficients for ``duration_s``."""
-    with daemon(cache) as running, transientcam.Camera(running.url) as camera:
+    environment = {"NUMBA_CACHE_DIR": str(cache)}
+    with (
+        daemon(environment=environment) as running,
+        transientcam.Camera(running.url) as camera,
+    ):
         applied = camera.configure(**VIDEO)
         latencies_ms, numbers = [], set()
         with camera.stream("range", "coefficients") as frames:

@@ -1,0 +1,91 @@
+"""A daemon in a process of its own, as a user would start it, and what it spends."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+_QUIET = {"PYTHONUNBUFFERED": "1", "TRANSIENTCAM_LOG_LEVEL": "warning"}
+CLOCK_TICKS_S = 1 / os.sysconf("SC_CLK_TCK")
+
+
+class Process:
+    """A program that prints where it serves."""
+
+    def __init__(self, command: Sequence[str | Path], environment: Mapping[str, str]) -> None:
+        self.started_s = time.perf_counter()
+        self._process = subprocess.Popen(
+            command,
+            env=os.environ | _QUIET | dict(environment),
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self._process.stdout is not None
+        found = None
+        while found is None:
+            line = self._process.stdout.readline()
+            if not line:
+                raise RuntimeError("the program ended before it said where it serves")
+            found = re.search(r"(http|ws)://\S+", line)
+        self.url = found.group()
+        self.address_s = self.age_s()
+
+    def age_s(self) -> float:
+        """Return the time since the process was started, in s."""
+        return time.perf_counter() - self.started_s
+
+    def cpu_s(self) -> float:
+        """Return the processor time spent so far, in s."""
+        stat = Path(f"/proc/{self._process.pid}/stat").read_text(encoding="utf-8")
+        fields = stat.rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) * CLOCK_TICKS_S
+
+    def resident_bytes(self) -> int:
+        """Return the memory it occupies."""
+        status = Path(f"/proc/{self._process.pid}/status").read_text(encoding="utf-8")
+        found = re.search(r"VmRSS:\s+(\d+) kB", status)
+        assert found is not None
+        return 1024 * int(found.group(1))
+
+    def descriptors(self) -> int:
+        """Return how many files, sockets and pipes it has open."""
+        return sum(1 for _ in Path(f"/proc/{self._process.pid}/fd").iterdir())
+
+    def threads(self) -> int:
+        """Return how many threads it runs."""
+        return sum(1 for _ in Path(f"/proc/{self._process.pid}/task").iterdir())
+
+    def end(self) -> None:
+        """Ask it to end, and wait until it has."""
+        self._process.send_signal(signal.SIGTERM)
+        try:
+            self._process.communicate(timeout=15)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            raise
+
+
+@contextmanager
+def running(
+    command: Sequence[str | Path], environment: Mapping[str, str] | None = None
+) -> Iterator[Process]:
+    """Run a program until the block ends."""
+    process = Process(command, environment or {})
+    try:
+        yield process
+    finally:
+        process.end()
+
+
+@contextmanager
+def daemon(*options: str, environment: Mapping[str, str] | None = None) -> Iterator[Process]:
+    """Run ``transientcam serve`` on a port the system chooses, until the block ends."""
+    program = Path(sys.executable).with_name("transientcam")
+    command: list[str | Path] = [program, "serve", "--port", "0", *options]
+    with running(command, environment) as process:
+        yield process
