@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -24,6 +25,11 @@ from transientcam_server.products import STAGES, Recipe
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
+Options = Mapping[str, str]
+"""Of a simulated camera's name."""
+NO_OPTIONS: Final[Options] = MappingProxyType({})
+WITHOUT_OUTLIERS: Final[Options] = MappingProxyType({"outliers": "off"})
+"""For single takes: there is nothing to tell outliers by, and the paper shows none in its."""
 DEVICE: Final = "prototype"
 """The make of camera: the paper's, as far as its figures are known."""
 WARM_UP_S: Final = 1800.0
@@ -81,9 +87,11 @@ class Bench:
         """Return how many of something to look at."""
         return quick if self.quick else full
 
-    def shot(self, scene: str, sequence: Sequence, **options: str) -> Shot:
+    def shot(
+        self, scene: str, sequence: Sequence, *, at_s: float = 0.0, options: Options = NO_OPTIONS
+    ) -> Shot:
         """Capture once; see `shots`."""
-        return self.shots(scene, sequence, **options)[0]
+        return self.shots(scene, sequence, at_s=at_s, options=options)[0]
 
     def shots(
         self,
@@ -92,7 +100,7 @@ class Bench:
         *,
         frames: int = 1,
         at_s: float = 0.0,
-        **options: str,
+        options: Options = NO_OPTIONS,
     ) -> list[Shot]:
         """Capture frames one after the other, and reconstruct them as the daemon would.
 
@@ -107,7 +115,7 @@ class Bench:
         at_s
             When to begin, after the warm-up.
         options
-            Further options of the camera's name, as in ``outliers="off"``.
+            Further options of the camera's name, as in `WITHOUT_OUTLIERS`.
         """
         sequence = self.sequence(sequence)
         key = (scene, sequence, frames, at_s, *sorted(options.items()))
@@ -131,13 +139,14 @@ class Bench:
             camera.stop()
             return images, camera.simulation.truth()
 
-    def calibration(self, sequence: Sequence, **options: str) -> Calibration:
+    def calibration(self, sequence: Sequence, *, options: Options = NO_OPTIONS) -> Calibration:
         """Return the calibration of a sequence: filter and diffusor before the lens (Fig. 4)."""
-        key = (replace(sequence, takes=1), *sorted(options.items()))
+        single = replace(sequence, takes=1)
+        key = (single, *sorted(options.items()))
         if key not in self._calibrations:
             with ExitStack() as stack:
                 camera = self._camera(stack, "calibration", options, 0.0)
-                camera.configure(key[0])
+                camera.configure(single)
                 takes = self.few(_CALIBRATION_TAKES, _QUICK_CALIBRATION_TAKES)
                 capture = capture_calibration(camera, takes=takes, average=tm.average_takes)
             self._calibrations[key] = evaluate(capture)
@@ -149,9 +158,9 @@ class Bench:
         sequence: Sequence,
         frames: int,
         at_s: float,
-        options: Mapping[str, str],
+        options: Options,
     ) -> list[Shot]:
-        calibration = self.calibration(sequence, **options)
+        calibration = self.calibration(sequence, options=options)
         shots = []
         with ExitStack() as stack:
             camera = self._camera(stack, scene, options, at_s)
@@ -169,12 +178,8 @@ class Bench:
             camera.stop()
         return shots
 
-    def _camera(
-        self, stack: ExitStack, scene: str, options: Mapping[str, str], at_s: float
-    ) -> Camera:
-        query = {"device": DEVICE, "seed": str(self.seed)} | {
-            name.replace("_", "-"): value for name, value in options.items()
-        }
+    def _camera(self, stack: ExitStack, scene: str, options: Options, at_s: float) -> Camera:
+        query = {"device": DEVICE, "seed": str(self.seed)} | dict(options)
         spec = f"sim:{scene}?" + "&".join(f"{name}={value}" for name, value in query.items())
         clock = VirtualClock()
         camera = stack.enter_context(open_camera(spec, clock=clock))

@@ -70,7 +70,7 @@ def capture(bench: Bench) -> CodedCapture:
     mean = images.reshape((takes, SEQUENCE.harmonics, 4, *images.shape[1:])).mean(axis=0)
     # opposite images: their difference has the odd harmonics alone
     samples = np.concatenate([mean[:, 0] - mean[:, 2], mean[:, 1] - mean[:, 3]])
-    smoothed = tm.smooth(samples.astype(np.complex64)).real.astype(np.float64)
+    smoothed = np.real(tm.smooth(samples.astype(np.complex64))).astype(np.float64)
     odd = np.where(np.arange(1, HARMONICS + 1) % 2, contents / contents[0], 0)
     multiples = np.arange(1, SEQUENCE.harmonics + 1)
     return CodedCapture(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_moments.comparisons import TECHNIQUES, Estimate, Technique
+from transientcam_server.paper.synthetic import Response
 
 _Array = NDArray[Any]
 OURS: Final = ("maximum-entropy", "pisarenko")
@@ -79,7 +80,7 @@ CONTENDERS: Final = (
 
 
 def samples(
-    contender: Contender, response: Any, *, noise: float, draws: int, rng: np.random.Generator
+    contender: Contender, response: Response, *, noise: float, draws: int, rng: np.random.Generator
 ) -> _Array:
     """Return what a contender measures of a response (N, draws), with Gaussian noise.
 
@@ -87,7 +88,7 @@ def samples(
     ----------
     contender
         Says at which frequencies.
-    response : synthetic.Response
+    response
         The light.
     noise
         Deviation of each real measurement over the brightness.
@@ -107,7 +108,7 @@ def samples(
     return noisy
 
 
-def _code_samples(contender: Contender, response: Any) -> _Array:
+def _code_samples(contender: Contender, response: Response) -> _Array:
     """Correlate a finely divided response with the code, at 62 shifts."""
     from transientcam_moments.comparisons.coded import equal_shifts_rad, maximum_length_code
 
@@ -115,13 +116,13 @@ def _code_samples(contender: Contender, response: Any) -> _Array:
     period_s = 1 / contender.base_frequency_hz
     edges_s = np.linspace(0, period_s, 8001)
     light = np.diff(response.cumulative(edges_s))
-    there = light > 0
-    middles = (edges_s[1:] + edges_s[:-1])[there] / 2
+    middles_s = (edges_s[1:] + edges_s[:-1]) / 2
+    at_s, weight = middles_s[light > 0], light[light > 0]
     if all(not each.width_s for each in response.returns):
-        middles = np.array([each.delay_s for each in response.returns])
-        light, there = np.array([each.weight for each in response.returns]), np.s_[:]
+        at_s = np.array([each.delay_s for each in response.returns])
+        weight = np.array([each.weight for each in response.returns])
     shifts = equal_shifts_rad(62)
     found: _Array = maximum_length_code().sample(
-        (turn * middles)[:, None], np.asarray(light[there])[:, None], shifts_rad=shifts
+        (turn * at_s)[:, None], weight[:, None], shifts_rad=shifts
     )[:, 0]
     return found

@@ -9,9 +9,6 @@ from transientcam_server.paper.bench import Bench
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Picture
 
-Cell = str | int | float | None
-"""Of a table; None where there is no value."""
-
 
 @dataclass(frozen=True, slots=True)
 class Statement:
@@ -98,11 +95,11 @@ def check(
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Figures beside a figure."""
+    """Figures beside a figure; cells are words, numbers, or None where there is no value."""
 
     title: str
     columns: Sequence[str]
-    rows: Sequence[Sequence[Cell]]
+    rows: Sequence[Sequence[Any]]
 
     def to_document(self) -> dict[str, Any]:
         """Return the fields for JSON."""

@@ -117,7 +117,8 @@ def _moments(shot: Shot, y: int, x: int) -> Table:
 def _draw(shot: Shot, y: int, x: int, phase: _Array) -> Any:
     with style.style():
         picture = style.new(11.0, 6.6)
-        upper, lower = picture.subfigures(2, 1, height_ratios=(1.0, 1.05))
+        halves: Any = picture.subfigures(2, 1, height_ratios=(1.0, 1.05))
+        upper, lower = halves
         left, middle, right = upper.subfigures(1, 3, width_ratios=(1.0, 1.25, 1.25))
         _draw_scene(left, shot, y, x)
         _draw_signal(middle, shot, y, x, phase)
@@ -129,9 +130,9 @@ def _draw(shot: Shot, y: int, x: int, phase: _Array) -> Any:
 def _draw_scene(part: Any, shot: Shot, y: int, x: int) -> None:
     axes = part.subplots()
     frame = shot.found.density(np.array([_FRAME_S]))[0]
-    drawn = style.show(axes, frame * 1e-9, f"(a, e) reconstruction, τ = {_FRAME_S * 1e9:.1f} ns")
+    style.show(axes, frame * 1e-9, f"(a, e) reconstruction, τ = {_FRAME_S * 1e9:.1f} ns")
     axes.plot(x, y, "o", color="white", markerfacecolor="none", markersize=9, markeredgewidth=1.6)
-    style.scale(part, drawn, axes, "density / (DN/ns)")
+    style.scale(part, axes, "density / (DN/ns)")
 
 
 def _draw_signal(part: Any, shot: Shot, y: int, x: int, phase: _Array) -> None:
@@ -145,6 +146,7 @@ def _draw_signal(part: Any, shot: Shot, y: int, x: int, phase: _Array) -> None:
         width = 1.6 if j < 7 else 0.8
         modulation.plot(phase, np.cos(j * phase), color=colour, linewidth=width, label=f"j = {j}")
     modulation.set(title="modulation cos(j φ)", xlabel="φ / rad", xlim=(0, 2 * np.pi))
+    modulation.set_ylim(-1.15, 1.9)
     modulation.legend(loc="upper right", ncols=3)
 
 
@@ -172,10 +174,8 @@ def _draw_moments(part: Any, shot: Shot, y: int, x: int) -> None:
     b = shot.found.moments
     most = float(np.percentile(b[0].real, 99))
     for j, axes in enumerate(panels.flat):
-        drawn = style.show(
-            axes, b[j].real, f"Re b_{j}", colours=style.SIGNED, least=-most, most=most
-        )
-    style.scale(part, drawn, list(panels.flat), "DN")
+        style.show(axes, b[j].real, f"Re b_{j}", colours=style.SIGNED, least=-most, most=most)
+    style.scale(part, list(panels.flat), "DN")
 
 
 FIGURE: Final = PaperFigure(

@@ -108,8 +108,9 @@ def _write(folder: Path, wave: _Array) -> Path:
 
 
 def _spectrum(curve: _Array) -> _Array:
-    spectrum: _Array = np.abs(np.fft.rfft(curve))[: _HIGHEST + 1]
-    return spectrum / spectrum[1]
+    spectrum = np.abs(np.fft.rfft(curve))[: _HIGHEST + 1]
+    relative: _Array = spectrum / spectrum[1]
+    return relative
 
 
 def _distortion(curve: _Array) -> float:

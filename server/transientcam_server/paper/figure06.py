@@ -138,11 +138,9 @@ def _draw(time_s: _Array, weight: _Array) -> Any:
         seen = weight > _SHOWN * weight[:1]
         most = float(np.percentile(weight[0], 99))
         for k, name in enumerate(_NAMES):
-            strength = style.show(
-                upper[k], np.where(seen[k], weight[k], 0), f"{name}: strength", most=most
-            )
+            style.show(upper[k], np.where(seen[k], weight[k], 0), f"{name}: strength", most=most)
             when = np.where(seen[k], time_s[k] * 1e9, np.nan)
-            time = style.show(
+            style.show(
                 lower[k],
                 when,
                 f"{name}: time of flight",
@@ -150,8 +148,8 @@ def _draw(time_s: _Array, weight: _Array) -> Any:
                 least=10.0,
                 most=30.0,
             )
-        style.scale(picture, strength, list(upper), "DN")
-        style.scale(picture, time, list(lower), "ns")
+        style.scale(picture, list(upper), "DN")
+        style.scale(picture, list(lower), "ns")
     return picture
 
 

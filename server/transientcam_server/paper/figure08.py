@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_server.paper import style
-from transientcam_server.paper.bench import Bench, Shot
+from transientcam_server.paper.bench import Bench, Options, Shot
 from transientcam_server.paper.figure import Made, PaperFigure, Statement, Table, check
 from transientcam_server.paper.mirrors import SEQUENCES, SINGLE_TAKE, TIMES_S, shots, thrice, title
 
 _Array = NDArray[Any]
-_DEVICES: Final[dict[str, dict[str, str]]] = {
+_DEVICES: Final[dict[str, Options]] = {
     "as captured": {},
-    "pure sinusoids": {"modulation_harmonics": "off", "lens_scatter": "off"},
+    "pure sinusoids": {"modulation-harmonics": "off", "lens-scatter": "off"},
 }
 """The camera with what its phase steps leave of the harmonics and its lens scatters, and "
 "without."""
@@ -38,7 +38,7 @@ def _biased_with(bench: Bench, name: str) -> dict[str, float]:
     """Return the share of biased pixels, as captured and without some of the device's errors."""
     shares = {}
     for device, options in _DEVICES.items():
-        shot = bench.shot("mirrors", SEQUENCES[name], **options)
+        shot = bench.shot("mirrors", SEQUENCES[name], options=options)
         b = np.array(shot.found.smoothed)
         shares[device] = _biased(b, shot)
         b[0] = shot.truth.brightness
@@ -278,16 +278,16 @@ def _why_biased(plain: dict[str, dict[str, float]]) -> Table:
 def _draw(first: dict[str, Shot]) -> Any:
     with style.style():
         picture = style.new(10.0, 7.6)
-        rows = picture.subfigures(3, 1)
+        rows: Any = picture.subfigures(3, 1)
         for part, (name, shot) in zip(rows, first.items(), strict=True):
             part.suptitle(title(name), fontsize=9.5, x=0.02, ha="left")
             panels = part.subplots(1, 3)
             density = _density(shot)
             for axes, frame, time_s in zip(panels, density, TIMES_S, strict=True):
-                drawn = style.show(
+                style.show(
                     axes, frame, f"τ = {time_s * 1e9:.1f} ns", most=float(np.percentile(frame, 99))
                 )
-                style.scale(part, drawn, axes, "DN/ns")
+                style.scale(part, axes, "DN/ns")
     return picture
 
 

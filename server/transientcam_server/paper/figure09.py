@@ -160,15 +160,15 @@ def _table(captures: dict[str, list[Shot]], errors: dict[str, _Errors]) -> Table
 def _draw(first: dict[str, Shot]) -> Any:
     with style.style():
         picture = style.new(10.0, 7.6)
-        rows = picture.subfigures(3, 1)
+        rows: Any = picture.subfigures(3, 1)
         for part, (name, shot) in zip(rows, first.items(), strict=True):
             part.suptitle(title(name), fontsize=9.5, x=0.02, ha="left")
             panels = part.subplots(1, 3)
             most = float(np.percentile(shot.truth.brightness, 99))
             frames = np.asarray(shot.found.cumulative(np.array(TIMES_S)))
             for axes, frame, time_s in zip(panels, frames, TIMES_S, strict=True):
-                drawn = style.show(axes, frame, f"until τ = {time_s * 1e9:.1f} ns", most=most)
-            style.scale(part, drawn, list(panels), "DN")
+                style.show(axes, frame, f"until τ = {time_s * 1e9:.1f} ns", most=most)
+            style.scale(part, list(panels), "DN")
     return picture
 
 

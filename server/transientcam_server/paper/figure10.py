@@ -180,17 +180,18 @@ def _draw(shot: Shot, walls: dict[str, _Wall]) -> Any:
     frames = np.asarray(shot.found.density(np.array(_TIMES_S))) * 1e-9
     with style.style():
         picture = style.new(11.0, 5.6)
-        upper, lower = picture.subfigures(2, 1)
+        parts: Any = picture.subfigures(2, 1)
+        upper, lower = parts
         panels = upper.subplots(1, 3)
         for axes, frame, time_s, letter in zip(panels, frames, _TIMES_S, "abc", strict=True):
             # the logarithm, so that the soft wave is seen beside the sharp one
-            drawn = style.show(
+            style.show(
                 axes,
                 np.log10(np.maximum(frame, 1e-3)),
                 f"({letter}) τ = {time_s * 1e9:.1f} ns",
                 most=4.3,
             )
-        style.scale(upper, drawn, list(panels), "log₁₀ of DN/ns")
+        style.scale(upper, list(panels), "log₁₀ of DN/ns")
         for axes, (name, wall) in zip(lower.subplots(1, 2), walls.items(), strict=True):
             _draw_pixel(axes, shot, name, wall)
     return picture

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_server.paper import coded_corner, style
-from transientcam_server.paper.bench import Bench, Shot
+from transientcam_server.paper.bench import WITHOUT_OUTLIERS, Bench, Shot
 from transientcam_server.paper.contenders import Contender
 from transientcam_server.paper.figure import Made, PaperFigure, Statement, Table, check
 
@@ -39,7 +39,6 @@ ENTRIES: Final = (
     Contender("matrix-pencil", _HALF, 7),
     Contender("matching-pursuit", _HALF, 8),
     Contender("frequency-domain", _HALF, 8),
-    Contender("high-frequency", _HALF, 8),
     Contender("maximum-entropy", _HALF, 8),
     Contender("pisarenko", _HALF, 8),
 )
@@ -86,7 +85,7 @@ def make(bench: Bench) -> Made:
     """Capture the corner twice, and let every technique find its ranges."""
     step = bench.few(4, 16)
     shots = {
-        sequence.base_frequency_hz: bench.shot("corner", sequence, outliers="off")
+        sequence.base_frequency_hz: bench.shot("corner", sequence, options=WITHOUT_OUTLIERS)
         for sequence in (DATA, MORE)
     }
     ranged = [
@@ -279,9 +278,9 @@ def _beaten(title: str, among: list[Ranged], best: Ranged) -> str:
         for each in rivals
         if each.median_m < best.median_m
     ]
-    told += "; better is " + ", ".join(better) if better else "; no rival is better"
+    told += "; better: " + ", ".join(better) if better else "; no rival is better"
     told += f". Its median absolute error is {1e3 * best.median_m:.1f} mm"
-    told += "; smaller is that of " + ", ".join(median) if median else "; no rival's is smaller"
+    told += "; smaller: " + ", ".join(median) if median else "; no rival's is smaller"
     return f"{told}."
 
 

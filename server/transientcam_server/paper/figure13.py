@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_server.paper import style
-from transientcam_server.paper.bench import Bench, Shot
+from transientcam_server.paper.bench import WITHOUT_OUTLIERS, Bench, Shot
 from transientcam_server.paper.figure import Made, PaperFigure, Statement, Table, check
 from transientcam_server.paper.visitor import MOMENTS_S, VIDEO, VIDEO_HZ, parts, video
 
@@ -24,7 +24,7 @@ def make(bench: Bench) -> Made:
     """Capture three moments of the video, and one with the exposure of the other figures."""
     frames = video(bench)
     longer = replace(VIDEO, exposure_s=_LONG_S)
-    bright = bench.shots("visitor", longer, frames=2, at_s=MOMENTS_S[0], outliers="off")
+    bright = bench.shots("visitor", longer, frames=2, at_s=MOMENTS_S[0], options=WITHOUT_OUTLIERS)
     return Made(
         _draw({at_s: pair[0] for at_s, pair in frames.items()}),
         _statements(frames, bright),
@@ -161,8 +161,8 @@ def _draw(frames: dict[float, Shot]) -> Any:
             most = float(np.percentile([each[column] for each in densities.values()], 99))
             for row, (at_s, density) in enumerate(densities.items()):
                 title = f"t = {at_s:g} s, τ = {time_s * 1e9:.1f} ns"
-                drawn = style.show(panels[row, column], density[column], title, most=most)
-            style.scale(picture, drawn, list(panels[:, column]), "DN/ns")
+                style.show(panels[row, column], density[column], title, most=most)
+            style.scale(picture, list(panels[:, column]), "DN/ns")
     return picture
 
 

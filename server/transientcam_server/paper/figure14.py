@@ -1,5 +1,6 @@
 """Figure 14: direct and indirect light in a transient video (Sec. 5.1, 6.3)."""
 
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -7,20 +8,20 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_server.paper import style
-from transientcam_server.paper.bench import Bench, Shot
+from transientcam_server.paper.bench import WITHOUT_OUTLIERS, Bench, Shot
 from transientcam_server.paper.figure import Made, PaperFigure, Statement, Table, check
 from transientcam_server.paper.visitor import MOMENTS_S, VIDEO, parts, video
 
 _Array = NDArray[Any]
 _OUTLIER: Final = 0.2
 """Share of a pixel's light that is put to the wrong side in an outlier."""
-_AMBIENT: Final = {"outliers": "off", "ambient": "on"}
+_AMBIENT: Final = {**WITHOUT_OUTLIERS, "ambient": "on"}
 
 
 def make(bench: Bench) -> Made:
     """Separate the frames of Figure 13, and once more by daylight."""
     frames = {at_s: pair[0] for at_s, pair in video(bench).items()}
-    daylight = bench.shot("visitor", VIDEO, at_s=MOMENTS_S[0], **_AMBIENT)
+    daylight = bench.shot("visitor", VIDEO, at_s=MOMENTS_S[0], options=_AMBIENT)
     return Made(_draw(frames), _statements(list(frames.values()), daylight), (_table(frames),))
 
 
@@ -151,7 +152,7 @@ def _table(frames: dict[float, Shot]) -> Table:
 
 
 def _draw(frames: dict[float, Shot]) -> Any:
-    rows = (
+    rows: tuple[tuple[str, Callable[[Shot], Any]], ...] = (
         ("direct and indirect", lambda shot: shot.found.direct + shot.found.indirect),
         ("direct", lambda shot: shot.found.direct),
         ("indirect", lambda shot: shot.found.indirect),
@@ -164,7 +165,7 @@ def _draw(frames: dict[float, Shot]) -> Any:
         for number, (name, image_of) in enumerate(rows):
             last = number == len(rows) - 1
             for axes, (at_s, shot) in zip(panels[number], frames.items(), strict=True):
-                drawn = style.show(
+                style.show(
                     axes,
                     np.asarray(image_of(shot)),
                     f"{name}, t = {at_s:g} s",
@@ -172,7 +173,7 @@ def _draw(frames: dict[float, Shot]) -> Any:
                     least=9.0 if last else 0.0,
                     most=16.0 if last else most,
                 )
-            style.scale(picture, drawn, list(panels[number]), "ns" if last else "DN")
+            style.scale(picture, list(panels[number]), "ns" if last else "DN")
     return picture
 
 

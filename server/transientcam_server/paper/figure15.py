@@ -174,19 +174,19 @@ def _draw(shot: Shot, row: int, streak: _Array, pairs: Shot) -> Any:
         style.show(left, frame, "the scanline in (a)")
         left.axhline(row, color=style.TRUTH, linewidth=2.0)
         _draw_streak(centre, streak, "(a) mirrors")
-        drawn = _draw_streak(right, closing, "(b) pairs, further apart with each column")
+        _draw_streak(right, closing, "(b) pairs, further apart with each column")
         for offset in (0.0, _APART_S):
             at_ns = (_FIRST_S + offset * np.arange(_WIDTH)) * 1e9
             right.plot(at_ns, np.arange(_WIDTH), color="white", linestyle=":", linewidth=0.8)
         right.set(xlim=(10, 22))
-        style.scale(picture, drawn, [centre, right], "log₁₀ of the density in DN/ns")
+        style.scale(picture, [centre, right], "log₁₀ of the density in DN/ns")
     return picture
 
 
-def _draw_streak(axes: Any, streak: _Array, title: str) -> Any:
+def _draw_streak(axes: Any, streak: _Array, title: str) -> None:
     extent = (_TIMES_S[0] * 1e9, _TIMES_S[-1] * 1e9, streak.shape[1] - 0.5, -0.5)
     # the logarithm, so that broad peaks are seen beside sharp ones
-    drawn = axes.imshow(
+    axes.imshow(
         np.log10(np.maximum(streak.T, 1e-3)),
         extent=extent,
         aspect="auto",
@@ -196,7 +196,6 @@ def _draw_streak(axes: Any, streak: _Array, title: str) -> Any:
     )
     axes.set(title=title, xlabel="τ / ns", ylabel="pixel along the scanline")
     axes.grid(visible=False)
-    return drawn
 
 
 FIGURE: Final = PaperFigure(

@@ -10,6 +10,8 @@ from transientcam_server.paper.figure import Made, PaperFigure
 PAGE: Final = "paper.md"
 FOLDER: Final = Path("figures") / "paper"
 DOCUMENT: Final = "paper.json"
+_NOTHING: Final = 1e-9
+"""What is not more is rounding, and shown as 0."""
 _PAPER: Final = "https://doi.org/10.1145/2816795.2818103"
 
 
@@ -82,7 +84,7 @@ def _head(figures: list[dict[str, Any]]) -> Iterator[str]:
     yield "# The paper, figure by figure"
     yield ""
     yield f"Written by `transientcam paper{quick} -o FOLDER`; `make paper` writes it into docs/."
-    yield f"Captures, reconstruction and drawing took {seconds:.0f} s."
+    yield f"Captures, reconstruction and drawing took {seconds:.0f} s of processor time."
     yield ""
     yield (
         f"The figures of [Peters et al. 2015]({_PAPER}), made by this software. Every capture "
@@ -98,7 +100,7 @@ def _head(figures: list[dict[str, Any]]) -> Iterator[str]:
         "reason is given below the table: the simulated scenes are like the paper's, not the same."
     )
     yield ""
-    yield "| figure | | statements that hold | seconds |"
+    yield "| figure | | statements that hold | processor seconds |"
     yield "|---|---|---|---|"
     for each in figures:
         own = [statement["passes"] for statement in each["statements"]]
@@ -131,12 +133,15 @@ def _figure(figure: dict[str, Any]) -> Iterator[str]:
         cells = (says, each["measure"], each["criterion"], each["shown"], verdict)
         yield f"| {' | '.join(map(_plain, cells))} |"
     yield ""
-    for each in figure["statements"]:
-        if not each["passes"]:
-            yield f"- **Differs:** “{each['says']}” ({each['shown']}): {each['reason']}."
-    for remark in figure["remarks"]:
-        yield f"- {remark}"
-    yield ""
+    notes = [
+        f"**Differs:** “{each['says']}” ({each['shown']}): {each['reason']}."
+        for each in figure["statements"]
+        if not each["passes"]
+    ]
+    notes += figure["remarks"]
+    if notes:
+        yield from (f"- {note}" for note in notes)
+        yield ""
     for table in figure["tables"]:
         yield from _table(table)
 
@@ -155,7 +160,9 @@ def _shown(cell: Any) -> str:
     if cell is None or (isinstance(cell, float) and cell != cell):
         return "–"
     if isinstance(cell, float):
-        return f"{cell:,.0f}" if abs(cell) >= 1000 else f"{cell:.3g}"
+        if abs(cell) >= 1000:
+            return f"{cell:,.0f}"
+        return f"{cell:.3g}" if abs(cell) > _NOTHING else "0"
     return str(cell)
 
 

@@ -43,7 +43,7 @@ _DPI = 110
 
 def style() -> Any:
     """Return a context in which pictures get their looks."""
-    return rc_context(_RC)
+    return rc_context(_RC)  # type: ignore[arg-type]  # its keys are typed one by one
 
 
 def new(width_in: float, height_in: float) -> Figure:
@@ -68,15 +68,14 @@ def show(
     colours: str = LIGHT,
     least: float | None = 0.0,
     most: float | None = None,
-) -> Any:
+) -> None:
     """Draw an image without ticks; ``most`` is its 99th percentile when left out."""
     finite = image[np.isfinite(image)]
     if most is None:
         most = max(float(np.percentile(finite, 99)), 1e-30) if finite.size else 1.0
-    drawn = axes.imshow(image, cmap=colours, vmin=least, vmax=most)
+    axes.imshow(image, cmap=colours, vmin=least, vmax=most)
     axes.set_title(title)
     bare(axes)
-    return drawn
 
 
 def bare(axes: Axes) -> None:
@@ -87,16 +86,9 @@ def bare(axes: Axes) -> None:
         spine.set_visible(False)
 
 
-def scale(picture: Figure | SubFigure, drawn: Any, axes: Axes | Sequence[Axes], label: str) -> None:
-    """Put a colour bar beside panels."""
-    bar = picture.colorbar(drawn, ax=axes, shrink=0.85, pad=0.02)
+def scale(picture: Figure | SubFigure, axes: Axes | Sequence[Axes], label: str) -> None:
+    """Put a colour bar beside panels: that of the image in the last one."""
+    last = axes if isinstance(axes, Axes) else axes[-1]
+    bar = picture.colorbar(last.images[0], ax=axes, shrink=0.85, pad=0.02)
     bar.set_label(label)
-    bar.outline.set_visible(False)  # type: ignore[operator]  # matplotlib types it as a callable
-
-
-def steps(phases: _Array, weights: _Array, end: float) -> tuple[_Array, _Array]:
-    """Return the corners of the cumulative sum of returns, from 0 to ``end``."""
-    order = np.argsort(phases)
-    x = np.concatenate([[0.0], np.repeat(phases[order], 2), [end]])
-    summed = np.concatenate([[0.0], np.cumsum(weights[order])])
-    return x, np.repeat(summed, 2)
+    bar.outline.set_visible(False)

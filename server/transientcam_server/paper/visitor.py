@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import Sequence
-from transientcam_server.paper.bench import Bench, Shot
+from transientcam_server.paper.bench import WITHOUT_OUTLIERS, Bench, Shot
 
 _Array = NDArray[Any]
 VIDEO: Final = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005)
@@ -22,7 +22,7 @@ def video(bench: Bench) -> dict[float, list[Shot]]:
     The paper fills what outliers took with the frame before; ours are taken without outliers.
     """
     return {
-        at_s: bench.shots("visitor", VIDEO, frames=2, at_s=at_s, outliers="off")
+        at_s: bench.shots("visitor", VIDEO, frames=2, at_s=at_s, options=WITHOUT_OUTLIERS)
         for at_s in MOMENTS_S[: bench.few(3, 2)]
     }
 

@@ -5,7 +5,7 @@ import pytest
 
 from transientcam_driver import Sequence
 from transientcam_server.paper import Bench
-from transientcam_server.paper.bench import Shot
+from transientcam_server.paper.bench import WITHOUT_OUTLIERS, Shot
 
 SEQUENCE = Sequence(harmonics=3, takes=20)
 
@@ -29,7 +29,7 @@ def test_a_capture_is_made_once_and_a_calibration_once_for_all_takes(bench: Benc
 
     assert bench.shot("wall", SEQUENCE) is bench.shot("wall", SEQUENCE)
     assert bench.calibration(Sequence(harmonics=3, takes=2)) is calibration
-    assert bench.calibration(SEQUENCE, outliers="off") is not calibration
+    assert bench.calibration(SEQUENCE, options=WITHOUT_OUTLIERS) is not calibration
 
 
 def test_quick_means_few_takes(bench: Bench, wall: Shot) -> None:

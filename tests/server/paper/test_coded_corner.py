@@ -5,6 +5,7 @@ import pytest
 
 from transientcam_moments.comparisons.coded import maximum_length_code
 from transientcam_server.paper import Bench, coded_corner
+from transientcam_server.paper.bench import WITHOUT_OUTLIERS
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +18,7 @@ def test_samples_are_odd_harmonics_of_the_scenes_moments(
     capture: coded_corner.CodedCapture, bench: Bench, x: int, y: int
 ) -> None:
     time_s, light = bench.shot(
-        "corner", coded_corner.SEQUENCE, outliers="off"
+        "corner", coded_corner.SEQUENCE, options=WITHOUT_OUTLIERS
     ).truth.impulse_response(x, y)
     contents = maximum_length_code().contents.real
     found = capture.samples[:, y, x]

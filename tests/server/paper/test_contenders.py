@@ -8,7 +8,7 @@ from transientcam_moments.comparisons import TECHNIQUES
 from transientcam_moments.comparisons.coded import maximum_length_code
 from transientcam_server.paper.contenders import CONTENDERS, OURS, PRINTED, Contender, samples
 from transientcam_server.paper.figure12 import ENTRIES
-from transientcam_server.paper.synthetic import CONTINUOUS, SPARSE
+from transientcam_server.paper.synthetic import CONTINUOUS, SPARSE, Response
 
 CODED = next(each for each in CONTENDERS if each.name == "coded")
 
@@ -71,11 +71,11 @@ def test_noise_is_the_same_share_of_the_brightness_in_every_real_measurement() -
 
 
 @pytest.mark.parametrize("response", [SPARSE, CONTINUOUS], ids=lambda each: each.name)
-def test_samples_of_a_code_are_moments_times_its_harmonics(response: object) -> None:
+def test_samples_of_a_code_are_moments_times_its_harmonics(response: Response) -> None:
     y = samples(CODED, response, noise=0.0, draws=1, rng=_rng())[:, 0]
 
     contents = maximum_length_code().contents[:8]
-    moments = response.moments(23e6, 8)[1:]  # type: ignore[attr-defined]  # both are responses
+    moments = response.moments(23e6, 8)[1:]
     spectrum = np.fft.fft(y)[1:9].conj() * 2 / y.size  # y = Re sum c b exp(-i k theta)
     # 62 shifts alias harmonics beyond the 31st
     assert np.abs(spectrum - contents * moments).max() < 0.05 * abs(contents[0])
