@@ -49,7 +49,7 @@ export function kindOf(problem: Problem): string {
 
 type Fetch = typeof fetch;
 
-interface Details {
+interface RequestDetails {
   readonly body?: unknown;
   readonly signal?: AbortSignal;
   /** Goes out even if the page is closed meanwhile. */
@@ -93,9 +93,8 @@ export class Api {
   }
 
   /** The number of a frame after `frame`, as soon as there is one; the service waits for it some seconds. */
-  async frameAfter(frame: number, wait_s: number, signal?: AbortSignal): Promise<number> {
-    const query = `after=${frame}&wait_s=${wait_s}`;
-    const meta = await this.#json("GET", `/frames/latest?${query}`, { ...(signal === undefined ? {} : { signal }) });
+  async frameAfter(frame: number, wait_s: number): Promise<number> {
+    const meta = await this.#json("GET", `${LIVE}?after=${frame}&wait_s=${wait_s}`);
     return (meta as { frame: number }).frame;
   }
 
@@ -266,13 +265,13 @@ export class Api {
     return answer.blob();
   }
 
-  async #json(method: string, path: string, details: Details | { body: unknown } = {}): Promise<unknown> {
+  async #json(method: string, path: string, details: RequestDetails = {}): Promise<unknown> {
     const answer = await this.#ask(method, path, details);
     await this.#refuse(answer);
     return answer.json();
   }
 
-  async #ask(method: string, path: string, { body, signal, keepalive, headers }: Details): Promise<Response> {
+  async #ask(method: string, path: string, { body, signal, keepalive, headers }: RequestDetails): Promise<Response> {
     const raw = body instanceof Blob;
     try {
       return await this.#fetch(`/api/v1${path}`, {

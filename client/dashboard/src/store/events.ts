@@ -54,8 +54,6 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
       return { words: notice.reason ? `The camera was lost: ${notice.reason}` : "The camera was lost.", tone: "bad" };
     case "camera-back":
       return { words: "The camera is back.", tone: "good" };
-    case "lost-images":
-      return { words: `${grouped(notice.count)} ${notice.count === 1 ? "image" : "images"} did not arrive from the camera intact.`, tone: "bad" };
     case "sequence-changed": {
       const { harmonics, exposure_s, images, base_frequency_hz } = notice.sequence;
       const figures = `${engineering(base_frequency_hz, "Hz")}, m = ${harmonics}, ${engineering(exposure_s, "s")}, ${images} images`;
@@ -83,7 +81,7 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
       return { words: `The recording ${why}.${notice.problem ? ` ${notice.problem}` : ""}`, tone };
     }
     default:
-      return null; // drops have their figure
+      return null; // drops and lost images have their figures
   }
 }
 

@@ -1,10 +1,11 @@
 import { beforeEach, describe, expect, test } from "vitest";
 
 import { Api } from "../../src/store/api";
+import type { RecordingDocument } from "../../src/store/documents";
 import { Store } from "../../src/store/store";
 import { StreamClient, type WorkerPort } from "../../src/stream/client";
 import type { FrameMeta, FrameMessage, Hello } from "../../src/stream/protocol";
-import { summarised } from "../../src/stream/summary";
+import { type FrameReport, summarised } from "../../src/stream/summary";
 import type { Command, Report } from "../../src/stream/worker";
 import { AnimationLoop } from "../../src/ui/animation";
 
@@ -139,5 +140,47 @@ describe("between worker and store", () => {
     expect(page.store.status.stale.value).toBe(true);
     page.client.retryNow();
     expect(page.sent.at(-1)).toEqual({ type: "retry" });
+  });
+
+  test("while a recording is shown no frame of the camera is drawn; after that the page subscribes anew", async () => {
+    page.store.replay.loader = () => new Promise(() => undefined);
+    page.store.replay.recording.value = { id: "r" } as RecordingDocument;
+    page.receives(frame("range", 4));
+    page.refreshes();
+    expect(page.store.frames.of("range").value).toBeNull();
+    expect(page.acknowledged).toEqual([]);
+    page.store.replay.leave();
+    expect(page.sent.at(-1)).toEqual({ type: "want", products: ["brightness", "range"] });
+    page.receives(frame("range", 5));
+    page.refreshes();
+    expect(page.store.frames.of("range").value?.values[0]).toBe(5);
+  });
+
+  test("what is fetched of a recording comes before a refresh, or says why it does not", async () => {
+    const bringing = page.store.replay.loader?.("/recordings/r/frames/3", ["range"]);
+    expect(page.sent.at(-1)).toEqual({ type: "bring", ticket: 1, path: "/api/v1/recordings/r/frames/3", products: ["range"] });
+    const brought = frame("range", 3) as FrameReport;
+    page.receives({ type: "brought", ticket: 1, reports: [brought], problem: null });
+    page.refreshes();
+    expect(await bringing).toEqual([brought]);
+    const refused = page.store.replay.loader?.("/recordings/r/frames/4", ["range"]);
+    page.receives({ type: "brought", ticket: 2, reports: [], problem: { title: "No such frame" } });
+    await expect(refused).rejects.toThrow("No such frame");
+  });
+
+  test("a service that lets nobody in without a token makes the page ask for one, and hears of it", () => {
+    const problem = { type: "/problems/token-required", title: "Who are you?", status: 401 };
+    page.receives({ type: "message", message: { type: "error", problem } }, { type: "refused" });
+    expect(page.store.status.unreadable.value).toBeNull();
+    expect(page.store.status.connection.value).toEqual({ kind: "refused" });
+    expect(page.store.asksForToken.value).toBe(true);
+    page.store.api.credentials.use("tc_secret");
+    expect(page.sent.at(-1)).toEqual({ type: "authenticate", token: "tc_secret" });
+  });
+
+  test("notices become what happened", () => {
+    page.receives({ type: "message", message: { type: "notice", kind: "lease-changed", change: "granted", holder: "bench 2" } });
+    page.receives({ type: "message", message: { type: "notice", kind: "lost-images", count: 2 } });
+    expect(page.store.events.all.value.map(({ words }) => words)).toEqual(["bench 2 has taken control."]);
   });
 });

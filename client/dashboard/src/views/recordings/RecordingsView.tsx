@@ -29,7 +29,7 @@ export function RecordingsView() {
       title={<h2>Recordings</h2>}
       tools={known?.free_bytes != null && <span class="quiet" title={known.directory}>{bytes(known.free_bytes)} free</span>}
     >
-      <div class="recordings">
+      <div class="panel-body">
         {recordings.active.value === null ? <RecordForm task={task} /> : <Running recording={recordings.active.value} task={task} />}
         <TaskLine task={task} field="recordings-status" />
         {recordings.trouble.value !== null && <p class="refusal">{recordings.trouble.value}</p>}
