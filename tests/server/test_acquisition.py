@@ -267,7 +267,8 @@ def test_meanwhile_nothing_is_read_and_what_would_disturb_it_is_refused() -> Non
             assert caught.value.kind is kinds.CAMERA_BUSY
             assert caught.value.extensions["job"] == "job-1"
         assert one.acquisition.status().state == "calibrating"
-        assert one.acquisition.device_status().result(PATIENCE_S) == "fine"
+        status: Any = one.acquisition.device_status().result(PATIENCE_S)
+        assert status == "fine"
         assert one.events.empty()
         end.set()
         occupied.result(PATIENCE_S)
