@@ -30,7 +30,8 @@ def directory(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def daemon(directory: Path) -> Iterator[Served]:
-    with serving(recordings={"directory": directory, "min_free_bytes": 0}) as served:
+    kept, history = {"directory": directory, "min_free_bytes": 0}, {"seconds": 3600.0}
+    with serving(recordings=kept, history=history) as served:
         yield served
 
 
@@ -94,7 +95,7 @@ def test_what_just_happened_can_be_saved(
 ) -> None:
     http.get("/api/v1/frames/6", params={"wait_s": 10.0})
 
-    started = http.post(RECORDINGS, json={"history_s": 10.0}).json()
+    started = http.post(RECORDINGS, json={"history_s": 3600.0}).json()
     number = http.get("/api/v1/frames/latest").json()["frame"]
     http.get("/api/v1/frames/latest", params={"after": number + 1, "wait_s": 10.0})
     document = http.post(f"{RECORDINGS}/{started['id']}/stop").json()
