@@ -131,5 +131,7 @@ def status_line(status: AcquisitionStatus) -> str:
             return f"no frame for {status.frame_age_s:.0f} s"
         case "starting":
             return "the camera is starting"
+        case _ if not status.frames:
+            return "waiting for the first frame"
     rate = "" if status.rate_hz is None else f" at {status.rate_hz:.1f} Hz"
     return f"frame {status.frames}{rate}"

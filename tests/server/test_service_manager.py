@@ -72,8 +72,11 @@ def manager(tmp_path: Path) -> Iterator[Listener]:
 class FakeAcquisition:
     """As much of an acquisition as is asked."""
 
-    def __init__(self, state: State = "streaming", *, stalled: bool = False) -> None:
+    def __init__(
+        self, state: State = "streaming", *, stalled: bool = False, frames: int = 42
+    ) -> None:
         self.state: State = state
+        self.frames = frames
         self.stalled = stalled
         self.stuck = False
 
@@ -82,7 +85,7 @@ class FakeAcquisition:
             state=self.state,
             running=True,
             rate_hz=10.6,
-            frames=42,
+            frames=self.frames,
             frame_age_s=7.0,
             reason="unplugged" if self.state == "lost" else None,
             stalled=self.stalled,
@@ -198,6 +201,7 @@ def test_a_watchdog_hears_of_us_several_times_before_it_bites() -> None:
     [
         (FakeAcquisition(), "frame 42 at 10.6 Hz"),
         (FakeAcquisition("starting"), "the camera is starting"),
+        (FakeAcquisition(frames=0), "waiting for the first frame"),
         (FakeAcquisition("lost"), "the camera is lost: unplugged"),
         (FakeAcquisition("stopped"), "the capture is stopped"),
         (FakeAcquisition("calibrating"), "a calibration is being measured"),
