@@ -12,16 +12,25 @@ interface DialogProps {
 /** Something over the page that is to be answered or closed; the browser keeps the focus in it. */
 export function Dialog({ open, title, onClose, children }: DialogProps) {
   const dialog = useRef<HTMLDialogElement>(null);
+  /** The page closed it; the browser says so later, when it may be open again. */
+  const closing = useRef(false);
   useEffect(() => {
-    if (open && !dialog.current?.open) dialog.current?.showModal();
-    else if (!open) dialog.current?.close();
+    if (open && !dialog.current?.open) {
+      dialog.current?.showModal();
+    } else if (!open && dialog.current?.open) {
+      closing.current = true;
+      dialog.current.close();
+    }
   }, [open]);
   return (
     <dialog
       ref={dialog}
       class="dialog"
       aria-label={title}
-      onClose={onClose}
+      onClose={() => {
+        if (!closing.current) onClose();
+        closing.current = false;
+      }}
       onClick={(event) => {
         if (event.target === dialog.current) onClose(); // beside it
       }}
