@@ -104,9 +104,10 @@ def test_what_just_happened_can_be_saved(
     assert document["frames"] >= started["history_frames"] + 1
     with Recording(directory / f"{document['id']}.h5") as recording:
         numbers = recording.series("frame")
-        # from the first frame on, without a gap and without a frame twice
-        np.testing.assert_array_equal(numbers, np.arange(len(numbers)) + numbers[0])
-        assert numbers[0] <= captured[0].number
+        # every frame that was captured, and none twice; a busy machine loses some before that
+        known = [raw.number for raw in captured if raw.number <= numbers[-1]]
+        assert [each for each in numbers if each >= known[0]] == known
+        assert (np.diff(numbers.astype(int)) > 0).all()
         by_number = {raw.number: raw for raw in captured}
         for raw in recording:
             if raw.number in by_number:
