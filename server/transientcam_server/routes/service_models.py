@@ -18,7 +18,12 @@ class InfoDocument(Document):
                     "name": "transientcam",
                     "version": "0.1.0",
                     "api": "v1",
-                    "stream": {"path": "/api/v1/stream", "subprotocol": "transientcam.v1.msgpack"},
+                    "stream": {
+                        "path": "/api/v1/stream",
+                        "subprotocol": "transientcam.v1.msgpack",
+                        "asyncapi": "/asyncapi.json",
+                        "encodings": ["f32", "u16", "reflection16"],
+                    },
                     "products": [
                         {
                             "name": "range",
