@@ -12,7 +12,7 @@ DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f 
 DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test check bench docs clean dashboard debian-packages
+.PHONY: help serve test check bench paper docs clean dashboard debian-packages
 
 help:  ## Say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 16
@@ -35,6 +35,9 @@ check: .venv/test.stamp client/dashboard/node_modules/.package-lock.json  ## Lin
 bench: .venv/test.stamp  ## Measure speed, everything in one run on the same data
 	$(BIN)/python -m benchmarks
 
+paper: .venv/test.stamp  ## Make the paper's figures, beside what the paper says of them (docs/paper.md)
+	$(BIN)/transientcam paper -o docs
+
 docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (half an hour on a quiet machine)
 	$(BIN)/python -m benchmarks.reference --write
 	$(BIN)/python -m benchmarks --write
@@ -44,6 +47,8 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (ha
 	$(BIN)/python -m benchmarks.simulation --write
 	$(BIN)/python -m benchmarks.recording --write
 	$(BIN)/python -m benchmarks.first_light --write
+	$(BIN)/python -m benchmarks.stream_load --write
+	$(BIN)/transientcam paper -o docs
 
 clean:  ## Remove everything that was built or installed here
 	rm -rf .venv build dist client/dashboard/node_modules $(dir $(PAGE))

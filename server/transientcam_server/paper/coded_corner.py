@@ -86,7 +86,7 @@ def _write(folder: Path, contents: _Array) -> Path:
     """Write the corner with a device of its own, its light weakened, and other light."""
     phase = 2 * np.pi * np.arange(_WAVE) / _WAVE
     orders = np.arange(1, HARMONICS + 1)
-    wave = (np.exp(1j * phase[:, None] * orders) @ contents).real
+    wave = np.real(np.exp(1j * phase[:, None] * orders) @ contents)
     np.save(folder / "code.npy", wave[None])
     (corner,) = (each.path for each in list_scenes() if each.name == "corner")
     text = corner.read_text(encoding="utf-8")
