@@ -108,6 +108,8 @@ async def _http(
         nonlocal start, body
         if message["type"] == "http.response.start":
             start = message
+        if (b"content-type", b"multipart") in [(k, v[:9]) for k, v in start["headers"]]:
+            await send(message)  # it has no end
         elif message["type"] == "http.response.body":
             body += message.get("body", b"")
             if not message.get("more_body"):

@@ -52,8 +52,8 @@ def test_a_broken_promise_fails_its_check(
     breakable: Breakable, name: str, breaking: Breaking, word: str
 ) -> None:
     breakable.breaker.current = breaking
-    # what is large takes its time also where it is broken
-    patience_s = PATIENCE_S if BY_NAME[name].group == "sizes" else SHORT_S
+    # some things take their time also where they are broken
+    patience_s = PATIENCE_S if BY_NAME[name].group in ("routes", "sizes") else SHORT_S
     with Device(breakable.served.url, patience_s=patience_s) as device:
         result = run(device, only(name)).results[0]
 

@@ -46,6 +46,8 @@ class Device:
             base_url=self.address.url, **http_options(token=token, timeout_s=patience_s)
         )
         self._lease_id: str | None = None
+        self.answers: list[tuple[dict[str, Any], httpx.Response]] = []
+        """What routes were read already, each with its description."""
 
     # -- requests ------------------------------------------------------------------------------
 

@@ -14,6 +14,7 @@ from transientcam.translation import media_type
 
 _OF_THE_SERVICE: Final = frozenset(("403", "408", "413", "429", "431"))
 """Any request may be refused with these, whatever it asks for."""
+_PATIENCES: Final = 6.0
 ROUTES: Final = (
     "GET /info",
     "GET /camera",
@@ -125,16 +126,22 @@ def _operations(device: Device) -> Iterator[tuple[str, str, dict[str, Any]]]:
                 yield path, method.upper(), operation
 
 
-def _answers(device: Device) -> Iterator[tuple[dict[str, Any], httpx.Response]]:
-    """Read every route there is, each with the example that its description gives."""
-    for path, method, operation in _operations(device):
-        if method == "GET":
+def _answers(device: Device) -> list[tuple[dict[str, Any], httpx.Response]]:
+    """Read every route there is, once, each with the example that its description gives."""
+    if not device.answers:
+        for path, method, operation in _operations(device):
+            if method != "GET":
+                continue
             query = {
                 each["name"]: _example(each)
                 for each in operation.get("parameters", ())
                 if each["in"] == "query" and each.get("required")
             }
-            yield operation, device.peek(_concrete(path, operation), params=query)
+            # some compute for long, and more so on a machine that is busy
+            patience_s = _PATIENCES * device.patience_s
+            response = device.peek(_concrete(path, operation), params=query, timeout=patience_s)
+            device.answers.append((operation, response))
+    return device.answers
 
 
 def _concrete(path: str, operation: Mapping[str, Any]) -> str:
