@@ -38,7 +38,7 @@ bench: .venv/test.stamp  ## Measure speed, everything in one run on the same dat
 paper: .venv/test.stamp  ## Make the paper's figures, beside what the paper says of them (docs/paper.md)
 	$(BIN)/transientcam paper -o docs
 
-docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (half an hour on a quiet machine)
+docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (more than an hour on a quiet machine)
 	$(BIN)/python -m benchmarks.reference --write
 	$(BIN)/python -m benchmarks --write
 	$(BIN)/python -m benchmarks.stability
@@ -48,6 +48,8 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (ha
 	$(BIN)/python -m benchmarks.recording --write
 	$(BIN)/python -m benchmarks.first_light --write
 	$(BIN)/python -m benchmarks.stream_load --write
+	$(BIN)/python -m benchmarks.robustness --write
+	$(BIN)/python -m benchmarks.soak --write
 	$(BIN)/transientcam paper -o docs
 
 clean:  ## Remove everything that was built or installed here
