@@ -9,7 +9,8 @@ import logging
 import os
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,7 @@ from transientcam_server.settings import CalibrationSettings
 _log = logging.getLogger(__name__)
 SUFFIX: Final = ".npz"
 _ACTIVE: Final = "active.json"
+_ABANDONED_S: Final = 24 * 3600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +65,15 @@ class Calibrations:
         One that the service was started with, wherever it is.
     """
 
-    def __init__(self, settings: CalibrationSettings, *, given: Path | None = None) -> None:
+    def __init__(
+        self,
+        settings: CalibrationSettings,
+        *,
+        given: Path | None = None,
+        unix_s: Callable[[], float] = time.time,
+    ) -> None:
         self._settings = settings
+        self._unix_s = unix_s
         self._given = given
         self._lock = threading.Lock()
         self._known: dict[Path, tuple[tuple[int, int], Stored | None]] = {}
@@ -217,6 +226,7 @@ class Calibrations:
         """
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
+            self._sweep()
             descriptor, name = tempfile.mkstemp(suffix=".part", dir=self.directory)
         except OSError as error:
             raise self.not_stored(error) from error
@@ -228,6 +238,13 @@ class Calibrations:
         _log.warning("storing a calibration in %s failed: %s", self.directory, error)
         reason = error.strerror or "no reason is given"
         return Problem(kinds.CALIBRATION_NOT_STORED, f"The disk does not take it: {reason}.")
+
+    def _sweep(self) -> None:
+        """Remove what a service left behind that died while it received something."""
+        for part in self.directory.glob("*.part"):
+            with suppress(FileNotFoundError):  # its owner was quicker
+                if part.stat().st_mtime < self._unix_s() - _ABANDONED_S:
+                    part.unlink()
 
     def _take(self, part: Path, capture: CalibrationCapture) -> Stored:
         path = self.directory / (capture.id + SUFFIX)
