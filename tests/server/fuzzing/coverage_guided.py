@@ -6,7 +6,7 @@ somebody ends it, or as long as ``-runs`` says; what it finds it writes to a fil
 
 import sys
 
-import atheris
+import atheris  # type: ignore[import-untyped]  # its stubs are another package
 
 # what is imported within is watched
 with atheris.instrument_imports(include=["transientcam.wire", "transientcam_driver.calibration"]):
