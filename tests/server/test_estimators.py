@@ -1,6 +1,7 @@
 """The daemon takes its range from any technique that keeps up, and says where one cannot."""
 
 from functools import cache
+from pathlib import Path
 from typing import get_args
 
 import httpx
@@ -132,3 +133,14 @@ def test_computing_time_is_that_of_sequences_which_the_estimator_takes() -> None
         once, often = (seconds(Sequence(harmonics=6, takes=takes)) for takes in (1, 20))
 
     assert 0 < once <= often
+
+
+def test_the_page_of_estimators_says_what_the_techniques_say() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "estimators.md").read_text(encoding="utf-8")
+
+    for technique in tm.comparisons.TECHNIQUES.values():
+        assert f"**{technique.name}**, {technique.label}\n" in page
+        for words in (technique.assumptions, technique.cost, technique.failure):
+            assert words in page
+    measured = [name for name in get_args(Estimator) if f"| `{name}` |" in page]
+    assert measured == list(get_args(Estimator))
