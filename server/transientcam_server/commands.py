@@ -88,7 +88,7 @@ def serve(
     settings = load_settings(command_line, file=config, environment=os.environ)
 
     import transientcam_moments as tm
-    from transientcam_server import run
+    from transientcam_server import long_lived, run
     from transientcam_server.app import build_app
     from transientcam_server.cameras import open_camera
 
@@ -98,8 +98,10 @@ def serve(
         url = run.address(listener, tls=settings.tls_certificate is not None)
         with open_camera(settings.camera) as opened:
             # NumPy serves until the compiled kernels are ready
-            leave(tm.kernels.compile_in_background())
+            compiling = tm.kernels.compile_in_background()
+            leave(compiling)
             app = build_app(opened, settings)
+            long_lived.set_aside_after(compiling)
             run.serve(
                 app,
                 settings,
