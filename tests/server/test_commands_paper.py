@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from transientcam.cli import run
@@ -41,3 +42,36 @@ def test_an_unknown_figure_is_refused_before_anything_is_made(
     said = " ".join(capfd.readouterr().err.split())
     assert "4 is none of 2, 3, 5" in said
     assert not (tmp_path / "out").exists()
+
+
+def test_a_measured_waveform_joins_figure_3(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    phase = 2 * np.pi * np.arange(500) / 500
+    square = np.sign(np.sin(phase)) + 1
+    np.save(tmp_path / "square.npy", np.stack([square, 2 - square]))
+    options = ["--quick", "--json", "--waveform", str(tmp_path / "square.npy")]
+
+    assert run(["paper", "3", "-o", str(tmp_path / "out"), *options]) == 0
+
+    (document,) = json.loads(capfd.readouterr().out)
+    (table,) = (each for each in document["tables"] if each["title"].startswith("square:"))
+    (plain,) = (row for row in table["rows"] if row[0] == "as it is")
+    third, fifth = (float(plain[k].rstrip("%")) / 100 for k in (2, 3))
+    assert (third, fifth) == pytest.approx((1 / 3, 1 / 5), abs=2e-3)  # of a square wave
+
+
+@pytest.mark.parametrize("content", [b"", b"not numpy", None])
+def test_a_file_that_is_no_waveform_is_refused_in_a_sentence(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], content: bytes | None
+) -> None:
+    path = tmp_path / "waveform.npy"
+    if content is None:
+        np.save(path, np.zeros(7))
+    else:
+        path.write_bytes(content)
+
+    code = run(["paper", "3", "-o", str(tmp_path), "--quick", "--waveform", str(path)])
+
+    assert code == 1
+    assert "waveform.npy" in " ".join(capfd.readouterr().err.split())

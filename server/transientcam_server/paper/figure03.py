@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence, SubPhases
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S, Scheme
+from transientcam_server.errors import InputError
 from transientcam_server.paper import style
 from transientcam_server.paper.bench import Bench
 from transientcam_server.paper.figure import Made, PaperFigure, Statement, Table, check
@@ -69,9 +70,27 @@ def _waveforms(bench: Bench) -> dict[str, _Array]:
         "CamBoard nano": np.cos(phase) + _THIRD * np.cos(3 * phase),
     }
     if bench.waveform is not None:
-        rows = np.load(bench.waveform).astype(float)
+        rows = _rows(bench.waveform)
         waveforms[bench.waveform.stem] = rows[0] - rows[1] if len(rows) % 2 == 0 else rows[0]
     return waveforms
+
+
+def _rows(path: Path) -> _Array:
+    """Read a measured correlation function.
+
+    Raises
+    ------
+    InputError
+        The file holds none.
+    """
+    try:
+        rows = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(str(path), "the file", str(error), "a .npy") from error
+    if not isinstance(rows, np.ndarray) or rows.ndim != 2 or rows.dtype.kind not in "iuf":
+        found = f"of shape {np.shape(rows)}"
+        raise InputError(str(path), "the array", found, "numbers (rows, samples) over one period")
+    return rows.astype(float)
 
 
 def measured(bench: Bench, wave: _Array, scheme: Steps) -> _Array:
@@ -243,6 +262,7 @@ def _draw_curves(curve: Any, rest: Any, name: str, each: dict[Steps, _Array]) ->
         rest.plot(phase, 100 * (aligned - np.cos(np.radians(phase))), color=colour)
     curve.set(title=f"{name}: effective modulation", xlabel="phase / degrees", xlim=(0, 360))
     curve.set(xticks=range(0, 361, 90), ylabel="over the fundamental")
+    curve.set_ylim(-1.3, 2.2)
     curve.legend(loc="upper center")
     rest.set(title="difference from a sinusoidal", xlabel="phase / degrees", xlim=(0, 360))
     rest.set(xticks=range(0, 361, 90), ylabel="% of the fundamental")
