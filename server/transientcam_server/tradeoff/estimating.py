@@ -16,6 +16,8 @@ _Array = NDArray[Any]
 _Clock = Callable[[], float]
 SAMPLE_PIXELS: Final = 96
 """Pixels whose range is held against the truth; all that slow techniques are timed with."""
+ENOUGH_S: Final = 0.5
+"""What takes longer is timed once."""
 
 QUANTITIES: Final[dict[str, str]] = {
     "seconds": "computing time of one frame, median; of techniques that go pixel by pixel, "
@@ -88,7 +90,10 @@ def measure(
     for _ in range(repetitions if technique.planar else 1):
         begin_s = clock()
         first_rad(whole)
-        times.append((clock() - begin_s) * flat.shape[1] / whole[0].size)
+        taken_s = clock() - begin_s
+        times.append(taken_s * flat.shape[1] / whole[0].size)
+        if taken_s > ENOUGH_S:
+            break  # so long a time needs no average
     values: dict[str, float | None] = {"seconds": float(np.median(times))}
     values |= _errors(tm.range_m(phase, scene.base_frequency_hz), scene.truth_m.reshape(-1)[chosen])
     spread: dict[str, float | None] = dict.fromkeys(values)
