@@ -95,9 +95,10 @@ def _head(figures: list[dict[str, Any]]) -> Iterator[str]:
     yield ""
     yield (
         "Beside each figure stands what the paper says about it in words, made checkable: what "
-        "was measured here, what it should be, and whether it is. The limits are ours; the paper "
-        f"prints few numbers. {hold} of {len(every)} statements hold. Where one does not, the "
-        "reason is given below the table: the simulated scenes are like the paper's, not the same."
+        "was measured here, what it should be, and whether it is. Measures and limits are ours; "
+        f"the paper prints few numbers. {hold} of {len(every)} statements hold. Where one does "
+        "not, the reason is given below the table: the simulated scenes are like the paper's, not "
+        "the same."
     )
     yield ""
     yield "| figure | | statements that hold | processor seconds |"
