@@ -32,7 +32,9 @@ SUBSCRIBE = {
 SEEN_BAR_S = 1.0
 BACK_BAR_S = 5.0
 END_BAR_S = 5.0
-WARM_UP = 10
+SETTLE_WITHIN_S = 900.0
+HISTORY_S = 12.0
+WARM_UP = 20
 """Unplugs before the memory that growth is measured from."""
 END_AFTER_S = (0.0, 0.5, 2.0, 5.0, 10.0)
 
@@ -66,6 +68,7 @@ def measure_unplugs(directory: Path, *, unplugs: int, viewers: int) -> Unplugs:
         transientcam.Camera(process.url) as camera,
     ):
         camera.configure(**VIDEO)
+        settle(camera)
         url = process.url.replace("http", "ws", 1) + "/api/v1/stream"
         watching = [Viewer(url, SUBSCRIBE) for _ in range(viewers)]
         with camera.stream("flags", reconnect=Reconnect()) as stream:
@@ -83,6 +86,14 @@ def measure_unplugs(directory: Path, *, unplugs: int, viewers: int) -> Unplugs:
         numbers = each.seen.numbers[::2]  # two products a frame
         found.missing.append(numbers[-1] - numbers[0] + 1 - len(numbers) - each.seen.dropped // 2)
     return found
+
+
+def settle(camera: transientcam.Camera) -> None:
+    """Wait until the kernels are there, and the frames of the last seconds are kept."""
+    end_s = time.perf_counter() + SETTLE_WITHIN_S
+    while camera.info["kernels"]["compiling"] and time.perf_counter() < end_s:
+        time.sleep(0.5)
+    time.sleep(HISTORY_S)
 
 
 def _unplug(
