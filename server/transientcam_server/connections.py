@@ -178,6 +178,17 @@ class BoundedStream(WebSocketsSansIOProtocol):
             self._patience.end()
         super().resume_writing()
 
+    def shutdown(self) -> None:
+        """End with the service; without waiting for a client that reads nothing."""
+        if not self.handshake_complete or self.close_sent or self._open():
+            super().shutdown()
+        else:
+            # the client has begun to close: uvicorn would do so again, which its library refuses
+            self.stop_keepalive()
+            self.transport.close()
+        if not self.writable.is_set():
+            self.transport.abort()
+
     async def send(self, message: Any) -> None:
         """Send a message of the application."""
         data = message.get("bytes")

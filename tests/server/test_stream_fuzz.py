@@ -8,17 +8,19 @@ import random
 import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 from websockets.client import ClientProtocol
+from websockets.protocol import State
 from websockets.uri import parse_uri
 
 from tests.server.streaming import streaming
 from tests.serving import Served, serving
 from transientcam import wire
+from transientcam_server.connections import BoundedStream
 
 PATIENCE_S = 30.0
 TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
@@ -361,3 +363,30 @@ def test_messages_of_any_content_are_answered_and_the_stream_goes_on(
 
     assert refused > 40
     assert not failures(caplog)
+
+
+def test_the_service_ends_while_a_client_that_reads_nothing_says_goodbye(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    streams: list[BoundedStream] = []
+    made = BoundedStream.connection_made
+
+    def noted(stream: BoundedStream, transport: asyncio.BaseTransport) -> None:
+        streams.append(stream)
+        made(stream, transport)
+
+    monkeypatch.setattr(BoundedStream, "connection_made", noted)
+    # a thread that fails fails the test: that of the service would
+    everything = wire.pack(wire.Subscribe((wire.Subscription("raw"),)).to_document())
+    with ExitStack() as stack:
+        service = stack.enter_context(ExitStack())
+        served = service.enter_context(serving("sim:mirrors?noise=off"))
+        client = stack.enter_context(opened(served.stream_url))
+        client.send(frame(BINARY, everything))
+        (stream,) = streams
+        while stream.writable.is_set():  # until nothing more fits on the way to the client
+            time.sleep(0.01)
+        client.send(closing(1000))
+        while stream.conn.state is State.OPEN:
+            time.sleep(0.01)
+        service.close()
