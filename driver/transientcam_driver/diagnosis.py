@@ -9,11 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-import usb.backend.libusb1
-
 from transientcam_driver.errors import UDEV_RULES_FILE, LibusbMissing
 from transientcam_driver.protocol import PRODUCT_ID, VENDOR_ID
-from transientcam_driver.usb import UDEV_RULE, UsbCamera, list_cameras
+from transientcam_driver.usb import UDEV_RULE, UsbCamera, list_cameras, system_libusb
 
 Reported = tuple[str, str, str, str | None]
 
@@ -46,7 +44,7 @@ def checks(
     backend
         A pyusb backend; the system's libusb without one.
     """
-    backend = backend or usb.backend.libusb1.get_backend()
+    backend = backend or system_libusb()
     if backend is None:
         yield "warning", "libusb", str(LibusbMissing()), "simulated cameras work without it"
     else:

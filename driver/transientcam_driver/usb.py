@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import usb.backend.libusb1
 import usb.core
 import usb.util
 
@@ -196,6 +197,11 @@ class UsbCamera:
     def spec(self) -> str:
         """The name that opens it."""
         return "usb" if self.serial is None else f"usb:{self.serial}"
+
+
+def system_libusb() -> Any:
+    """Return pyusb's backend for the libusb of this system; None where there is none."""
+    return usb.backend.libusb1.get_backend()
 
 
 def list_cameras(*, backend: Any = None) -> tuple[UsbCamera, ...]:

@@ -8,6 +8,7 @@ from transientcam_driver import DriverError, errors
 EXAMPLES: list[DriverError] = [
     errors.SequenceError("takes", 0, "an integer of at least 1"),
     errors.SceneError("a.toml", "light", 3, "a table"),
+    errors.EffectError("effects", "rain", "one of ambient"),
     errors.SpecError("webcam", "neither"),
     errors.CalibrationError("anything"),
     errors.CalibrationMismatch("harmonics", 3, 4),

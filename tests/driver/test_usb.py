@@ -234,7 +234,7 @@ def test_an_empty_bus_lists_no_camera() -> None:
 
 
 def test_the_file_for_udev_holds_the_rule_that_the_error_tells() -> None:
-    file = Path(__file__).parents[2] / "docker" / Path(UDEV_RULES_FILE).name
+    file = Path(__file__).parents[2] / "packaging" / Path(UDEV_RULES_FILE).name
     rules = [line for line in file.read_text().splitlines() if not line.startswith("#")]
 
     assert rules == [UDEV_RULE]
