@@ -2,8 +2,9 @@
 
 from typing import Any
 
-from transientcam.conformance.check import checks, equal, expect, skip_unless
+from transientcam.conformance.check import checks
 from transientcam.conformance.device import API, Device
+from transientcam.conformance.expecting import equal, expect, skip_unless
 from transientcam.errors import PromiseBroken
 from transientcam.wire import CloseCode
 

@@ -1,14 +1,11 @@
-"""What a check is, and how it says that a promise was not kept."""
+"""What a check is."""
 
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from transientcam.errors import CheckSkipped, PromiseBroken
-
-if TYPE_CHECKING:
-    from transientcam.conformance.device import Device
+from transientcam.conformance.device import Device
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +26,10 @@ class Check:
     group: str
     name: str
     promise: str
-    run: "Callable[[Device], None]"
+    run: Callable[[Device], None]
 
 
-def checks(group: str, *functions: "Callable[[Device], None]") -> tuple[Check, ...]:
+def checks(group: str, *functions: Callable[[Device], None]) -> tuple[Check, ...]:
     """Return functions as checks: the name of one is its name, its docstring the promise."""
     return tuple(
         Check(group, each.__name__.replace("_", "-"), _sentence(each), each) for each in functions
@@ -41,26 +38,3 @@ def checks(group: str, *functions: "Callable[[Device], None]") -> tuple[Check, .
 
 def _sentence(function: Callable[..., Any]) -> str:
     return " ".join((inspect.getdoc(function) or "").split())
-
-
-def expect(kept: object, what: str) -> None:
-    """Say ``what`` is wrong unless a promise was ``kept``."""
-    if not kept:
-        raise PromiseBroken(what)
-
-
-def equal(found: object, wanted: object, what: str) -> None:
-    """Say what was ``found`` unless it is what was ``wanted``."""
-    if found != wanted:
-        raise PromiseBroken(f"{what} is {_shown(found)}, not {_shown(wanted)}")
-
-
-def skip_unless(possible: object, why: str) -> None:
-    """Leave the check out unless it is ``possible``."""
-    if not possible:
-        raise CheckSkipped(why)
-
-
-def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 160 else text[:159] + "…"

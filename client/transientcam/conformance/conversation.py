@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from transientcam.conformance.check import expect
+from transientcam.conformance.expecting import expect
 from transientcam.connection import stream_options
 from transientcam.errors import PromiseBroken, ProtocolError
 from transientcam.translation import translated

@@ -12,8 +12,8 @@ import httpx
 
 from transientcam import rest
 from transientcam.address import parse_address
-from transientcam.conformance.check import equal, expect, skip_unless
 from transientcam.conformance.conversation import Conversation, connected
+from transientcam.conformance.expecting import equal, expect, skip_unless
 from transientcam.connection import answer, http_options
 from transientcam.errors import PromiseBroken, ProtocolError
 from transientcam.translation import media_type, translated

@@ -1,7 +1,8 @@
 """The lease: one controller, whom others are told of, and watchers whom nothing blocks."""
 
-from transientcam.conformance.check import checks, equal, expect
+from transientcam.conformance.check import checks
 from transientcam.conformance.device import API, HOLDER, Device
+from transientcam.conformance.expecting import equal, expect
 
 _LEASE = f"{API}/lease"
 _ACQUISITION = f"{API}/acquisition"

@@ -2,8 +2,9 @@
 
 import httpx
 
-from transientcam.conformance.check import checks, equal, expect
+from transientcam.conformance.check import checks
 from transientcam.conformance.device import API, Device
+from transientcam.conformance.expecting import equal, expect
 
 _ID = "conformance-1.2:3"
 

@@ -8,8 +8,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from transientcam.conformance.check import checks, equal, expect, skip_unless
+from transientcam.conformance.check import checks
 from transientcam.conformance.device import API, Device
+from transientcam.conformance.expecting import equal, expect, skip_unless
 from transientcam.conformance.replaying import can_replay, replayed
 from transientcam.wire import Frame, Notice
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
-from transientcam.conformance.check import expect
+from transientcam.conformance.expecting import expect
 
 _PROGRAM = "from transientcam.cli import main; main()"
 _END_S = 20.0

@@ -1,7 +1,8 @@
 """Coming back: what was missed is sent, or it is said what is missing."""
 
-from transientcam.conformance.check import checks, equal, expect
+from transientcam.conformance.check import checks
 from transientcam.conformance.device import Device
+from transientcam.conformance.expecting import equal, expect
 from transientcam.wire import Frame, Notice, ServerMessage
 
 _AFTER = 3

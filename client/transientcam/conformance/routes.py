@@ -6,8 +6,9 @@ from typing import Any, Final
 
 import httpx
 
-from transientcam.conformance.check import checks, expect, skip_unless
+from transientcam.conformance.check import checks
 from transientcam.conformance.device import API, Device
+from transientcam.conformance.expecting import expect, skip_unless
 from transientcam.connection import answer
 from transientcam.rest import problem
 from transientcam.translation import media_type

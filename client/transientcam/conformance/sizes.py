@@ -5,9 +5,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-from transientcam.conformance.check import checks, equal, expect, skip_unless
+from transientcam.conformance.check import checks
 from transientcam.conformance.conversation import Conversation
 from transientcam.conformance.device import API, Device
+from transientcam.conformance.expecting import equal, expect, skip_unless
 
 MIB: Final = 1024 * 1024
 _LONGEST_CAPTURE_S = 10.0

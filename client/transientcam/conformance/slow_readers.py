@@ -5,9 +5,10 @@ from typing import Final
 
 import numpy as np
 
-from transientcam.conformance.check import checks, equal, expect, skip_unless
+from transientcam.conformance.check import checks
 from transientcam.conformance.conversation import Conversation
 from transientcam.conformance.device import Device
+from transientcam.conformance.expecting import equal, expect, skip_unless
 from transientcam.wire import Channel
 
 _FRAMES: Final = 10

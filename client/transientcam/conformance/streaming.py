@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from transientcam.conformance.check import checks, equal, expect
+from transientcam.conformance.check import checks
 from transientcam.conformance.device import API, Device
+from transientcam.conformance.expecting import equal, expect
 from transientcam.wire import PRODUCTS, SUBPROTOCOL, CloseCode
 
 _META = ("frame", "sequence_id", "calibration_id", "device_time_s", "host_time_s", "capture_s")

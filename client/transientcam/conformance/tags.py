@@ -4,8 +4,9 @@ from typing import Any
 
 import httpx
 
-from transientcam.conformance.check import checks, equal, expect
+from transientcam.conformance.check import checks
 from transientcam.conformance.device import API, Device
+from transientcam.conformance.expecting import equal, expect
 
 _SEQUENCE = f"{API}/sequence"
 _STALE = '"of-somebody-else"'

@@ -3,9 +3,10 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from transientcam.conformance.check import checks, equal, expect
+from transientcam.conformance.check import checks
 from transientcam.conformance.conversation import Conversation
 from transientcam.conformance.device import API, Device
+from transientcam.conformance.expecting import equal, expect
 
 
 def an_unplugged_camera_is_told(device: Device) -> None:

@@ -3,7 +3,7 @@ import { effect, signal, untracked, type ReadonlySignal } from "@preact/signals"
 import type { PixelDocument } from "../stream/protocol";
 import { type Api, LIVE, RequestError } from "./api";
 import type { Frame } from "./frames";
-import type { Pixel } from "./store";
+import type { Pixel } from "./pixel";
 
 /** Least time between two questions about the same pixel. */
 const PAUSE_S = 0.5;

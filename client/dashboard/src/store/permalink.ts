@@ -4,7 +4,8 @@ import { effect } from "@preact/signals";
 import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
 import { RequestError } from "./api";
-import type { Pixel, Store } from "./store";
+import type { Pixel } from "./pixel";
+import type { Store } from "./store";
 
 export interface Place {
   readonly map?: string;

@@ -9,6 +9,7 @@ import { Credentials } from "./credentials";
 import { Events } from "./events";
 import { Frames } from "./frames";
 import { Lease } from "./lease";
+import type { Pixel } from "./pixel";
 import { Player } from "./player";
 import { browserShelf, oneOf, remembered, sessionShelf, type Shelf } from "./settings";
 import { isLayout, OVERVIEW, type Layout } from "../views/layout";
@@ -21,12 +22,6 @@ import { Simulation } from "./simulation";
 import { Status } from "./status";
 import { Details } from "./details";
 import { Theme } from "../ui/theme";
-
-/** A place on the sensor: column from the left, row from the top. */
-export interface Pixel {
-  readonly x: number;
-  readonly y: number;
-}
 
 /** All that the page knows. Views read and set it; what fills it is no concern of theirs. */
 export class Store {

@@ -2,7 +2,8 @@ import { computed } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { useMemo } from "preact/hooks";
 
-import { useStore, type Pixel } from "../store/store";
+import type { Pixel } from "../store/pixel";
+import { useStore } from "../store/store";
 
 interface StageProps {
   /** Size of the picture in pixels of the sensor. */

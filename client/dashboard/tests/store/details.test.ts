@@ -4,7 +4,7 @@ import { expect, test, vi } from "vitest";
 import { type Api, LIVE } from "../../src/store/api";
 import { Details } from "../../src/store/details";
 import type { Frame } from "../../src/store/frames";
-import type { Pixel } from "../../src/store/store";
+import type { Pixel } from "../../src/store/pixel";
 
 const frame = (number: number): Frame => ({ origin: LIVE, meta: { frame: number, width: 10, height: 10 } }) as Frame;
 const settled = (): Promise<void> => new Promise((done) => setTimeout(done));

@@ -3,7 +3,8 @@ import type { RefObject } from "preact";
 import { useMemo, useRef } from "preact/hooks";
 
 import type { Frame } from "../../store/frames";
-import { useStore, type Pixel } from "../../store/store";
+import type { Pixel } from "../../store/pixel";
+import { useStore } from "../../store/store";
 import { COLOUR_MAPS } from "../../ui/colourMaps";
 import { Choice, Tabs, Toggle } from "../../ui/controls";
 import { saveNumbers, savePicture } from "../../ui/download";
