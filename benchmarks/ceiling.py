@@ -76,11 +76,11 @@ def measured(cores: int) -> Ceiling:
     """Measure the ceiling of so many cores at a time."""
     width = simd.REGISTER_BYTES // 4
     operands: list[_Array] = [np.full(14 * width, 0.5, np.float32) for _ in range(cores)]
-    fused_s = _together(cores, lambda core: _fused(operands[core], _ROUNDS))
+    fused_s = _best_s(cores, lambda core: _fused(operands[core], _ROUNDS))
     small = [_room(1 << 22) for _ in range(cores)]
-    cached_s = _together(cores, lambda core: _write_often(small[core]))
+    cached_s = _best_s(cores, lambda core: _write_often(small[core]))
     large = [_room(1 << 27) for _ in range(cores)]
-    stream_s = _together(cores, lambda core: _write(large[core], 1.0, True))
+    stream_s = _best_s(cores, lambda core: _write(large[core], 1.0, True))
     return Ceiling(
         cores * _ROUNDS * _CHAINS * width / fused_s,
         cores * _OFTEN * (1 << 22) / cached_s,
@@ -97,17 +97,16 @@ def _write_often(x: _Array) -> None:
         _write(x, 1.0, False)
 
 
-def _together(cores: int, work: Callable[[int], object]) -> float:
+def together(cores: int, work: Callable[[int], object]) -> None:
+    """Have each of so many cores do its part at the same time."""
+    threads = [threading.Thread(target=work, args=(core,)) for core in range(1, cores)]
+    for thread in threads:
+        thread.start()
+    work(0)
+    for thread in threads:
+        thread.join()
+
+
+def _best_s(cores: int, work: Callable[[int], object]) -> float:
     """Return the seconds that a part takes with every core at work."""
-    if cores == 1:
-        return measure(lambda: work(0)).best_s
-
-    def all_at_once() -> None:
-        threads = [threading.Thread(target=work, args=(core,)) for core in range(1, cores)]
-        for thread in threads:
-            thread.start()
-        work(0)
-        for thread in threads:
-            thread.join()
-
-    return measure(all_at_once).best_s
+    return measure(lambda: together(cores, work)).best_s

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from transientcam_moments._kernels.spread import Spread, at_once
 _BANK = 240  # pairs of registers of coefficients, which stay in the first cache for all phases
 _PAST_CACHES_BYTES = 1 << 24
 _LEAST_MIRRORED = 8
+_REMEMBERED = 4096  # phases; more are a computation rather than a film
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -201,6 +203,11 @@ def paired(phase_rad: Any, m: int, precision: str, alike: int) -> Pairs:
     )
 
 
+@lru_cache(maxsize=16)
+def _paired_before(phase_rad: bytes, m: int, precision: str, alike: int) -> Pairs:
+    return paired(np.frombuffer(phase_rad), m, precision, alike)
+
+
 def _equidistant(phase_rad: Any) -> bool:
     """Say whether phases are equidistant, but for the rounding of their own digits."""
     even = np.linspace(phase_rad[0], phase_rad[-1], phase_rad.size)
@@ -238,7 +245,11 @@ def density_lane(m: int, precision: str) -> Callable[..., Any]:
         past_caches = out.nbytes > _PAST_CACHES_BYTES
         row = pixels * out.itemsize
         alike = simd.REGISTER_BYTES // math.gcd(simd.REGISTER_BYTES, row) if past_caches else 1
-        rows, waves, centre, mirrored = paired(phases, m, precision, alike)
+        if phases.size <= _REMEMBERED:  # one frame after the other is wanted at the same phases
+            pairs = _paired_before(phases.tobytes(), m, precision, alike)
+        else:
+            pairs = paired(phases, m, precision, alike)
+        rows, waves, centre, mirrored = pairs
 
         def part(start: int, stop: int) -> None:
             run(order, a, g, scale, rows, waves, centre, flat, start, stop, mirrored, past_caches)
