@@ -33,9 +33,10 @@ def breakable_daemon(recordings: Path, **settings: Any) -> Iterator[Breakable]:
         yield Breakable(served, breaker)
 
 
-@pytest.fixture(scope="session")
+# not for the session: it would capture on beside all tests that come after these
+@pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Breakable]:
-    """One daemon for all tests of this directory."""
+    """One daemon for all tests of a file."""
     with breakable_daemon(tmp_path_factory.mktemp("recordings")) as made:
         yield made
 
