@@ -95,11 +95,11 @@ def _nobody_writing(directory: Path) -> Iterator[None]:
 def convert(
     recording: RecordingArgument,
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="The .npz, .nc or .zarr to write.")
+        Path, typer.Option("--output", "-o", help="The .npz, .nc, .zarr or .mcap to write.")
     ],
     as_json: JsonOption = False,
 ) -> None:
-    """Convert a recording for NumPy (.npz), netCDF programs (.nc) or Dask and the like (.zarr)."""
+    """Convert a recording: .npz (NumPy), .nc (netCDF), .zarr (Dask), .mcap (Foxglove, ROS)."""
     from transientcam_server.recording import Recording
     from transientcam_server.recording import convert as converting
 

@@ -1,4 +1,4 @@
-"""A recording as other programs like it: NumPy's .npz, netCDF's .nc, a .zarr store.
+"""A recording as other programs like it: NumPy's .npz, netCDF's .nc, a .zarr store, an .mcap.
 
 Images go from file to file one frame at a time, so that a recording may be larger than memory.
 """
@@ -174,6 +174,46 @@ def _zarr(
     yield put
 
 
+@contextmanager
+def _mcap(
+    path: Path, recording: Recording, table: Table, attributes: Mapping[str, str]
+) -> Iterator[Put]:
+    """Write each image of a frame to a topic of its own, as Foxglove and ROS programs show them."""
+    foxglove = _library("foxglove", "an .mcap")
+    messages = importlib.import_module("foxglove.messages")
+    topic = importlib.import_module("foxglove.channels").RawImageChannel
+    context = foxglove.Context()
+    topics = [
+        topic(f"/raw/{label.index:03d}", metadata=_texts(asdict(label)), context=context)
+        for label in recording.labels
+    ]
+    arrived_ns = np.round(np.asarray(table["host_time_s"][1]) * 1e9).astype(np.int64)
+    with foxglove.open_mcap(path, context=context) as writer:
+        writer.write_metadata("recording", dict(attributes))
+
+        def put(index: int, images: NDArray[np.uint16]) -> None:
+            time_ns = int(arrived_ns[index])
+            stamp = messages.Timestamp(*divmod(time_ns, 10**9))
+            for channel, image in zip(topics, images.astype("<u2"), strict=True):
+                height, width = image.shape
+                message = messages.RawImage(
+                    timestamp=stamp,
+                    frame_id="camera",
+                    width=width,
+                    height=height,
+                    encoding="16UC1",
+                    step=image.strides[0],
+                    data=image.tobytes(),
+                )
+                channel.log(message, log_time=time_ns)
+
+        yield put
+
+
+def _texts(document: Mapping[str, Any]) -> dict[str, str]:
+    return {name: json.dumps(value) for name, value in document.items()}
+
+
 def _library(name: str, what: str) -> Any:
     try:
         return importlib.import_module(name)
@@ -182,4 +222,4 @@ def _library(name: str, what: str) -> Any:
 
 
 _Sink = Callable[[Path, Recording, Table, Mapping[str, str]], AbstractContextManager[Put]]
-_SINKS: Final[dict[str, _Sink]] = {".npz": _npz, ".nc": _netcdf, ".zarr": _zarr}
+_SINKS: Final[dict[str, _Sink]] = {".npz": _npz, ".nc": _netcdf, ".zarr": _zarr, ".mcap": _mcap}

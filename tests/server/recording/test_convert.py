@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray
 import zarr
+from mcap.reader import make_reader
 from zarr.core.sync import cleanup_resources
 
 from tests.server.recording.made import APPLIED, frame, record
@@ -68,10 +69,32 @@ def test_zarr_opens_in_zarr_and_xarray(source: Path, tmp_path: Path) -> None:
         np.testing.assert_array_equal(dataset["frame"], np.arange(FRAMES))
 
 
+def test_mcap_has_an_image_a_topic_with_its_label_and_time(source: Path, tmp_path: Path) -> None:
+    with Recording(source) as recording:
+        convert(recording, tmp_path / "a.mcap")
+        host_time_s = recording.series("host_time_s")
+
+    with (tmp_path / "a.mcap").open("rb") as stream:
+        reader = make_reader(stream)
+        (metadata,) = reader.iter_metadata()
+        found = [
+            (schema.name, channel, message)
+            for schema, channel, message in reader.iter_messages(topics=["/raw/001"])
+            if schema is not None
+        ]
+    assert json.loads(metadata.metadata["sequence"])["harmonics"] == 2
+    assert len(found) == FRAMES
+    for number, (schema, channel, message) in enumerate(found):
+        assert schema == "foxglove.RawImage"
+        assert json.loads(channel.metadata["harmonic"]) == APPLIED.labels[1].harmonic
+        assert message.log_time == pytest.approx(host_time_s[number] * 1e9, abs=1e3)
+        assert frame(number).images[1].astype("<u2").tobytes() in message.data
+
+
 def test_another_suffix_is_refused_with_those_there_are(source: Path, tmp_path: Path) -> None:
     with (
         Recording(source) as recording,
-        pytest.raises(NotConvertible, match=r"a\.mat: .* \.nc, \.npz, \.zarr"),
+        pytest.raises(NotConvertible, match=r"a\.mat: .* \.mcap, \.nc, \.npz, \.zarr"),
     ):
         convert(recording, tmp_path / "a.mat")
 
