@@ -32,16 +32,18 @@ def test_the_camera_is_put_before_another_scene(page: Page, served: Served) -> N
     expect(scene).to_have_value("wall")
     wall = map_pixels(page)
     scene.select_option("mirrors")
-    expect(page.locator(".toast").last).to_contain_text(
-        "stands before mirrors", timeout=PATIENCE_MS
-    )
-    expect(scene).to_have_value("mirrors")
     mirrors = panel.locator("[data-effect=mirror-paths]")
-    expect(mirrors).to_have_attribute("data-built", "true")
+    expect(mirrors).to_have_attribute("data-built", "true", timeout=PATIENCE_MS)
+    expect(scene).to_have_value("mirrors")
+    page.wait_for_function(
+        """() => transientcam.store.events.all.peek()
+             .some(({ words }) => words === "The camera stands before mirrors.")"""
+    )
     assert simulated(served)["scene"] == "mirrors"
     page.wait_for_function(  # the frame that both scenes may be in has passed
         "(frame) => transientcam.store.frames.of('range').peek()?.meta.frame > frame + 1",
         arg=page.evaluate("transientcam.store.frames.of('range').peek()?.meta.frame"),
+        timeout=PATIENCE_MS,
     )
     assert np.mean(map_pixels(page) != wall) > 0.2
 
@@ -67,10 +69,10 @@ def test_the_cable_is_pulled_and_plugged_in_again(page: Page, served: Served) ->
     panel = page.locator(".panel-simulation")
     expect(panel.get_by_role("button", name="Plug in")).to_be_disabled()
     panel.get_by_role("button", name="Unplug").click()
-    expect(page.locator(".toast").filter(has_text="The camera was lost")).to_be_visible()
+    expect(page.locator("[data-field=state]")).to_have_text("Camera lost")
     expect(panel.get_by_role("button", name="Unplug")).to_be_disabled()
     panel.get_by_role("button", name="Plug in").click()
-    expect(page.locator(".toast").filter(has_text="The camera is back")).to_be_visible()
+    expect(page.locator("[data-field=state]")).to_have_text("Live")
     expect(panel.get_by_role("button", name="Unplug")).to_be_enabled()
 
 
