@@ -197,9 +197,9 @@ def report(result: Soak) -> str:
     share = result.cpu_s / result.duration_s
     return "\n".join(
         [
-            "# Half an hour at full rate",
+            f"# {result.minutes:g} minutes at full rate",
             "",
-            "Written by `python -m benchmarks.soak --write` on",
+            f"Written by `python -m benchmarks.soak --minutes {result.minutes:g} --write` on",
             f"{machine()}.",
             "",
             f"`transientcam serve` with the simulated camera at the paper's video setting, "

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -147,7 +148,7 @@ def _frames(
     frames = []
     camera.start()
     for taken in range(takes):
-        frames.append(_frame(camera, timeout_s, lambda: tell(taken)))  # noqa: B023 - called now
+        frames.append(_frame(camera, timeout_s, partial(tell, taken)))
         tell(taken + 1)
     camera.stop()
     return frames

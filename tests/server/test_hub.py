@@ -1,42 +1,13 @@
 import asyncio
-from collections.abc import Callable
 
 import pytest
 
-from tests.server.fakes import channel, fake_frame
+from tests.server.fakes import fake_frame
+from tests.server.outboxes import numbers, run, subscribed, waiting
 from transientcam import wire
 from transientcam_server.errors import Problem
 from transientcam_server.hub import Hub
-from transientcam_server.outbox import Delivery, Goodbye, Item, Outbox
-
-
-def run(test: Callable[[], object]) -> None:
-    async def main() -> None:
-        result = test()
-        if asyncio.iscoroutine(result):
-            await result
-
-    asyncio.run(main())
-
-
-def waiting(outbox: Outbox) -> list[Item]:
-    """Take everything an outbox would hand out now."""
-    items = []
-    while (item := outbox._take()) is not None:
-        items.append(item)
-    return items
-
-
-def numbers(items: list[Item]) -> list[int]:
-    return [item.frame.number for item in items if isinstance(item, Delivery)]
-
-
-def subscribed(
-    *, depth: int = 2, credit: int | None = None, rate_hz: float | None = None
-) -> Outbox:
-    outbox = Outbox(depth=depth)
-    outbox.subscribe((channel(max_rate_hz=rate_hz),), credit=credit)
-    return outbox
+from transientcam_server.outbox import Goodbye, Outbox
 
 
 def test_everybody_gets_the_frame_and_the_news_but_not_before_they_subscribed() -> None:

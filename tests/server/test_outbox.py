@@ -1,5 +1,4 @@
 import asyncio
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -7,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.server.fakes import NOTICE, channel, fake_frame
+from tests.server.outboxes import numbers, run, subscribed, waiting
 from transientcam import wire
 from transientcam_server.frame import Frame
 from transientcam_server.outbox import (
@@ -16,35 +16,6 @@ from transientcam_server.outbox import (
     Item,
     Outbox,
 )
-
-
-def run(test: Callable[[], object]) -> None:
-    async def main() -> None:
-        result = test()
-        if asyncio.iscoroutine(result):
-            await result
-
-    asyncio.run(main())
-
-
-def waiting(outbox: Outbox) -> list[Item]:
-    """Take everything an outbox would hand out now."""
-    items = []
-    while (item := outbox._take()) is not None:
-        items.append(item)
-    return items
-
-
-def numbers(items: list[Item]) -> list[int]:
-    return [item.frame.number for item in items if isinstance(item, Delivery)]
-
-
-def subscribed(
-    *, depth: int = 2, credit: int | None = None, rate_hz: float | None = None
-) -> Outbox:
-    outbox = Outbox(depth=depth)
-    outbox.subscribe((channel(max_rate_hz=rate_hz),), credit=credit)
-    return outbox
 
 
 def test_the_newest_frames_wait_and_the_dropped_ones_are_counted() -> None:
