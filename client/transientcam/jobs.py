@@ -38,7 +38,7 @@ class Jobs(Generic[_Document]):
 
     def cancel(self, job_id: str) -> _Document:
         """Let a job end as soon as it can."""
-        return self._ask(rest.document(_path(job_id), method="DELETE"))
+        return self._ask(rest.document(f"{_path(job_id)}/cancel", method="POST"))
 
 
 def waiting(job_id: str, *, wait_s: float) -> rest.Request[dict[str, Any]]:

@@ -257,6 +257,10 @@ def _mistake(each: dict[str, Any]) -> dict[str, Any]:
         "less_than_equal": f"at most {context.get('le')}",
         "less_than": f"less than {context.get('lt')}",
         "too_long": f"at most {context.get('max_length')} items",
+        "string_too_long": f"at most {context.get('max_length')} characters",
+        "string_too_short": f"at least {context.get('min_length')} characters",
+        "string_type": "text",
+        "value_error": str(context.get("error")).removeprefix("must be "),
         "int_parsing": "an integer",
         "int_type": "an integer",
         "int_from_float": "an integer",
@@ -268,7 +272,7 @@ def _mistake(each: dict[str, Any]) -> dict[str, Any]:
     value = None if kind == "missing" else _plain(each.get("input"))
     if kind == "json_invalid":
         parts, value = ["body"], None
-    limit = limits.get(kind) or str(each["msg"])
+    limit = limits.get(kind) or str(each["msg"]).removeprefix("Input should be ")
     return {"field": ".".join(parts), "value": value, "limit": limit}
 
 

@@ -109,7 +109,7 @@ _CALLS: dict[
     "cancel": (
         lambda c: c.jobs.cancel("5a0c"),
         lambda c: c.jobs.cancel("5a0c"),
-        ("DELETE", "jobs/5a0c", "", None),
+        ("POST", "jobs/5a0c/cancel", "", None),
     ),
     "acquisition": (
         lambda c: c.acquisition,

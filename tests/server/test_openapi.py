@@ -45,7 +45,7 @@ def test_every_resource_of_the_interface_is_described(document: dict[str, Any]) 
         "GET /api/v1/parameters",
         "GET /api/v1/jobs",
         "GET /api/v1/jobs/{job}",
-        "DELETE /api/v1/jobs/{job}",
+        "POST /api/v1/jobs/{job}/cancel",
         "GET /api/v1/acquisition",
         "PUT /api/v1/acquisition",
         "GET /api/v1/frames",

@@ -1,8 +1,11 @@
 import json
 import re
+from enum import Enum
+from typing import Annotated
 
 import pytest
 from fastapi.exceptions import RequestValidationError
+from pydantic import AfterValidator, BaseModel, Field, ValidationError
 
 from transientcam.errors import ProtocolError
 from transientcam_driver import CameraFault, CameraLost, CameraNotFound, FrameTimeout, SequenceError
@@ -103,6 +106,43 @@ def test_a_request_that_cannot_be_read_names_field_and_limit(
 
     assert problem.extensions["field"] == field
     assert str(problem.extensions["limit"]).startswith(limit)
+
+
+def printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("must be text that can be printed")
+    return text
+
+
+class Colour(Enum):
+    RED = "red"
+    BLUE = "blue"
+
+
+class Labels(BaseModel):
+    name: Annotated[str, Field(max_length=8), AfterValidator(printable)] = ""
+    colour: Colour = Colour.RED
+
+
+@pytest.mark.parametrize(
+    ("given", "detail"),
+    [
+        ({"name": "a\tb"}, r"name is 'a\tb', but must be text that can be printed"),
+        ({"name": "x" * 9}, "name is 'xxxxxxxxx', but must be at most 8 characters"),
+        ({"name": 7}, "name is 7, but must be text"),
+        ({"colour": "green"}, "colour is 'green', but must be 'red' or 'blue'"),
+    ],
+)
+def test_what_pydantic_refuses_is_told_in_a_sentence(given: dict[str, object], detail: str) -> None:
+    with pytest.raises(ValidationError) as refused:
+        Labels(**given)  # type: ignore[arg-type]
+    (mistake,) = refused.value.errors()
+
+    problem = _of_validation(
+        RequestValidationError([{**mistake, "loc": ("body", *mistake["loc"])}])
+    )
+
+    assert problem.detail == detail
 
 
 def test_several_mistakes_are_all_listed() -> None:

@@ -46,7 +46,7 @@ ROUTES: Final = (
     "GET /calibrations/{calibration}/file",
     "GET /jobs",
     "GET /jobs/{job}",
-    "DELETE /jobs/{job}",
+    "POST /jobs/{job}/cancel",
     "GET /recordings",
     "POST /recordings",
     "GET /recordings/{recording}",

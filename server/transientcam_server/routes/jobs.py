@@ -54,13 +54,13 @@ async def read_job(
     return document(found)
 
 
-@router.delete(
-    "/jobs/{job}",
+@router.post(
+    "/jobs/{job}/cancel",
     summary="Cancel a job",
     responses=documented(kinds.UNKNOWN_JOB, kinds.INVALID_REQUEST),
 )
 async def cancel_job(service: ServiceOf, job: _Job) -> JobDocument:
-    """Let a job end as soon as it can; one that has ended stays as it is."""
+    """Let a job end as soon as it can; it stays in the list, and one that has ended as it is."""
     return document(service.jobs.cancel(job))
 
 

@@ -1,15 +1,17 @@
 """Requests that nobody thought of: every answer is one that the OpenAPI document has."""
 
+import json
 import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import httpx
 import pytest
 
-from tests.conformance.breaking import Breaker
+from tests.conformance.breaking import Answer, Breaker, Breaking
 from tests.conformance.broken_promises import with_status
 from tests.conftest import ROOT
 from tests.serving import serving
@@ -17,19 +19,31 @@ from tests.serving import serving
 CONFIG = Path(__file__).with_name("schemathesis.toml")
 PROGRAM = "from schemathesis.cli import schemathesis; schemathesis()"
 ENDLESS = "mjpeg"
+ALL_PHASES = "examples,coverage,fuzzing"
 
 
-def fuzz(url: str, directory: Path, *options: str) -> "subprocess.CompletedProcess[str]":
-    """Run schemathesis against a daemon.
+def fuzz(
+    url: str, directory: Path, *options: str, phases: str = ALL_PHASES
+) -> "subprocess.CompletedProcess[str]":
+    """Run schemathesis against a daemon, one request at a time."""
+    return in_its_own_process(
+        *("-c", PROGRAM, "--config-file", str(CONFIG)),
+        *("run", f"{url}/openapi.json", "--no-color", "--exclude-path-regex", ENDLESS),
+        *("--phases", phases),
+        *options,
+        directory=directory,
+    )
 
-    It runs in a process of its own, as its plugin, hooks and threads are no business of the tests.
-    """
+
+def tell_stories(url: str, directory: Path) -> "subprocess.CompletedProcess[str]":
+    """Let requests follow from answers."""
+    return in_its_own_process("-m", "tests.server.fuzzing.stateful", url, directory=directory)
+
+
+def in_its_own_process(*arguments: str, directory: Path) -> "subprocess.CompletedProcess[str]":
+    """Run Python: plugins, hooks and threads of schemathesis are no business of the tests."""
     return subprocess.run(
-        [
-            *(sys.executable, "-c", PROGRAM, "--config-file", str(CONFIG)),
-            *("run", f"{url}/openapi.json", "--no-color", "--exclude-path-regex", ENDLESS),
-            *options,
-        ],
+        [sys.executable, *arguments],
         cwd=directory,
         env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])},
         capture_output=True,
@@ -65,7 +79,7 @@ def test_a_camera_that_is_unplugged_answers_with_documented_problems(tmp_path: P
             daemon.url,
             tmp_path,
             *("--include-path-regex", "sequence|acquisition|camera|faults|readyz|frames/.frame.$"),
-            *("--phases", "coverage"),
+            phases="coverage",
         )
 
     assert result.returncode == 0, result.stdout + result.stderr
@@ -81,6 +95,49 @@ def test_an_answer_that_is_not_documented_is_found(tmp_path: Path) -> None:
     assert fine.returncode == 0, fine.stdout
     assert broken.returncode == 1
     assert "418" in broken.stdout
+
+
+def test_what_was_made_is_there_until_it_is_deleted(tmp_path: Path) -> None:
+    recordings = {"directory": tmp_path / "recordings", "min_free_bytes": 0}
+    with serving("sim:wall?noise=off", recordings=recordings) as daemon:
+        result = tell_stories(daemon.url, tmp_path)
+
+    assert result.returncode == 0, result.stderr
+    story = json.loads(result.stdout)
+    assert story["wrong"] == []
+    recording, job = "/api/v1/recordings/{recording}", "/api/v1/jobs/{job}"
+    for each in (
+        "POST /api/v1/recordings 201",
+        f"GET {recording} 200",
+        f"PATCH {recording} 200",
+        f"POST {recording}/stop 200",
+        f"GET {recording}/file 200",
+        f"GET {recording}/frames/{{frame}} 200",
+        f"DELETE {recording} 200",
+        f"GET {recording} 404",
+        "POST /api/v1/calibrations 202",
+        f"GET {job} 200",
+        f"POST {job}/cancel 200",
+    ):
+        assert story["answers"].get(each), f"{each} never came about"
+
+
+def said_to_be_deleted(answer: Answer) -> Answer:
+    """Call everything deleted, also what cannot be, as a recording that still runs."""
+    return replace(answer, status=200) if answer.method == "DELETE" else answer
+
+
+def test_something_deleted_that_can_still_be_had_is_found(tmp_path: Path) -> None:
+    recordings = {"directory": tmp_path / "recordings", "min_free_bytes": 0}
+    breaker = Breaker()
+    with serving("sim:wall?noise=off", prepare=breaker.install, recordings=recordings) as daemon:
+        breaker.current = Breaking(answer=said_to_be_deleted)
+        result = tell_stories(daemon.url, tmp_path)
+
+    assert result.returncode == 0, result.stderr
+    assert any(
+        "Deleted resource still available" in each for each in json.loads(result.stdout)["wrong"]
+    )
 
 
 pytestmark = pytest.mark.timeout(300)

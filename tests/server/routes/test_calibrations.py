@@ -284,14 +284,14 @@ def test_meanwhile_the_camera_is_for_the_job_alone(http: httpx.Client) -> None:
         assert answer.status_code == 409
         assert answer.json()["type"] == "/problems/camera-busy"
         assert job.endswith(answer.json()["job"])
-    http.delete(job)
+    http.post(f"{job}/cancel")
 
 
 def test_it_is_cancelled_and_frames_come_again(http: httpx.Client) -> None:
     sequence = http.get("/api/v1/sequence").json()
     job = started(http)
 
-    http.delete(job)
+    http.post(f"{job}/cancel")
 
     assert http.get(job, params={"wait_s": 30}).json()["state"] == "cancelled"
     assert next_meta(http)["calibration_id"] == "nominal"

@@ -253,7 +253,7 @@ export class Api {
   }
 
   cancelJob(id: string): Promise<JobDocument> {
-    return this.#json("DELETE", `/jobs/${encodeURIComponent(id)}`) as Promise<JobDocument>;
+    return this.#json("POST", `/jobs/${encodeURIComponent(id)}/cancel`) as Promise<JobDocument>;
   }
 
   // -- files -------------------------------------------------------------------------------------
