@@ -1,6 +1,7 @@
 """What the service says of a recording: of one that runs, and of a file."""
 
 import os
+from collections.abc import Set
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +17,11 @@ class Descriptions:
     """Describes files, and reads each only once as long as it stays the same."""
 
     def __init__(self) -> None:
-        self._known: dict[Path, tuple[tuple[int, int], dict[str, Any]]] = {}
+        self._known: dict[str, tuple[tuple[int, int], dict[str, Any]]] = {}
+
+    def __len__(self) -> int:
+        """Return how many files are remembered."""
+        return len(self._known)
 
     def of_file(self, path: Path) -> dict[str, Any] | None:
         """Describe a file; None where there is none any more."""
@@ -26,11 +31,15 @@ class Descriptions:
             return None
         return self._of_content(path, status) | {"size_bytes": status.st_size}
 
+    def keep(self, ids: Set[str]) -> None:
+        """Forget all but these recordings."""
+        self._known = {each: self._known[each] for each in self._known.keys() & ids}
+
     def _of_content(self, path: Path, status: os.stat_result) -> dict[str, Any]:
         stamp = status.st_mtime_ns, status.st_size
-        known = self._known.get(path)
+        known = self._known.get(id_of(path))
         if known is None or known[0] != stamp:
-            known = self._known[path] = stamp, _read(path)
+            known = self._known[id_of(path)] = stamp, _read(path)
         return known[1]
 
 

@@ -187,7 +187,9 @@ class Library:
 
     def describe_all(self) -> list[dict[str, Any]]:
         """Describe all recordings, the newest first."""
-        documents = [self._described(each) for each in self._directory.ids()]
+        ids = self._directory.ids()
+        self._descriptions.keep(ids)
+        documents = [self._described(each) for each in ids]
         found = [document for document in documents if document is not None]
         return sorted(found, key=lambda each: (each["started_s"] or 0.0, each["id"]), reverse=True)
 
@@ -260,6 +262,8 @@ class Library:
             path.unlink(missing_ok=True)
         except OSError as error:
             raise not_stored(path, error) from error
+        self._problems.pop(recording_id, None)
+        self._descriptions.keep(self._directory.ids())
         return document
 
     # -- inside --------------------------------------------------------------------------------

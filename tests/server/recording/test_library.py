@@ -1,0 +1,44 @@
+"""What the service keeps of recordings, beside their files."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.server.recording.made import header, record
+from transientcam_server.errors import Problem
+from transientcam_server.recording import layout
+from transientcam_server.recording.library import Library
+from transientcam_server.settings import RecordingSettings
+
+IDS = [f"20261120T08150{number}Z-3f9c2a" for number in range(4)]
+
+
+@pytest.fixture
+def library(tmp_path: Path) -> Library:
+    """One with a few recordings that others have made."""
+    for each in IDS:
+        record(tmp_path / f"{each}{layout.SUFFIX}", 2, recording_id=each)
+
+    def new_header(recording_id: str, name: str, started_s: float) -> object:
+        return header(recording_id=recording_id, name=name, started_s=started_s)
+
+    return Library(RecordingSettings(directory=tmp_path), header=new_header)  # type: ignore[arg-type]
+
+
+def test_what_is_deleted_is_forgotten(library: Library) -> None:
+    assert len(library.describe_all()) == len(IDS)
+
+    for deleted, each in enumerate(IDS, start=1):
+        library.delete(each)
+        assert len(library._descriptions) == len(IDS) - deleted
+
+
+def test_what_others_deleted_is_forgotten(library: Library, tmp_path: Path) -> None:
+    assert len(library.describe_all()) == len(IDS)
+    for path in tmp_path.glob("*.h5"):
+        path.unlink()
+
+    assert library.describe_all() == []
+    assert not len(library._descriptions)
+    with pytest.raises(Problem, match=IDS[0]):
+        library.describe(IDS[0])
