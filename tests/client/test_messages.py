@@ -1,6 +1,7 @@
 """The messages of docs/stream.md."""
 
 import contextlib
+import json
 import math
 from typing import Any
 
@@ -58,19 +59,34 @@ def test_messages_are_encoded_as_recorded(name: str, recorded: dict[str, Recordi
 _RANGE_M = np.array([[1.5, math.nan], [2.25, -0.0]], dtype="<f4")
 
 
-def test_a_recorded_frame_says_what_the_specification_prints_beside_it(
-    recorded: dict[str, Recording],
-) -> None:
-    document = msgpack.unpackb(recorded["frame"].data)
-    array = document.pop("array")
-    printed = dict(recorded["frame"].document)
-    printed_array = printed.pop("array")
+_FRAMES = ["frame", "u16", "reflection16"]
 
-    assert document.pop("pad").decode() == printed.pop("pad")
-    assert document == printed
-    values = np.array([float(value) for value in printed_array.pop("data")], dtype="<f4")
-    assert array.pop("data") == values.tobytes()
-    assert array == printed_array
+
+def _with_values(document: dict[str, Any]) -> dict[str, Any]:
+    """Replace the bytes of arrays by numbers as JSON has them."""
+    for array in (document["array"], document.get("brightness")):
+        if array is not None:
+            values = np.frombuffer(array["data"], array["dtype"]).tolist()
+            array["data"] = ["NaN" if math.isnan(value) else value for value in values]
+    return document | {"pad": document["pad"].decode()}
+
+
+@pytest.mark.parametrize("name", _FRAMES)
+def test_a_recorded_frame_says_what_the_specification_prints_beside_it(
+    name: str, recorded: dict[str, Recording]
+) -> None:
+    said = _with_values(msgpack.unpackb(recorded[name].data))
+
+    assert json.dumps(said) == json.dumps(recorded[name].document)  # -0.0 is not 0.0
+
+
+@pytest.mark.parametrize("name", _FRAMES)
+def test_the_data_of_a_recorded_frame_begins_at_a_multiple_of_8_bytes(
+    name: str, recorded: dict[str, Recording]
+) -> None:
+    data = recorded[name].data
+
+    assert (len(data) - len(msgpack.unpackb(data)["array"]["data"])) % 8 == 0
 
 
 def test_a_recorded_frame_is_parsed(recorded: dict[str, Recording]) -> None:
@@ -94,6 +110,49 @@ def test_a_frame_is_encoded_as_recorded(recorded: dict[str, Recording]) -> None:
     )
 
     assert data == recorded["frame"].data
+
+
+_CODED_RANGE_M = np.array([[1.0, math.nan], [1.99993896484375, 0.0]], dtype="<f4")
+_COEFFICIENTS = np.array([[[3.0, math.nan]], [[-0.5, math.nan]], [[0.0, math.nan]]], dtype="<f4")
+
+
+@pytest.mark.parametrize(
+    ("name", "values"), [("u16", _CODED_RANGE_M), ("reflection16", _COEFFICIENTS)]
+)
+def test_a_recorded_frame_of_codes_is_parsed_into_values(
+    name: str, values: Any, recorded: dict[str, Recording]
+) -> None:
+    frame = wire.parse_server_message(recorded[name].data)
+
+    assert isinstance(frame, wire.Frame)
+    np.testing.assert_allclose(frame.array, values, rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "coded"),
+    [
+        ("u16", wire.encode_u16(_CODED_RANGE_M)),
+        ("reflection16", wire.encode_reflection16(_COEFFICIENTS)),
+    ],
+)
+def test_values_are_encoded_as_recorded(
+    name: str, coded: wire.Coded, recorded: dict[str, Recording]
+) -> None:
+    document = msgpack.unpackb(recorded[name].data)
+    told = ("approximate", "max_error", "median_error", "encoding")
+
+    data = wire.encode_frame(
+        product=document["product"],
+        unit=document["unit"],
+        axes=tuple(document["axes"]),
+        meta=document["meta"],
+        array=coded.array,
+        encode_s=document["encode_s"],
+        channel=0,
+        extra={key: document[key] for key in told if key in document} | coded.fields,
+    )
+
+    assert data == recorded[name].data
 
 
 def test_a_frame_without_channel_keeps_what_only_its_product_has() -> None:

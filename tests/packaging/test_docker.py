@@ -1,4 +1,4 @@
-"""What can be said of docker/ without building it; docker/build-and-check does that for real."""
+"""What can be said of docker/ without building it; the scripts beside it do that for real."""
 
 import os
 import re
@@ -103,11 +103,12 @@ def test_the_image_runs_as_somebody_and_is_asked_whether_it_is_ready() -> None:
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
-def test_the_script_that_builds_it_is_a_script() -> None:
-    script = _DOCKER / "build-and-check"
+@pytest.mark.parametrize("name", ["build-and-check", "compose-check"])
+def test_what_tries_it_out_is_a_script_that_says_how_to_run_it(name: str) -> None:
+    script = _DOCKER / name
 
     assert os.access(script, os.X_OK)
     subprocess.run(["bash", "-n", script], check=True)
     wrong = subprocess.run([script, "--nonsense"], capture_output=True, text=True, check=False)
     assert wrong.returncode == 2
-    assert "docker/build-and-check [--base IMAGE]" in wrong.stdout
+    assert f"\n  docker/{name}" in wrong.stdout

@@ -63,8 +63,11 @@ export interface Tagged<T> {
   readonly tag: string | null;
 }
 
-/** Where frames of a recording are, beside those of the camera. */
+/** Where the newest frame of the camera is; frames of recordings are elsewhere. */
 export const LIVE = "/frames/latest";
+
+/** Where one of the camera's last frames is. */
+export const liveFrame = (number: number): string => `/frames/${number}`;
 
 export class Api {
   readonly credentials: Credentials;

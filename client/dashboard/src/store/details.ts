@@ -1,9 +1,12 @@
 import { effect, signal, untracked, type ReadonlySignal } from "@preact/signals";
 
 import type { PixelDocument } from "../stream/protocol";
-import { type Api, LIVE, RequestError } from "./api";
+import { type Api, LIVE, liveFrame, RequestError } from "./api";
 import type { Frame } from "./frames";
 import type { Pixel } from "./pixel";
+
+/** A frame that the service kept for some seconds, or that it has never had: it was started anew. */
+const GONE: readonly string[] = ["frame-gone", "unknown-frame"];
 
 /** Least time between two questions about the same pixel. */
 const PAUSE_S = 0.5;
@@ -56,7 +59,7 @@ export class Details {
     this.#asked_s = this.#now_s();
     this.#origin = newest.origin;
     try {
-      const told = await this.#api.pixel(place.x, place.y, newest.origin);
+      const told = await this.#ask(place, newest);
       if (this.#place?.x === told.x && this.#place.y === told.y) this.document.value = told;
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;
@@ -65,6 +68,17 @@ export class Details {
       this.#asking = false;
     }
     if (this.#place?.x !== place.x || this.#place.y !== place.y || this.#newest?.origin !== newest.origin) await this.#look();
+  }
+
+  /** Asks about the very frame that is shown, as long as the service keeps it: it may be held here. */
+  async #ask({ x, y }: Pixel, { origin, meta }: Frame): Promise<PixelDocument> {
+    if (origin !== LIVE) return this.#api.pixel(x, y, origin);
+    try {
+      return await this.#api.pixel(x, y, liveFrame(meta.frame));
+    } catch (error) {
+      if (!(error instanceof RequestError) || !GONE.includes(error.kind)) throw error;
+      return this.#api.pixel(x, y);
+    }
   }
 
   /** Whether it is too soon to ask again; if so, it is asked when it is not: no other frame may come. */

@@ -1,7 +1,7 @@
 import { signal } from "@preact/signals";
 import { expect, test, vi } from "vitest";
 
-import { type Api, LIVE } from "../../src/store/api";
+import { type Api, LIVE, RequestError } from "../../src/store/api";
 import { Details } from "../../src/store/details";
 import type { Frame } from "../../src/store/frames";
 import type { Pixel } from "../../src/store/pixel";
@@ -64,5 +64,31 @@ test("what is known of one pixel is not shown as another's", async () => {
     expect(details.document.value?.x).toBe(6);
   });
   expect(asked).toEqual(["3,4", "5,5", "6,6"]);
+  end();
+});
+
+/** A service whose newest frame is 90, and which keeps no frame before 80. */
+function keeping(): { api: Api; asked: string[] } {
+  const asked: string[] = [];
+  const pixel = (x: number, y: number, address: string = LIVE): Promise<unknown> => {
+    asked.push(address);
+    const number = address === LIVE ? 90 : Number(address.split("/").pop());
+    if (number < 80) return Promise.reject(new RequestError({ type: "/problems/frame-gone" }));
+    return Promise.resolve({ x, y, meta: { frame: number } });
+  };
+  return { api: { pixel } as unknown as Api, asked };
+}
+
+test.each([
+  { held: 85, told: 85, addresses: ["/frames/85"] },
+  { held: 70, told: 90, addresses: ["/frames/70", LIVE] },
+])("a pixel of frame $held, held for a while, is told of frame $told", async ({ held, told, addresses }) => {
+  const { api, asked } = keeping();
+  const details = new Details(api);
+  const end = details.follow(signal<Pixel | null>({ x: 3, y: 4 }), signal<Frame | null>(frame(held)));
+  await vi.waitFor(() => {
+    expect(details.document.value?.meta.frame).toBe(told);
+  });
+  expect(asked).toEqual(addresses);
   end();
 });
