@@ -203,9 +203,22 @@ def test_a_viewer_looks_and_is_told_what_it_may_not(page_of_guarded: Any) -> Non
     page.goto("/?debug")
     show_token(page, tokens[Role.VIEWER])
     page.locator(".panel-map canvas[data-frame]").wait_for()
-    page.get_by_role("button", name="Stop", exact=True).click()
-    expect(page.locator("[data-banner=message]")).to_contain_text("takes the role operator")
-    page.locator("[data-banner=message]").get_by_role("button", name="Dismiss").click()
+    stop = page.get_by_role("button", name="Stop", exact=True)
+    expect(stop).to_be_disabled()
+    expect(stop).to_have_attribute("title", "The token viewer is a viewer's")
+    page.get_by_label("Page: layout, colours, help").select_option(label="Token…")
+    dialog = page.get_by_role("dialog", name="Who are you?")
+    expect(dialog.locator("[data-field=caller]")).to_contain_text("knows this page as viewer")
+    # with another one it may at once
+    show_token(page, tokens[Role.OPERATOR])
+    expect(stop).to_be_enabled()
+
+
+def test_a_viewer_may_switch_the_light_off(page_of_guarded: Any) -> None:
+    page, _, tokens = page_of_guarded
+    page.goto("/?debug")
+    show_token(page, tokens[Role.VIEWER])
+    page.locator(".panel-map canvas[data-frame]").wait_for()
     control(page, "Light off")
     expect(page.locator("[data-field=state]")).to_have_text("Stopped")
 

@@ -1,10 +1,14 @@
 """What answers here, and which versions of the interface it serves."""
 
+from typing import Any
+
 from fastapi import APIRouter
 
 import transientcam_moments as tm
 from transientcam import wire
 from transientcam_server import asyncapi
+from transientcam_server.access import PrincipalOf
+from transientcam_server.auth import Principal
 from transientcam_server.encoding import ENCODINGS
 from transientcam_server.products import Product
 from transientcam_server.routes.frame_models import HistoryDocument
@@ -23,8 +27,8 @@ async def read_versions() -> VersionsDocument:
 
 
 @router.get("/info", summary="The service")
-async def read_info(service: ServiceOf) -> InfoDocument:
-    """Say what this service is and which products its frames have."""
+async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
+    """Say what this service is, which products its frames have, and who asks."""
     return InfoDocument(
         name=service.identity["name"],
         version=service.identity["version"],
@@ -36,11 +40,17 @@ async def read_info(service: ServiceOf) -> InfoDocument:
             encodings=list(wire.ENCODINGS),
         ),
         products=[_product(product) for product in service.pipeline.products.values()],
+        caller=_caller(principal),
         history=HistoryDocument(**service.history.to_document()),
         clients=service.hub.clients,
         kernels=dict(tm.kernels.state()),
         reconstruction=service.pipeline.reconstruction.settings.model_dump(),
     )
+
+
+def _caller(principal: Principal) -> InfoDocument.CallerDocument:
+    role: Any = str(principal.role)
+    return InfoDocument.CallerDocument(name=principal.name, role=role)
 
 
 def _product(product: Product) -> InfoDocument.ProductDocument:

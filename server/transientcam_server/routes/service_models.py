@@ -45,6 +45,7 @@ class InfoDocument(Document):
                         "limit_bytes": 268435456,
                         "limit_seconds": 10.0,
                     },
+                    "caller": {"name": "bench-2", "role": "operator"},
                     "clients": 1,
                     "kernels": {"enabled": True, "compiled": [], "compiling": None, "failed": []},
                     "reconstruction": {
@@ -58,6 +59,12 @@ class InfoDocument(Document):
             ]
         }
     )
+
+    class CallerDocument(Document):
+        """Who the service takes the one who asks for."""
+
+        name: str = Field(description="of the token; anybody where none is needed")
+        role: Literal["viewer", "operator", "admin"]
 
     class ProductDocument(Document):
         """An array that a frame can be asked for."""
@@ -87,6 +94,7 @@ class InfoDocument(Document):
     api: str
     stream: StreamDocument
     products: list[ProductDocument]
+    caller: CallerDocument
     history: HistoryDocument
     """Which frames can be had, as `GET /frames` says."""
     clients: int

@@ -7,6 +7,7 @@ import type {
   CalibrationDocument,
   CalibrationRequest,
   CalibrationsDocument,
+  CallerDocument,
   EffectChoice,
   ExplanationDocument,
   Fault,
@@ -81,6 +82,11 @@ export class Api {
   }
 
   // -- the camera --------------------------------------------------------------------------------
+
+  /** Who the service takes this page for. */
+  async caller(): Promise<CallerDocument> {
+    return ((await this.#json("GET", "/info")) as { caller: CallerDocument }).caller;
+  }
 
   camera(): Promise<CameraDocument> {
     return this.#json("GET", "/camera") as Promise<CameraDocument>;

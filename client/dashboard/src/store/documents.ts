@@ -6,6 +6,12 @@ export interface AcquisitionDocument {
   readonly state: CameraState;
 }
 
+/** Who the service takes this page for. */
+export interface CallerDocument {
+  readonly name: string;
+  readonly role: "viewer" | "operator" | "admin";
+}
+
 /** Who controls the camera. */
 export interface LeaseDocument {
   readonly held: boolean;

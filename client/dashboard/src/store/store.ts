@@ -5,6 +5,7 @@ import { useContext } from "preact/hooks";
 import type { AppliedSequence, CameraDocument } from "../stream/protocol";
 import { Api, kindOf } from "./api";
 import { Calibrations } from "./calibrations";
+import { Caller } from "./caller";
 import { Credentials } from "./credentials";
 import { Events } from "./events";
 import { Frames } from "./frames";
@@ -28,8 +29,12 @@ export class Store {
   readonly frames = new Frames();
   readonly status = new Status();
   readonly api: Api;
+  /** Who this page is to the service. */
+  readonly caller: Caller;
   /** Who controls the camera. */
   readonly lease: Lease;
+  /** Why nothing can be changed from here; null where everything may. */
+  readonly obstacle = computed(() => this.caller.obstacle.value ?? this.lease.obstacle.value);
   readonly recordings: Recordings;
   readonly reconstruction: Reconstruction;
   readonly calibrations: Calibrations;
@@ -76,6 +81,7 @@ export class Store {
   constructor({ api = new Api(undefined, new Credentials(sessionShelf())), shelf = browserShelf() }: { api?: Api; shelf?: Shelf | null } = {}) {
     this.api = api;
     this.shelf = shelf;
+    this.caller = new Caller(api);
     this.lease = new Lease(api);
     this.recordings = new Recordings(api);
     this.reconstruction = new Reconstruction(api);

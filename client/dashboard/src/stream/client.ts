@@ -128,6 +128,7 @@ export class StreamClient {
     this.#store.status.sessionOpened(hello.camera.state, this.#now_s());
     this.#takeSequence(hello.sequence);
     void this.#readCamera();
+    void this.#store.caller.look();
     void this.#store.lease.look();
     void this.#store.recordings.refresh();
     clearTimeout(this.#filling);

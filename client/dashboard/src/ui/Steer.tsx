@@ -13,9 +13,9 @@ interface SteerProps {
   readonly children: ComponentChildren;
 }
 
-/** A button that changes something of the camera: not to be pressed while somebody else controls it, and it says so. */
+/** A button that changes something of the camera: not to be pressed where that would be refused, and it says why. */
 export function Steer({ onClick, title, primary = false, danger = false, disabled = false, submit = false, children }: SteerProps) {
-  const { obstacle } = useStore().lease;
+  const { obstacle } = useStore();
   return (
     <button
       type={submit ? "submit" : "button"}
@@ -32,13 +32,14 @@ export function Steer({ onClick, title, primary = false, danger = false, disable
 
 /** Why nothing can be changed here, beside controls that are disabled for it. */
 export function Obstacle() {
-  const { lease, asksForControl } = useStore();
-  if (lease.obstacle.value === null) return null;
+  const { caller, obstacle, asksForControl, asksForToken } = useStore();
+  if (obstacle.value === null) return null;
+  const [way, asks] = caller.obstacle.value === null ? ["Control…", asksForControl] : ["Token…", asksForToken];
   return (
     <p class="obstacle" role="status">
-      {lease.obstacle.value}: you can look, but not change this.{" "}
-      <button type="button" class="link" onClick={() => (asksForControl.value = true)}>
-        Control…
+      {obstacle.value}: you can look, but not change this.{" "}
+      <button type="button" class="link" onClick={() => (asks.value = true)}>
+        {way}
       </button>
     </p>
   );

@@ -38,7 +38,7 @@ export function SimulationView() {
 }
 
 function ScenePicker({ task }: { task: Task }) {
-  const { simulation, lease } = useStore();
+  const { simulation, obstacle } = useStore();
   const world = simulation.world.value;
   if (world === null) return null;
   const known = world.scenes.some(({ name }) => name === world.scene);
@@ -48,7 +48,7 @@ function ScenePicker({ task }: { task: Task }) {
       <select
         name="scene"
         value={world.scene}
-        disabled={task.busy.value !== null || lease.obstacle.value !== null}
+        disabled={task.busy.value !== null || obstacle.value !== null}
         onChange={(event) => {
           const scene = event.currentTarget.value;
           void task.run(`Preparing ${scene}…`, () => simulation.stage(scene));
@@ -105,7 +105,7 @@ function Effects({ task }: { task: Task }) {
 }
 
 function EffectRow({ effect, calledAbove, task }: { effect: EffectDocument; calledAbove: number; task: Task }) {
-  const { simulation, lease } = useStore();
+  const { simulation, obstacle } = useStore();
   const name = effectWords(effect.effect);
   const mine = simulation.world.value?.effects[effect.effect];
   return (
@@ -122,7 +122,7 @@ function EffectRow({ effect, calledAbove, task }: { effect: EffectDocument; call
             name={effect.effect}
             aria-label={`Whether ${name} is computed`}
             value={mine ?? ""}
-            disabled={task.busy.value !== null || lease.obstacle.value !== null}
+            disabled={task.busy.value !== null || obstacle.value !== null}
             onChange={(event) => {
               const choice = event.currentTarget.value as EffectChoice | "";
               void task.run(`Preparing ${name.toLowerCase()}…`, () => simulation.choose(effect.effect, choice === "" ? null : choice));

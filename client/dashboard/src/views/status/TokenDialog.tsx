@@ -18,10 +18,12 @@ export function TokenDialog() {
 }
 
 function TokenForm({ onDone }: { onDone: () => void }) {
-  const { credentials } = useStore().api;
+  const { api, caller } = useStore();
+  const { credentials } = api;
   const text = useSignal("");
   const known = credentials.token.value !== null;
   const problem = credentials.refused.value;
+  const told = caller.document.value;
   return (
     <form
       class="control"
@@ -40,6 +42,11 @@ function TokenForm({ onDone }: { onDone: () => void }) {
         <span>Token</span>
         <input type="password" name="token" autocomplete="off" spellcheck={false} value={text.value} onInput={(event) => (text.value = event.currentTarget.value)} />
       </label>
+      {known && told !== null && (
+        <p data-field="caller">
+          The service knows this page as <strong>{told.name}</strong>, {told.role}.
+        </p>
+      )}
       <p class="quiet">It is kept until this tab is closed, and sent to this service only.</p>
       <div class="dialog-actions">
         {known && (
