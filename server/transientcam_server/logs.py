@@ -15,12 +15,22 @@ request_id: Final[ContextVar[str | None]] = ContextVar("request_id", default=Non
 _NOISY: Final = ("websockets", "asyncio", "multipart", "PIL", "numba", "h5py")
 """Libraries that tell their own debugging at `debug`, some of it headers."""
 
+_OF_CLIENTS: Final = frozenset(
+    (
+        "Invalid UTF-8 sequence received from client.",
+        "ASGI callable returned without completing handshake.",
+    )
+)
+"""What uvicorn calls errors, one with a traceback, although somebody else made the mistake and has
+been told: text that is none, and a stream that was refused."""
+
 
 def configure(*, level: str, form: LogFormat, stream: TextIO = sys.stderr) -> None:
     """Log to ``stream``, one line a message."""
     handler = logging.StreamHandler(stream)
     handler.setFormatter(formatter(form if form != "auto" else _form_for(stream)))
     handler.addFilter(_add_request_id)
+    handler.addFilter(_blame_clients)
     logging.basicConfig(level=level.upper(), handlers=[handler], force=True)
     for name in _NOISY:
         logging.getLogger(name).setLevel(max(logging.INFO, logging.getLevelName(level.upper())))
@@ -46,3 +56,10 @@ def _add_request_id(record: logging.LogRecord) -> bool:
     if current is not None:
         record.request_id = current
     return True
+
+
+def _blame_clients(record: logging.LogRecord) -> bool:
+    if record.name != "uvicorn.error" or record.msg not in _OF_CLIENTS:
+        return True
+    record.levelno, record.levelname, record.exc_info = logging.INFO, "INFO", None
+    return logging.getLogger().isEnabledFor(logging.INFO)

@@ -5,7 +5,12 @@ import logging
 from collections.abc import Iterator
 
 import pytest
+from websockets.exceptions import ConnectionClosedError, InvalidStatus
+from websockets.sync.client import connect
+from websockets.typing import Origin, Subprotocol
 
+from tests.serving import serving
+from transientcam import wire
 from transientcam_server import logs
 
 
@@ -100,3 +105,29 @@ def test_libraries_that_tell_headers_stay_quiet_at_debug() -> None:
 
     assert "secret" not in stream.getvalue()
     assert "ours" in stream.getvalue()
+
+
+def test_what_clients_do_wrong_is_no_error_of_the_service() -> None:
+    stream = io.StringIO()
+    with serving("sim:wall?noise=off") as daemon:
+        logs.configure(level="info", form="json", stream=stream)
+        subprotocols = [Subprotocol(wire.SUBPROTOCOL)]
+        with connect(daemon.stream_url, subprotocols=subprotocols) as client:
+            client.send(b"\xff\xfe", text=True)
+            with pytest.raises(ConnectionClosedError):
+                client.recv()
+        with (
+            pytest.raises(InvalidStatus),
+            connect(
+                daemon.stream_url,
+                subprotocols=subprotocols,
+                origin=Origin("https://elsewhere.example"),
+            ),
+        ):
+            pass
+
+    documents = [json.loads(line) for line in lines(stream)]
+    told = [each for each in documents if each["message"] in logs._OF_CLIENTS]
+    assert [each["level"] for each in told] == ["INFO", "INFO"]
+    assert not any("exception" in each for each in documents)
+    assert all(each["level"] in ("INFO", "WARNING") for each in documents)
