@@ -8,6 +8,7 @@ import httpx
 from websockets.typing import Subprotocol
 
 from transientcam.rest import Answer, Request
+from transientcam.tls import shared_context
 from transientcam.translation import media_type
 from transientcam.wire import MAX_SERVER_MESSAGE_BYTES, SUBPROTOCOL
 
@@ -80,3 +81,9 @@ def stream_options(*, timeout_s: float) -> dict[str, Any]:
         # the reading of pongs, and the connection of a reader that thinks for long would be cut.
         "max_queue": _QUEUED_MESSAGES,
     }
+
+
+def threaded_stream_options(url: str, *, timeout_s: float) -> dict[str, Any]:
+    """Return the same for a client that reads on a thread of its own."""
+    options = stream_options(timeout_s=timeout_s)
+    return options | {"ssl": shared_context()} if url.startswith("wss:") else options

@@ -9,7 +9,7 @@ from typing import Any
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Data
 
-from transientcam.connection import stream_options
+from transientcam.connection import threaded_stream_options
 from transientcam.deadline import Deadline
 from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamError
 from transientcam.frame import Frame
@@ -148,7 +148,7 @@ class Stream:
     def _connect(self) -> ClientConnection:
         with translated(self._url):
             connection: ClientConnection = self._stack.enter_context(
-                connect(self._url, **stream_options(timeout_s=self._timeout_s))
+                connect(self._url, **threaded_stream_options(self._url, timeout_s=self._timeout_s))
             )
             connection.send(self._state.opening(connection.subprotocol))
         if self.closed:  # meanwhile, by another thread

@@ -38,6 +38,17 @@ def test_requests_and_streams_go_through_tls(
                 assert stream.receive().product == "flags"
 
 
+def test_every_one_of_many_streams_opens(
+    files: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Session tickets come when they come: about one stream in 300 once never opened."""
+    monkeypatch.setenv("SSL_CERT_FILE", str(files["authority"]))
+    with serving("sim:wall?noise=off", tls_certificate=files["both"]) as served:
+        for _ in range(400):
+            with Camera(served.url, timeout_s=5.0) as camera, camera.stream("flags") as stream:
+                assert not stream.closed
+
+
 def test_an_authority_nobody_trusts_is_not_trusted(files: dict[str, Path]) -> None:
     with (
         serving(tls_certificate=files["both"]) as served,

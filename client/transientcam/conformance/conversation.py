@@ -11,7 +11,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from transientcam.conformance.expecting import expect
-from transientcam.connection import stream_options
+from transientcam.connection import threaded_stream_options
 from transientcam.errors import PromiseBroken, ProtocolError
 from transientcam.translation import translated
 from transientcam.wire import (
@@ -154,7 +154,7 @@ def connected(
     ``silent`` sends no subscription, ``unread`` keeps the buffers of this end so small that what
     is not read stays with the camera.
     """
-    options = stream_options(timeout_s=patience_s)
+    options = threaded_stream_options(url, timeout_s=patience_s)
     if unread:
         options |= {"max_queue": 1, "sock": _small_socket(url, patience_s)}
     with translated(url), connect(url, **options) as connection:
