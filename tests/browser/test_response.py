@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
 import transientcam_moments as tm
+from tests.browser.conftest import Watch
 from tests.browser.dashboard import choose, open_page, point_at, shows_frame, text
 from tests.browser.test_transient import stop
 from tests.serving import Served
@@ -126,13 +127,34 @@ def test_every_aspect_is_drawn(page: Page, served: Served, aspect: str) -> None:
     assert ink > 30, "an empty plot has but its axes' few colours"
 
 
-def test_what_is_told_beside_a_held_frame_says_of_which_it_is(page: Page, served: Served) -> None:
+def hold(page: Page, served: Served) -> str:
+    """Hold a frame until there is another, and return its number."""
     open_page(page)
     page.keyboard.press("h")
     expect(page.locator("[data-field=state]")).to_have_text("Held")
     held = str(page.locator("canvas[data-product=transient]").get_attribute("data-frame"))
-    httpx.get(
-        f"{served.url}/api/v1/frames/latest", params={"after": held, "wait_s": 10}
-    ).raise_for_status()
+    query = {"after": held, "wait_s": 10}
+    httpx.get(f"{served.url}/api/v1/frames/latest", params=query).raise_for_status()
+    return held
+
+
+def test_what_is_told_beside_a_held_frame_is_of_that_frame(page: Page, served: Served) -> None:
+    held = hold(page, served)
+    with page.expect_response(lambda answer: f"/frames/{held}/pixel?" in answer.url):
+        point_at(page, "map", *PIXEL, click=True)
+    expect(page.locator(".response-side [data-field=returns]")).to_be_visible()
+    expect(page.locator(".response-side")).not_to_contain_text("the curves are of frame")
+
+
+def test_of_a_held_frame_that_is_not_kept_any_more_it_is_said(
+    page: Page, served: Served, watch: Watch
+) -> None:
+    watch.refusals_expected = True
+    held = hold(page, served)
+    gone = {"type": "/problems/frame-gone", "title": "Gone", "status": 410}
+    page.route(
+        f"**/frames/{held}/pixel?*",
+        lambda route: route.fulfill(status=410, json=gone),
+    )
     point_at(page, "map", *PIXEL, click=True)
     expect(page.locator(".response-side")).to_contain_text(f"the curves are of frame {held}")

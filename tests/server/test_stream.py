@@ -190,9 +190,9 @@ def test_a_region_and_a_decimation_send_the_pixels_that_rest_answers(served: Ser
     region = [40, 30, 50, 21]
     with streaming(served.stream_url) as client, httpx.Client(base_url=served.url) as http:
         hello = client.subscribe({"product": "moments", "region": region, "decimation": 2})
+        frame = client.frame()
         http.put("/api/v1/acquisition", json={"running": False})
         whole = wire.parse_frame(http.get("/api/v1/frames/latest/moments").content)
-        frame = client.frame()
         while frame.meta["frame"] < whole.meta["frame"]:
             frame = client.frame()
 

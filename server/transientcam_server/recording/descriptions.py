@@ -17,7 +17,7 @@ class Descriptions:
     """Describes files, and reads each only once as long as it stays the same."""
 
     def __init__(self) -> None:
-        self._known: dict[str, tuple[tuple[int, int], dict[str, Any]]] = {}
+        self._known: dict[Path, tuple[tuple[int, int], dict[str, Any]]] = {}
 
     def __len__(self) -> int:
         """Return how many files are remembered."""
@@ -33,13 +33,13 @@ class Descriptions:
 
     def keep(self, ids: Set[str]) -> None:
         """Forget all but these recordings."""
-        self._known = {each: self._known[each] for each in self._known.keys() & ids}
+        self._known = {path: known for path, known in self._known.items() if id_of(path) in ids}
 
     def _of_content(self, path: Path, status: os.stat_result) -> dict[str, Any]:
         stamp = status.st_mtime_ns, status.st_size
-        known = self._known.get(id_of(path))
+        known = self._known.get(path)
         if known is None or known[0] != stamp:
-            known = self._known[id_of(path)] = stamp, _read(path)
+            known = self._known[path] = stamp, _read(path)
         return known[1]
 
 
