@@ -133,8 +133,8 @@ def hold(page: Page, served: Served) -> str:
     page.keyboard.press("h")
     expect(page.locator("[data-field=state]")).to_have_text("Held")
     held = str(page.locator("canvas[data-product=transient]").get_attribute("data-frame"))
-    query = {"after": held, "wait_s": 10}
-    httpx.get(f"{served.url}/api/v1/frames/latest", params=query).raise_for_status()
+    newer = f"{served.url}/api/v1/frames/latest?after={held}&wait_s=10"
+    httpx.get(newer).raise_for_status()
     return held
 
 
