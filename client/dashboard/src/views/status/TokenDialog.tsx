@@ -47,7 +47,7 @@ function TokenForm({ onDone }: { onDone: () => void }) {
           The service knows this page as <strong>{told.name}</strong>, {told.role}.
         </p>
       )}
-      <p class="quiet">It is kept until this tab is closed, and sent to this service only.</p>
+      <p class="quiet">A token is kept until this tab is closed, and sent to this service only.</p>
       <div class="dialog-actions">
         {known && (
           <button
