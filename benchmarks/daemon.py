@@ -60,6 +60,11 @@ class Process:
         """Return how many threads it runs."""
         return sum(1 for _ in Path(f"/proc/{self._process.pid}/task").iterdir())
 
+    def kill(self) -> None:
+        """End it wherever it is, with SIGKILL."""
+        self._process.kill()
+        self._process.communicate()
+
     def end(self) -> None:
         """Ask it to end, and wait until it has."""
         self._process.send_signal(signal.SIGTERM)

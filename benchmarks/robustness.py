@@ -3,7 +3,8 @@
 Run it with ``python -m benchmarks.robustness [--unplugs 100] [--viewers 10] [--write]``. It starts
 ``transientcam serve`` with the simulated camera at the paper's video setting (Sec. 6.3: 18.6 Hz),
 lets viewers stream range and coefficients, records, unplugs the camera, and plugs it in again. It
-also ends a daemon with SIGTERM at moments when it is starting, compiling and streaming.
+also ends a daemon with SIGTERM at moments when it is starting, compiling and streaming, and kills
+one while it records (``--kills 100``).
 """
 
 import argparse
@@ -17,6 +18,7 @@ from pathlib import Path
 import httpx
 
 import transientcam
+from benchmarks import kills
 from benchmarks.daemon import Process, daemon
 from benchmarks.machine import machine
 from benchmarks.viewers import Viewer, cut, watch
@@ -151,7 +153,13 @@ def measure_ends(directory: Path) -> list[tuple[float, float, bool]]:
     return ends
 
 
-def report(unplugs: Unplugs, ends: list[tuple[float, float, bool]], *, viewers: int) -> str:
+def report(
+    unplugs: Unplugs,
+    ends: list[tuple[float, float, bool]],
+    killed: list[kills.Kill],
+    *,
+    viewers: int,
+) -> str:
     """Return the page."""
     return "\n".join(
         [
@@ -192,6 +200,7 @@ def report(unplugs: Unplugs, ends: list[tuple[float, float, bool]], *, viewers: 
             "",
             f"Bar: {END_BAR_S:g} s, {_met(max(end_s for _, end_s, _ in ends) <= END_BAR_S)}.",
             "",
+            *kills.report(killed),
         ]
     )
 
@@ -214,12 +223,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--unplugs", type=int, default=100, help="how often")
     parser.add_argument("--viewers", type=int, default=10, help="how many look on")
+    parser.add_argument("--kills", type=int, default=100, help="how often, while it records")
     parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         unplugs = measure_unplugs(Path(name), unplugs=arguments.unplugs, viewers=arguments.viewers)
         ends = measure_ends(Path(name))
-    page = report(unplugs, ends, viewers=arguments.viewers)
+        killed = kills.measure_kills(Path(name) / "kills", kills=arguments.kills)
+    page = report(unplugs, ends, killed, viewers=arguments.viewers)
     print(page)
     if arguments.write:
         PAGE.write_text(page, encoding="utf-8")

@@ -57,23 +57,26 @@ class SharedSocket(ssl.SSLSocket):
         """Close it; who waits in `recv` returns."""
         with contextlib.suppress(OSError):  # it was never connected, or the other end is gone
             socket.socket.shutdown(self, socket.SHUT_RDWR)
-        super().close()
+        with self._turn or contextlib.nullcontext():
+            super().close()
 
     def _take_turns(self, act: Callable[[], _Result], usual_event: int) -> _Result:
         if self._turn is None:
             return act()
         while True:
-            try:
-                with self._turn:
+            with self._turn:
+                try:
                     return act()
-            except ssl.SSLWantReadError:
-                event = selectors.EVENT_READ
-            except ssl.SSLWantWriteError:
-                event = selectors.EVENT_WRITE
-            except BlockingIOError:  # after `shutdown`, when OpenSSL is not asked any more
-                event = usual_event
-            with selectors.DefaultSelector() as selector:
-                selector.register(self, event)
+                except ssl.SSLWantReadError:
+                    event = selectors.EVENT_READ
+                except ssl.SSLWantWriteError:
+                    event = selectors.EVENT_WRITE
+                except BlockingIOError:  # after `shutdown`, when OpenSSL is not asked any more
+                    event = usual_event
+                # a handle of its own: what is closed meanwhile may at once be somebody else's
+                handle = socket.fromfd(self.fileno(), self.family, self.type)
+            with handle, selectors.DefaultSelector() as selector:
+                selector.register(handle, event)
                 if not selector.select(self._timeout_s):
                     raise TimeoutError("timed out")
 

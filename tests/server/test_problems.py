@@ -135,7 +135,7 @@ class Labels(BaseModel):
 )
 def test_what_pydantic_refuses_is_told_in_a_sentence(given: dict[str, object], detail: str) -> None:
     with pytest.raises(ValidationError) as refused:
-        Labels(**given)  # type: ignore[arg-type]
+        Labels.model_validate(given)
     (mistake,) = refused.value.errors()
 
     problem = _of_validation(

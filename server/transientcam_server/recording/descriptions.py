@@ -33,7 +33,9 @@ class Descriptions:
 
     def keep(self, ids: Set[str]) -> None:
         """Forget all but these recordings."""
-        self._known = {path: known for path, known in self._known.items() if id_of(path) in ids}
+        for path in list(self._known):  # other threads describe meanwhile
+            if id_of(path) not in ids:
+                self._known.pop(path, None)
 
     def _of_content(self, path: Path, status: os.stat_result) -> dict[str, Any]:
         stamp = status.st_mtime_ns, status.st_size

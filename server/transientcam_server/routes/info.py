@@ -1,14 +1,11 @@
 """What answers here, and which versions of the interface it serves."""
 
-from typing import Any
-
 from fastapi import APIRouter
 
 import transientcam_moments as tm
 from transientcam import wire
 from transientcam_server import asyncapi
 from transientcam_server.access import PrincipalOf
-from transientcam_server.auth import Principal
 from transientcam_server.encoding import ENCODINGS
 from transientcam_server.products import Product
 from transientcam_server.routes.frame_models import HistoryDocument
@@ -40,17 +37,14 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
             encodings=list(wire.ENCODINGS),
         ),
         products=[_product(product) for product in service.pipeline.products.values()],
-        caller=_caller(principal),
+        caller=InfoDocument.CallerDocument.model_validate(
+            {"name": principal.name, "role": str(principal.role)}
+        ),
         history=HistoryDocument(**service.history.to_document()),
         clients=service.hub.clients,
         kernels=dict(tm.kernels.state()),
         reconstruction=service.pipeline.reconstruction.settings.model_dump(),
     )
-
-
-def _caller(principal: Principal) -> InfoDocument.CallerDocument:
-    role: Any = str(principal.role)
-    return InfoDocument.CallerDocument(name=principal.name, role=role)
 
 
 def _product(product: Product) -> InfoDocument.ProductDocument:

@@ -20,8 +20,6 @@ from hypothesis.stateful import run_state_machine_as_test
 from schemathesis.config import SchemathesisConfig
 from schemathesis.core.failures import FailureGroup
 
-import tests.server.fuzzing.hooks  # noqa: F401  # registers them
-
 CONFIG: Final = Path(__file__).with_name("schemathesis.toml")
 STORIES: Final = 30
 STORY: Final = settings(

@@ -6,7 +6,8 @@ import pytest
 
 from tests.server.recording.made import header, record
 from transientcam_server.errors import Problem
-from transientcam_server.recording import layout
+from transientcam_server.recording import Header, layout
+from transientcam_server.recording.descriptions import Descriptions
 from transientcam_server.recording.library import Library
 from transientcam_server.settings import RecordingSettings
 
@@ -19,10 +20,10 @@ def library(tmp_path: Path) -> Library:
     for each in IDS:
         record(tmp_path / f"{each}{layout.SUFFIX}", 2, recording_id=each)
 
-    def new_header(recording_id: str, name: str, started_s: float) -> object:
+    def new_header(recording_id: str, name: str, started_s: float) -> Header:
         return header(recording_id=recording_id, name=name, started_s=started_s)
 
-    return Library(RecordingSettings(directory=tmp_path), header=new_header)  # type: ignore[arg-type]
+    return Library(RecordingSettings(directory=tmp_path), header=new_header)
 
 
 def test_what_is_deleted_is_forgotten(library: Library) -> None:
@@ -42,3 +43,28 @@ def test_what_others_deleted_is_forgotten(library: Library, tmp_path: Path) -> N
     assert not len(library._descriptions)
     with pytest.raises(Problem, match=IDS[0]):
         library.describe(IDS[0])
+
+
+class Busy(frozenset[str]):
+    """Ids; whoever looks for one is interrupted by somebody who describes another file."""
+
+    descriptions: Descriptions
+    others: list[Path]
+
+    def __contains__(self, item: object) -> bool:
+        if self.others:
+            self.descriptions.of_file(self.others.pop())
+        return super().__contains__(item)
+
+
+def test_a_file_may_be_described_while_others_are_forgotten(tmp_path: Path) -> None:
+    paths = [record(tmp_path / f"{each}{layout.SUFFIX}", 2, recording_id=each) for each in IDS]
+    descriptions = Descriptions()
+    for path in paths[:2]:
+        descriptions.of_file(path)
+    ids = Busy(IDS[1:])
+    ids.descriptions, ids.others = descriptions, paths[2:]
+
+    descriptions.keep(ids)
+
+    assert len(descriptions) == len(IDS) - 1
