@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import Sequence, open_camera
-from transientcam_driver.simulation.clock import VirtualClock
+from transientcam_driver.clock import VirtualClock
 
 BASE_FREQUENCY_HZ = 23e6
 TAKES = 4

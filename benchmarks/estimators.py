@@ -14,10 +14,10 @@ from rich.progress import Progress, TaskID
 
 import transientcam_moments as tm
 from benchmarks.machine import machine
+from transientcam_experiments import tradeoff
+from transientcam_experiments.tradeoff.estimating import SAMPLE_PIXELS
 from transientcam_moments.comparisons import TECHNIQUES, Technique
-from transientcam_server import tradeoff
 from transientcam_server.settings import Estimator
-from transientcam_server.tradeoff.estimating import SAMPLE_PIXELS
 
 PAGE = Path(__file__).parents[1] / "docs" / "estimators.md"
 SCENES = ("mirrors", "corner")

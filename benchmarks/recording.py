@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks.machine import machine
 from transientcam_driver import AppliedSequence, Capabilities, RawFrame, Sequence, open_camera
-from transientcam_driver.simulation.clock import VirtualClock
+from transientcam_driver.clock import VirtualClock
 from transientcam_server.recording import Header, Recording, RecordingWriter, recover
 
 PAGE = Path(__file__).parents[1] / "docs" / "recording-cost.md"

@@ -22,7 +22,7 @@ from benchmarks import kills
 from benchmarks.daemon import Process, daemon
 from benchmarks.machine import machine
 from benchmarks.viewers import Viewer, cut, watch
-from transientcam.subscription import Reconnect
+from transientcam.stream_state import Reconnect
 
 PAGE = Path(__file__).parents[1] / "docs" / "robustness.md"
 VIDEO = {"base_frequency_hz": 23e6, "harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}

@@ -16,7 +16,7 @@ from benchmarks.machine import machine
 from transientcam_driver import Sequence
 from transientcam_driver.simulation.build import find_scene, world_of
 from transientcam_driver.simulation.effects import EFFECTS
-from transientcam_driver.simulation.scene import Scene
+from transientcam_driver.simulation.scene.scene import Scene
 from transientcam_driver.simulation.world import World
 
 VIDEO = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005)

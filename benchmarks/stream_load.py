@@ -28,10 +28,10 @@ from benchmarks.machine import machine
 from benchmarks.viewers import Viewer, cut, stuck, watch
 from transientcam import wire
 from transientcam_driver import open_camera
-from transientcam_server.app import build_app
-from transientcam_server.frame import Frame
-from transientcam_server.history import History
-from transientcam_server.run import Server, address, listen
+from transientcam_server.api.app import build_app
+from transientcam_server.daemon.server import Server, address, listen
+from transientcam_server.imaging.frame import Frame
+from transientcam_server.imaging.history import History
 from transientcam_server.settings import Settings
 
 PAGE = Path(__file__).parents[1] / "docs" / "stream-load.md"

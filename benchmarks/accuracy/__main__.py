@@ -18,8 +18,8 @@ from benchmarks.accuracy.capturing import SEED, known_scenes
 from benchmarks.accuracy.noise import draw_noise, predicted_and_observed
 from benchmarks.accuracy.page import report
 from benchmarks.accuracy.plans import planned
-from transientcam_server import tradeoff
-from transientcam_server.tradeoff.report import file_name
+from transientcam_experiments import tradeoff
+from transientcam_experiments.tradeoff.report import file_name
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

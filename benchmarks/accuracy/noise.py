@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from benchmarks.accuracy.capturing import SEED, SETTINGS, captured, short
 from transientcam_driver import Sequence, open_camera
-from transientcam_driver.simulation.clock import VirtualClock
-from transientcam_server.accuracy import Accuracy
+from transientcam_driver.clock import VirtualClock
+from transientcam_experiments.tradeoff.measuring import spec_of
+from transientcam_server.planning.planner import Accuracy
 from transientcam_server.settings import SensorSettings
-from transientcam_server.tradeoff.measuring import spec_of
 
 
 @dataclass(frozen=True)

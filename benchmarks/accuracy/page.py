@@ -7,8 +7,8 @@ from benchmarks.accuracy.noise import FRAMES, Compared
 from benchmarks.accuracy.plans import Planned
 from benchmarks.machine import machine
 from transientcam_driver import Sequence
-from transientcam_server import tradeoff
-from transientcam_server.tradeoff.report import file_name
+from transientcam_experiments import tradeoff
+from transientcam_experiments.tradeoff.report import file_name
 
 
 def report(

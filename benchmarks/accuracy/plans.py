@@ -7,13 +7,13 @@ import numpy as np
 
 from benchmarks.accuracy.capturing import SEED, SETTINGS, captured, known_scenes
 from transientcam_driver import Sequence, open_camera
-from transientcam_driver.simulation.clock import VirtualClock
-from transientcam_server.accuracy import Accuracy
+from transientcam_driver.clock import VirtualClock
+from transientcam_experiments.tradeoff.capture import repeatability
+from transientcam_experiments.tradeoff.measuring import spec_of
 from transientcam_server.planning import Goal, plan
-from transientcam_server.prediction import Predictor
+from transientcam_server.planning.planner import Accuracy
+from transientcam_server.planning.prediction import Predictor
 from transientcam_server.settings import SensorSettings
-from transientcam_server.tradeoff.capture import repeatability
-from transientcam_server.tradeoff.measuring import spec_of
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from transientcam.errors import (
 from transientcam.frame import Frame
 from transientcam.lease import AsyncLease, Lease
 from transientcam.stream import Stream
-from transientcam.subscription import Reconnect
+from transientcam.stream_state import Reconnect
 from transientcam.wire import Notice, Subscription
 
 __version__ = version("transientcam")

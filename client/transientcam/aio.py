@@ -11,24 +11,15 @@ import httpx
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Data
 
-from transientcam import frame_requests, rest
-from transientcam.address import parse_address
-from transientcam.calibrations import Calibrations
-from transientcam.connection import (
-    Progress,
-    Told,
-    answer,
-    http_options,
-    request_options,
-    stream_options,
-)
-from transientcam.deadline import Deadline
 from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamError
 from transientcam.frame import Frame
-from transientcam.frame_requests import Part, Which
-from transientcam.jobs import PROGRESS_EVERY_S, WAIT_S, Jobs, OnProgress, ended
 from transientcam.lease import AsyncLease, OnLapse
-from transientcam.subscription import (
+from transientcam.requests import frames as frame_requests
+from transientcam.requests import request as rest
+from transientcam.requests.calibrations import Calibrations
+from transientcam.requests.frames import Part, Which
+from transientcam.requests.jobs import PROGRESS_EVERY_S, WAIT_S, Jobs, OnProgress, ended
+from transientcam.stream_state import (
     DEFAULT_CREDITS,
     NoticeHandler,
     Reconnect,
@@ -36,7 +27,17 @@ from transientcam.subscription import (
     reconnect_policy,
     subscribe_message,
 )
-from transientcam.translation import translated
+from transientcam.transport.address import parse_address
+from transientcam.transport.deadline import Deadline
+from transientcam.transport.errors import translated
+from transientcam.transport.options import (
+    Progress,
+    Told,
+    answer,
+    http_options,
+    request_options,
+    stream_options,
+)
 from transientcam.wire import LEASE_HEADER, Channel, CloseCode, Hello, Notice, Subscription
 
 _T = TypeVar("_T")

@@ -7,16 +7,15 @@ from typing import Any, TypeVar
 
 import httpx
 
-from transientcam import frame_requests, rest
-from transientcam.address import parse_address
-from transientcam.calibrations import Calibrations
-from transientcam.connection import Progress, Told, answer, http_options, request_options
 from transientcam.frame import Frame
-from transientcam.frame_requests import Part, Which
-from transientcam.jobs import PROGRESS_EVERY_S, WAIT_S, Jobs, OnProgress, ended
 from transientcam.lease import Lease, OnLapse
+from transientcam.requests import frames as frame_requests
+from transientcam.requests import request as rest
+from transientcam.requests.calibrations import Calibrations
+from transientcam.requests.frames import Part, Which
+from transientcam.requests.jobs import PROGRESS_EVERY_S, WAIT_S, Jobs, OnProgress, ended
 from transientcam.stream import Stream
-from transientcam.subscription import (
+from transientcam.stream_state import (
     DEFAULT_CREDITS,
     NoticeHandler,
     Reconnect,
@@ -24,7 +23,9 @@ from transientcam.subscription import (
     reconnect_policy,
     subscribe_message,
 )
-from transientcam.translation import translated
+from transientcam.transport.address import parse_address
+from transientcam.transport.errors import translated
+from transientcam.transport.options import Progress, Told, answer, http_options, request_options
 from transientcam.wire import LEASE_HEADER, Subscription
 
 _T = TypeVar("_T")

@@ -6,8 +6,8 @@ from collections.abc import Awaitable, Callable
 from types import TracebackType
 from typing import Any, Final, Literal
 
-from transientcam import rest
 from transientcam.errors import ProblemError, TransientcamError
+from transientcam.requests import request
 
 OnLapse = Literal["stop", "keep"]
 _RENEWALS: Final = 3.0
@@ -28,7 +28,7 @@ class Lease:
 
     def __init__(
         self,
-        ask: Callable[[rest.Request[dict[str, Any]]], dict[str, Any]],
+        ask: Callable[[request.Request[dict[str, Any]]], dict[str, Any]],
         show: Callable[[str | None], None],
         terms: dict[str, Any],
     ) -> None:
@@ -46,8 +46,8 @@ class Lease:
         return self._lost is not None
 
     def __enter__(self) -> "Lease":
-        granted = self._ask(rest.take_lease(self._terms))
-        self._show(rest.lease_id(granted))
+        granted = self._ask(request.take_lease(self._terms))
+        self._show(request.lease_id(granted))
         self._end.clear()
         self._lost = None
         self._thread = threading.Thread(target=self._keep, name="transientcam-lease", daemon=True)
@@ -65,7 +65,7 @@ class Lease:
             self._thread.join()
         try:
             if not self.lost:
-                self._ask(rest.give_lease_back())
+                self._ask(request.give_lease_back())
         except TransientcamError:
             # an error on the way says more, and what cannot be given back lapses
             if error is None:
@@ -76,7 +76,7 @@ class Lease:
     def _keep(self) -> None:
         while not self._end.wait(self._terms["duration_s"] / _RENEWALS):
             try:
-                self._ask(rest.renew_lease())
+                self._ask(request.renew_lease())
             except ProblemError as problem:
                 if problem.type == _LOST:
                     self._lost = problem
@@ -90,7 +90,7 @@ class AsyncLease:
 
     def __init__(
         self,
-        ask: Callable[[rest.Request[dict[str, Any]]], Awaitable[dict[str, Any]]],
+        ask: Callable[[request.Request[dict[str, Any]]], Awaitable[dict[str, Any]]],
         show: Callable[[str | None], None],
         terms: dict[str, Any],
     ) -> None:
@@ -107,8 +107,8 @@ class AsyncLease:
         return self._lost is not None
 
     async def __aenter__(self) -> "AsyncLease":
-        granted = await self._ask(rest.take_lease(self._terms))
-        self._show(rest.lease_id(granted))
+        granted = await self._ask(request.take_lease(self._terms))
+        self._show(request.lease_id(granted))
         self._lost = None
         self._task = asyncio.create_task(self._keep(), name="transientcam-lease")
         return self
@@ -124,7 +124,7 @@ class AsyncLease:
             await asyncio.gather(self._task, return_exceptions=True)
         try:
             if not self.lost:
-                await self._ask(rest.give_lease_back())
+                await self._ask(request.give_lease_back())
         except TransientcamError:
             if error is None:  # as above
                 raise
@@ -135,7 +135,7 @@ class AsyncLease:
         while not self.lost:
             await asyncio.sleep(self._terms["duration_s"] / _RENEWALS)
             try:
-                await self._ask(rest.renew_lease())
+                await self._ask(request.renew_lease())
             except ProblemError as problem:
                 if problem.type == _LOST:
                     self._lost = problem

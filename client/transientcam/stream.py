@@ -9,12 +9,12 @@ from typing import Any
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Data
 
-from transientcam.connection import threaded_stream_options
-from transientcam.deadline import Deadline
 from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamError
 from transientcam.frame import Frame
-from transientcam.subscription import DEFAULT_CREDITS, StreamState, subscribe_message
-from transientcam.translation import translated
+from transientcam.stream_state import DEFAULT_CREDITS, StreamState, subscribe_message
+from transientcam.transport.deadline import Deadline
+from transientcam.transport.errors import translated
+from transientcam.transport.options import threaded_stream_options
 from transientcam.wire import Channel, CloseCode, Hello, Notice, Subscription
 
 

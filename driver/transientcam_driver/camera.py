@@ -10,6 +10,7 @@ from enum import StrEnum
 from types import TracebackType
 
 from transientcam_driver.capabilities import IMAGE_HEADER_BYTES, AppliedSequence, Capabilities
+from transientcam_driver.clock import Clock, RealClock
 from transientcam_driver.errors import (
     CameraClosed,
     CameraError,
@@ -22,8 +23,6 @@ from transientcam_driver.errors import (
     TransferOverflow,
     TransferStalled,
 )
-from transientcam_driver.frames import Counters, RawFrame
-from transientcam_driver.incoming import Incoming
 from transientcam_driver.protocol import (
     CAPS_ROOM_BYTES,
     LAST_ERROR_BYTES,
@@ -37,9 +36,10 @@ from transientcam_driver.protocol import (
     unpack_last_error,
     unpack_time,
 )
+from transientcam_driver.receiving.assembler import Counters, RawFrame
+from transientcam_driver.receiving.receiver import Incoming
 from transientcam_driver.sequence import Sequence
 from transientcam_driver.simulation import Simulation
-from transientcam_driver.simulation.clock import Clock, RealClock
 from transientcam_driver.usb import Transport
 
 READ_S = 0.1

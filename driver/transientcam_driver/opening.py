@@ -7,8 +7,8 @@ from typing import Any, get_args
 from urllib.parse import parse_qsl
 
 from transientcam_driver.camera import Camera
+from transientcam_driver.clock import Clock, RealClock
 from transientcam_driver.errors import SpecError
-from transientcam_driver.simulation.backend import SimulatedBus
 from transientcam_driver.simulation.build import (
     DEFAULT_HEIGHT,
     DEFAULT_WIDTH,
@@ -19,10 +19,10 @@ from transientcam_driver.simulation.build import (
     measured_scene,
     without_noise,
 )
-from transientcam_driver.simulation.clock import Clock, RealClock
-from transientcam_driver.simulation.device_profile import PROFILES
+from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.simulation.effects import CHOICES, EFFECTS
-from transientcam_driver.simulation.scene import Background, Scene, TimeZero
+from transientcam_driver.simulation.imperfections import PROFILES
+from transientcam_driver.simulation.scene.scene import Background, Scene, TimeZero
 from transientcam_driver.usb import open_transport
 
 DEFAULT_SPEC = "sim:mirrors"

@@ -11,8 +11,8 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel
 
 from transientcam_driver import Capabilities, Sequence, SequenceError
-from transientcam_server.routes.camera_models import AcquisitionRequest
-from transientcam_server.routes.sequence_models import SequenceDocument, SubPhasesDocument
+from transientcam_server.api.documents.camera import AcquisitionRequest
+from transientcam_server.api.documents.sequence import SequenceDocument, SubPhasesDocument
 from transientcam_server.settings import (
     HistorySettings,
     ReconstructionSettings,

@@ -14,37 +14,37 @@ from fastapi import Depends, Request
 
 from transientcam import wire
 from transientcam_driver import AppliedSequence, CalibrationError
-from transientcam_driver.calibration import DEVICE_FIELDS
-from transientcam_server.accuracy import Accuracy
-from transientcam_server.acquisition import Acquisition
-from transientcam_server.auth import Guard
-from transientcam_server.calibrating import CalibrationDesk
-from transientcam_server.calibration import (
+from transientcam_driver.calibration.file import DEVICE_FIELDS
+from transientcam_server.api.auth.guard import Guard
+from transientcam_server.api.metrics import Metrics
+from transientcam_server.broadcast.hub import Hub
+from transientcam_server.broadcast.outbox import Channel, Goodbye
+from transientcam_server.camera.acquisition import Acquisition
+from transientcam_server.camera.calibration_store import Calibrations
+from transientcam_server.camera.calibrator import CalibrationDesk
+from transientcam_server.camera.events import Back, Captured, Event, Lost, SequenceChanged
+from transientcam_server.camera.jobs import Job, JobDesk
+from transientcam_server.camera.lease import Alarm, Change, Lease, LeaseDesk
+from transientcam_server.camera.source import Camera
+from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging.calibration import (
     NOMINAL_ID,
     Calibration,
     calibration_id,
     load_calibration,
 )
-from transientcam_server.calibrations import Calibrations
-from transientcam_server.cameras import Camera
-from transientcam_server.errors import Problem
-from transientcam_server.events import Back, Captured, Event, Lost, SequenceChanged
-from transientcam_server.fronts import Fronts
-from transientcam_server.history import History
-from transientcam_server.hub import Hub
-from transientcam_server.jobs import Job, JobDesk
-from transientcam_server.lease import Alarm, Change, Lease, LeaseDesk
-from transientcam_server.lens import Intrinsics, known_intrinsics
-from transientcam_server.metrics import Metrics
-from transientcam_server.outbox import Channel, Goodbye
-from transientcam_server.pipeline import Pipeline
-from transientcam_server.reconstruction import Reconstruction, require_harmonics
+from transientcam_server.imaging.encodings.compact import encoding_name, travelling
+from transientcam_server.imaging.history import History
+from transientcam_server.imaging.lens import Intrinsics, known_intrinsics
+from transientcam_server.imaging.pipeline import Pipeline
+from transientcam_server.imaging.recipe import Reconstruction, require_harmonics
+from transientcam_server.planning.front import Fronts
+from transientcam_server.planning.planner import Accuracy
 from transientcam_server.recording import Header
 from transientcam_server.recording.frames import RecordedFramesOf
 from transientcam_server.recording.library import Library, Wanted
 from transientcam_server.recording.replay import ReplayCamera
 from transientcam_server.settings import ReconstructionSettings, Settings
-from transientcam_server.stream_encodings import encoding_name, travelling
 
 _log = logging.getLogger(__name__)
 VERSION: Final = version("transientcam")

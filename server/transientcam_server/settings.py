@@ -1,4 +1,4 @@
-"""What can be set; `transientcam_server.configuration` reads it."""
+"""What can be set; `transientcam_server.daemon.configuration` reads it."""
 
 import os
 from ipaddress import ip_address

@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, Page, expect
 from tests.browser.conftest import Watch
 from tests.browser.dashboard import open_page, shows_frame
 from tests.serving import Served, serving
-from transientcam_server.tokens import Role, TokenFile, utc_now
+from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
 
 
 def lease(served: Served, method: str, **document: Any) -> httpx.Response:

@@ -8,8 +8,9 @@ import pytest
 
 import transientcam
 from tests.serving import Served, serving
-from transientcam import AsyncCamera, Camera, rest
+from transientcam import AsyncCamera, Camera
 from transientcam.errors import ProblemError, ProtocolError, ServerUnreachable
+from transientcam.requests import request as rest
 
 OTHER = {"harmonics": 4}
 

@@ -14,7 +14,7 @@ from transientcam.cli import run as command
 from transientcam.conformance import CHECKS, GROUPS, Check, Device, Report, chosen, run
 from transientcam.errors import ParameterError, ServerUnreachable
 from transientcam.wire import LEASE_HEADER
-from transientcam_server.tokens import Role, TokenFile, utc_now
+from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
 
 PATIENCE_S = 20.0
 SHORT_S = 1.5

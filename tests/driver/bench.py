@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import Camera, Capabilities, ImageLabel, RawFrame, Sequence
+from transientcam_driver.clock import VirtualClock
 from transientcam_driver.protocol import Request, Status, pack_capabilities
-from transientcam_driver.simulation.backend import SimulatedBus
-from transientcam_driver.simulation.clock import VirtualClock
-from transientcam_driver.simulation.device import EmulatedDevice
-from transientcam_driver.simulation.firmware import Firmware
-from transientcam_driver.simulation.profile import prototype
+from transientcam_driver.simulation.device.bus import SimulatedBus
+from transientcam_driver.simulation.device.firmware import Firmware
+from transientcam_driver.simulation.device.prototype import prototype
+from transientcam_driver.simulation.device.usb_device import EmulatedDevice
 from transientcam_driver.usb import open_transport
 
 WIDTH, HEIGHT = 12, 5

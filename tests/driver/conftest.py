@@ -6,7 +6,7 @@ from contextlib import ExitStack
 import pytest
 
 from transientcam_driver import Camera, Simulation, open_camera
-from transientcam_driver.simulation.clock import VirtualClock
+from transientcam_driver.clock import VirtualClock
 
 OpenCamera = Callable[..., Camera]
 

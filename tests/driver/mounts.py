@@ -8,11 +8,11 @@ from typing import Any, Protocol
 import usb.core
 
 from transientcam_driver import Camera, CameraLost, CameraNotFound, Sequence, open_camera
+from transientcam_driver.clock import VirtualClock
 from transientcam_driver.protocol import Request, Status
-from transientcam_driver.simulation.backend import SimulatedBus
 from transientcam_driver.simulation.build import build, find_scene, without_noise
-from transientcam_driver.simulation.clock import VirtualClock
-from transientcam_driver.simulation.faults import Fault
+from transientcam_driver.simulation.device.bus import SimulatedBus
+from transientcam_driver.simulation.device.faults import Fault
 from transientcam_driver.usb import open_transport
 
 from .usbfs.processes import Program, emulated_camera

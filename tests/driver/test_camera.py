@@ -22,11 +22,11 @@ from transientcam_driver import (
     Simulation,
     open_camera,
 )
+from transientcam_driver.clock import RealClock, VirtualClock
 from transientcam_driver.protocol import Request
-from transientcam_driver.simulation.backend import SimulatedBus
 from transientcam_driver.simulation.build import build, find_scene
-from transientcam_driver.simulation.clock import RealClock, VirtualClock
-from transientcam_driver.simulation.device import EmulatedDevice
+from transientcam_driver.simulation.device.bus import SimulatedBus
+from transientcam_driver.simulation.device.usb_device import EmulatedDevice
 from transientcam_driver.usb import open_transport
 
 from .conftest import OpenCamera

@@ -21,8 +21,8 @@ from transientcam_driver import (
     NotStreaming,
     Sequence,
 )
-from transientcam_driver.frames import FrameAssembler
-from transientcam_driver.simulation.faults import Fault
+from transientcam_driver.receiving.assembler import FrameAssembler
+from transientcam_driver.simulation.device.faults import Fault
 
 from .bench import Bench, number_of
 

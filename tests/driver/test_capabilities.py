@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from transientcam_driver import Capabilities, Sequence, SequenceError, SubPhases
-from transientcam_driver.simulation.profile import prototype
+from transientcam_driver.simulation.device.prototype import prototype
 
 CAPABILITIES = prototype(serial="T", width=163, height=120, bits=12)
 

@@ -26,7 +26,7 @@ from transientcam_driver import (
     SequenceError,
     open_camera,
 )
-from transientcam_driver.simulation.clock import VirtualClock
+from transientcam_driver.clock import VirtualClock
 
 from .mounts import Mount, PyusbMount, RealMount, UsbfsMount
 

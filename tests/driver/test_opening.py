@@ -5,7 +5,7 @@ import pytest
 
 from transientcam_driver import CameraNotFound, SceneError, SpecError
 from transientcam_driver.opening import CameraSpec, open_camera, parse_spec
-from transientcam_driver.simulation.backend import SimulatedBus
+from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.usb import open_transport
 
 from .conftest import OpenCamera

@@ -15,12 +15,12 @@ from transientcam_driver import (
     LibusbMissing,
     PermissionDenied,
 )
+from transientcam_driver.clock import VirtualClock
 from transientcam_driver.errors import UDEV_RULES_FILE, TransferOverflow, TransferStalled
 from transientcam_driver.protocol import Request
-from transientcam_driver.simulation.backend import SimulatedBus
 from transientcam_driver.simulation.build import build, find_scene
-from transientcam_driver.simulation.clock import VirtualClock
-from transientcam_driver.simulation.device import EmulatedDevice
+from transientcam_driver.simulation.device.bus import SimulatedBus
+from transientcam_driver.simulation.device.usb_device import EmulatedDevice
 from transientcam_driver.usb import UDEV_RULE, UsbCamera, list_cameras, open_transport
 
 

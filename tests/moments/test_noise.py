@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import RawFrame, Sequence, SubPhases, open_camera
-from transientcam_driver.simulation.clock import VirtualClock
+from transientcam_driver.clock import VirtualClock
 from transientcam_moments import noise
 
 Array = NDArray[Any]

@@ -6,7 +6,7 @@ import httpx
 import numpy as np
 import pytest
 
-from tests.server.test_reconstruct import composite
+from tests.server.offline.test_measurement import composite
 from tests.serving import serving
 from transientcam import wire
 

@@ -15,8 +15,8 @@ from websockets.uri import parse_uri
 from tests.server.streaming import streaming
 from tests.serving import Served
 from transientcam import wire
-from transientcam_server.outbox import Delivery
-from transientcam_server.products import STAGES
+from transientcam_server.broadcast.outbox import Delivery
+from transientcam_server.imaging.products import STAGES
 
 LATEST = "/api/v1/frames/latest"
 PATIENCE_S = 60.0

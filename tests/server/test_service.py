@@ -3,8 +3,8 @@ from typing import Any
 import pytest
 
 from tests.serving import Served
-from transientcam_server.acquisition import AcquisitionStatus
-from transientcam_server.outbox import Channel
+from transientcam_server.broadcast.outbox import Channel
+from transientcam_server.camera.acquisition import AcquisitionStatus
 
 HEALTHY: dict[str, Any] = {
     "state": "streaming",

@@ -11,12 +11,12 @@ from typing import Any, Final
 
 import httpx
 
-from transientcam.address import parse_address
 from transientcam.camera import Camera
 from transientcam.cli.findings import Finding
-from transientcam.connection import http_options
 from transientcam.errors import FrameTimeout, ProblemError, TransientcamError
-from transientcam.translation import translated
+from transientcam.transport.address import parse_address
+from transientcam.transport.errors import translated
+from transientcam.transport.options import http_options
 
 CLOCKS_WITHIN_S: Final = 1.5
 """The daemon's ``Date`` has whole seconds, so that nothing finer can be said."""

@@ -11,9 +11,9 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from transientcam.conformance.expecting import expect
-from transientcam.connection import threaded_stream_options
 from transientcam.errors import PromiseBroken, ProtocolError
-from transientcam.translation import translated
+from transientcam.transport.errors import translated
+from transientcam.transport.options import threaded_stream_options
 from transientcam.wire import (
     Ack,
     Channel,

@@ -10,13 +10,13 @@ from typing import Any, Final
 
 import httpx
 
-from transientcam import rest
-from transientcam.address import parse_address
 from transientcam.conformance.conversation import Conversation, connected
 from transientcam.conformance.expecting import equal, expect, skip_unless
-from transientcam.connection import answer, http_options
 from transientcam.errors import PromiseBroken, ProtocolError
-from transientcam.translation import media_type, translated
+from transientcam.requests import request as rest
+from transientcam.transport.address import parse_address
+from transientcam.transport.errors import media_type, translated
+from transientcam.transport.options import answer, http_options
 from transientcam.wire import LEASE_HEADER, MEDIA_TYPE, PROBLEM_MEDIA_TYPE, Frame, parse_frame
 
 API: Final = "/api/v1"

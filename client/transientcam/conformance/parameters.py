@@ -6,8 +6,8 @@ from typing import Any, Final
 from transientcam.conformance.check import checks
 from transientcam.conformance.device import API, Device
 from transientcam.conformance.expecting import equal, expect
-from transientcam.connection import answer
-from transientcam.rest import problem
+from transientcam.requests.request import problem
+from transientcam.transport.options import answer
 
 _SEQUENCE: Final = f"{API}/sequence"
 _CHANGEABLE: Final = "read-write"

@@ -9,9 +9,9 @@ import httpx
 from transientcam.conformance.check import checks
 from transientcam.conformance.device import API, Device
 from transientcam.conformance.expecting import expect, skip_unless
-from transientcam.connection import answer
-from transientcam.rest import problem
-from transientcam.translation import media_type
+from transientcam.requests.request import problem
+from transientcam.transport.errors import media_type
+from transientcam.transport.options import answer
 
 _OF_THE_SERVICE: Final = frozenset(("403", "408", "413", "429", "431"))
 """Any request may be refused with these, whatever it asks for."""

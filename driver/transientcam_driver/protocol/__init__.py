@@ -4,7 +4,7 @@ Pure: nothing here knows a transport or a clock. Both ends use it, the driver an
 firmware. The specification is docs/usb-protocol.md; all numbers are little-endian.
 """
 
-from transientcam_driver.protocol.caps import (
+from transientcam_driver.protocol.capabilities import (
     CAPS_BYTES,
     CAPS_ROOM_BYTES,
     pack_capabilities,

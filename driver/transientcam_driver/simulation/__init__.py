@@ -7,6 +7,6 @@ a real one.
 from transientcam_driver.simulation.explain import ExplainedEffect, Explanation
 from transientcam_driver.simulation.handle import Simulation
 from transientcam_driver.simulation.responses import Truth
-from transientcam_driver.simulation.scene_file import SceneInfo, list_scenes
+from transientcam_driver.simulation.scene.file import SceneInfo, list_scenes
 
 __all__ = ["ExplainedEffect", "Explanation", "SceneInfo", "Simulation", "Truth", "list_scenes"]

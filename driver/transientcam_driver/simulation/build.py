@@ -6,22 +6,22 @@ from pathlib import Path
 
 import numpy as np
 
+from transientcam_driver.clock import Clock
 from transientcam_driver.errors import EffectError, SceneError
-from transientcam_driver.simulation.clock import Clock
-from transientcam_driver.simulation.device import EmulatedDevice
-from transientcam_driver.simulation.device_profile import DeviceProfile
+from transientcam_driver.simulation.device.firmware import Firmware
+from transientcam_driver.simulation.device.prototype import prototype
+from transientcam_driver.simulation.device.usb_device import EmulatedDevice
 from transientcam_driver.simulation.effects import CHOICES, EFFECTS, NOISE
 from transientcam_driver.simulation.effects.modulation_harmonics import measured_harmonics
 from transientcam_driver.simulation.effects.pixel_pattern import read_offsets_rad
-from transientcam_driver.simulation.firmware import Firmware
 from transientcam_driver.simulation.handle import Simulation
-from transientcam_driver.simulation.measured import load_responses
+from transientcam_driver.simulation.imperfections import DeviceProfile
+from transientcam_driver.simulation.light.measured import load_responses
+from transientcam_driver.simulation.light.transport import GivenScenery, Scenery, SurfaceScenery
 from transientcam_driver.simulation.outlook import Outlook
-from transientcam_driver.simulation.profile import prototype
 from transientcam_driver.simulation.responses import SparseResponses
-from transientcam_driver.simulation.scene import Background, Diffusor, Scene, TimeZero
-from transientcam_driver.simulation.scene_file import BUILT_IN, list_scenes, load_scene
-from transientcam_driver.simulation.scenery import GivenScenery, Scenery, SurfaceScenery
+from transientcam_driver.simulation.scene.file import BUILT_IN, list_scenes, load_scene
+from transientcam_driver.simulation.scene.scene import Background, Diffusor, Scene, TimeZero
 from transientcam_driver.simulation.world import World
 
 MEASURED = "measured"

@@ -5,12 +5,12 @@ from collections.abc import Callable, Mapping
 
 from transientcam_driver.errors import CameraError
 from transientcam_driver.sequence import Sequence
-from transientcam_driver.simulation.device import EmulatedDevice
+from transientcam_driver.simulation.device.faults import Fault
+from transientcam_driver.simulation.device.usb_device import EmulatedDevice
 from transientcam_driver.simulation.explain import Explanation
-from transientcam_driver.simulation.faults import Fault
 from transientcam_driver.simulation.outlook import Outlook
 from transientcam_driver.simulation.responses import Truth
-from transientcam_driver.simulation.scene import Scene
+from transientcam_driver.simulation.scene.scene import Scene
 from transientcam_driver.simulation.sensor import Sensor
 from transientcam_driver.simulation.world import World
 

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.sequence import ImageLabel, Sequence
-from transientcam_driver.simulation.device_profile import IDEAL, DeviceProfile
 from transientcam_driver.simulation.effects import (
     EFFECTS,
     Call,
@@ -27,8 +26,9 @@ from transientcam_driver.simulation.effects import (
     ThermalDrift,
 )
 from transientcam_driver.simulation.explain import ExplainedEffect, Explanation
+from transientcam_driver.simulation.imperfections import IDEAL, DeviceProfile
+from transientcam_driver.simulation.light.transport import Scenery, Seen, View
 from transientcam_driver.simulation.responses import Truth
-from transientcam_driver.simulation.scenery import Scenery, Seen, View
 from transientcam_driver.simulation.sensor import Sensor
 
 _AMBIENT_C = 25.0

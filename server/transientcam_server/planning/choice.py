@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from transientcam_driver import AppliedSequence
-from transientcam_server.prediction import Deviation
-from transientcam_server.tradeoff.pareto import front
+from transientcam_server.planning.pareto import front
+from transientcam_server.planning.prediction import Deviation
 
 TARGETS: Final = ("range_std_m", "separation_m", "bound_width")
 """Accuracies that can be asked for, the one that choices are compared by first."""

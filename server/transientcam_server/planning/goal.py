@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from transientcam_driver import Sequence
-from transientcam_server import problem_kinds as kinds
-from transientcam_server.errors import Problem
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import Problem
 from transientcam_server.planning.choice import TARGETS, Choice
 
 BUDGETS: Final = ("capture_s", "frame_rate_hz", "computing_share")

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from transientcam_server import problem_kinds as kinds
-from transientcam_server.errors import Problem
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import Problem
 from transientcam_server.planning.choice import TARGETS, Choice
 from transientcam_server.planning.goal import BUDGETS, Goal
 

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from transientcam_server.errors import NotARecording
+from transientcam_server.errors.exceptions import NotARecording
 from transientcam_server.recording.directory import id_of
 from transientcam_server.recording.layout import Header
 from transientcam_server.recording.reader import Recording

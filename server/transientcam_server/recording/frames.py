@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from transientcam_driver import Capabilities, RawFrame
-from transientcam_server import problem_kinds as kinds
-from transientcam_server.errors import DamagedFrame, NotARecording, Problem
-from transientcam_server.frame import Frame
-from transientcam_server.pipeline import Pipeline
-from transientcam_server.reconstruction import Reconstruction
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import DamagedFrame, NotARecording, Problem
+from transientcam_server.imaging.frame import Frame
+from transientcam_server.imaging.pipeline import Pipeline
+from transientcam_server.imaging.recipe import Reconstruction
 from transientcam_server.recording.layout import Header
 from transientcam_server.recording.library import Library
 from transientcam_server.recording.reader import Recording

@@ -14,20 +14,20 @@ from pathlib import Path
 from typing import Any, Final
 
 from transientcam_driver import AppliedSequence, RawFrame
-from transientcam_server import problem_kinds as kinds
-from transientcam_server.errors import Problem
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import Problem
 from transientcam_server.recording import layout, recovery
 from transientcam_server.recording.annotating import annotate
 from transientcam_server.recording.descriptions import Descriptions, of_recorder
 from transientcam_server.recording.directory import Directory, id_of
 from transientcam_server.recording.layout import Header
-from transientcam_server.recording.recorder import Limits, Recorder
-from transientcam_server.recording.refusals import (
+from transientcam_server.recording.problems import (
     not_stored,
     require_annotations,
     unfinished,
     unknown,
 )
+from transientcam_server.recording.recorder import Limits, Recorder
 from transientcam_server.recording.totals import Totals
 from transientcam_server.recording.writer import RecordingWriter
 from transientcam_server.settings import RecordingSettings

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import DriverError, RawFrame
-from transientcam_server.errors import DamagedFrame, NotARecording
+from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
 from transientcam_server.recording import hdf5, layout, swmr
 
 

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_server.lens import known_intrinsics
-from transientcam_server.products import Recipe
-from transientcam_server.reconstruction import Reconstruction
+from transientcam_server.imaging.lens import known_intrinsics
+from transientcam_server.imaging.products import Recipe
+from transientcam_server.imaging.recipe import Reconstruction
 from transientcam_server.recording.layout import Header
 from transientcam_server.settings import LensSettings
 
 if TYPE_CHECKING:
-    from transientcam_server.calibration import Calibration
+    from transientcam_server.imaging.calibration import Calibration
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,9 +24,9 @@ from transientcam_driver import (
     SpecError,
     Status,
 )
+from transientcam_driver.clock import Clock, RealClock
 from transientcam_driver.protocol import DeviceState
 from transientcam_driver.protocol.status import StatusFlag
-from transientcam_driver.simulation.clock import Clock, RealClock
 from transientcam_server.recording.reader import Recording
 
 PREFIX: Final = "recording:"

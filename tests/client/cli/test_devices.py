@@ -10,7 +10,8 @@ import pytest
 from transientcam.cli import devices, run
 from transientcam.discovery import FoundCamera
 from transientcam.errors import ServerUnreachable
-from transientcam_driver import LibusbMissing, commands
+from transientcam_driver import LibusbMissing
+from transientcam_driver.cli import scenes
 from transientcam_driver.usb import UsbCamera
 
 FREE = UsbCamera("/dev/bus/usb/001/004", "A-17", "AMCW lidar")
@@ -21,12 +22,12 @@ ANNOUNCED = FoundCamera("lidar B-3", "http://192.168.7.5:8000", "B-3", "1.2", "v
 @pytest.fixture(autouse=True)
 def nothing_there(monkeypatch: pytest.MonkeyPatch) -> None:
     """Start from empty buses and silent networks."""
-    monkeypatch.setattr(commands, "list_cameras", lambda: ())
+    monkeypatch.setattr(scenes, "list_cameras", lambda: ())
     monkeypatch.setattr(devices, "discover", lambda **_: ())
 
 
 def plug(monkeypatch: pytest.MonkeyPatch, *cameras: UsbCamera) -> None:
-    monkeypatch.setattr(commands, "list_cameras", lambda: cameras)
+    monkeypatch.setattr(scenes, "list_cameras", lambda: cameras)
 
 
 def failing(error: Exception) -> Callable[..., Any]:
@@ -117,7 +118,7 @@ def test_a_missing_libusb_is_told_beside_the_others(
     def missing() -> None:
         raise LibusbMissing
 
-    monkeypatch.setattr(commands, "list_cameras", missing)
+    monkeypatch.setattr(scenes, "list_cameras", missing)
     monkeypatch.setattr(devices, "discover", lambda **_: (ANNOUNCED,))
 
     assert "libusb-1.0 was not found" in told(capsys)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from transientcam_driver import Sequence, SubPhases
 from transientcam_driver.simulation.effects import EFFECTS, Call, Effect, ShotNoise
 from transientcam_driver.simulation.effects.shot_noise import FEW_E
+from transientcam_driver.simulation.light.transport import GivenScenery
 from transientcam_driver.simulation.responses import SparseResponses
-from transientcam_driver.simulation.scenery import GivenScenery
 from transientcam_driver.simulation.sensor import Sensor
 from transientcam_driver.simulation.world import World
 

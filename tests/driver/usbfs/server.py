@@ -10,10 +10,10 @@ from typing import Any
 
 from usbfs import UsbfsMount  # type: ignore[import-not-found]  # beside this script, no package
 
+from transientcam_driver.clock import RealClock
 from transientcam_driver.protocol import Request, Status
 from transientcam_driver.simulation.build import build, find_scene, without_noise
-from transientcam_driver.simulation.clock import RealClock
-from transientcam_driver.simulation.faults import Fault
+from transientcam_driver.simulation.device.faults import Fault
 
 
 def main() -> None:

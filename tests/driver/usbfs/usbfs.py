@@ -19,8 +19,13 @@ from enum import IntEnum
 from pathlib import Path
 
 from transientcam_driver.protocol import PRODUCT_ID, VENDOR_ID
-from transientcam_driver.simulation import descriptors
-from transientcam_driver.simulation.device import EmulatedDevice, Overflow, Stall, Unplugged
+from transientcam_driver.simulation.device import descriptors
+from transientcam_driver.simulation.device.usb_device import (
+    EmulatedDevice,
+    Overflow,
+    Stall,
+    Unplugged,
+)
 
 DEVICE_PATH = "/devices/pci0000:00/0000:00:14.0/usb1/1-1"
 HIGH_SPEED_MBIT, HIGH_SPEED = 480, 3

@@ -9,7 +9,9 @@ import sys
 import atheris  # type: ignore[import-untyped]  # its stubs are another package
 
 # what is imported within is watched
-with atheris.instrument_imports(include=["transientcam.wire", "transientcam_driver.calibration"]):
+with atheris.instrument_imports(
+    include=["transientcam.wire", "transientcam_driver.calibration.file"]
+):
     from tests.server.fuzzing.targets import TARGETS
 
 _TARGETS = tuple(TARGETS.values())

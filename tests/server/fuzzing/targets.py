@@ -8,10 +8,10 @@ from typing import Final
 
 from transientcam import wire
 from transientcam.errors import ProtocolError
-from transientcam_driver.calibration import CalibrationCapture
+from transientcam_driver.calibration.file import CalibrationCapture
 from transientcam_driver.errors import CalibrationError
-from transientcam_server.errors import Problem
-from transientcam_server.routes import files
+from transientcam_server.api import downloads
+from transientcam_server.errors.exceptions import Problem
 
 SMALL_BYTES: Final = 1024 * 1024
 
@@ -40,7 +40,7 @@ def calibration_file(data: bytes) -> None:
 def byte_range(data: bytes) -> None:
     """Read the Range header of a download of 1000 bytes."""
     with contextlib.suppress(Problem):
-        files._check_range(data.decode("latin-1"), 1000)
+        downloads._check_range(data.decode("latin-1"), 1000)
 
 
 TARGETS: Final[dict[str, Callable[[bytes], None]]] = {

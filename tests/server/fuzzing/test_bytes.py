@@ -19,7 +19,7 @@ from tests.server.fuzzing.targets import TARGETS
 from tests.serving import serving
 from transientcam import wire
 from transientcam_driver import Sequence, capture_calibration, open_camera
-from transientcam_driver.simulation.clock import VirtualClock
+from transientcam_driver.clock import VirtualClock
 
 RUNS = 2000
 REPEATABLE = settings(derandomize=True, deadline=None, database=None, max_examples=60)

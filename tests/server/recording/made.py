@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from transientcam_driver import Capabilities, RawFrame, Sequence, open_camera
-from transientcam_driver.simulation.clock import VirtualClock
+from transientcam_driver.clock import VirtualClock
 from transientcam_server.recording import Header, RecordingWriter
 
 WIDTH, HEIGHT = 16, 12

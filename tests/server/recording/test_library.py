@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.server.recording.made import header, record
-from transientcam_server.errors import Problem
+from transientcam_server.errors.exceptions import Problem
 from transientcam_server.recording import Header, layout
 from transientcam_server.recording.descriptions import Descriptions
 from transientcam_server.recording.library import Library

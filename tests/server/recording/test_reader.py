@@ -11,7 +11,7 @@ from isal import isal_zlib
 
 from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, assert_same, frame, header, record
 from transientcam_driver import RawFrame
-from transientcam_server.errors import DamagedFrame, NotARecording
+from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
 from transientcam_server.recording import Recording, RecordingWriter, swmr
 
 SHAPE = (APPLIED.images, HEIGHT, WIDTH)

@@ -13,7 +13,7 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.server.recording.made import assert_same, frame, header, record
-from transientcam_server.errors import NotARecording
+from transientcam_server.errors.exceptions import NotARecording
 from transientcam_server.recording import Recording, RecordingWriter, recover
 from transientcam_server.recording.recovery import recover_all, unfinished
 

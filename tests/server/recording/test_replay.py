@@ -15,9 +15,9 @@ from transientcam_driver import (
     SequenceError,
     SpecError,
 )
-from transientcam_driver.simulation.clock import VirtualClock
-from transientcam_server import cameras
-from transientcam_server.errors import DamagedFrame, NotARecording
+from transientcam_driver.clock import VirtualClock
+from transientcam_server.camera import source
+from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
 from transientcam_server.recording.replay import ReplayCamera, ReplaySpec, parse_replay
 
 
@@ -183,11 +183,11 @@ def test_a_name_that_cannot_be_read_says_why(spec: str, reason: str) -> None:
 
 
 def test_cameras_opens_recordings_and_what_the_driver_opens(path: Path) -> None:
-    with cameras.open_camera(f"recording:{path}?speed=fast") as replayed:
+    with source.open_camera(f"recording:{path}?speed=fast") as replayed:
         assert isinstance(replayed, ReplayCamera)
-    with cameras.open_camera("sim:mirrors?noise=off") as simulated:
+    with source.open_camera("sim:mirrors?noise=off") as simulated:
         assert simulated.simulation is not None
     with pytest.raises(NotARecording):
-        cameras.open_camera(f"recording:{__file__}")
+        source.open_camera(f"recording:{__file__}")
     with pytest.raises(FileNotFoundError):
-        cameras.open_camera("recording:/nowhere.h5")
+        source.open_camera("recording:/nowhere.h5")

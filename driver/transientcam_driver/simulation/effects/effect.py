@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.sequence import LOW_FREQUENCY_HZ, Sequence
-from transientcam_driver.simulation.device_profile import IDEAL, PROTOTYPE, DeviceProfile
+from transientcam_driver.simulation.imperfections import IDEAL, PROTOTYPE, DeviceProfile
 from transientcam_driver.simulation.responses import Scatter
 from transientcam_driver.simulation.sensor import Sensor
 

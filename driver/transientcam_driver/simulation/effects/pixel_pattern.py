@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.errors import SceneError
-from transientcam_driver.simulation.device_profile import Pattern
 from transientcam_driver.simulation.effects.effect import (
     Call,
     Conditions,
@@ -14,6 +13,7 @@ from transientcam_driver.simulation.effects.effect import (
     PlaneEffect,
     weigh,
 )
+from transientcam_driver.simulation.imperfections import Pattern
 
 _CODES = 4096  # of a turn, in files of phase offsets
 

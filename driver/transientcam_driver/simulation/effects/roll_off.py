@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from transientcam_driver.simulation.device_profile import RollOff
 from transientcam_driver.simulation.effects.effect import (
     Call,
     Conditions,
@@ -10,6 +9,7 @@ from transientcam_driver.simulation.effects.effect import (
     PlaneEffect,
     weigh,
 )
+from transientcam_driver.simulation.imperfections import RollOff
 
 
 class AmplitudeRollOff(PlaneEffect):

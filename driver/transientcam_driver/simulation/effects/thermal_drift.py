@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.device_profile import Drift
 from transientcam_driver.simulation.effects.effect import (
     Call,
     Conditions,
@@ -12,6 +11,7 @@ from transientcam_driver.simulation.effects.effect import (
     ShotEffect,
     weigh,
 )
+from transientcam_driver.simulation.imperfections import Drift
 
 
 class ThermalDrift(ShotEffect):

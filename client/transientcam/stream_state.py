@@ -1,0 +1,251 @@
+"""The client's side of one stream, without any input or output.
+
+A stream's owner sends `opening` on every new connection, feeds what it receives to `received`,
+sends `acknowledgement` before it waits for the next message, and asks `retry_after_s` what to do
+when the connection is lost.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from transientcam.errors import (
+    ParameterError,
+    ProblemError,
+    ProtocolError,
+    ServerUnreachable,
+    StreamClosed,
+    TransientcamError,
+)
+from transientcam.frame import Frame
+from transientcam.requests.request import problem_error
+from transientcam.wire import (
+    ENCODINGS,
+    MAX_CREDITS,
+    MAX_DECIMATION,
+    SUBPROTOCOL,
+    Ack,
+    Channel,
+    CloseCode,
+    ErrorMessage,
+    Hello,
+    Notice,
+    Subscribe,
+    Subscription,
+    encode,
+    fields,
+    parse_channels,
+    parse_server_message,
+)
+
+DEFAULT_CREDITS: Final = 2
+_KEPT_NOTICES = 256
+_FINAL = frozenset((CloseCode.POLICY, CloseCode.BAD_FIRST_MESSAGE, CloseCode.AUTHENTICATION_FAILED))
+_RESTARTING = frozenset((502, 503, 504))
+"""What a proxy, or a server not yet ready, answers to the handshake."""
+
+NoticeHandler = Callable[[Notice], object]
+
+
+@dataclass(frozen=True, slots=True)
+class Reconnect:
+    """How to come back after a lost connection: wait, try, and wait twice as long each time.
+
+    Attributes
+    ----------
+    first_wait_s, longest_wait_s
+        Bounds of the wait.
+    attempts
+        How many times to try before giving up; None for no end.
+    resume
+        Whether to go on with the frame after the last one, as far as the daemon has them still,
+        instead of the newest.
+    """
+
+    first_wait_s: float = 0.1
+    longest_wait_s: float = 5.0
+    attempts: int | None = None
+    resume: bool = False
+
+    def wait_s(self, attempt: int) -> float:
+        """Return how long to wait before an attempt, counted from 0."""
+        # an exponent without bound would overflow after a night without a server
+        return min(self.longest_wait_s, self.first_wait_s * 2.0 ** min(attempt, 32))
+
+
+def reconnect_policy(wanted: bool | Reconnect) -> Reconnect | None:
+    """Return the policy that the argument ``reconnect`` of a stream stands for."""
+    if isinstance(wanted, Reconnect):
+        return wanted
+    return Reconnect() if wanted else None
+
+
+def subscribe_message(
+    products: Iterable[str | Subscription],
+    *,
+    token: str | None,
+    credits: int | None,  # noqa: A002 - the protocol calls them so
+    max_rate_hz: float | None,
+    start: int | None = None,
+) -> Subscribe:
+    """Build the message that subscribes to some products, given by name or in full.
+
+    Raises
+    ------
+    ParameterError
+        If there is no product, or a number is out of range.
+    """
+    subscriptions = tuple(
+        Subscription(each, max_rate_hz) if isinstance(each, str) else each for each in products
+    )
+    if not subscriptions:
+        raise ParameterError("products", (), "at least one product, such as 'range'")
+    for each in subscriptions:
+        _check(each)
+    if start is not None and start < 1:
+        raise ParameterError("start", start, "the number of a frame, from 1, or None")
+    if credits is not None and not 1 <= credits <= MAX_CREDITS:
+        raise ParameterError("credits", credits, f"from 1 to {MAX_CREDITS}, or None")
+    return Subscribe(subscriptions, token=token, credits=credits, start=start)
+
+
+def _check(subscription: Subscription) -> None:
+    rate_hz, region = subscription.max_rate_hz, subscription.region
+    if rate_hz is not None and not 0.0 < rate_hz < float("inf"):
+        raise ParameterError("max_rate_hz", rate_hz, "a number of Hz above 0")
+    if subscription.encoding not in ENCODINGS:
+        raise ParameterError("encoding", subscription.encoding, f"one of {', '.join(ENCODINGS)}")
+    if region is not None and (len(region) != len("xywh") or min(region) < 0):
+        raise ParameterError("region", region, "x, y, width and height in pixels")
+    if not 1 <= subscription.decimation <= MAX_DECIMATION:
+        limit = f"an integer from 1 to {MAX_DECIMATION}"
+        raise ParameterError("decimation", subscription.decimation, limit)
+
+
+class StreamState:
+    """What one stream knows and owes; not safe for use from several threads at once."""
+
+    def __init__(
+        self,
+        subscribe: Subscribe,
+        *,
+        on_notice: NoticeHandler | None = None,
+        reconnect: Reconnect | None = None,
+    ) -> None:
+        self.subscribe = subscribe
+        self.hello: Hello | None = None
+        self.channels: tuple[Channel, ...] = ()
+        self.sequence: Mapping[str, Any] = {}
+        self.notices: deque[Notice] = deque(maxlen=_KEPT_NOTICES)
+        self._on_notice = on_notice
+        self._reconnect = reconnect
+        self._attempt = 0
+        self._owed: int | None = None
+        self._last: int | None = None
+
+    def opening(self, subprotocol: str | None) -> bytes:
+        """Return the first message of a connection for which the server chose ``subprotocol``.
+
+        Raises
+        ------
+        ProtocolError
+            If it chose none: a server that knows nothing of this protocol may do so.
+        """
+        if subprotocol != SUBPROTOCOL:
+            raise ProtocolError("subprotocol", subprotocol, SUBPROTOCOL)
+        self._owed = None
+        if self.hello is None:
+            return encode(self.subscribe)
+        resumes = self._reconnect is not None and self._reconnect.resume
+        start = self._last + 1 if resumes and self._last is not None else None
+        return encode(replace(self.subscribe, start=start))
+
+    def resubscribe(self, subscribe: Subscribe) -> bytes:
+        """Return the message that asks for something else from now on."""
+        self.subscribe = replace(subscribe, token=self.subscribe.token)
+        return encode(self.subscribe)
+
+    def received(self, data: bytes | str) -> Frame | None:
+        """Take in one message; return the frame if it was one.
+
+        Raises
+        ------
+        ProblemError
+            If the server refuses what was asked of it.
+        ProtocolError
+            If the message is none of the protocol.
+        """
+        message = parse_server_message(data)
+        match message:
+            case Frame():
+                if self.hello is None:
+                    raise ProtocolError("type", "frame", "hello, before anything else")
+                self._owed = self._last = message.frame
+                return message
+            case Hello():
+                if self._attempt:
+                    self.notify(Notice("reconnected", {"attempts": self._attempt}))
+                self._attempt = 0
+                self.hello = message
+                self.channels = message.channels
+                self.sequence = message.sequence
+            case Notice():
+                self._follow(message)
+                self.notify(message)
+            case ErrorMessage():
+                self._refused(message)
+        return None
+
+    def _follow(self, notice: Notice) -> None:
+        if notice.kind == "sequence-changed":
+            sequence = fields.mapping(notice.details, "sequence")
+            self.channels = parse_channels(notice.details)
+            self.sequence = sequence
+
+    def _refused(self, message: ErrorMessage) -> None:
+        # one product that fails is no reason to lose the others: only what answers a message of
+        # this client, and so names no channel, is raised
+        if "channel" not in message.problem:
+            raise problem_error(message.problem)
+        self.notify(Notice("product-failed", message.problem))
+
+    def acknowledgement(self) -> bytes | None:
+        """Return what the server is owed for the frame handed out last, once; None for nothing."""
+        if self._owed is None or self.subscribe.credits is None:
+            return None
+        owed, self._owed = self._owed, None
+        return encode(Ack(owed))
+
+    def retry_after_s(self, error: TransientcamError) -> float:
+        """Return how long to wait before connecting again after ``error``, or raise it.
+
+        It is raised where no reconnection was asked for, none has succeeded before, the server
+        would refuse again, or the attempts are used up.
+        """
+        policy = self._reconnect
+        if policy is None or self.hello is None or not _may_pass(error):
+            raise error
+        if policy.attempts is not None and self._attempt >= policy.attempts:
+            raise error
+        if self._attempt == 0:
+            self.notify(Notice("connection-lost", {"reason": str(error)}))
+        wait_s = policy.wait_s(self._attempt)
+        self._attempt += 1
+        return wait_s
+
+    def notify(self, notice: Notice) -> None:
+        """Keep a notice and hand it to whom it concerns."""
+        self.notices.append(notice)
+        if self._on_notice is not None:
+            self._on_notice(notice)
+
+
+def _may_pass(error: TransientcamError) -> bool:
+    match error:
+        case StreamClosed():
+            return error.code not in _FINAL
+        case ProblemError():
+            return error.status in _RESTARTING
+        case _:
+            return isinstance(error, ServerUnreachable)

@@ -1,0 +1,366 @@
+"""Light transport: from surfaces, mirrors and stencils to the light that each pixel sees.
+
+A planar mirror is handled by image points: light that reaches a wall by mirrors M1, ..., Mk comes
+straight from the source reflected in M1, then in M2, and so on, as far as each mirror is hit
+within its rectangle and nothing stands in between.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
+from transientcam_driver.simulation.responses import Scatter, SparseResponses
+from transientcam_driver.simulation.scene.geometry import Points, Rectangle, blocked_by_mask
+from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Viewpoint
+
+_BLOCK = 8192  # rays at a time, so that what is computed for them stays in the cache
+_FAR_M = 1e3  # longer than any way in a scene
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """The scattering points behind the rays that end on one, flat.
+
+    ``ray`` says which ray; ``throughput`` is what mirrors on the way leave of the light.
+    """
+
+    ray: NDArray[np.intp]
+    point: Points
+    surface: NDArray[np.intp]
+    distance_m: NDArray[np.float64]
+    throughput: NDArray[np.float64]
+
+    def with_more(self, more: "Seen", rays: NDArray[np.intp]) -> "Seen":
+        """Put what other rays see behind what ``rays`` see."""
+        return Seen(
+            np.concatenate([self.ray, more.ray + len(rays)]),
+            np.concatenate([self.point, more.point]),
+            np.concatenate([self.surface, more.surface]),
+            np.concatenate([self.distance_m, more.distance_m]),
+            np.concatenate([self.throughput, more.throughput]),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ImageLight:
+    """The light source as it appears in a chain of mirrors, the last one first."""
+
+    mirrors: tuple[Surface, ...]
+    positions_m: tuple[Points, ...]
+    axis: Points
+
+
+@dataclass(frozen=True, slots=True)
+class Lit:
+    """What rays of the camera see: one row a ray, all flat.
+
+    Attributes
+    ----------
+    surface
+        (P) index of the surface a ray ends on, -1 for none.
+    point
+        (P, 3) where it ends.
+    distance_m
+        (P) its length.
+    reflectance
+        (P) share of the light on its end that it takes to the camera: albedo times mirrors.
+    delay_s, weight
+        (K, P) whole time of flight and brightness by each chain of mirrors.
+    """
+
+    surface: NDArray[np.intp]
+    point: Points
+    distance_m: NDArray[np.float64]
+    reflectance: NDArray[np.float64]
+    delay_s: NDArray[np.float64]
+    weight: NDArray[np.float64]
+
+    def moments(self, frequency_hz: float, scatter: Scatter | None) -> NDArray[np.complex128]:
+        """``int g(tau) exp(2 pi i f tau) dtau`` of each ray (P), over all chains of mirrors."""
+        moments = np.zeros(len(self.surface), dtype=np.complex128)
+        for delay_s, weight in zip(self.delay_s, self.weight, strict=True):
+            if weight.any():
+                moments += weight * np.exp(2j * np.pi * frequency_hz * delay_s)
+        if scatter is not None:
+            moments *= scatter.transfer(frequency_hz)
+        return moments
+
+    def scatter(self, scene: Scene) -> Scatter | None:
+        """Return how the surfaces' depths spread the light of each ray, if any does."""
+        return scatter_of(scene, self.surface)
+
+
+def scatter_of(scene: Scene, surface: NDArray[np.intp]) -> Scatter | None:
+    """Return the spread of light by the surfaces given by their index; -1 means none."""
+    spreads = [surface.scatter or Scatter(0.0, 0.0) for surface in scene.surfaces]
+    if not any(spread.width_s or spread.decay_s for spread in spreads):
+        return None
+    return Scatter(
+        np.array([spread.width_s for spread in spreads] + [0.0])[surface],
+        np.array([spread.decay_s for spread in spreads] + [0.0])[surface],
+    )
+
+
+def trace(scene: Scene, *, width: int, height: int) -> SparseResponses:
+    """Impulse responses of all pixels by direct light and any chain of mirrors up to the limit."""
+    lit = light_rays(scene, camera_rays(_camera(scene), width=width, height=height))
+    return sparse(scene, lit, width=width, height=height)
+
+
+def sparse(scene: Scene, lit: Lit, *, width: int, height: int) -> SparseResponses:
+    """Arrange what the pixels' rays see as an image."""
+    reaching = np.any(lit.weight > 0, axis=1)
+    reaching[0] |= not reaching.any()  # a dark scene has one return, of weight 0
+    shape = (-1, height, width)
+    scatter = lit.scatter(scene)
+    return SparseResponses(
+        lit.delay_s[reaching].reshape(shape),
+        lit.weight[reaching].reshape(shape),
+        None if scatter is None else scatter.reshaped((height, width)),
+    )
+
+
+def camera_rays(view: Viewpoint, *, width: int, height: int) -> Points:
+    """Return unit vectors through the pixels' centres, row by row from the top."""
+    columns, rows = np.meshgrid(np.arange(width), np.arange(height))
+    return rays_through(view, columns.ravel(), rows.ravel(), width=width, height=height)
+
+
+def rays_through(
+    view: Viewpoint,
+    column: NDArray[Any],
+    row: NDArray[Any],
+    *,
+    width: int,
+    height: int,
+) -> Points:
+    """Return unit vectors through places on the sensor; whole numbers are pixels' centres."""
+    forward = view.look_at_m - view.position_m
+    forward = forward / np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    half = np.tan(np.radians(view.field_of_view_deg) / 2)
+    x = half * (2 * (column + 0.5) / width - 1)
+    y = half * (height / width) * (1 - 2 * (row + 0.5) / height)
+    rays = forward + x[:, None] * right + y[:, None] * up
+    directions: Points = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+    return directions
+
+
+def light_rays(scene: Scene, directions: Points) -> Lit:
+    """Follow rays from the camera to what they see, and light to there."""
+    lights = tuple(image_lights(scene))
+    parts = []
+    for first in range(0, max(1, len(directions)), _BLOCK):
+        rays = directions[first : first + _BLOCK]
+        seen = first_scattering(scene, _camera(scene).position_m, rays)
+        parts.append(light_seen(scene, lights, seen, rays=len(rays)))
+    if len(parts) == 1:
+        return parts[0]
+    return joined(parts)
+
+
+def joined(parts: list[Lit]) -> Lit:
+    """Put rays behind others."""
+    return Lit(
+        np.concatenate([part.surface for part in parts]),
+        np.concatenate([part.point for part in parts]),
+        np.concatenate([part.distance_m for part in parts]),
+        np.concatenate([part.reflectance for part in parts]),
+        np.concatenate([part.delay_s for part in parts], axis=1),
+        np.concatenate([part.weight for part in parts], axis=1),
+    )
+
+
+def light_seen(scene: Scene, lights: tuple[ImageLight, ...], seen: Seen, *, rays: int) -> Lit:
+    """Follow light to what rays end on."""
+    lit = Lit(
+        np.full(rays, -1),
+        np.zeros((rays, 3)),
+        np.zeros(rays),
+        np.zeros(rays),
+        np.zeros((len(lights), rays)),
+        np.zeros((len(lights), rays)),
+    )
+    albedos = np.array([surface.reflectivity for surface in scene.surfaces])
+    reflectance = seen.throughput * albedos[seen.surface]
+    normal = normals_at(scene, seen.point, seen.surface)
+    lit.surface[seen.ray] = seen.surface
+    lit.point[seen.ray] = seen.point
+    lit.distance_m[seen.ray] = seen.distance_m
+    lit.reflectance[seen.ray] = reflectance
+    for k, light in enumerate(lights):
+        length_m, irradiance = light_on(scene, light, seen.point, normal)
+        lit.delay_s[k, seen.ray] = (length_m + seen.distance_m) / SPEED_OF_LIGHT_M_S
+        lit.weight[k, seen.ray] = irradiance * reflectance
+    return lit
+
+
+def _camera(scene: Scene) -> Viewpoint:
+    assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
+    return scene.camera
+
+
+def first_scattering(scene: Scene, eye: Points, direction: Points) -> Seen:
+    """Follow the camera's rays, over mirrors, to the scattering surface each one ends on."""
+    count = len(direction)
+    start = np.broadcast_to(eye, direction.shape)
+    ray = np.arange(count)
+    distance_m, throughput = np.zeros(count), np.ones(count)
+    ended: list[tuple[NDArray[np.intp], Points, NDArray[np.intp], Points, Points]] = []
+    scatters = np.array([surface.scatters for surface in scene.surfaces] + [False])
+    reflects = np.array([surface.kind == "mirror" for surface in scene.surfaces] + [False])
+    for _bounce in range(scene.mirror_bounces + 1):
+        nearest = np.full(len(ray), np.inf)
+        which = np.full(len(ray), -1)
+        for index, surface in enumerate(scene.surfaces):
+            at = _hit(surface, start, start + _FAR_M * direction)
+            closer = at < nearest
+            nearest[closer], which[closer] = at[closer], index
+        length_m = np.where(which < 0, 0.0, nearest) * _FAR_M
+        point = start + length_m[:, None] * direction
+        distance_m = distance_m + length_m
+        normal = normals_at(scene, point, which)
+        facing = np.einsum("pc,pc->p", normal, direction) < 0
+        end = scatters[which] & facing
+        ended.append((ray[end], point[end], which[end], distance_m[end], throughput[end]))
+        on = reflects[which] & facing
+        if not on.any():
+            break
+        ray, which, direction = ray[on], which[on], direction[on]
+        start, distance_m, throughput = point[on], distance_m[on], throughput[on]
+        for index in np.unique(which):
+            mine, surface = which == index, scene.surfaces[index]
+            direction[mine] = surface.mirror.mirrored_direction(direction[mine])
+            throughput[mine] *= surface.reflectivity
+    return Seen(*(np.concatenate(parts) for parts in zip(*ended, strict=True)))
+
+
+def image_lights(scene: Scene) -> Iterator[ImageLight]:
+    """Yield the light itself and its images in every chain of mirrors that it can enter."""
+    mirrors = [surface for surface in scene.surfaces if surface.kind == "mirror"]
+    axis = scene.light.aim_at_m - scene.light.position_m
+    lights = [ImageLight((), (scene.light.position_m,), axis / np.linalg.norm(axis))]
+    yield lights[0]
+    for _bounce in range(scene.mirror_bounces):
+        lights = [
+            ImageLight(
+                (mirror, *light.mirrors),
+                (mirror.mirror.mirrored(light.positions_m[0]), *light.positions_m),
+                mirror.mirror.mirrored_direction(light.axis),
+            )
+            for light in lights
+            for mirror in mirrors
+            if not any(mirror is last for last in light.mirrors[:1])
+            and mirror.mirror.in_front(light.positions_m[0])
+        ]
+        yield from lights
+
+
+def light_on(
+    scene: Scene, light: ImageLight, point: Points, normal: Points
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Length of the way in m, and irradiance, by one chain of mirrors at points on surfaces.
+
+    The length is 0 where the light is not seen in the mirrors.
+    """
+    length_m, irradiance = np.zeros(len(point)), np.zeros(len(point))
+    near = np.arange(len(point))
+    if light.mirrors:  # few points see the light in the mirror
+        image_m = np.broadcast_to(light.positions_m[0], point.shape)
+        near = np.flatnonzero(light.mirrors[0].shape.hit(point, image_m) < 1)
+        point, normal = point[near], normal[near]
+    way = light.positions_m[0] - point
+    distance_m = np.sqrt(np.einsum("pc,pc->p", way, way))
+    towards = way / distance_m[:, None]
+    cosine = np.einsum("pc,pc->p", towards, normal)
+    received = np.maximum(cosine, 0) / distance_m**2
+    received *= _beam(scene.light, -towards @ light.axis)
+    for mirror in light.mirrors:
+        received *= mirror.reflectivity
+    shone_at = np.flatnonzero(received)
+    reached = shone_at[_unobstructed(scene, light, point[shone_at])]
+    length_m[near] = distance_m
+    irradiance[near[reached]] = received[reached]
+    return length_m, irradiance
+
+
+def normals_at(scene: Scene, point: Points, surface: NDArray[np.intp]) -> Points:
+    """Return the normals of the surfaces that points lie on; none of points on none (-1)."""
+    normals = np.zeros_like(point)
+    for index, each in enumerate(scene.surfaces):
+        mine = surface == index
+        if mine.any():
+            normals[mine] = each.shape.normals(point[mine])
+    return normals
+
+
+def _beam(light: Light, cosine: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Intensity relative to the beam's axis."""
+    if light.beam_exponent == 0:
+        return np.ones_like(cosine)
+    intensity: NDArray[np.float64] = np.maximum(cosine, 0) ** light.beam_exponent
+    return intensity
+
+
+def _unobstructed(scene: Scene, light: ImageLight, point: Points) -> NDArray[np.intp]:
+    """Walk back from points over the chain of mirrors to the light; tell which ones arrive."""
+    left = np.arange(len(point))
+    stops = [point]
+    # first whether all mirrors are met, which few points' ways do; then what stands in between
+    for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
+        start = stops[-1]
+        fraction = mirror.shape.hit(start, np.broadcast_to(image_m, start.shape))
+        on = (fraction < 1) & mirror.shape.in_front(start)
+        stops = [stop[on] for stop in stops]
+        stops.append(stops[-1] + fraction[on][:, None] * (image_m - stops[-1]))
+        left = left[on]
+    stops.append(np.broadcast_to(light.positions_m[-1], stops[-1].shape))
+    clear = np.ones(len(left), dtype=bool)
+    for start, end in pairwise(stops):
+        still = np.flatnonzero(clear)
+        end_m = end[:1] if end.strides[0] == 0 else end[still]
+        start_m = start[still]
+        clear[still] = ~blocked(scene, start_m, np.broadcast_to(end_m, start_m.shape))
+    return left[clear]
+
+
+def blocked(scene: Scene, start: Points, end: Points) -> NDArray[np.bool_]:
+    """Whether anything stands between two points; what they lie on themselves does not count."""
+    blocked = np.zeros(len(start), dtype=bool)
+    if not len(start):
+        return blocked
+    low, high = _box(start, end)
+    for surface in scene.surfaces:
+        least, most = surface.shape.box
+        if (most < low).any() or (least > high).any():
+            continue  # nowhere near any of the segments
+        if surface.opaque is None:
+            blocked |= surface.shape.hit(start, end) < 1 - 1e-9
+        else:
+            assert isinstance(surface.shape, Rectangle)  # noqa: S101  (stencils are)
+            blocked |= blocked_by_mask(surface.shape, surface.opaque, start, end)
+    return blocked
+
+
+def _box(start: Points, end: Points) -> tuple[Points, Points]:
+    """Lowest and highest coordinates of segments, all of which may end at one point."""
+    ends = end[:1] if end.strides[0] == 0 else end  # as broadcasting makes it
+    axes = range(3)
+    low = [min(start[:, axis].min(), ends[:, axis].min()) for axis in axes]
+    high = [max(start[:, axis].max(), ends[:, axis].max()) for axis in axes]
+    return np.array(low), np.array(high)
+
+
+def _hit(surface: Surface, start: Points, end: Points) -> NDArray[np.float64]:
+    at = surface.shape.hit(start, end)
+    if surface.opaque is None:
+        return at
+    assert isinstance(surface.shape, Rectangle)  # noqa: S101  (stencils are)
+    return np.where(blocked_by_mask(surface.shape, surface.opaque, start, end), at, np.inf)

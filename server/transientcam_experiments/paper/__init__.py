@@ -1,0 +1,46 @@
+"""The paper's figures, made by this software, each with what the paper says about it.
+
+One file a figure; all have the shape of `PaperFigure`.
+"""
+
+from typing import Final
+
+from transientcam_experiments.paper import (
+    figure02,
+    figure03,
+    figure05,
+    figure06,
+    figure07,
+    figure08,
+    figure09,
+    figure10,
+    figure11,
+    figure12,
+    figure13,
+    figure14,
+    figure15,
+)
+from transientcam_experiments.paper.bench import Bench
+from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table
+
+FIGURES: Final[dict[int, PaperFigure]] = {
+    module.FIGURE.number: module.FIGURE
+    for module in (
+        figure02,
+        figure03,
+        figure05,
+        figure06,
+        figure07,
+        figure08,
+        figure09,
+        figure10,
+        figure11,
+        figure12,
+        figure13,
+        figure14,
+        figure15,
+    )
+}
+"""Every figure by its number."""
+
+__all__ = ["FIGURES", "Bench", "Made", "PaperFigure", "Statement", "Table"]

@@ -1,0 +1,140 @@
+"""The shape that all figures of the paper share: what is drawn, measured and held against it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from transientcam_experiments.paper.bench import Bench
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Picture
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """A sentence of the paper, and what was measured here.
+
+    Attributes
+    ----------
+    source
+        Where the paper says it.
+    says
+        What it says.
+    measure
+        What was measured to see whether it holds.
+    value
+        The measure's value.
+    shown
+        The same, to be read.
+    criterion
+        What the value has to be for the statement to hold.
+    passes
+        Whether it is.
+    reason
+        Why ours differs; empty where it does not.
+    """
+
+    source: str
+    says: str
+    measure: str
+    value: float
+    shown: str
+    criterion: str
+    passes: bool
+    reason: str = ""
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the fields for JSON."""
+        return {name: getattr(self, name) for name in self.__slots__}
+
+
+def check(
+    source: str,
+    says: str,
+    measure: str,
+    value: float,
+    *,
+    at_most: float | None = None,
+    at_least: float | None = None,
+    form: str = "{:.3g}",
+    otherwise: str = "",
+) -> Statement:
+    """Hold a value against limits.
+
+    Parameters
+    ----------
+    source, says, measure, value
+        As of `Statement`.
+    at_most, at_least
+        The limits; a value that is no number keeps none.
+    form
+        How value and limits are shown.
+    otherwise
+        The reason where the value is outside.
+    """
+    value = float(value)
+    limits = []
+    passes = value == value
+    if at_least is not None:
+        limits.append(f"at least {form.format(at_least)}")
+        passes = passes and value >= at_least
+    if at_most is not None:
+        limits.append(f"at most {form.format(at_most)}")
+        passes = passes and value <= at_most
+    return Statement(
+        source,
+        says,
+        measure,
+        value,
+        form.format(value),
+        " and ".join(limits),
+        bool(passes),
+        "" if passes else otherwise,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Figures beside a figure; cells are words, numbers, or None where there is no value."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Any]]
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the fields for JSON."""
+        return {
+            "title": self.title,
+            "columns": list(self.columns),
+            "rows": [list(row) for row in self.rows],
+        }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Made:
+    """What became of a figure: its picture, and the numbers beside it."""
+
+    picture: "Picture"
+    statements: Sequence[Statement]
+    tables: Sequence[Table]
+    remarks: Sequence[str] = field(default=())
+
+
+@dataclass(frozen=True, slots=True)
+class PaperFigure:
+    """One figure of the paper.
+
+    Attributes
+    ----------
+    number, title
+        As in the paper.
+    caption
+        What our picture shows, and how it was captured.
+    make
+        Captures, computes and draws.
+    """
+
+    number: int
+    title: str
+    caption: str
+    make: Callable[[Bench], Made]

@@ -1,0 +1,258 @@
+"""Figure 7: sharp bounds on every smoothed density with the same moments (Sec. 5.2)."""
+
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam_experiments.paper import style
+from transientcam_experiments.paper.bench import Bench
+from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.synthetic import CONTINUOUS, Response
+
+_Array = NDArray[Any]
+_M: Final = 5
+_F_HZ: Final = 23e6
+_RADIUS: Final = 0.93
+_RING: Final = 4096
+_WIDTHS: Final = ("mean width over mean density", "greatest width over highest bound")
+
+
+def make(bench: Bench) -> Made:
+    """Bound the smoothed density of the continuous response of Fig. 11b."""
+    b = CONTINUOUS.moments(_F_HZ, _M)
+    phase = 2 * np.pi * np.arange(_RING) / _RING
+    lower, upper = (each[:, 0] for each in tm.bounds(b[:, None], phase, _RADIUS))
+    smoothed = candidates(b, phase, bench.few(40, 5), np.random.default_rng(bench.seed))
+    widths = [(m, *_width(CONTINUOUS, m, phase)) for m in (3, 4, 5, 6, 8)]
+    sharper = [
+        (scale, *_width(_sharper(scale), _M, phase)) for scale in (1.0, 0.5, 0.25, 0.125, 0.0625)
+    ]
+    return Made(
+        _draw(b, phase, lower, upper, smoothed),
+        _statements(phase, lower, upper, smoothed, widths),
+        (
+            Table(
+                "Bounds on the continuous response",
+                ("m", *_WIDTHS),
+                widths,
+            ),
+            Table(
+                "Bounds where every return is narrower, m = 5",
+                ("widths and decays times", *_WIDTHS),
+                sharper,
+            ),
+        ),
+    )
+
+
+def _sharper(scale: float) -> Response:
+    """Return the continuous response with narrower returns."""
+    returns = (
+        replace(each, width_s=scale * each.width_s, decay_s=scale * each.decay_s)
+        for each in CONTINUOUS.returns
+    )
+    return replace(CONTINUOUS, returns=tuple(returns))
+
+
+def _width(response: Response, m: int, phase: _Array) -> tuple[float, float]:
+    b = response.moments(_F_HZ, m)[:, None]
+    lower, upper = tm.bounds(b, phase, _RADIUS)
+    width = upper - lower
+    mean = response.brightness / (2 * np.pi)
+    return float(width.mean() / mean), float(width.max() / upper.max())
+
+
+def _truth(phase: _Array) -> _Array:
+    """Return the true density over phase, per radian."""
+    turn = 2 * np.pi * _F_HZ
+    return CONTINUOUS.density(phase / turn) / turn
+
+
+def candidates(b: _Array, phase: _Array, several: int, rng: np.random.Generator) -> _Array:
+    """Return smoothed densities (N, T) that share all moments: the truth, the estimates, others.
+
+    A positive measure for b less a small positive one exists where the matrix stays positive:
+    returns at random phases are taken from the moments, the rest is Pisarenko's, and both are
+    smoothed as sums of kernels.
+    """
+    found = [
+        _smooth(_truth(phase)),
+        tm.smoothed_density(tm.levinson(b[:, None]), phase, _RADIUS)[:, 0],
+    ]
+    found.append(_returns(b, phase))
+    while len(found) < 3 + several:
+        at = rng.uniform(0, 2 * np.pi)
+        steering = np.exp(1j * at * np.arange(b.size))
+        # the most that can be taken at a phase: 1 / (s* B^-1 s)
+        matrix = _toeplitz(b)
+        most = 1 / (steering.conj() @ np.linalg.solve(matrix, steering)).real
+        weight = rng.uniform(0.2, 0.95) * most
+        rest = _returns(b - weight * steering, phase)
+        found.append(rest + weight * _kernel(phase - at))
+    return np.array(found)
+
+
+def _returns(b: _Array, phase: _Array) -> _Array:
+    """Return the smoothed Pisarenko estimate: kernels at its returns, and its uniform part."""
+    returns = tm.pisarenko(b[:, None])
+    smoothed: _Array = np.full(phase.shape, returns.uniform[0] / (2 * np.pi))
+    for at, weight in zip(returns.phase_rad[:, 0], returns.weight[:, 0], strict=True):
+        if weight > 0:
+            smoothed = smoothed + weight * _kernel(phase - at)
+    return smoothed
+
+
+def _toeplitz(b: _Array) -> _Array:
+    j = np.arange(b.size)
+    both = np.concatenate([b[:0:-1].conj(), b])
+    matrix: _Array = both[j[:, None] - j[None] + b.size - 1]
+    return matrix
+
+
+def _kernel(phase: _Array) -> _Array:
+    """Poisson's kernel."""
+    kernel: _Array = (1 - _RADIUS**2) / (2 * np.pi * np.abs(1 - _RADIUS * np.exp(1j * phase)) ** 2)
+    return kernel
+
+
+def _smooth(density: _Array) -> _Array:
+    """Convolve with Poisson's kernel: harmonic k is multiplied by r^|k|."""
+    spectrum = np.fft.rfft(density)
+    smoothed: _Array = np.fft.irfft(spectrum * _RADIUS ** np.arange(spectrum.size), density.size)
+    return smoothed
+
+
+def must_peak(phase: _Array, lower: _Array, upper: _Array) -> tuple[float, float]:
+    """Return where a maximum must be: what is compatible is lower on both sides."""
+    top = int(lower.argmax())
+    below = upper < lower[top]
+    before, after = np.flatnonzero(below[:top]), np.flatnonzero(below[top:])
+    if not before.size or not after.size:
+        return 0.0, 2 * np.pi
+    return float(phase[before[-1]]), float(phase[top + after[0]])
+
+
+def _outside(smoothed: _Array, lower: _Array, upper: _Array) -> float:
+    """Return how far densities leave the bounds, over the highest bound."""
+    return float(np.maximum(lower - smoothed, smoothed - upper).max() / upper.max())
+
+
+def _statements(
+    phase: _Array,
+    lower: _Array,
+    upper: _Array,
+    smoothed: _Array,
+    widths: list[tuple[int, float, float]],
+) -> list[Statement]:
+    truth = smoothed[0]
+    begin, end = must_peak(phase, lower, upper)
+    slack = 1e-6  # of the density's wrapped tail
+    of_five = {m: greatest for m, _, greatest in widths}[_M]
+    return [
+        check(
+            "Fig. 7",
+            "The ground truth is known to lie within the bounds after smoothing.",
+            "how far the smoothed truth leaves them, over the highest bound",
+            _outside(truth[None], lower, upper),
+            at_most=slack,
+            form="{:.1e}",
+        ),
+        check(
+            "Sec. 5.2",
+            "The same holds for our reconstruction.",
+            "how far the smoothed maximum entropy estimate leaves them, over the highest bound",
+            _outside(smoothed[1:2], lower, upper),
+            at_most=slack,
+            form="{:.1e}",
+        ),
+        check(
+            "Fig. 7",
+            "Any density compatible with the moments is known to lie within these bounds.",
+            f"how far {len(smoothed) - 2} other measures with the same moments leave them, over "
+            "the highest bound",
+            _outside(smoothed[2:], lower, upper),
+            at_most=slack,
+            form="{:.1e}",
+        ),
+        check(
+            "Sec. 5.2",
+            "The bounds are sharp.",
+            "least distance that any of these measures keeps from a bound, over the highest bound",
+            float(np.minimum(smoothed - lower, upper - smoothed).min() / upper.max()),
+            at_most=1e-3,
+            form="{:.1e}",
+        ),
+        check(
+            "Sec. 5.2",
+            "If the ground truth is reasonably close to sparse this area is pleasantly small.",
+            "greatest distance of the bounds over the highest bound",
+            of_five,
+            at_most=0.25,
+            form="{:.0%}",
+            otherwise="our response is not as close to sparse as theirs may have been (the paper "
+            "does not print its parameters): the second table shows the area shrink as the returns "
+            "get narrower",
+        ),
+        check(
+            "Sec. 5.2",
+            "We can give specific bounds on possible locations of local maxima.",
+            "width of the interval in which a maximum must be, around the highest lower bound, "
+            "over "
+            f"2 π / m (the true one, at {float(phase[truth.argmax()]):.2f} rad, is in "
+            f"[{begin:.2f}, {end:.2f}])",
+            (end - begin) / (2 * np.pi / _M),
+            at_most=0.5,
+            form="{:.2f}",
+        ),
+    ]
+
+
+def _draw(b: _Array, phase: _Array, lower: _Array, upper: _Array, smoothed: _Array) -> Any:
+    with style.style():
+        picture = style.new(11.0, 3.8)
+        left, right = picture.subplots(1, 2)
+        left.plot(
+            phase,
+            _truth(phase),
+            color=style.TRUTH,
+            linestyle=":",
+            linewidth=2.2,
+            label="ground truth",
+        )
+        left.plot(
+            phase,
+            tm.density(tm.levinson(b[:, None]), phase)[:, 0],
+            color=style.OURS,
+            label="maximum entropy, m = 5",
+        )
+        left.set(title="densities", ylabel="h(φ) per rad")
+        right.fill_between(phase, lower, upper, color="0.85", label="bounds")
+        right.plot(phase, smoothed[3:].T, color="0.6", linewidth=0.4)
+        right.plot([], [], color="0.6", linewidth=0.8, label="others with these moments")
+        right.plot(
+            phase,
+            smoothed[0],
+            color=style.TRUTH,
+            linestyle=":",
+            linewidth=2.2,
+            label="ground truth",
+        )
+        right.plot(phase, smoothed[1], color=style.OURS, label="maximum entropy")
+        right.set(title=f"smoothed by Poisson's kernel, r = {_RADIUS}", ylabel="h ∗ P per rad")
+        for axes in (left, right):
+            axes.set(xlabel="φ / rad", xlim=(0, 2 * np.pi), ylim=(0, None))
+            axes.legend()
+    return picture
+
+
+FIGURE: Final = PaperFigure(
+    7,
+    "Error bounds on smoothed densities",
+    "Synthetic: the three exponentially modified Gaussians of Figure 11b, m = 5, f = 23 MHz, "
+    "without noise, r = 0.93 as in the paper. Other measures with the same moments are made by "
+    "taking a return from anywhere and explaining the rest by Pisarenko's estimate.",
+    make,
+)

@@ -1,0 +1,210 @@
+"""Figure 15: a streak image, one scanline over time of flight (Sec. 6.4)."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
+from transientcam_experiments.paper import style
+from transientcam_experiments.paper.bench import Bench, Shot
+from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.mirrors import SEQUENCES, shots, thrice
+
+_Array = NDArray[Any]
+_TIMES_S: Final = np.linspace(9e-9, 31e-9, 881)
+_WIDTH: Final = 163
+_BINS: Final = 164
+_FIRST_S: Final = 12e-9
+_APART_S: Final = 0.05e-9
+"""By how much returns of a pair are further apart from one column to the next."""
+_TRIED: Final = (5, 10, 15, 20, 25, 30, 40, 60, 80, 120, 160)
+_SCENE: Final = """\
+name = "pairs"
+[light]
+electrons_per_s = 1.0e7
+[[response]]
+file = "pairs.npz"
+"""
+
+
+def make(bench: Bench) -> Made:
+    """Take one row out of the capture of Figure 8b and 9b."""
+    shot = shots(bench, SEQUENCES["b"], frames=2)[0]
+    row = _scanline(shot)
+    line = _line(shot, row)
+    streak = 2 * np.pi * shot.base_frequency_hz * tm.density(line, _phase(shot)) * 1e-9
+    pairs = _pairs(bench)
+    merging = _merging(pairs)
+    return Made(
+        _draw(shot, row, np.asarray(streak), pairs),
+        _statements(shot, row, np.asarray(streak), merging),
+        (
+            Table(
+                "Pairs of returns of 2 : 1, captured with the same sequence",
+                ("apart / ns", "pixels in which both peak / %"),
+                merging,
+            ),
+        ),
+        (
+            "The returns of our scene are nowhere closer than "
+            f"{_closest_s(shot, row) * 1e9:.1f} ns on this scanline, and none merge. Where they "
+            "would is shown by a scene of pairs that come closer from column to column.",
+        ),
+    )
+
+
+def _scanline(shot: Shot) -> int:
+    """Return the middle row, which crosses the shadows of all three digits."""
+    return int(shot.lit.shape[0] // 2)
+
+
+def _line(shot: Shot, row: int) -> tm.Coefficients:
+    coefficients = shot.found.coefficients
+    return tm.Coefficients(
+        coefficients.error[row], coefficients.polynomial[:, row], coefficients.reflection[:, row]
+    )
+
+
+def _phase(shot: Shot) -> _Array:
+    phase: _Array = 2 * np.pi * shot.base_frequency_hz * _TIMES_S
+    return phase
+
+
+def _closest_s(shot: Shot, row: int) -> float:
+    gaps = np.diff(shot.truth.delay_s[:, row], axis=0)
+    return float(np.nanmin(gaps))
+
+
+def _widths_ns(shot: Shot, row: int, streak: _Array) -> tuple[_Array, _Array]:
+    """Return weight and full width at half maximum in ns of the peaks at the true returns."""
+    weights, widths = [], []
+    for x in np.flatnonzero(thrice(shot)[row]):
+        for delay_s, weight in zip(
+            shot.truth.delay_s[:3, row, x], shot.truth.weight[:3, row, x], strict=True
+        ):
+            near = np.flatnonzero(np.abs(_TIMES_S - delay_s) < 1e-9)
+            top = near[streak[near, x].argmax()]
+            low = streak[:, x] < streak[top, x] / 2
+            before, after = np.flatnonzero(low[:top]), np.flatnonzero(low[top:])
+            if before.size and after.size:
+                weights.append(weight / shot.truth.brightness[row, x])
+                widths.append((after[0] + top - before[-1]) * (_TIMES_S[1] - _TIMES_S[0]) * 1e9)
+    return np.array(weights), np.array(widths)
+
+
+def _pairs(bench: Bench) -> Shot:
+    """Capture pairs of returns of 2 : 1, further apart in each column of the sensor."""
+    columns = np.arange(_WIDTH)
+    h = np.zeros((1, _WIDTH, _BINS), dtype=np.float32)
+    h[0, columns, 0] = 2 / 3
+    h[0, columns, columns] += 1 / 3
+    with TemporaryDirectory() as folder:
+        np.savez(
+            Path(folder) / "pairs.npz",
+            h=h,
+            start_opl_m=_FIRST_S * SPEED_OF_LIGHT_M_S,
+            bin_opl_m=_APART_S * SPEED_OF_LIGHT_M_S,
+        )
+        scene = Path(folder) / "pairs.toml"
+        scene.write_text(_SCENE, encoding="utf-8")
+        return bench.shot(str(scene), SEQUENCES["b"])
+
+
+def _merging(pairs: Shot) -> list[tuple[float, float]]:
+    """Return distances in ns, and the share in % of the pixels in which both returns peak."""
+    found = tm.peaks(pairs.found.coefficients, threshold=0.0).phase_rad
+    turn = 2 * np.pi * pairs.base_frequency_hz
+    rows = []
+    for column in _TRIED:
+        apart = turn * _APART_S * column
+        first = turn * _FIRST_S
+        peaks = [np.abs(found[:, :, column] - at) < apart / 2 for at in (first, first + apart)]
+        both = np.all([each.any(axis=0) for each in peaks], axis=0)
+        rows.append((round(_APART_S * column * 1e9, 2), 100 * float(both.mean())))
+    return rows
+
+
+def _statements(
+    shot: Shot, row: int, streak: _Array, merging: list[tuple[float, float]]
+) -> list[Statement]:
+    weight, width = _widths_ns(shot, row, streak)
+    weak, strong = width[weight < 0.2], width[weight > 0.5]
+    return [
+        check(
+            "Fig. 15",
+            "Note the smoothed densities in regions of high uncertainty.",
+            "median width of peaks with less than a fifth of a pixel's light, over that of peaks "
+            "with more than half",
+            float(np.median(weak) / np.median(strong)),
+            at_least=1.2,
+            form="{:.1f}",
+        ),
+        check(
+            "Sec. 6.4",
+            "If two returns are temporally close, uncertainty can cause them to merge into one.",
+            f"share of pixels in which both of a pair {merging[0][0]:g} ns apart peak",
+            merging[0][1] / 100,
+            at_most=0.5,
+            form="{:.0%}",
+        ),
+        check(
+            "Sec. 5.3",
+            "The maximum entropy estimate can reconstruct distinct peaks (where they are far "
+            "apart).",
+            f"share of pixels in which both of a pair {merging[-1][0]:g} ns apart peak",
+            merging[-1][1] / 100,
+            at_least=0.95,
+            form="{:.0%}",
+        ),
+    ]
+
+
+def _draw(shot: Shot, row: int, streak: _Array, pairs: Shot) -> Any:
+    middle = _scanline(pairs)
+    turn = 2 * np.pi * pairs.base_frequency_hz
+    closing = turn * np.asarray(tm.density(_line(pairs, middle), _phase(pairs))) * 1e-9
+    with style.style():
+        picture = style.new(11.0, 4.4)
+        left, centre, right = picture.subplots(1, 3, width_ratios=(0.8, 1.2, 1.2))
+        frame = np.asarray(shot.found.cumulative(np.array([35e-9])))[0]
+        style.show(left, frame, "the scanline in (a)")
+        left.axhline(row, color=style.TRUTH, linewidth=2.0)
+        _draw_streak(centre, streak, "(a) mirrors")
+        _draw_streak(right, closing, "(b) pairs, further apart with each column")
+        for offset in (0.0, _APART_S):
+            at_ns = (_FIRST_S + offset * np.arange(_WIDTH)) * 1e9
+            right.plot(at_ns, np.arange(_WIDTH), color="white", linestyle=":", linewidth=0.8)
+        right.set(xlim=(10, 22))
+        style.scale(picture, [centre, right], "log₁₀ of the density in DN/ns")
+    return picture
+
+
+def _draw_streak(axes: Any, streak: _Array, title: str) -> None:
+    extent = (_TIMES_S[0] * 1e9, _TIMES_S[-1] * 1e9, streak.shape[1] - 0.5, -0.5)
+    # the logarithm, so that broad peaks are seen beside sharp ones
+    axes.imshow(
+        np.log10(np.maximum(streak.T, 1e-3)),
+        extent=extent,
+        aspect="auto",
+        cmap=style.LIGHT,
+        vmin=0.0,
+        vmax=4.3,
+    )
+    axes.set(title=title, xlabel="τ / ns", ylabel="pixel along the scanline")
+    axes.grid(visible=False)
+
+
+FIGURE: Final = PaperFigure(
+    15,
+    "A streak image",
+    "(a) One scanline of the capture of Figures 8b and 9b (m = 4, f = 23 MHz, 20 takes) over time "
+    "of "
+    "flight. (b) The same for a scene of two returns, 2 : 1, that are 0.05 ns further apart in "
+    "each "
+    "column (dotted: where they are).",
+    make,
+)

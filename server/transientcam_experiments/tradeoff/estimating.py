@@ -1,0 +1,113 @@
+"""Computing time against the error of the range: every technique on the same noisy moments."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam_experiments.tradeoff.capture import OUTLIER_M
+from transientcam_moments.comparisons import TECHNIQUES, Technique
+
+_Array = NDArray[Any]
+_Clock = Callable[[], float]
+SAMPLE_PIXELS: Final = 96
+"""Pixels whose range is held against the truth; all that slow techniques are timed with."""
+ENOUGH_S: Final = 0.5
+"""What takes longer is timed once."""
+
+QUANTITIES: Final[dict[str, str]] = {
+    "seconds": "computing time of one frame, median; of techniques that go pixel by pixel, "
+    f"that of {SAMPLE_PIXELS} pixels, multiplied",
+    "range_median_m": f"median absolute error of the range, {SAMPLE_PIXELS} lit pixels",
+    "range_p90_m": "error of the range that nine of ten of them stay below",
+    "range_outliers": f"share of them off by more than {OUTLIER_M:g} m",
+    "range_missing": "share of them without a range",
+}
+"""What is measured, in words."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """What a camera measured, and where it should have seen something.
+
+    Attributes
+    ----------
+    moments
+        (m + 1, H, W), biased.
+    base_frequency_hz
+        Of the moments.
+    truth_m
+        (H, W) range of the first return, NaN where no light is.
+    """
+
+    moments: _Array
+    base_frequency_hz: float
+    truth_m: _Array
+
+
+def points(harmonics: int) -> Iterator[tuple[Technique, Mapping[str, Any]]]:
+    """Yield the techniques that a number of harmonics is enough for, as points."""
+    for technique in TECHNIQUES.values():
+        if technique.measures == "moments" and technique.least_harmonics <= harmonics:
+            yield (
+                technique,
+                {
+                    "estimator": technique.name,
+                    "label": technique.label,
+                    "harmonics": harmonics,
+                    "planar": technique.planar,
+                },
+            )
+
+
+def measure(
+    technique: Technique,
+    scene: Scene,
+    *,
+    repetitions: int,
+    seed: int,
+    clock: _Clock = time.perf_counter,
+) -> tuple[dict[str, float | None], dict[str, float | None]]:
+    """Return what `QUANTITIES` says of a technique, and the spread of its time.
+
+    A technique that looks at neighbours has none in the sample.
+    """
+    lit = np.flatnonzero(np.isfinite(scene.truth_m))
+    chosen = np.random.default_rng(seed).permutation(lit)[:SAMPLE_PIXELS]
+    flat = scene.moments.reshape((scene.moments.shape[0], -1))
+    sample = np.ascontiguousarray(flat[:, chosen])
+
+    def first_rad(b: _Array) -> _Array:
+        return np.asarray(technique.estimate(b).first_phase_rad())
+
+    phase = first_rad(sample)  # fills caches, too
+    whole = scene.moments if technique.planar else sample
+    times = []
+    for _ in range(repetitions if technique.planar else 1):
+        begin_s = clock()
+        first_rad(whole)
+        taken_s = clock() - begin_s
+        times.append(taken_s * flat.shape[1] / whole[0].size)
+        if taken_s > ENOUGH_S:
+            break  # so long a time needs no average
+    values: dict[str, float | None] = {"seconds": float(np.median(times))}
+    values |= _errors(tm.range_m(phase, scene.base_frequency_hz), scene.truth_m.reshape(-1)[chosen])
+    spread: dict[str, float | None] = dict.fromkeys(values)
+    spread["seconds"] = float(np.std(times, ddof=1)) if len(times) > 1 else None
+    return values, spread
+
+
+def _errors(range_m: _Array, truth_m: _Array) -> dict[str, float | None]:
+    error_m = np.abs(range_m - truth_m)
+    there = np.isfinite(error_m)
+    found = error_m[there]
+    return {
+        "range_median_m": float(np.median(found)) if found.size else None,
+        "range_p90_m": float(np.quantile(found, 0.9)) if found.size else None,
+        "range_outliers": float(np.mean(found > OUTLIER_M)) if found.size else None,
+        "range_missing": 1.0 - float(there.mean()),
+    }

@@ -1,0 +1,228 @@
+"""All points of a grid on a scene, one after the other, each kept before the next begins."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+
+import transientcam_moments as tm
+from transientcam_driver import Camera, Sequence, Truth, open_camera
+from transientcam_driver.clock import VirtualClock
+from transientcam_experiments.tradeoff import capture, computing, estimating, transport
+from transientcam_experiments.tradeoff.grid import Grid
+from transientcam_experiments.tradeoff.records import Record, Records, key_of
+from transientcam_experiments.tradeoff.truth import Sample, sample_pixels
+from transientcam_moments.comparisons import Technique
+from transientcam_server.imaging.products import STAGES, Recipe
+from transientcam_server.settings import ReconstructionSettings
+
+SAMPLE_PIXELS: Final = 400
+"""Pixels whose whole impulse responses are compared."""
+BEGINS_S: Final = 5.0
+"""When a capture begins after power-up: in a scene that moves, something is going on by then."""
+_Summary = tuple[dict[str, float | None], dict[str, float | None]]
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One thing to measure: what it is, and how."""
+
+    kind: str
+    scene: str
+    point: Mapping[str, Any]
+    conditions: Mapping[str, Any]
+    run: Callable[["_Bench"], _Summary]
+
+    @property
+    def key(self) -> str:
+        """As of the record that it becomes."""
+        return key_of(self.kind, self.scene, self.point, self.conditions)
+
+
+def points_of(grid: Grid, *, scene: str, repetitions: int, seed: int) -> list[Point]:
+    """Return everything that a grid asks for on a scene."""
+    conditions = {"repetitions": repetitions, "seed": seed}
+
+    def point(kind: str, settings: Mapping[str, Any], run: Callable[["_Bench"], _Summary]) -> Point:
+        return Point(kind, scene, settings, conditions, run)
+
+    def capture_point(sequence: Sequence) -> Point:
+        return point(
+            "capture",
+            sequence.to_document(),
+            lambda bench: bench.capture(sequence, repetitions),
+        )
+
+    def computing_point(harmonics: int, task: computing.Task) -> Point:
+        return point(
+            "computing",
+            task.point,
+            lambda bench: computing.measure(
+                task, bench.moments(harmonics), repetitions=repetitions
+            ),
+        )
+
+    def estimating_point(technique: Technique, settings: Mapping[str, Any]) -> Point:
+        return point(
+            "estimating",
+            settings,
+            lambda bench: estimating.measure(
+                technique,
+                bench.scene(settings["harmonics"]),
+                repetitions=repetitions,
+                seed=seed,
+            ),
+        )
+
+    def transport_point(harmonics: int, coding: transport.Coding) -> Point:
+        return point(
+            "transport",
+            coding.point,
+            lambda bench: transport.measure(
+                coding, bench.moments(harmonics), bench.range_m(harmonics), repetitions=repetitions
+            ),
+        )
+
+    points = [capture_point(sequence) for sequence in grid.sequences]
+    for m in grid.harmonics:
+        points += [computing_point(m, task) for task in computing.tasks(m, grid)]
+        points += [estimating_point(*each) for each in estimating.points(m)]
+        points += [transport_point(m, coding) for coding in transport.codings(m)]
+    return points
+
+
+def measure(
+    points: list[Point],
+    records: Records,
+    *,
+    scene: str,
+    seed: int,
+    progress: Callable[[str], None],
+    clock: Callable[[], float] = time.perf_counter,
+) -> None:
+    """Measure what is not in the records yet.
+
+    Parameters
+    ----------
+    points
+        Of one scene, from `points_of`.
+    records
+        Where results are and go.
+    scene, seed
+        Which world, and its chance.
+    progress
+        Is told the kind of each point when it is done, also of those that were there already.
+    clock
+        Of the machine, for how long each point takes.
+
+    Raises
+    ------
+    SpecError, SceneError
+        The scene cannot be opened.
+    SequenceError
+        The camera cannot run a sequence of the grid.
+    """
+    left = [point for point in points if point.key not in records]
+    for point in points:
+        if point.key in records:
+            progress(point.kind)
+    if not left:
+        return
+    bench = _Bench(spec_of(scene, seed=seed), seed=seed)
+    for point in left:
+        begin_s = clock()
+        values, spread = point.run(bench)
+        took_s = clock() - begin_s
+        records.append(
+            Record(point.kind, scene, point.point, point.conditions, values, spread, took_s)
+        )
+        progress(point.kind)
+
+
+def spec_of(scene: str, *, seed: int) -> str:
+    """Return the simulated camera in front of a scene: a name, a .toml, or the camera's name."""
+    spec = scene if scene.startswith("sim:") else f"sim:{scene}"
+    return f"{spec}{'&' if '?' in spec else '?'}seed={seed}"
+
+
+class _Bench:
+    """Cameras before a scene, and what several points share.
+
+    Every point gets a camera that was just switched on, at the same time of the scene: what is
+    measured does not depend on what was measured before, nor on an interruption in between.
+    """
+
+    def __init__(self, spec: str, *, seed: int) -> None:
+        self._spec = spec
+        self._seed = seed
+        self._settings = ReconstructionSettings()
+        self._scenes: dict[int, estimating.Scene] = {}
+        self._sampled: tuple[Truth, Sample] | None = None
+
+    def capture(self, sequence: Sequence, repetitions: int) -> _Summary:
+        with self._camera() as camera:
+            applied = camera.configure(sequence)
+            return capture.accuracy(
+                capture.capture(camera, repetitions),
+                self._sample_of,
+                applied,
+                settings=self._settings,
+                bits=camera.capabilities.bits,
+            )
+
+    @contextmanager
+    def _camera(self) -> Iterator[Camera]:
+        clock = VirtualClock()
+        with open_camera(self._spec, clock=clock) as camera:
+            clock.sleep(BEGINS_S)
+            yield camera
+
+    def _sample_of(self, truth: Truth) -> Sample:
+        """Sample pixels; of a scene that stands still, only once."""
+        if self._sampled is None or not _same_light(self._sampled[0], truth):
+            sample = sample_pixels(truth, pixels=SAMPLE_PIXELS, seed=self._seed)
+            self._sampled = truth, sample
+        return self._sampled[1]
+
+    def moments(self, harmonics: int) -> Any:
+        """Return the scene's moments in double precision, of one frame, fit for reconstruction."""
+        return self.scene(harmonics).moments
+
+    def scene(self, harmonics: int) -> estimating.Scene:
+        """Return those moments and the truth of the same frame."""
+        if harmonics not in self._scenes:
+            with self._camera() as camera:
+                most_hz = camera.capabilities.max_frequency_hz / harmonics
+                sequence = replace(
+                    Sequence(harmonics=harmonics), base_frequency_hz=min(23e6, most_hz)
+                )
+                applied = camera.configure(sequence)
+                (shot,) = capture.capture(camera, 1)
+                recipe = Recipe(applied, self._settings, 2.0**camera.capabilities.bits - 1.0)
+            b = STAGES["moments"].compute(recipe, shot.frame).moments.astype(np.complex128)
+            # rounding to single precision took from what biasing had given
+            biased = tm.bias(b, self._settings.bias).moments
+            truth = shot.truth
+            truth_m = np.where(truth.brightness > 0, truth.range_m, np.nan)
+            base_hz = applied.sequence.base_frequency_hz
+            self._scenes[harmonics] = estimating.Scene(biased, base_hz, truth_m)
+        return self._scenes[harmonics]
+
+    def range_m(self, harmonics: int) -> Any:
+        """Return the range image of those moments, at a base frequency of 23 MHz."""
+        phase = tm.separate(tm.pisarenko(self.moments(harmonics))).phase_rad
+        return tm.range_m(phase, 23e6)
+
+
+def _same_light(one: Truth, other: Truth) -> bool:
+    """Whether two truths hold the same light, whatever the exposure."""
+    if one.kind != other.kind or one.delay_s.shape != other.delay_s.shape:
+        return False
+    share, other_share = (
+        truth.weight / max(float(truth.weight.sum()), 1e-30) for truth in (one, other)
+    )
+    same_times = np.array_equal(one.delay_s, other.delay_s, equal_nan=True)
+    return same_times and np.allclose(share, other_share)

@@ -1,0 +1,189 @@
+"""One HTML page of all that was measured: no other file, no other host."""
+
+import html
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+from transientcam_experiments.tradeoff import capture, computing, estimating, transport
+from transientcam_experiments.tradeoff.plots import PLOTS, point_id
+from transientcam_experiments.tradeoff.records import Record
+
+_QUANTITIES: Final = {
+    "capture": capture.QUANTITIES,
+    "computing": computing.QUANTITIES,
+    "estimating": estimating.QUANTITIES,
+    "transport": transport.QUANTITIES,
+}
+_TITLES: Final = {
+    "capture": "Capture time",
+    "computing": "Computing time",
+    "estimating": "Estimators of range",
+    "transport": "Transport",
+}
+
+_STYLE: Final = """
+:root { color-scheme: light dark; font: 15px/1.45 system-ui, sans-serif; }
+body { max-width: 78rem; margin: 2rem auto; padding: 0 1rem; }
+.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(27rem, 1fr)); gap: 1rem; }
+.plots svg { width: 100%; height: auto; background: #fff; border-radius: .4rem; }
+.plots g[id^="p"] { cursor: pointer; }
+.table { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
+th, td { padding: .2rem .6rem; text-align: right; white-space: nowrap; }
+th, td { border-bottom: 1px solid #8884; }
+th:first-child, td:first-child { text-align: left; }
+tr.chosen { background: #fd04; }
+small { opacity: .7; }
+button { font: inherit; }
+dt { font-weight: 600; font-family: ui-monospace, monospace; }
+#copied { position: fixed; bottom: 1rem; right: 1rem; padding: .4rem .8rem; border-radius: .4rem;
+  background: #174; color: #fff; }
+"""
+
+_SCRIPT: Final = """
+const copied = document.getElementById('copied');
+async function copy(row) {
+  const text = row.dataset.sequence;
+  try {
+    await navigator.clipboard.writeText(text);
+  } catch {
+    const area = document.body.appendChild(document.createElement('textarea'));
+    area.value = text;
+    area.select();
+    document.execCommand('copy');
+    area.remove();
+  }
+  copied.hidden = false;
+  setTimeout(() => { copied.hidden = true; }, 1500);
+}
+function choose(id) {
+  for (const row of document.querySelectorAll('tr.chosen')) row.classList.remove('chosen');
+  const row = document.getElementById('row-' + id);
+  if (!row) return;
+  row.classList.add('chosen');
+  row.scrollIntoView({ block: 'center', behavior: 'smooth' });
+}
+document.addEventListener('click', (event) => {
+  const button = event.target.closest('button.copy');
+  if (button) copy(button.closest('tr'));
+  const point = event.target.closest('.plots g[data-point]');
+  if (point) choose(point.dataset.point);
+});
+"""
+
+
+def page(records: Iterable[Record], plots: Mapping[tuple[str, str], bytes]) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    records
+        What was measured.
+    plots
+        SVG by scene and name of the plot.
+    """
+    results = list(records)
+    scenes = list(dict.fromkeys(record.scene for record in results))
+    parts = [
+        "<!doctype html><html lang=en><meta charset=utf-8>",
+        "<meta name=viewport content='width=device-width'>",
+        f"<title>What accuracy costs</title><style>{_STYLE}</style>",
+        "<h1>What accuracy costs</h1>",
+        "<p>Each point is one setting, measured on a simulated scene whose truth is known; the "
+        "grey line joins those that no other beats in both. Click a point to find it in the "
+        "table. <b>Copy</b> puts its sequence on the clipboard, ready for "
+        "<code>PUT /api/v1/sequence</code>. Small figures are the spread over the repetitions.",
+    ]
+    for scene in scenes:
+        of_scene = [record for record in results if record.scene == scene]
+        parts += [f"<h2>{html.escape(scene)}</h2>", *_section(scene, of_scene, plots)]
+    parts += [
+        "<div id=copied role=status hidden>Copied</div>",
+        f"<script>{_SCRIPT}</script></html>",
+    ]
+    return "\n".join(parts)
+
+
+def _section(
+    scene: str, records: list[Record], plots: Mapping[tuple[str, str], bytes]
+) -> Iterable[str]:
+    for kind, title in _TITLES.items():
+        mine = [record for record in records if record.kind == kind]
+        if not mine:
+            continue
+        yield f"<h3>{title}</h3><div class=plots>"
+        for name, axes in PLOTS.items():
+            svg = plots.get((scene, name))
+            if axes.kind == kind and svg is not None:
+                yield _inline(svg, f"{scene}-{name}", mine)
+        yield "</div>"
+        yield _table(mine, _QUANTITIES[kind])
+        yield "<dl>"
+        for name, meaning in _QUANTITIES[kind].items():
+            yield f"<dt>{name}<dd>{html.escape(meaning)}"
+        yield "</dl>"
+
+
+def _inline(svg: bytes, prefix: str, records: list[Record]) -> str:
+    """Put a picture into the page, its ids made its own and its points named."""
+    text = svg.decode()
+    text = text[text.index("<svg") :]
+    for reference in ('id="', 'href="#', "url(#"):
+        text = text.replace(reference, f"{reference}{prefix}-")
+    for record in records:
+        known = point_id(record)
+        label = html.escape(_what(record))
+        text = text.replace(
+            f'<g id="{prefix}-{known}">',
+            f'<g id="p-{prefix}-{known}" data-point="{known}"><title>{label}</title>',
+        )
+    return text
+
+
+def _what(record: Record) -> str:
+    """Say what a point is."""
+    point = dict(record.point)
+    if record.kind != "capture":
+        return ", ".join(_setting(name, value) for name, value in point.items())
+    sub_phases = point["sub_phases"]
+    of_exposure = sub_phases["scheme"]
+    if of_exposure != "none":
+        of_exposure += f" {sub_phases['n']}"
+    takes = "1 take" if point["takes"] == 1 else f"{point['takes']} takes"
+    return (
+        f"m = {point['harmonics']}, {point['base_frequency_hz'] / 1e6:g} MHz, "
+        f"{point['exposure_s'] * 1e3:g} ms, {takes}, {point['zeroth']}, "
+        f"{of_exposure}"
+    )
+
+
+def _setting(name: str, value: Any) -> str:
+    if name == "harmonics":
+        return f"m = {value}"
+    return f"{value} bins" if name == "bins" else str(value)
+
+
+def _table(records: list[Record], quantities: Mapping[str, str]) -> str:
+    shown = [name for name in quantities if any(record.values.get(name) for record in records)]
+    copyable = records[0].kind == "capture"
+    head = "".join(f"<th title='{html.escape(quantities[name])}'>{name}" for name in shown)
+    rows = [f"<div class=table><table><tr><th>{'<th>' if copyable else ''}{head}"]
+    for record in records:
+        cells = "".join(
+            f"<td>{_number(record.values.get(name), record.spread.get(name))}" for name in shown
+        )
+        body = html.escape(json.dumps(record.point), quote=True)
+        data = f' data-sequence="{body}"' if copyable else ""
+        button = "<td><button class=copy>Copy</button>" if copyable else ""
+        rows.append(
+            f'<tr id="row-{point_id(record)}"{data}><td>{html.escape(_what(record))}{button}{cells}'
+        )
+    return "\n".join([*rows, "</table></div>"])
+
+
+def _number(value: float | None, spread: float | None) -> str:
+    if value is None:
+        return "–"
+    shown = f"{value:,.0f}" if abs(value) >= 1e4 else f"{value:.4g}"
+    return f"{shown} <small>±{spread:.1g}</small>" if spread else shown

@@ -1,0 +1,99 @@
+"""The service as one ASGI application."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Final
+
+from fastapi import APIRouter, Depends, FastAPI
+
+from transientcam_server.api import problems
+from transientcam_server.api.auth import permissions
+from transientcam_server.api.auth.guard import Authentication
+from transientcam_server.api.docs import pages
+from transientcam_server.api.middleware.requests import Requests
+from transientcam_server.api.middleware.security import BodyLimit, SameSite, SecurityHeaders
+from transientcam_server.api.routes import (
+    acquisition,
+    calibrations,
+    camera,
+    frames,
+    health,
+    info,
+    jobs,
+    lease,
+    metrics,
+    parameters,
+    plan,
+    preview,
+    reconstruction,
+    recording_frames,
+    recordings,
+    sequence,
+    simulation,
+)
+from transientcam_server.api.stream import websocket
+from transientcam_server.camera.source import Camera
+from transientcam_server.service import VERSION, Service
+from transientcam_server.settings import Settings
+
+API: Final = "/api/v1"
+_RESOURCES = (
+    info,
+    camera,
+    lease,
+    sequence,
+    reconstruction,
+    calibrations,
+    acquisition,
+    frames,
+    preview,
+    recordings,
+    recording_frames,
+    simulation,
+    plan,
+    parameters,
+    jobs,
+)
+
+
+def build_app(camera: Camera, settings: Settings) -> FastAPI:
+    """Return the application that serves ``camera``; it captures while its lifespan lasts.
+
+    The camera stays the caller's: it is neither opened nor closed here.
+    """
+    service = Service(camera, settings)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        async with service.running():
+            yield
+
+    app = FastAPI(
+        title="transientcam",
+        version=VERSION,
+        summary="A networked camera for transient imaging",
+        description=pages.DESCRIPTION,
+        license_info={"name": "BSD-3-Clause", "identifier": "BSD-3-Clause"},
+        lifespan=lifespan,
+        docs_url=None,  # pages.router has one that needs no other host
+        redoc_url=None,
+        swagger_ui_oauth2_redirect_url=None,
+    )
+    app.state.service = service
+    api = APIRouter(prefix=API)
+    for resource in _RESOURCES:
+        api.include_router(resource.router, dependencies=[Depends(permissions.admit)])
+    api.include_router(websocket.router)
+    app.include_router(api)
+    for router in (info.versions, health.router, metrics.router, pages.router):
+        app.include_router(router)
+    pages.add_dashboard(app)
+    problems.install(app)
+    permissions.describe(app, [resource.router for resource in _RESOURCES], prefix=API)
+    # the last one added is the first to see a request
+    app.add_middleware(BodyLimit, counted_elsewhere=frozenset((f"{API}{calibrations.IMPORT}",)))
+    app.add_middleware(Authentication, guard=service.guard)
+    app.add_middleware(SameSite, settings=settings)
+    app.add_middleware(Requests, metrics=service.metrics)
+    app.add_middleware(SecurityHeaders)
+    return app

@@ -1,0 +1,120 @@
+"""Who asks: the token of a request or a stream, and whether one is needed at all."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Final
+
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
+from transientcam_server.api.problems import problem_response
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import Problem, TokenFileError
+from transientcam_server.settings import Settings
+
+_log = logging.getLogger(__name__)
+_GUARDED: Final = ("/api/v1/", "/metrics")
+_FORWARDED: Final = ("forwarded", "x-forwarded-for")
+
+
+@dataclass(frozen=True, slots=True)
+class Principal:
+    """Who asks; ``token_id`` is None for somebody who needed no token."""
+
+    name: str
+    role: Role
+    token_id: str | None = None
+
+
+ANYBODY: Final = Principal("anybody", Role.ADMIN)
+"""Whoever reaches a service that asks for no token."""
+
+
+class Guard:
+    """Knows who may come in.
+
+    No token is needed where only this machine reaches the service, unless a proxy has forwarded
+    the request, and none where ``insecure`` says so.
+    """
+
+    def __init__(self, settings: Settings, *, now: Callable[[], datetime] = utc_now) -> None:
+        self.tokens = TokenFile(settings.tokens_file)
+        self._insecure = settings.insecure
+        self._required = settings.needs_token
+        self._now = now
+
+    def identify(self, headers: Headers, *, first_message: str | None = None) -> Principal:
+        """Return who sends a request with these headers, or a stream with this first message.
+
+        Raises
+        ------
+        Problem
+            ``token-required`` without a token where one is needed, ``token-refused``.
+        """
+        token = first_message if first_message is not None else _shown(headers)
+        if token is not None:
+            return self._check(token)
+        forwarded = any(name in headers for name in _FORWARDED)
+        if self._required or (forwarded and not self._insecure):
+            raise Problem(kinds.TOKEN_REQUIRED, "This service asks everybody for a token.")
+        return ANYBODY
+
+    def still_valid(self, principal: Principal) -> bool:
+        """Return whether somebody who came in may stay."""
+        if principal.token_id is None:
+            return True
+        try:
+            return self.tokens.has(principal.token_id, now=self._now())
+        except TokenFileError:
+            return False
+
+    def _check(self, text: str) -> Principal:
+        try:
+            token = self.tokens.find(text, now=self._now())
+        except TokenFileError as error:
+            _log.error("no token is valid: %s", error)
+            token = None
+        if token is None:
+            raise Problem(kinds.TOKEN_REFUSED, "This token is unknown, revoked or expired.")
+        return Principal(token.name, token.rank, token.id)
+
+
+class Authentication:
+    """Lets nobody into the interface who cannot say who they are; streams ask for themselves."""
+
+    def __init__(self, app: ASGIApp, *, guard: Guard) -> None:
+        self._app = app
+        self._guard = guard
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Refuse, or pass on with `Principal` in the request's state."""
+        if scope["type"] != "http" or not scope["path"].startswith(_GUARDED):
+            await self._app(scope, receive, send)
+            return
+        try:
+            principal = self._guard.identify(Headers(scope=scope))
+        except Problem as problem:
+            log_refusal(scope, problem)
+            response = problem_response(problem, instance=scope["path"])
+            response.headers["WWW-Authenticate"] = "Bearer"
+            await response(scope, receive, send)
+            return
+        scope.setdefault("state", {})["principal"] = principal
+        await self._app(scope, receive, send)
+
+
+def log_refusal(scope: Scope, problem: Problem) -> None:
+    """Note that somebody was not let in; never what they showed."""
+    client = scope.get("client")
+    who = client[0] if client else "somebody"
+    _log.warning("%s was not let in to %s: %s", who, scope["path"][:200], problem.kind.slug)
+
+
+def _shown(headers: Headers) -> str | None:
+    scheme, _, credentials = headers.get("authorization", "").partition(" ")
+    if scheme.lower() == "bearer":
+        return credentials.strip()
+    return headers.get("x-api-key")

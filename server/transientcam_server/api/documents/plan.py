@@ -1,0 +1,230 @@
+"""The JSON documents of planning."""
+
+from typing import Any
+
+from pydantic import ConfigDict, Field, JsonValue
+
+from transientcam_server.api.documents.document import Document
+from transientcam_server.api.documents.frame import META_EXAMPLE, FrameDocument
+from transientcam_server.api.documents.sequence import SequenceDocument
+
+_SEQUENCE: dict[str, JsonValue] = {
+    "base_frequency_hz": 23e6,
+    "harmonics": 3,
+    "zeroth": "estimated",
+    "exposure_s": 0.001652,
+    "takes": 1,
+    "take_order": "sequential",
+    "sub_phases": {"scheme": "arccos", "n": 8},
+}
+_CHOICE: dict[str, JsonValue] = {
+    "sequence": _SEQUENCE,
+    "applied": {**_SEQUENCE, "images": 12, "capture_s": 0.0646, "frame_rate_hz": 14.8},
+    "capture_s": 0.0646,
+    "frame_rate_hz": 14.8,
+    "reconstruct_s": 0.0082,
+    "computing_share": 0.12,
+    "predicted": {
+        "range_std_m": {"median": 0.0098, "low": 0.0091, "high": 0.0105, "p90": 0.0247},
+        "range_bias_m": 1.3e-07,
+        "beyond_scene": False,
+        "first_order_share": 0.48,
+        "bound_width": None,
+        "separation_share": None,
+    },
+}
+
+
+class _Asked(Document):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class TargetDocument(_Asked):
+    """What has to be reached; all that is given."""
+
+    range_std_m: float | None = Field(default=None, gt=0)
+    """Standard deviation of the range of a typical pixel, at most."""
+    separation_m: float | None = Field(default=None, gt=0)
+    """Distance at which two equal returns are both found."""
+    separation_share: float = Field(default=0.9, gt=0, lt=1)
+    """In what share of all captures they are."""
+    bound_width: float | None = Field(default=None, gt=0)
+    """Width of the bounds on the density over the mean density, at most."""
+
+
+class BudgetDocument(_Asked):
+    """What may be spent; all that is given."""
+
+    capture_s: float | None = Field(default=None, gt=0)
+    """Time of one capture, at most."""
+    frame_rate_hz: float | None = Field(default=None, gt=0)
+    """Frames a second back to back, at least."""
+    computing_share: float | None = Field(default=None, gt=0)
+    """Share of the time between two frames that reconstruction may take, at most."""
+
+
+class GivenReturnDocument(_Asked):
+    """Light that comes back from one range."""
+
+    range_m: float = Field(gt=0)
+    weight: float = Field(default=1.0, gt=0)
+    """Relative to the others."""
+
+
+class SceneDocument(_Asked):
+    """A scene of equal pixels."""
+
+    brightness_dn_per_s: float = Field(gt=0)
+    """Zeroth moment in DN for each second of exposure."""
+    ambient_dn_per_s: float = Field(default=0.0, ge=0)
+    """Light that is not the camera's, in DN an image for each second of exposure."""
+    returns: list[GivenReturnDocument] = Field(
+        default_factory=lambda: [GivenReturnDocument(range_m=2.0)], min_length=1, max_length=32
+    )
+
+
+class PlanRequest(_Asked):
+    """What a sequence is wanted for."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {"target": {"range_std_m": 0.01}},
+                {"budget": {"frame_rate_hz": 15.0}, "fixed": {"zeroth": "low-frequency"}},
+            ]
+        },
+    )
+
+    target: TargetDocument = TargetDocument()
+    budget: BudgetDocument = BudgetDocument()
+    fixed: dict[str, Any] = Field(default_factory=dict)
+    """Fields of the sequence that must stay as given here."""
+    scene: SceneDocument | None = None
+    """Null takes the current frame's."""
+    ambient_dn_per_s: float = Field(default=0.0, ge=0)
+    """Light on the current frame's scene that is not the camera's."""
+
+
+class DeviationDocument(Document):
+    """Predicted standard deviation of the range in m."""
+
+    median: float
+    low: float
+    """The median lies above this with 97.5 %."""
+    high: float
+    """And below this."""
+    p90: float
+    """90 % of the pixels are better."""
+
+
+class PredictedDocument(Document):
+    """Predicted accuracy."""
+
+    range_std_m: DeviationDocument
+    range_bias_m: float
+    """How far the range of the median pixel is off without any noise."""
+    beyond_scene: bool
+    """Whether it sees more of the scene than the frame that the scene was judged by, so that the
+    prediction is a bound on how good it can be."""
+    first_order_share: float
+    """Share of the pixels where the noise model holds to first order; noise was drawn for the
+    others."""
+    bound_width: float | None = None
+    separation_share: float | None = None
+
+
+class ChoiceDocument(Document):
+    """A sequence and what is predicted of it."""
+
+    sequence: SequenceDocument
+    """The body for `PUT /sequence`."""
+    applied: dict[str, Any]
+    """What the camera would make of it."""
+    capture_s: float
+    frame_rate_hz: float
+    reconstruct_s: float
+    """Computing time of one frame on this machine."""
+    computing_share: float
+    predicted: PredictedDocument
+
+
+class NeighbourDocument(ChoiceDocument):
+    """Another choice on the front, beside the recommended one."""
+
+    time_factor: float
+    """Its capture time over the recommended one's."""
+    error_factor: float | None = None
+    """Its error over the recommended one's."""
+
+
+class PlanDocument(ChoiceDocument):
+    """A recommendation and its neighbours."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    **_CHOICE,
+                    "compared_by": "range_std_m",
+                    "half_time": None,
+                    "twice_accuracy": {**_CHOICE, "time_factor": 1.25, "error_factor": 0.5},
+                }
+            ]
+        }
+    )
+
+    compared_by: str
+    """The target that neighbours are compared by."""
+    half_time: NeighbourDocument | None = None
+    """What half the time gives; null where nothing is that quick."""
+    twice_accuracy: NeighbourDocument | None = None
+    """What half the error costs; null where nothing is that accurate."""
+
+
+class RangeErrorDocument(Document):
+    """Error of the range against the simulated truth, in m."""
+
+    median: float
+    rms: float
+
+
+class CurrentDocument(Document):
+    """Where the current frame stands."""
+
+    meta: FrameDocument
+    sequence: SequenceDocument
+    capture_s: float
+    frame_rate_hz: float
+    range_error_m: RangeErrorDocument | None = None
+    """Null for a real camera."""
+
+
+class TradeoffDocument(Document):
+    """What accuracy costs on the scene before the camera."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "compared_by": "range_std_m",
+                    "scene_of_frame": 1204,
+                    "current": {
+                        "meta": META_EXAMPLE,
+                        "sequence": _SEQUENCE,
+                        "capture_s": 0.0904,
+                        "frame_rate_hz": 10.6,
+                        "range_error_m": None,
+                    },
+                    "front": [_CHOICE],
+                }
+            ]
+        }
+    )
+
+    compared_by: str
+    scene_of_frame: int
+    """Number of the frame that the scene was judged by."""
+    current: CurrentDocument
+    front: list[ChoiceDocument]
+    """By rising capture time and falling error."""

@@ -1,0 +1,198 @@
+"""The JSON documents of recordings."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, ConfigDict, Field, JsonValue
+
+from transientcam_server.api.documents.document import Document
+from transientcam_server.api.documents.sequence import APPLIED_EXAMPLE, AppliedDocument
+
+_ID_EXAMPLE = "20261120T081500Z-3f9c2a"
+_ANNOTATIONS_EXAMPLE: dict[str, JsonValue] = {"sample": "corner, white paint", "operator": "Åsa"}
+RECORDING_EXAMPLE: dict[str, JsonValue] = {
+    "id": _ID_EXAMPLE,
+    "name": "corner at 3 m",
+    "state": "complete",
+    "frames": 318,
+    "dropped_frames": 0,
+    "size_bytes": 114873344,
+    "started_s": 1795161600.25,
+    "duration_s": 30.02,
+    "reason": "duration",
+    "problem": None,
+    "annotations": _ANNOTATIONS_EXAMPLE,
+    "sequence": APPLIED_EXAMPLE,
+    "camera": {"model": "AMCW lidar (simulated)", "serial": "SIM-mirrors", "scene": "mirrors"},
+    "calibration": {"id": "nominal"},
+    "width": 163,
+    "height": 120,
+    "versions": {"transientcam": "0.1.0"},
+    "limits": None,
+}
+
+
+def _printable(name: str) -> str:
+    if not name.isprintable() or not name.strip():
+        raise ValueError("must be text that can be printed")
+    return name
+
+
+class RecordingDocument(Document):
+    """A recording: what is in it, and how it is."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [RECORDING_EXAMPLE]})
+
+    id: str
+    """What requests call it."""
+    name: str
+    """What people call it."""
+    state: Literal["recording", "finishing", "complete", "interrupted", "recovering", "damaged"]
+    """`interrupted`: its writer died, and the next start of the service recovers it."""
+    frames: int
+    dropped_frames: int
+    """Frames the disk was too slow for; each frame in the file says how many before it."""
+    size_bytes: int
+    started_s: float | None = None
+    """Unix time."""
+    duration_s: float
+    reason: str | None = None
+    """Why it ended: `stopped`, `duration`, `size`, `frames`, `disk-space`, `sequence-changed`,
+    `failed`, `shutdown`, or `interrupted`; null while it runs."""
+    problem: str | None = None
+    """What went wrong, if anything did."""
+    annotations: dict[str, Any]
+    sequence: AppliedDocument | None = None
+    camera: dict[str, Any]
+    calibration: dict[str, Any]
+    width: int | None = None
+    height: int | None = None
+    versions: dict[str, str]
+    """Of the software that recorded it."""
+    limits: dict[str, float | None] | None = None
+    """When it ends by itself; null once it has ended."""
+    history_frames: int | None = None
+    """Of the past that it began with; only in the answer that tells of its start."""
+
+
+class RecordingLimitsDocument(Document):
+    """When recordings end by themselves, whatever was asked for; null without such a limit."""
+
+    max_duration_s: float | None = None
+    max_bytes: int | None = None
+    min_free_bytes: int
+    """What the disk keeps."""
+
+
+class RecordingsDocument(Document):
+    """All recordings, the newest first."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "directory": "/var/lib/transientcam/recordings",
+                    "free_bytes": 214748364800,
+                    "active": None,
+                    "limits": {
+                        "max_duration_s": None,
+                        "max_bytes": None,
+                        "min_free_bytes": 1073741824,
+                    },
+                    "recordings": [RECORDING_EXAMPLE],
+                }
+            ]
+        }
+    )
+
+    directory: str
+    """Where they are kept, on the machine of the service."""
+    free_bytes: int | None = None
+    """What its disk has left; null before the first recording made the directory."""
+    active: str | None = None
+    """The one that runs."""
+    limits: RecordingLimitsDocument
+    recordings: list[RecordingDocument]
+
+
+class TimelineDocument(Document):
+    """Which frames a recording has, and when they were captured."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "first": 1,
+                    "last": 4,
+                    "count": 4,
+                    "duration_s": 0.283,
+                    "frame_rate_hz": 10.6,
+                    "host_time_s": 1795161600.25,
+                    "times_s": [0.0, 0.094, 0.189, 0.283],
+                    "times_step": 1,
+                }
+            ]
+        }
+    )
+
+    first: int | None = None
+    """Recorded frames are counted from 1; null before there is any."""
+    last: int | None = None
+    count: int
+    duration_s: float
+    """From the first to the last."""
+    frame_rate_hz: float | None = None
+    """On average; null before there are two."""
+    host_time_s: float | None = None
+    """Arrival of the first frame, Unix time."""
+    times_s: list[float]
+    """Arrival of every `times_step`-th frame, beginning with the first, after the first."""
+    times_step: int
+    """1 unless there are very many."""
+
+
+class RecordingRequest(Document):
+    """What should be recorded, and until when; the least of all limits ends it."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {
+                    "name": "corner at 3 m",
+                    "duration_s": 30.0,
+                    "annotations": _ANNOTATIONS_EXAMPLE,
+                },
+                {},
+            ]
+        },
+    )
+
+    name: Annotated[str, AfterValidator(_printable)] | None = Field(
+        default=None, min_length=1, max_length=200
+    )
+    """For people; without one it is named after the time."""
+    duration_s: float | None = Field(default=None, gt=0, allow_inf_nan=False)
+    """From now on."""
+    max_bytes: int | None = Field(default=None, ge=1)
+    frames: int | None = Field(default=None, ge=1)
+    """Those of the past count, too."""
+    history_s: float | None = Field(default=None, gt=0, le=3600, allow_inf_nan=False)
+    """Begin with the frames of so many seconds before, as far as `GET /frames` has them."""
+    annotations: dict[str, Any] = Field(default_factory=dict)
+    """Anything worth keeping with it, at most 16 KiB as JSON."""
+
+
+class RecordingChange(Document):
+    """What can be changed of a recording."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"annotations": _ANNOTATIONS_EXAMPLE}]}
+    )
+
+    annotations: dict[str, Any]
+    """Replace those it has."""
+
+
+def document(described: dict[str, Any]) -> RecordingDocument:
+    """Return what the library says of a recording as its document."""
+    return RecordingDocument.model_validate(described)

@@ -1,0 +1,71 @@
+"""JSON documents about the simulated world."""
+
+from typing import Annotated, Literal
+
+from pydantic import ConfigDict, Field, JsonValue
+
+from transientcam_server.api.documents.document import Document
+
+_EXAMPLE_SCENES: list[JsonValue] = [
+    {"name": "corner", "description": "Two walls that light each other."},
+    {"name": "mirrors", "description": "Three returns in each pixel."},
+]
+Choice = Literal["auto", "on", "off"]
+
+
+class SceneDocument(Document):
+    """A scene that comes along."""
+
+    name: str
+    description: str
+
+
+class SimulationDocument(Document):
+    """The simulated world before the camera."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "scene": "mirrors",
+                    "effects": {"ambient": "on"},
+                    "scenes": _EXAMPLE_SCENES,
+                    "plugged": True,
+                    "faults": ["unplug", "replug", "corrupt-image", "drop-image"],
+                }
+            ]
+        }
+    )
+
+    scene: str
+    effects: dict[str, Choice]
+    """What was chosen for effects by name, in place of what the scene says."""
+    scenes: list[SceneDocument]
+    """What the camera can be put before."""
+    plugged: bool
+    """Whether the simulated cable is in."""
+    faults: list[str]
+    """What can be made to go wrong."""
+
+
+class SimulationRequest(Document):
+    """What the camera should be put before; what is absent stays."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"scene": "corner", "effects": {"ambient": "on"}}]},
+    )
+
+    scene: Annotated[str, Field(max_length=64)] | None = None
+    effects: Annotated[dict[str, Choice], Field(max_length=64)] | None = None
+    """By name, in place of all earlier choices; of the others the scene decides."""
+
+
+class FaultRequest(Document):
+    """What should go wrong."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"fault": "corrupt-image"}]}
+    )
+
+    fault: Literal["unplug", "replug", "corrupt-image", "drop-image"]

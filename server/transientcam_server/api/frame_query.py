@@ -1,0 +1,238 @@
+"""What a frame is asked, whether it is the latest, a former one or recorded: query and answer."""
+
+import json
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Annotated, Any, Final, Literal
+
+from fastapi import Depends, Path, Query, Request, Response
+from pydantic import FiniteFloat
+
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging.encodings.encoding import (
+    COLOUR_PNG,
+    ENCODINGS,
+    MSGPACK,
+    PNG,
+    Encoding,
+    negotiate,
+)
+from transientcam_server.imaging.frame import Frame
+from transientcam_server.imaging.pixel import pixel_csv, pixel_json
+from transientcam_server.imaging.products import Product, View
+from transientcam_server.imaging.view import Crop
+
+MAX_BINS: Final = 4096
+DEFAULT_BINS: Final = 64
+MAX_NUMBER: Final = 2**53 - 1
+LATEST: Final = "latest"
+
+FrameName = Annotated[
+    str,
+    Path(
+        description="number of the frame, or `latest`",
+        pattern="^(latest|[1-9][0-9]{0,14})$",
+        examples=["latest", "1204"],
+    ),
+]
+ProductName = Annotated[
+    str,
+    Path(
+        description="name of the product, without or with one of the suffixes "
+        + ", ".join(f"`.{name}`" for name in ENCODINGS),
+        examples=["range", "range.npy", "transient.npz", "pointcloud.ply"],
+    ),
+]
+X = Annotated[int, Query(ge=0, description="column", examples=[80])]
+Y = Annotated[int, Query(ge=0, description="row", examples=[60])]
+PixelBins = Annotated[int, Query(ge=1, le=MAX_BINS, description="times of flight")]
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a request says of the product it wants."""
+
+    time_s: list[float] | None
+    bins: int | None
+    y: int | None
+    region: str | None
+    decimation: int | None
+    view: Literal["colour"] | None
+    accept: str | None
+
+    def view_of(self, product: Product, frame: Frame) -> View:
+        """Return which part of the frame's product that is.
+
+        Raises
+        ------
+        Problem
+            ``invalid-request`` for what this product does not have or this frame cannot give.
+        """
+        self._require_meaning(product)
+        height, width = frame.shape
+        crop = Crop.parse(self.region, self.decimation, height=height, width=width)
+        times_s = self._times_s(frame) if product.over_time else ()
+        y = self._row(crop, height) if product.name == "streak" else None
+        return View(times_s, crop, y)
+
+    def _require_meaning(self, product: Product) -> None:
+        if not product.over_time and (self.time_s is not None or self.bins is not None):
+            field = "bins" if self.bins is not None else "time_s"
+            limit = "left out: this product has no times of flight"
+            raise invalid(field, self.bins or self.time_s, limit)
+        if self.time_s is not None and self.bins is not None:
+            raise invalid("bins", self.bins, "left out where time_s is given")
+        if self.y is not None and product.name != "streak":
+            raise invalid("y", self.y, "left out: this product has more than one row")
+
+    def _times_s(self, frame: Frame) -> tuple[float, ...]:
+        if self.time_s is not None:
+            return tuple(self.time_s)
+        count = self.bins or DEFAULT_BINS
+        period_s = 1.0 / frame.recipe.base_frequency_hz
+        return tuple(period_s * index / count for index in range(count))
+
+    def _row(self, crop: Crop, height: int) -> int:
+        _, first, _, rows = crop.region or (0, 0, 0, height)
+        if self.y is None:
+            return first + rows // 2
+        if not first <= self.y < first + rows:
+            raise invalid("y", self.y, f"from {first} to {first + rows - 1}")
+        return self.y
+
+
+# async, or FastAPI takes a thread for it
+async def _wanted(
+    request: Request,
+    time_s: Annotated[
+        list[FiniteFloat] | None,
+        Query(max_length=MAX_BINS, description="times of flight in seconds; may be repeated"),
+    ] = None,
+    bins: Annotated[
+        int | None,
+        Query(ge=1, le=MAX_BINS, description="evenly spaced times from 0 to one period"),
+    ] = None,
+    y: Annotated[
+        int | None, Query(ge=0, description="row of a streak; the middle one without it")
+    ] = None,
+    region: Annotated[
+        str | None,
+        Query(
+            max_length=64,
+            description="`x,y,width,height` of the part wanted, in pixels of the frame",
+            examples=["40,30,64,48"],
+        ),
+    ] = None,
+    decimation: Annotated[
+        int | None, Query(ge=1, description="every so many pixels of it, both ways")
+    ] = None,
+    view: Annotated[
+        Literal["colour"] | None,
+        Query(description="a PNG for eyes: 8 bits, coloured, without values"),
+    ] = None,
+) -> Wanted:
+    accept = request.headers.get("accept")
+    return Wanted(time_s, bins, y, region, decimation, view, accept)
+
+
+WantedOf = Annotated[Wanted, Depends(_wanted)]
+"""What the request wants of a product."""
+
+
+def choose(product: Product, suffix: str | None, wanted: Wanted) -> Encoding:
+    """Return the format that a request wants a product in.
+
+    Raises
+    ------
+    Problem
+        ``not-acceptable``.
+    """
+    encoding = negotiate(product, suffix=suffix, accept=wanted.accept)
+    return COLOUR_PNG if wanted.view is not None and encoding is PNG else encoding
+
+
+async def product_answer(
+    name: str,
+    wanted: Wanted,
+    *,
+    product: Callable[[str], Product],
+    frame: Callable[[], Awaitable[Frame]],
+) -> Response:
+    """Answer with a product; the frame is asked for once the request is known to make sense."""
+    stem, dot, suffix = name.partition(".")
+    chosen = product(stem)
+    encoding = choose(chosen, suffix if dot else None, wanted)
+    found = await frame()
+    view = wanted.view_of(chosen, found)
+    data = await found.encoded(chosen, encoding, view)
+    headers = {"Cache-Control": "no-store", "Vary": "Accept"}
+    if encoding is not MSGPACK:  # which says so inside
+        meta = found.meta() | view.crop.to_meta(*found.shape)
+        headers |= {
+            "Transientcam-Frame": str(found.number),
+            "Transientcam-Unit": chosen.png_unit if encoding is PNG else chosen.description.unit,
+            "Transientcam-Meta": json.dumps(meta, separators=(",", ":")),
+        }
+    return Response(data, media_type=encoding.media_type, headers=headers)
+
+
+async def pixel_answer(
+    frame: Frame, x: int, y: int, bins: int, *, simulated: bool = False, as_csv: bool = False
+) -> Response:
+    """Answer with everything about one pixel, or with its values over time of flight as CSV."""
+    for field, value, length in (("x", x, frame.shape[1]), ("y", y, frame.shape[0])):
+        if value >= length:
+            raise invalid(field, value, f"from 0 to {length - 1}")
+    truth = await frame.stage("truth") if simulated and not as_csv else None
+    body = await frame.with_moments(pixel_csv if as_csv else pixel_json, truth, x, y, bins)
+    media_type = "text/csv" if as_csv else "application/json"
+    return Response(body, media_type=media_type, headers={"Cache-Control": "no-store"})
+
+
+def invalid(field: str, value: object, limit: str) -> Problem:
+    """Return the problem of a value that cannot be used."""
+    return Problem(
+        kinds.INVALID_REQUEST,
+        f"{field} must be {limit}.",
+        field=field,
+        value=value,
+        limit=limit,
+    )
+
+
+_BINARY: Final[dict[str, Any]] = {"schema": {"type": "string", "format": "binary"}}
+_HEADERS: Final = {
+    "Transientcam-Frame": {
+        "description": "number of the frame (not with msgpack, which says so inside)",
+        "schema": {"type": "integer"},
+    },
+    "Transientcam-Unit": {"description": "of one step", "schema": {"type": "string"}},
+    "Transientcam-Meta": {
+        "description": "what is known of the frame, as compact JSON",
+        "schema": {"type": "string"},
+    },
+}
+PRODUCT_RESPONSES: Final[dict[int | str, dict[str, Any]]] = {
+    200: {
+        "description": "The product, in the format that suffix or Accept header name",
+        "content": {each.media_type: _BINARY for each in ENCODINGS.values()},
+        "headers": _HEADERS,
+    }
+}
+"""How a product is documented to be answered."""
+CSV_RESPONSES: Final[dict[int | str, dict[str, Any]]] = {
+    200: {
+        "description": "A line for each time of flight, under a line with names",
+        "content": {"text/csv": {"schema": {"type": "string"}}},
+    }
+}
+"""How a pixel is documented to be answered as CSV."""
+PRODUCT_PROBLEMS: Final = (
+    kinds.UNKNOWN_PRODUCT,
+    kinds.NOT_ACCEPTABLE,
+    kinds.INVALID_REQUEST,
+    kinds.ANSWER_TOO_LARGE,
+    kinds.PRODUCT_FAILED,
+)
+"""What can be wrong with a request for a product, whatever its frame."""

@@ -1,0 +1,98 @@
+"""Every request: its id, its outcome counted and logged, and an answer even where it fails."""
+
+import logging
+import re
+import secrets
+import time
+from typing import Final
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from transientcam_server.api.metrics import Metrics
+from transientcam_server.api.problems import problem_of, problem_response
+from transientcam_server.logs import request_id
+
+_log = logging.getLogger(__name__)
+REQUEST_ID_HEADER: Final = "X-Request-ID"
+_ACCEPTED: Final = re.compile(r"[A-Za-z0-9._:+/=-]{1,128}")
+_HEAD: Final = "transientcam.head"
+_READS: Final = frozenset(("GET", "HEAD", "OPTIONS"))
+
+
+def asks_for_head(scope: Scope) -> bool:
+    """Whether a request that is answered as GET is HEAD; what never ends has to know."""
+    return bool(scope.get(_HEAD))
+
+
+class Requests:
+    """Gives every request an id, and every failure an answer.
+
+    An id that the client sends in ``X-Request-ID`` is kept if it may stand in a log. HEAD is
+    answered as GET without its body.
+    """
+
+    def __init__(self, app: ASGIApp, *, metrics: Metrics) -> None:
+        self._app = app
+        self._metrics = metrics
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on, count, log."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        # the server runs each request in a context of its own, so nothing is to be undone
+        sent = Headers(scope=scope).get(REQUEST_ID_HEADER, "")
+        identifier = sent if _ACCEPTED.fullmatch(sent) else secrets.token_hex(8)
+        request_id.set(identifier)
+        if scope["type"] == "websocket":
+            await self._app(scope, receive, send)
+        else:
+            await self._answer(scope, receive, send, identifier)
+
+    async def _answer(self, scope: Scope, receive: Receive, send: Send, identifier: str) -> None:
+        status = 0
+        begin_s = time.perf_counter()
+        head = scope["method"] == "HEAD"
+
+        async def watched(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                MutableHeaders(scope=message)[REQUEST_ID_HEADER] = identifier
+            elif head:
+                message = {**message, "body": b""}
+            await send(message)
+
+        inner = {**scope, "method": "GET", _HEAD: True} if head else scope
+        try:
+            await self._app(inner, receive, watched)
+        except Exception as error:
+            _log.exception("%s %s failed", scope["method"], scope["path"][:200])
+            if status:  # its beginning is on the way: only breaking it off tells the client
+                raise
+            response = problem_response(problem_of(error), instance=scope["path"])
+            await response(inner, receive, watched)
+        self._metrics.answered(status or 499)  # nobody was there any more
+        self._note(inner, scope["method"], status, time.perf_counter() - begin_s)
+
+    def _note(self, scope: Scope, method: str, status: int, duration_s: float) -> None:
+        """Log a request: a change for everybody to see, a look for those who search."""
+        principal = scope.get("state", {}).get("principal")
+        level = logging.DEBUG if method in _READS else logging.INFO
+        details = {
+            "method": method,
+            "path": scope["path"][:200],
+            "status": status,
+            "duration_s": round(duration_s, 6),
+            "principal": None if principal is None else principal.name,
+        }
+        _log.log(
+            level,
+            "%s %s: %d, for %s",
+            method,
+            details["path"],
+            status,
+            details["principal"],
+            extra=details,
+        )

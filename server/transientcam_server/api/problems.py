@@ -1,0 +1,302 @@
+"""Errors as RFC 9457 problem documents, and the one place where foreign errors become problems."""
+
+import logging
+import math
+from collections.abc import Callable, Iterable
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse, Response
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.exceptions import HTTPException
+from starlette.routing import compile_path
+
+from transientcam.errors import ProtocolError
+from transientcam.wire import PROBLEM_MEDIA_TYPE
+from transientcam_driver import (
+    CalibrationMismatch,
+    CameraError,
+    CameraLost,
+    CameraNotFound,
+    DriverError,
+    EffectError,
+    SequenceError,
+)
+from transientcam_moments import ParameterError
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors.kinds import ProblemKind
+from transientcam_server.logs import request_id
+
+_log = logging.getLogger(__name__)
+_SHOWN_CHARACTERS = 200
+_KIND_OF_STATUS = {
+    kind.status: kind
+    for kind in (kinds.BAD_REQUEST, kinds.NOT_FOUND, kinds.METHOD_NOT_ALLOWED, kinds.TOO_LARGE)
+}
+
+
+class ProblemDocument(BaseModel):
+    """A problem as RFC 9457 describes it."""
+
+    model_config = ConfigDict(extra="allow")
+
+    type: str = Field(description="identifies the kind of problem; a page of this service")
+    title: str = Field(description="the kind of problem in one sentence")
+    status: int = Field(description="the HTTP status")
+    detail: str = Field(description="this occurrence in one sentence")
+    instance: str | None = Field(default=None, description="the path that was asked for")
+    request_id: str | None = Field(
+        default=None, description="names the request in the service's log; also in X-Request-ID"
+    )
+    field: str | None = Field(default=None, description="the part of the request that was refused")
+    value: Any = Field(default=None, description="what it was")
+    limit: Any = Field(default=None, description="what it may be")
+
+
+def problem_document(problem: Problem, *, instance: str | None = None) -> dict[str, Any]:
+    """Return a problem as the map that travels as JSON and inside stream messages."""
+    document: dict[str, Any] = {
+        "type": problem.kind.type,
+        "title": problem.kind.title,
+        "status": problem.kind.status,
+        "detail": problem.detail,
+    }
+    if instance is not None:
+        document["instance"] = instance
+    return document | {key: _plain(value) for key, value in problem.extensions.items()}
+
+
+def problem_of(error: Exception) -> Problem:
+    """Return the problem that stands for any error of this project.
+
+    An error that belongs to none of its packages becomes ``internal-error``, without its text:
+    that goes to the log alone.
+    """
+    match error:
+        case Problem():
+            return error
+        case SequenceError():
+            return Problem(
+                kinds.INVALID_SEQUENCE,
+                str(error),
+                field=error.field,
+                value=error.value,
+                limit=error.limit,
+            )
+        case CalibrationMismatch():
+            return Problem(
+                kinds.CALIBRATION_MISFIT,
+                f"{str(error)[0].upper()}{str(error)[1:]}.",
+                field=error.field,
+                value=error.value,
+                limit=error.needed,
+            )
+        case CameraLost() | CameraNotFound():
+            return Problem(kinds.CAMERA_LOST, str(error))
+        case ParameterError() | EffectError():
+            return Problem(
+                kinds.INVALID_REQUEST,
+                str(error),
+                field=error.field,
+                value=error.value,
+                limit=error.limit,
+            )
+        case CameraError() | DriverError():
+            return Problem(kinds.CAMERA_FAILED, str(error))
+        case ProtocolError():
+            return Problem(
+                kinds.BAD_MESSAGE,
+                str(error),
+                field=error.field,
+                value=error.value,
+                limit=error.limit,
+            )
+        case _:
+            return Problem(kinds.INTERNAL_ERROR, "The service failed; its log says more.")
+
+
+def problem_response(problem: Problem, *, instance: str | None = None) -> Response:
+    """Return a problem as an HTTP answer."""
+    document = problem_document(problem, instance=instance)
+    identifier = request_id.get()
+    return JSONResponse(
+        document if identifier is None else document | {"request_id": identifier},
+        status_code=problem.kind.status,
+        media_type=PROBLEM_MEDIA_TYPE,
+        headers={"Cache-Control": "no-store"},
+    )
+
+
+_REFERENCE = {"$ref": "#/components/schemas/ProblemDocument"}
+
+
+def documented(*problem_kinds: ProblemKind) -> dict[int | str, dict[str, Any]]:
+    """Return what a route's OpenAPI entry says of the problems it may answer with."""
+    responses: dict[int | str, dict[str, Any]] = {}
+    _add_to(responses, problem_kinds, key=int)
+    return responses
+
+
+def document_problems(operation: dict[str, Any], *problem_kinds: ProblemKind) -> None:
+    """Add problems to an operation of an OpenAPI document that exists already."""
+    _add_to(operation["responses"], problem_kinds, key=str)
+
+
+def _add_to(
+    responses: dict[Any, dict[str, Any]],
+    problem_kinds: Iterable[ProblemKind],
+    *,
+    key: Callable[[int], int | str],
+) -> None:
+    for kind in problem_kinds:
+        entry = responses.setdefault(
+            key(kind.status),
+            {
+                "description": "",
+                "content": {PROBLEM_MEDIA_TYPE: {"schema": _REFERENCE, "examples": {}}},
+            },
+        )
+        entry["description"] = "; ".join(filter(None, (entry["description"], kind.title)))
+        entry["content"][PROBLEM_MEDIA_TYPE]["examples"][kind.slug] = {
+            "summary": kind.title,
+            "value": problem_document(Problem(kind, kind.meaning)),
+        }
+
+
+def describe(app: FastAPI) -> None:
+    """Let the OpenAPI document of ``app`` hold what `documented` refers to.
+
+    A model named in a route's responses would be documented as plain JSON beside the problem.
+    """
+    generate = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        document = generate()
+        schema = ProblemDocument.model_json_schema()
+        document.setdefault("components", {}).setdefault("schemas", {})["ProblemDocument"] = schema
+        return document
+
+    app.openapi = openapi  # type: ignore[method-assign]  # as FastAPI's documentation extends it
+
+
+def install(app: FastAPI) -> None:
+    """Let every error of ``app`` be answered as a problem, and documented as one."""
+    describe(app)
+
+    async def known(request: Request, error: Exception) -> Response:
+        return problem_response(problem_of(error), instance=request.url.path)
+
+    async def invalid(request: Request, error: Exception) -> Response:
+        assert isinstance(error, RequestValidationError)  # noqa: S101 - registered for it below
+        return problem_response(_of_validation(error), instance=request.url.path)
+
+    async def http(request: Request, error: Exception) -> Response:
+        assert isinstance(error, HTTPException)  # noqa: S101 - registered for it below
+        response = problem_response(_of_http(error, request), instance=request.url.path)
+        response.headers.update(error.headers or {})
+        if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
+            response.headers["Allow"] = _allowed(request) or response.headers.get("Allow", "")
+        return response
+
+    for kind in (Problem, DriverError, ParameterError):
+        app.add_exception_handler(kind, known)
+    app.add_exception_handler(RequestValidationError, invalid)
+    app.add_exception_handler(HTTPException, http)
+
+
+def _of_http(error: HTTPException, request: Request) -> Problem:
+    kind = _KIND_OF_STATUS.get(error.status_code)
+    if kind is None:
+        status = HTTPStatus(error.status_code)
+        kind = ProblemKind(status.phrase.lower().replace(" ", "-"), status, status.phrase, "")
+    if kind is kinds.NOT_FOUND:
+        return Problem(kind, f"Nothing is at {_shortened(request.url.path)}.")
+    if kind is kinds.METHOD_NOT_ALLOWED:
+        detail = f"{_shortened(request.url.path)} does not answer {request.method}."
+        return Problem(kind, detail)
+    return Problem(kind, str(error.detail))
+
+
+def _allowed(request: Request) -> str:
+    """Return every method a path answers; the framework knows only those of one route of it."""
+    app: FastAPI = request.app
+    methods = {
+        allowed
+        for template, operations in app.openapi()["paths"].items()
+        if compile_path(template)[0].match(request.url.path)
+        for method in operations
+        for allowed in (["GET", "HEAD"] if method == "get" else [method.upper()])
+    }
+    return ", ".join(sorted(methods))
+
+
+def _of_validation(error: RequestValidationError) -> Problem:
+    mistakes = [_mistake(each) for each in error.errors()]
+    first = mistakes[0]
+    detail = f"{first['field']} is {_shown(first['value'])}, but must be {first['limit']}"
+    more = {"errors": mistakes} if len(mistakes) > 1 else {}
+    return Problem(kinds.INVALID_REQUEST, detail, **first, **more)
+
+
+def _mistake(each: dict[str, Any]) -> dict[str, Any]:
+    # the first part of the place says only whether it was body, query or path
+    parts = [str(part) for part in each["loc"][1:]] or [str(each["loc"][0])]
+    kind, context = each["type"], each.get("ctx") or {}
+    limits = {
+        "missing": "given",
+        "extra_forbidden": "left out",
+        "json_invalid": f"valid JSON ({context.get('error', '')})",
+        "model_attributes_type": "a JSON object",
+        "finite_number": "a finite number",
+        "literal_error": str(context.get("expected")),
+        "greater_than_equal": f"at least {context.get('ge')}",
+        "greater_than": f"greater than {context.get('gt')}",
+        "less_than_equal": f"at most {context.get('le')}",
+        "less_than": f"less than {context.get('lt')}",
+        "too_long": f"at most {context.get('max_length')} items",
+        "string_too_long": f"at most {context.get('max_length')} characters",
+        "string_too_short": f"at least {context.get('min_length')} characters",
+        "string_type": "text",
+        "value_error": str(context.get("error")).removeprefix("must be "),
+        "int_parsing": "an integer",
+        "int_type": "an integer",
+        "int_from_float": "an integer",
+        "float_parsing": "a number",
+        "float_type": "a number",
+        "bool_type": "true or false",
+        "bool_parsing": "true or false",
+    }
+    value = None if kind == "missing" else _plain(each.get("input"))
+    if kind == "json_invalid":
+        parts, value = ["body"], None
+    limit = limits.get(kind) or str(each["msg"]).removeprefix("Input should be ")
+    return {"field": ".".join(parts), "value": value, "limit": limit}
+
+
+def _plain(value: object) -> object:
+    """Return a value as JSON can carry it: no NaN, nothing long, no foreign type."""
+    match value:
+        case None | bool() | int():
+            return value
+        case float():
+            return value if math.isfinite(value) else str(value)
+        case str():
+            return _shortened(value)
+        case dict():
+            return {str(key): _plain(each) for key, each in list(value.items())[:64]}
+        case list() | tuple():
+            return [_plain(each) for each in value[:64]]
+        case _:
+            return _shortened(str(value))
+
+
+def _shown(value: object) -> str:
+    return "missing" if value is None else _shortened(repr(value))
+
+
+def _shortened(text: str) -> str:
+    text = text.encode("utf-8", "replace").decode()  # JSON may bring half a character
+    return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"

@@ -1,0 +1,45 @@
+"""The camera: what it can do, and how it is."""
+
+import asyncio
+import contextlib
+from dataclasses import asdict
+from typing import Any
+
+from fastapi import APIRouter
+
+from transientcam_driver import CameraError, Status
+from transientcam_server.api.documents.camera import CameraDocument
+from transientcam_server.service import ServiceOf
+
+router = APIRouter(tags=["camera"])
+
+
+@router.get("/camera", summary="The camera")
+async def read_camera(service: ServiceOf) -> CameraDocument:
+    """Say what the camera can do and how it is; asks the camera itself for its status."""
+    camera = service.camera
+    status = None
+    if service.acquisition.status().state != "lost":
+        with contextlib.suppress(CameraError):  # which is what `state` and `reason` then say
+            status = _document(await asyncio.wrap_future(service.acquisition.device_status()))
+    acquisition = service.acquisition.status()
+    return CameraDocument(
+        state=acquisition.state,
+        reason=acquisition.reason,
+        simulated=camera.simulation is not None,
+        capabilities=asdict(camera.capabilities),
+        intrinsics=CameraDocument.IntrinsicsDocument(**asdict(service.intrinsics)),
+        status=status,
+        counters=asdict(camera.counters),
+    )
+
+
+def _document(status: Status) -> dict[str, Any]:
+    document = asdict(status)
+    del document["flags"]
+    return document | {
+        "state": status.state.name.lower(),
+        "light_on": status.light_on,
+        "interlock_closed": status.interlock_closed,
+        "watchdog_tripped": status.watchdog_tripped,
+    }

@@ -1,0 +1,26 @@
+"""Health, for whoever restarts or routes around this service."""
+
+from fastapi import APIRouter
+
+from transientcam_server.api.documents.service import LivenessDocument, ReadinessDocument
+from transientcam_server.api.problems import documented
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import Problem
+from transientcam_server.service import ServiceOf
+
+router = APIRouter(tags=["health"])
+
+
+@router.get("/livez", summary="The process answers")
+async def livez() -> LivenessDocument:
+    """Answer. An unplugged camera is no reason to restart the process: see `/readyz`."""
+    return LivenessDocument()
+
+
+@router.get("/readyz", summary="Frames can be had", responses=documented(kinds.NOT_READY))
+async def readyz(service: ServiceOf) -> ReadinessDocument:
+    """Answer 200 while the camera delivers frames or was stopped on request, else say why not."""
+    reasons = service.not_ready()
+    if reasons:
+        raise Problem(kinds.NOT_READY, "; ".join(reasons), reasons=reasons)
+    return ReadinessDocument()

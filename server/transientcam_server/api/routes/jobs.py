@@ -1,0 +1,75 @@
+"""Jobs: long work that was started elsewhere, and how far it is."""
+
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Path, Query, Response
+
+from transientcam_server.api.documents.job import JobDocument, JobsDocument
+from transientcam_server.api.problems import documented
+from transientcam_server.camera.jobs import Job
+from transientcam_server.errors import kinds
+from transientcam_server.service import ServiceOf
+
+router = APIRouter(tags=["jobs"])
+MAX_WAIT_S: Final = 30.0
+ACCEPTED: Final[dict[int | str, dict[str, Any]]] = {
+    202: {
+        "description": "It has begun, or waits for its turn",
+        "headers": {
+            "Location": {
+                "description": "where its progress is told",
+                "schema": {"type": "string"},
+            }
+        },
+    }
+}
+"""What the OpenAPI document says of a route that starts a job."""
+_Job = Annotated[
+    str,
+    Path(description="its id, as the list has it", max_length=200, examples=["5a0c1f6be2d4"]),
+]
+
+
+@router.get("/jobs", summary="All jobs")
+async def read_jobs(service: ServiceOf) -> JobsDocument:
+    """List what runs, what waits and the last ones that have ended, the newest first."""
+    return JobsDocument(jobs=[document(job) for job in service.jobs.all])
+
+
+@router.get(
+    "/jobs/{job}",
+    summary="A job",
+    responses=documented(kinds.UNKNOWN_JOB, kinds.INVALID_REQUEST),
+)
+async def read_job(
+    service: ServiceOf,
+    job: _Job,
+    wait_s: Annotated[
+        float, Query(ge=0.0, le=MAX_WAIT_S, description="how long to wait for its end")
+    ] = 0.0,
+) -> JobDocument:
+    """Say how far a job is; with `wait_s` not before it has ended, or that long has passed."""
+    found = service.jobs.get(job)
+    await service.jobs.end_of(found, wait_s=wait_s)
+    return document(found)
+
+
+@router.post(
+    "/jobs/{job}/cancel",
+    summary="Cancel a job",
+    responses=documented(kinds.UNKNOWN_JOB, kinds.INVALID_REQUEST),
+)
+async def cancel_job(service: ServiceOf, job: _Job) -> JobDocument:
+    """Let a job end as soon as it can; it stays in the list, and one that has ended as it is."""
+    return document(service.jobs.cancel(job))
+
+
+def document(job: Job) -> JobDocument:
+    """Return where a job stands."""
+    return JobDocument(**job.to_document())
+
+
+def accepted(job: Job, response: Response) -> JobDocument:
+    """Answer whoever started a job."""
+    response.headers["Location"] = f"/api/v1/jobs/{job.id}"
+    return document(job)

@@ -1,0 +1,94 @@
+"""The sending half of a stream: an outbox into a WebSocket."""
+
+import asyncio
+import time
+from typing import Any
+
+from fastapi import WebSocket
+
+from transientcam import wire
+from transientcam_server.api.metrics import Metrics
+from transientcam_server.api.problems import problem_document
+from transientcam_server.api.stream.rate_limit import Allowance
+from transientcam_server.broadcast.outbox import Channel, Delivery, Goodbye, Outbox
+from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging.products import View
+
+_AT_ONCE = 4
+"""Deliveries after which others have their turn."""
+
+
+class Sender:
+    """Empties an outbox into a WebSocket."""
+
+    def __init__(
+        self, websocket: WebSocket, outbox: Outbox, metrics: Metrics, allowance: Allowance
+    ) -> None:
+        self._websocket = websocket
+        self._allowance = allowance
+        self._metrics = metrics
+        self._outbox = outbox
+        self._failing: set[str] = set()
+
+    async def send_all(self) -> None:
+        """Send until the client is gone or was told goodbye."""
+        delivered = 0
+        while True:
+            item = await self._outbox.next()
+            if isinstance(item, Goodbye):
+                await self._websocket.close(item.code, item.reason)
+                return
+            if isinstance(item, Delivery):
+                await self._deliver(item)
+                delivered += 1
+                if delivered % _AT_ONCE == 0:
+                    # nothing above has to wait where all is computed and the network takes it
+                    await asyncio.sleep(0)
+            else:
+                await self._websocket.send_bytes(wire.encode(item))
+
+    async def _deliver(self, delivery: Delivery) -> None:
+        first, *others = delivery.channels
+        # all products of the frame are under way at once; each is sent as soon as those before
+        tasks = [asyncio.ensure_future(self._encoded(delivery, each)) for each in others]
+        try:
+            await self._send(delivery, first, None)
+            for channel, task in zip(others, tasks, strict=True):
+                await self._send(delivery, channel, task)
+        finally:
+            for task in tasks:
+                task.cancel()
+
+    async def _send(
+        self, delivery: Delivery, channel: Channel, task: asyncio.Task[bytes] | None
+    ) -> None:
+        if channel.dropped:
+            await self._tell_dropped(channel)
+        try:
+            data = await (self._encoded(delivery, channel) if task is None else task)
+        except Problem as problem:
+            await self._tell_failed(channel, problem)
+            return
+        self._failing.discard(channel.product.name)
+        self._allowance.earn()  # for its acknowledgement
+        await self._websocket.send_bytes(data)
+        self._metrics.sent(time.time() - delivery.frame.raw.host_time_s)
+
+    async def _encoded(self, delivery: Delivery, channel: Channel) -> bytes:
+        return await delivery.frame.encoded(
+            channel.product, channel.encoding, View(crop=channel.crop), channel=channel.number
+        )
+
+    async def _tell_dropped(self, channel: Channel) -> None:
+        count, channel.dropped = channel.dropped, 0
+        channel.dropped_total += count
+        details = {"channel": channel.number, "count": count, "total": channel.dropped_total}
+        await self._websocket.send_bytes(wire.encode(wire.Notice("dropped", details)))
+
+    async def _tell_failed(self, channel: Channel, problem: Problem) -> None:
+        """Tell a failure once, not with every frame until it is mended."""
+        if channel.product.name not in self._failing:
+            self._failing.add(channel.product.name)
+            document: dict[str, Any] = problem_document(problem)
+            document["channel"] = channel.number
+            await self._websocket.send_bytes(wire.encode(wire.ErrorMessage(document)))

@@ -1,0 +1,120 @@
+"""The newest frame to everybody who looks: a slow one loses frames, nobody waits for anybody.
+
+Everything here lives on the event loop and never waits for a client.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from transientcam import wire
+from transientcam_server.broadcast.channel import ChannelNumbers
+from transientcam_server.broadcast.outbox import Channel, Goodbye, Outbox
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging.frame import Frame
+
+
+class Hub:
+    """Where the acquisition's frames and news meet those who want them.
+
+    Attributes
+    ----------
+    latest
+        The newest frame, None before the first.
+    dropped
+        Frames that clients were too slow for, of all clients together.
+    deserted
+        Set while nobody looks on.
+    """
+
+    def __init__(self) -> None:
+        self.latest: Frame | None = None
+        self.dropped = 0
+        self._outboxes: set[Outbox] = set()
+        self._arrived = asyncio.Event()
+        self._closed = False
+        self._numbers = ChannelNumbers()
+        self.deserted = asyncio.Event()
+        self.deserted.set()
+
+    @property
+    def clients(self) -> int:
+        """How many look on."""
+        return len(self._outboxes)
+
+    @property
+    def outboxes(self) -> tuple[Outbox, ...]:
+        """Of everybody, also those who have not said yet what to send."""
+        return tuple(self._outboxes)
+
+    def join(self, outbox: Outbox) -> None:
+        """Let an outbox take part from the next frame on."""
+        self._outboxes.add(outbox)
+        self.deserted.clear()
+        if self._closed:
+            outbox.put(_SHUTDOWN)
+
+    def leave(self, outbox: Outbox) -> None:
+        """Forget an outbox."""
+        self._outboxes.discard(outbox)
+        self._numbers.release(outbox.channels)
+        if not self._outboxes:
+            self.deserted.set()
+
+    def subscribe(self, outbox: Outbox, channels: Iterable[Channel], *, credit: int | None) -> None:
+        """Let an outbox get these channels, and number them: those that are alike, alike."""
+        former, chosen = outbox.channels, tuple(channels)
+        self._numbers.assign(chosen)
+        self._numbers.release(former)
+        outbox.subscribe(chosen, credit=credit)
+
+    def publish(self, frame: Frame) -> None:
+        """Hand the newest frame to everybody."""
+        self.latest = frame
+        arrived, self._arrived = self._arrived, asyncio.Event()
+        arrived.set()
+        for outbox in self._outboxes:
+            self.dropped += outbox.put_frame(frame)
+        if frame.raw.lost_images:
+            self.tell("lost-images", {"count": frame.raw.lost_images, "frame": frame.number})
+
+    def tell(self, kind: str, details: Mapping[str, Any]) -> None:
+        """Tell everybody some news."""
+        for outbox in self.subscribers:
+            outbox.put(wire.Notice(kind, details))
+
+    @property
+    def subscribers(self) -> tuple[Outbox, ...]:
+        """Everybody who has said what to send."""
+        return tuple(outbox for outbox in self._outboxes if outbox.channels)
+
+    async def newest(self, *, after: int, wait_s: float) -> Frame:
+        """Return the newest frame once its number is greater than ``after``.
+
+        Raises
+        ------
+        Problem
+            ``no-frame-yet`` if none came within ``wait_s``, ``shutting-down``.
+        """
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(wait_s):
+                while not self._closed:
+                    if self.latest is not None and self.latest.number > after:
+                        return self.latest
+                    await self._arrived.wait()
+        if self._closed:
+            raise Problem(kinds.SHUTTING_DOWN, "The service shuts down.")
+        what = f"No frame after frame {after}" if after else "No frame"
+        raise Problem(kinds.NO_FRAME_YET, f"{what} was captured within {wait_s:g} s of waiting.")
+
+    def close(self) -> None:
+        """Send everybody away."""
+        self._closed = True
+        self._arrived.set()
+        for outbox in self._outboxes:
+            outbox.put(_SHUTDOWN)
+
+
+_SHUTDOWN = Goodbye(wire.CloseCode.GOING_AWAY, "the service shuts down")

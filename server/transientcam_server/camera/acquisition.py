@@ -1,0 +1,390 @@
+"""The one thread that owns the camera: reads frames, runs commands, outlives an unplug.
+
+What happens is reported through ``report``, called on this thread; commands come from any thread
+and are answered through futures.
+"""
+
+import logging
+import queue
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Any, Final, Literal, TypeVar
+
+from transientcam_driver import (
+    AppliedSequence,
+    CameraError,
+    FrameTimeout,
+    Sequence,
+    Status,
+)
+from transientcam_server.camera.events import Back, Captured, Event, Lost, SequenceChanged
+from transientcam_server.camera.source import Camera
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import JobCancelled, Problem
+
+_log = logging.getLogger(__name__)
+_T = TypeVar("_T")
+
+READ_TIMEOUT_S: Final = 0.1
+"""How long a command may have to wait for the camera to say nothing."""
+IDLE_S: Final = 0.5
+"""How often a camera that captures nothing is asked whether it is there."""
+BACKOFF_S: Final = (0.1, 0.2, 0.5, 1.0)
+"""Pauses between attempts to find a lost camera; the last one repeats."""
+STALLED_PERIODS: Final = 5.0
+STALLED_MIN_S: Final = 2.0
+_RATE_FRAMES = 32
+
+State = Literal["starting", "streaming", "stopped", "calibrating", "lost"]
+
+
+@dataclass(frozen=True, slots=True)
+class AcquisitionStatus:
+    """How the acquisition is doing.
+
+    Attributes
+    ----------
+    state
+        ``streaming`` also before the first frame; ``stopped`` because somebody asked for it;
+        ``calibrating`` while a calibration has the camera for itself.
+    running
+        Whether frames are wanted.
+    rate_hz
+        Measured over the last frames; None before there are two.
+    frames
+        Captured since the start of the service.
+    frame_age_s
+        Since the last frame, or since the start where there was none.
+    reason
+        Why the camera is lost.
+    stalled
+        Whether frames are wanted and the camera is there, but has delivered none for too long.
+    """
+
+    state: State
+    running: bool
+    rate_hz: float | None
+    frames: int
+    frame_age_s: float
+    reason: str | None
+    stalled: bool
+
+
+class Acquisition:
+    """Owns ``camera`` from `start` to `stop`, on a thread of its own."""
+
+    def __init__(
+        self,
+        camera: Camera,
+        *,
+        report: Callable[[Event], None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._camera = camera
+        self._report = report
+        self._clock = clock
+        self._commands: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._occupied = threading.Lock()
+        self._occupant: str | None = None
+        self._interrupted = threading.Event()
+        self._restored: Sequence | None = None
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="acquisition", daemon=True)
+        self._running = True
+        self._connected = True
+        self._lost: str | None = None
+        self._started = False
+        self._attempts = 0
+        self._frames = 0
+        self._moved_s = clock()
+        self._arrivals_s: deque[float] = deque(maxlen=_RATE_FRAMES)
+        self._applied: dict[int, AppliedSequence] = {}
+        self._remember(camera.applied)
+
+    # -- from any thread -----------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop the camera, its light and the thread; waits for it."""
+        self._stopping.set()
+        self._interrupted.set()
+        self._commands.put(lambda: None)
+        self._thread.join()
+
+    def configure(
+        self, sequence: Sequence, *, check: Callable[[AppliedSequence], None] | None = None
+    ) -> "Future[AppliedSequence]":
+        """Change the sequence, unless ``check`` raises for the one that is running then.
+
+        Raises
+        ------
+        Problem
+            ``camera-busy`` while something has the camera for itself.
+        """
+        with self._occupied:
+            self.require_free()
+            return self.submit(lambda: self._configure(sequence, check))
+
+    def set_running(self, running: bool) -> "Future[None]":
+        """Start or stop capturing; stopping also ends what has the camera for itself.
+
+        Raises
+        ------
+        Problem
+            ``camera-busy`` where it should start while something has the camera for itself.
+        """
+        with self._occupied:
+            if running:
+                self.require_free()
+            self._interrupted.set()
+            return self.submit(lambda: self._set_running(running))
+
+    def safe_off(self) -> "Future[None]":
+        """Stop capturing and switch the light off, by what the camera always honours."""
+        self._interrupted.set()
+        return self.submit(self._safe_off)
+
+    def device_status(self) -> "Future[Status]":
+        """Ask the device how it is."""
+        return self.submit(self._camera.status)
+
+    def occupy(self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T]) -> "Future[_T]":
+        """Hand the camera to ``work``, which has it for itself until it returns.
+
+        No frames are reported meanwhile. It leaves the sequence as it was, and calls its second
+        argument several times a second, which raises `JobCancelled` where the light is to go off.
+
+        Raises
+        ------
+        Problem
+            ``camera-busy`` if something has it already.
+        """
+        with self._occupied:
+            self.require_free()
+            self._occupant = job_id
+            self._interrupted.clear()
+            occupied = self.submit(lambda: self._occupy(job_id, work))
+        occupied.add_done_callback(self._occupied_no_more)  # also where it was taken back
+        return occupied
+
+    def require_free(self) -> None:
+        """Refuse what would disturb somebody who has the camera for itself.
+
+        Raises
+        ------
+        Problem
+            ``camera-busy``, with the job that has it.
+        """
+        job_id = self._occupant
+        if job_id is not None:
+            raise Problem(kinds.CAMERA_BUSY, f"The job {job_id} has the camera.", job=job_id)
+
+    def submit(self, command: Callable[[], _T]) -> "Future[_T]":
+        """Run a command between two reads of the camera."""
+        future: Future[_T] = Future()
+
+        def run() -> None:
+            if not future.set_running_or_notify_cancel():
+                return
+            try:
+                result = command()
+            except Exception as error:
+                future.set_exception(error)
+            else:
+                future.set_result(result)
+
+        self._commands.put(run)
+        return future
+
+    def status(self) -> AcquisitionStatus:
+        """Return how the acquisition is doing; never waits."""
+        arrivals_s = list(self._arrivals_s)
+        rate_hz = None
+        if len(arrivals_s) > 1 and arrivals_s[-1] > arrivals_s[0]:
+            rate_hz = (len(arrivals_s) - 1) / (arrivals_s[-1] - arrivals_s[0])
+        age_s = self._clock() - self._moved_s
+        state = self._state()
+        return AcquisitionStatus(
+            state=state,
+            running=self._running,
+            rate_hz=rate_hz,
+            frames=self._frames,
+            frame_age_s=age_s,
+            reason=self._lost,
+            stalled=state in ("starting", "streaming") and age_s > self._patience_s(),
+        )
+
+    def _state(self) -> State:
+        if self._lost is not None:
+            return "lost"
+        if self._occupant is not None:
+            return "calibrating"
+        if not self._running:
+            return "stopped"
+        return "streaming" if self._started else "starting"
+
+    def _patience_s(self) -> float:
+        applied = self._camera.applied
+        return max(STALLED_MIN_S, STALLED_PERIODS / applied.frame_rate_hz)
+
+    # -- on the thread -------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            try:
+                self._run_commands(wait_s=0.0)
+                self._step()
+            except CameraError as error:
+                self._camera_lost(str(error))
+            except Exception:
+                # nothing that goes wrong with one frame may end the acquisition
+                _log.exception("the acquisition failed; it carries on")
+                self._run_commands(wait_s=BACKOFF_S[-1])
+        self._shut_down()
+
+    def _step(self) -> None:
+        if not self._connected:
+            self._look_for_camera()
+        elif self._restored is not None:
+            self._configure(self._restored)
+            self._restored = None
+        elif not self._running:
+            self._run_commands(wait_s=IDLE_S)
+            self._camera.status()  # an unplug is noticed also while nothing is read
+            self._camera_works()
+        elif not self._started:
+            self._camera.start()
+            self._started = True
+            self._moved_s = self._clock()
+        else:
+            self._read()
+
+    def _read(self) -> None:
+        try:
+            raw = self._camera.read_frame(timeout_s=READ_TIMEOUT_S)
+        except FrameTimeout:
+            return
+        self._camera_works()
+        self._frames += 1
+        self._moved_s = self._clock()
+        self._arrivals_s.append(self._moved_s)
+        self._report(Captured(raw, self._applied[raw.epoch]))
+
+    def _remember(self, applied: AppliedSequence) -> None:
+        self._applied[applied.epoch] = applied
+        while len(self._applied) > 8:  # frames of older sequences have long been read
+            del self._applied[next(iter(self._applied))]
+
+    def _configure(
+        self, sequence: Sequence, check: Callable[[AppliedSequence], None] | None = None
+    ) -> AppliedSequence:
+        if check is not None:
+            check(self._camera.applied)
+        applied = self._camera.configure(sequence)
+        self._remember(applied)
+        self._arrivals_s.clear()
+        self._moved_s = self._clock()
+        self._report(SequenceChanged(applied))
+        return applied
+
+    def _set_running(self, running: bool) -> None:
+        if running != self._running:
+            self._running = running
+            self._arrivals_s.clear()
+            self._moved_s = self._clock()
+            if not running and self._started:
+                self._started = False
+                self._camera.stop()
+
+    def _occupied_no_more(self, occupied: "Future[Any]") -> None:
+        if occupied.cancelled():
+            self._occupant = None
+
+    def _occupy(self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T]) -> _T:
+        def go_on() -> None:
+            if self._interrupted.is_set():
+                raise JobCancelled(job_id)
+            self._run_commands(wait_s=0.0)  # such as disturb nobody, or end this
+
+        before = self._camera.applied
+        try:
+            go_on()
+            self._arrivals_s.clear()
+            if self._started:
+                self._started = False
+                self._camera.stop()
+            return work(self._camera, go_on)
+        finally:
+            self._occupant = None
+            self._arrivals_s.clear()
+            self._moved_s = self._clock()
+            applied = self._camera.applied
+            if applied.sequence != before.sequence:
+                self._restored = before.sequence  # once it can be reached
+            elif applied.epoch != before.epoch:
+                self._remember(applied)
+                self._report(SequenceChanged(applied))
+
+    def _safe_off(self) -> None:
+        # whatever the camera answers, nothing here starts it again
+        self._running = False
+        self._started = False
+        self._arrivals_s.clear()
+        self._moved_s = self._clock()
+        self._camera.safe_off()
+
+    def _camera_lost(self, reason: str) -> None:
+        self._connected = False
+        self._started = False
+        if self._lost is None:
+            _log.warning("%s", reason)
+            self._attempts = 0
+            self._arrivals_s.clear()
+            self._report(Lost(reason))
+        self._lost = reason
+
+    def _look_for_camera(self) -> None:
+        self._run_commands(wait_s=BACKOFF_S[min(self._attempts, len(BACKOFF_S) - 1)])
+        if self._stopping.is_set():
+            return
+        self._attempts += 1
+        self._camera.reconnect()
+        self._connected = True
+        self._moved_s = self._clock()
+        applied = self._camera.applied
+        if applied.epoch not in self._applied:
+            # the same sequence, but the device counts it anew
+            self._remember(applied)
+            self._report(SequenceChanged(applied))
+
+    def _camera_works(self) -> None:
+        """Believe that a lost camera is back only once it does what it should."""
+        if self._lost is not None:
+            _log.info("the camera is back after %d attempts", self._attempts)
+            self._lost = None
+            self._report(Back())
+
+    def _run_commands(self, *, wait_s: float) -> None:
+        """Run all commands that wait; with none, wait up to ``wait_s`` for one."""
+        try:
+            command = self._commands.get(timeout=wait_s) if wait_s else self._commands.get_nowait()
+            while True:
+                command()
+                command = self._commands.get_nowait()
+        except queue.Empty:
+            return
+
+    def _shut_down(self) -> None:
+        self._run_commands(wait_s=0.0)
+        try:
+            self._camera.safe_off()
+        except CameraError as error:
+            # it is unplugged, or its heartbeat ends and it turns its light off by itself
+            _log.info("the camera could not be told to stop: %s", error)

@@ -1,0 +1,294 @@
+"""The calibrations of a service: one directory of files, and which of them is active.
+
+What clients call a calibration never becomes a path: they name it by its id, which is looked up
+among the files that are there.
+"""
+
+import json
+import logging
+import os
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from transientcam_driver import CalibrationCapture, CalibrationFileError, CalibrationSubject
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging.calibration import NOMINAL_ID
+from transientcam_server.settings import CalibrationSettings
+
+_log = logging.getLogger(__name__)
+SUFFIX: Final = ".npz"
+_ACTIVE: Final = "active.json"
+_ABANDONED_S: Final = 24 * 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """A calibration that is there, without its images.
+
+    Attributes
+    ----------
+    path
+        Its file.
+    subject
+        What it is good for.
+    captured_unix_s
+        When its last image arrived.
+    notes
+        ``name``, and what else is kept with it.
+    """
+
+    id: str
+    path: Path
+    size_bytes: int
+    subject: CalibrationSubject
+    model: str
+    captured_unix_s: float
+    temperature_c: float
+    notes: Mapping[str, Any]
+
+
+class Calibrations:
+    """The calibrations that are there. Reads and writes files, so call it on a worker.
+
+    Parameters
+    ----------
+    settings
+        Where they are kept, how many and how large.
+    given
+        One that the service was started with, wherever it is.
+    """
+
+    def __init__(
+        self,
+        settings: CalibrationSettings,
+        *,
+        given: Path | None = None,
+        unix_s: Callable[[], float] = time.time,
+    ) -> None:
+        self._settings = settings
+        self._unix_s = unix_s
+        self._given = given
+        self._lock = threading.Lock()
+        self._known: dict[Path, tuple[tuple[int, int], Stored | None]] = {}
+
+    @property
+    def directory(self) -> Path:
+        """Where they are kept."""
+        return self._settings.directory
+
+    def all(self) -> list[Stored]:
+        """Return every calibration that can be read, the newest first."""
+        with self._lock:
+            found = {each.id: each for path in self._paths() if (each := self._stored(path))}
+        return sorted(found.values(), key=lambda each: each.captured_unix_s, reverse=True)
+
+    def get(self, calibration_id: str) -> Stored:
+        """Return a calibration.
+
+        Raises
+        ------
+        Problem
+            ``unknown-calibration``.
+        """
+        for each in self.all():
+            if each.id == calibration_id:
+                return each
+        shown = calibration_id[:64]
+        raise Problem(
+            kinds.UNKNOWN_CALIBRATION,
+            f"There is no calibration {shown!r}.",
+            field="calibration",
+            value=shown,
+        )
+
+    def add(self, capture: CalibrationCapture) -> Stored:
+        """Keep a measurement.
+
+        Raises
+        ------
+        Problem
+            ``calibration-not-stored``.
+        """
+        self.require_room()
+        with self._part() as part:
+            try:
+                capture.save(part)
+            except OSError as error:
+                raise self.not_stored(error) from error
+            return self._take(part, capture)
+
+    def take_in(self, part: Path) -> Stored:
+        """Keep a file that was received; one that is here already stays as it is.
+
+        Raises
+        ------
+        Problem
+            ``invalid-calibration``, ``calibration-not-stored``.
+        """
+        try:
+            capture = CalibrationCapture.load(part, max_bytes=self._settings.max_bytes)
+        except CalibrationFileError as error:
+            raise Problem(
+                kinds.INVALID_CALIBRATION,
+                f"{error.key} is {error.found}, but must be {error.expected}.",
+                field=error.key,
+                value=str(error.found),
+                limit=str(error.expected),
+            ) from error
+        identity = capture.id
+        with suppress(Problem):
+            return self.get(identity)
+        self.require_room()
+        return self._take(part, capture)
+
+    def delete(self, calibration_id: str) -> Stored:
+        """Delete a calibration for good.
+
+        Raises
+        ------
+        Problem
+            ``unknown-calibration``, ``calibration-in-use`` for the one that the service was
+            started with, ``calibration-not-stored`` where the disk does not let it.
+        """
+        stored = self.get(calibration_id)
+        if stored.path == self._given:
+            raise Problem(
+                kinds.CALIBRATION_IN_USE,
+                "The service was started with it.",
+                field="calibration",
+                value=stored.id,
+            )
+        try:
+            stored.path.unlink(missing_ok=True)
+        except OSError as error:
+            raise self.not_stored(error) from error
+        return stored
+
+    @property
+    def active_id(self) -> str:
+        """Which one was active when the service was here last."""
+        try:
+            document = json.loads((self.directory / _ACTIVE).read_text(encoding="utf-8"))
+            return str(document["id"])
+        except FileNotFoundError:
+            return NOMINAL_ID
+        except (OSError, ValueError, TypeError, KeyError) as error:
+            _log.warning("which calibration was active cannot be read: %s", error)
+            return NOMINAL_ID
+
+    def remember_active(self, calibration_id: str) -> None:
+        """Let the next start of the service know; a disk that does not take it is no problem."""
+        try:
+            with self._part() as part:
+                part.write_text(json.dumps({"id": calibration_id}), encoding="utf-8")
+                part.replace(self.directory / _ACTIVE)
+        except (Problem, OSError) as error:
+            _log.warning("the next start will not know the active calibration: %s", error)
+
+    def require_room(self) -> None:
+        """Refuse one more calibration where there are many.
+
+        Raises
+        ------
+        Problem
+            ``calibration-not-stored``.
+        """
+        most = self._settings.max_count
+        if len(self.all()) >= most:
+            raise Problem(
+                kinds.CALIBRATION_NOT_STORED,
+                f"There are {most} calibrations already; delete one.",
+                limit=most,
+            )
+
+    @contextmanager
+    def _part(self) -> Iterator[Path]:
+        part = self.new_part()
+        try:
+            yield part
+        finally:
+            part.unlink(missing_ok=True)
+
+    def new_part(self) -> Path:
+        """Make a file in the directory for what is not complete yet; who asks removes it.
+
+        Raises
+        ------
+        Problem
+            ``calibration-not-stored``.
+        """
+        try:
+            self.directory.mkdir(parents=True, exist_ok=True)
+            self._sweep()
+            descriptor, name = tempfile.mkstemp(suffix=".part", dir=self.directory)
+        except OSError as error:
+            raise self.not_stored(error) from error
+        os.close(descriptor)
+        return Path(name)
+
+    def not_stored(self, error: OSError) -> Problem:
+        """Say that the disk does not take a calibration, and log where."""
+        _log.warning("storing a calibration in %s failed: %s", self.directory, error)
+        reason = error.strerror or "no reason is given"
+        return Problem(kinds.CALIBRATION_NOT_STORED, f"The disk does not take it: {reason}.")
+
+    def _sweep(self) -> None:
+        """Remove what a service left behind that died while it received something."""
+        for part in self.directory.glob("*.part"):
+            with suppress(FileNotFoundError):  # its owner was quicker
+                if part.stat().st_mtime < self._unix_s() - _ABANDONED_S:
+                    part.unlink()
+
+    def _take(self, part: Path, capture: CalibrationCapture) -> Stored:
+        path = self.directory / (capture.id + SUFFIX)
+        try:
+            with part.open("rb") as file:
+                os.fsync(file.fileno())
+            part.replace(path)
+        except OSError as error:
+            raise self.not_stored(error) from error
+        return self.get(capture.id)
+
+    def _paths(self) -> list[Path]:
+        try:
+            kept = sorted(self.directory.glob(f"*{SUFFIX}"))
+        except OSError as error:
+            _log.warning("the calibrations cannot be listed: %s", error)
+            kept = []
+        return kept if self._given is None else [*kept, self._given]
+
+    def _stored(self, path: Path) -> Stored | None:
+        try:
+            status = path.stat()
+        except OSError:  # deleted this moment
+            return None
+        stamp = status.st_mtime_ns, status.st_size
+        known = self._known.get(path)
+        if known is None or known[0] != stamp:
+            known = self._known[path] = stamp, _read(path, status.st_size)
+        return known[1]
+
+
+def _read(path: Path, size_bytes: int) -> Stored | None:
+    try:
+        capture = CalibrationCapture.load(path)
+    except CalibrationFileError as error:
+        _log.warning("%s", error)
+        return None
+    return Stored(
+        id=capture.id,
+        path=path,
+        size_bytes=size_bytes,
+        subject=capture.subject,
+        model=capture.model,
+        captured_unix_s=capture.captured_unix_s,
+        temperature_c=capture.temperature_c,
+        notes=dict(capture.notes),
+    )

@@ -1,0 +1,322 @@
+"""Measuring calibrations with the service's own camera, activating them, watching them drift."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam_driver import (
+    AppliedSequence,
+    CalibrationCapture,
+    CalibrationMismatch,
+    RawFrame,
+    capture_calibration,
+)
+from transientcam_driver.calibration.capture import DEFAULT_TAKES
+from transientcam_server.camera.acquisition import Acquisition
+from transientcam_server.camera.calibration_store import Calibrations, Stored
+from transientcam_server.camera.jobs import Job, JobDesk
+from transientcam_server.camera.source import Camera
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging.calibration import (
+    NOMINAL_ID,
+    Calibration,
+    calibration_id,
+    evaluate,
+    load_calibration,
+)
+from transientcam_server.imaging.frame import Frame
+from transientcam_server.imaging.history import History
+from transientcam_server.imaging.noise import invalid_share
+from transientcam_server.imaging.pipeline import Pipeline
+from transientcam_server.imaging.products import STAGES, Recipe
+from transientcam_server.planning.planner import Accuracy
+
+_log = logging.getLogger(__name__)
+_Array = NDArray[Any]
+MAX_CAPTURE_BYTES: Final = 2 * 1024**3
+"""Of the raw images of one measurement, which stand in memory until they are averaged."""
+JUDGED_FRAMES: Final = 8
+"""Frames whose invalid pixels are counted. The best of them stands for the calibration: an image
+that lost its synchronisation spoils one frame, and drift all of them."""
+DRIFT_EVERY_S: Final = 5.0
+_EVALUATING: Final = 0.95  # of the work is done when all is captured
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What somebody wants measured: ``frames`` of each kind, to be used at once or not."""
+
+    name: str = ""
+    frames: int = DEFAULT_TAKES
+    activate: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """Share of invalid pixels in recent frames, and in the measurement itself (None: unknown)."""
+
+    invalid_share: float
+    invalid_share_at_capture: float | None
+    frame: int
+
+    def to_document(self) -> dict[str, Any]:
+        """Return it as JSON has it."""
+        return {
+            "invalid_share": self.invalid_share,
+            "invalid_share_at_capture": self.invalid_share_at_capture,
+            "frame": self.frame,
+        }
+
+
+class CalibrationDesk:
+    """Where calibrations are asked for; on the event loop, everything slow on workers.
+
+    Parameters
+    ----------
+    kept
+        The calibrations there are.
+    tell
+        Called when other gains are used, with what a ``calibration-changed`` notice says.
+    """
+
+    def __init__(
+        self,
+        camera: Camera,
+        kept: Calibrations,
+        *,
+        acquisition: Acquisition,
+        pipeline: Pipeline,
+        accuracy: Accuracy,
+        jobs: JobDesk,
+        history: History,
+        tell: Callable[[Mapping[str, Any]], None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.kept = kept
+        self._camera = camera
+        self._acquisition = acquisition
+        self._pipeline = pipeline
+        self._accuracy = accuracy
+        self._jobs = jobs
+        self._history = history
+        self._tell = tell
+        self._clock = clock
+        self._drift: Drift | None = None
+        self._drift_of = NOMINAL_ID
+        self._drift_until_s = 0.0
+        self._judging = asyncio.Lock()
+
+    @property
+    def active_id(self) -> str:
+        """The calibration that is used wherever it is good for the sequence."""
+        return calibration_id(self._pipeline.calibration)
+
+    @property
+    def active_since_s(self) -> float | None:
+        """When the active calibration was measured, in Unix time; None without one."""
+        calibration = self._pipeline.calibration
+        return None if calibration is None else calibration.capture.captured_unix_s
+
+    @property
+    def known_drift(self) -> Drift | None:
+        """What `drift` has found last."""
+        return self._drift if self._drift_of == self.active_id else None
+
+    def notice(self, applied: AppliedSequence) -> dict[str, Any]:
+        """Return which gains are used with a sequence, and why not those of the active one."""
+        misfit = self._pipeline.misfit(applied)
+        return {
+            "calibration_id": calibration_id(self._pipeline.calibration_for(applied)),
+            "reason": None if misfit is None else str(misfit),
+        }
+
+    def misfit(self, stored: Stored, applied: AppliedSequence) -> CalibrationMismatch | None:
+        """Say why a calibration is not good for a sequence of this camera."""
+        return stored.subject.misfit(applied, self._camera.capabilities)
+
+    async def activate(self, wanted_id: str, applied: Callable[[], AppliedSequence]) -> None:
+        """Use a calibration, or the nominal gains, from the next frame on.
+
+        Raises
+        ------
+        Problem
+            ``unknown-calibration``, ``calibration-misfit``.
+        """
+        calibration = None
+        if wanted_id != NOMINAL_ID:
+            stored = await asyncio.to_thread(self.kept.get, wanted_id)
+            self._require_fit(self.misfit(stored, applied()))
+            loaded, _ = await self._pipeline.run_long(load_calibration, stored.path)
+            # the sequence may be another one by now
+            loaded.capture.require_fit(applied(), self._camera.capabilities)
+            calibration = loaded
+        if self.active_id != wanted_id:
+            _log.info("frames are calibrated by %s", wanted_id)
+            self._pipeline.calibration = calibration
+            self._tell(self.notice(applied()))
+        await asyncio.to_thread(self.kept.remember_active, wanted_id)
+
+    async def delete(self, unwanted_id: str) -> Stored:
+        """Delete a calibration that is not active.
+
+        Raises
+        ------
+        Problem
+            ``unknown-calibration``, ``calibration-in-use``, ``calibration-not-stored``.
+        """
+        if unwanted_id == self.active_id != NOMINAL_ID:
+            raise Problem(
+                kinds.CALIBRATION_IN_USE,
+                "Frames are calibrated by it.",
+                field="calibration",
+                value=unwanted_id,
+            )
+        return await asyncio.to_thread(self.kept.delete, unwanted_id)
+
+    def measure(self, wanted: Wanted, applied: Callable[[], AppliedSequence]) -> Job:
+        """Start measuring with the present sequence; the job's result is the calibration.
+
+        Raises
+        ------
+        Problem
+            ``camera-busy``, ``too-many-jobs``, ``calibration-not-stored``, ``invalid-request``
+            where the images would not go into memory.
+        """
+        self._acquisition.require_free()
+        once = self._camera.validate(replace(applied().sequence, takes=1, take_order="sequential"))
+        most = MAX_CAPTURE_BYTES // (once.images * self._camera.capabilities.image_bytes)
+        if wanted.frames > most:
+            raise Problem(
+                kinds.INVALID_REQUEST,
+                f"{wanted.frames} frames of this sequence do not go into memory.",
+                field="frames",
+                value=wanted.frames,
+                limit=f"at most {most}",
+            )
+
+        async def work(job: Job) -> dict[str, Any]:
+            await asyncio.to_thread(self.kept.require_room)  # said before anything is captured
+            takes = _Takes()
+            measuring = self._acquisition.occupy(
+                job.id, lambda camera, go_on: _capture(camera, job, wanted, takes, go_on)
+            )
+            capture = await asyncio.wrap_future(measuring)
+            job.report(_EVALUATING, "evaluating")
+            calibration, _ = await self._pipeline.run_long(evaluate, capture)
+            share, _ = await self._pipeline.run_long(self._share_of_takes, calibration, takes, once)
+            notes = {"name": wanted.name, "invalid_share": share}
+            stored = await asyncio.to_thread(self.kept.add, replace(capture, notes=notes))
+            if wanted.activate:
+                await self.activate(stored.id, applied)
+            return {
+                "calibration": stored.id,
+                "bad_pixels": int(calibration.bad.sum()),
+                "rejected_images": capture.rejected_images,
+                "images": int(capture.kept.size),
+                "invalid_share": share,
+            }
+
+        return self._jobs.start("calibration", work)
+
+    async def drift(self) -> Drift | None:
+        """Return how the active calibration does; None without one, or without frames of it."""
+        async with self._judging:
+            if self._drift_of != self.active_id or self._clock() > self._drift_until_s:
+                self._drift = await self._judged()
+                self._drift_of = self.active_id
+                self._drift_until_s = self._clock() + DRIFT_EVERY_S
+            return self._drift
+
+    async def _judged(self) -> Drift | None:
+        calibration = self._pipeline.calibration
+        last = self._history.last
+        if calibration is None or last is None:
+            return None
+        shares = []
+        for number in range(last, max(0, last - JUDGED_FRAMES), -1):
+            try:
+                frame = self._history.frame(number)
+            except Problem:  # no older ones are there
+                break
+            if frame.recipe.calibration is calibration:
+                share = await self._share_of(frame)
+                if share is not None:
+                    shares.append(share)
+        if not shares:
+            return None
+        return Drift(min(shares), _share_in(calibration.capture.notes), last)
+
+    async def _share_of(self, frame: Frame) -> float | None:
+        try:
+            found = await frame.stage("moments")
+            share, _ = await self._pipeline.run(self._share, frame.recipe, found)
+        except Exception:  # one frame that cannot be computed says nothing of the calibration
+            _log.exception("frame %d: counting its invalid pixels failed", frame.number)
+            return None
+        return share
+
+    def _share(self, recipe: Recipe, found: tm.Reconstruction) -> float | None:
+        return invalid_share(found, self._accuracy.noise(recipe, found))
+
+    def _share_of_takes(
+        self, calibration: Calibration, takes: "_Takes", once: AppliedSequence
+    ) -> float | None:
+        """Return the share of the measurement's own frames, each by itself; runs on a worker."""
+        full_scale = 2.0**self._camera.capabilities.bits - 1.0
+        recipe = Recipe(once, self._pipeline.reconstruction.settings, full_scale, calibration)
+        shares = []
+        for images in takes.frames():
+            raw = RawFrame(0, 0, images, once.labels, 0.0, 0.0, 0.0, 0.0, 0)
+            found = STAGES["moments"].compute(recipe, raw)
+            if (share := self._share(recipe, found)) is not None:
+                shares.append(share)
+        return min(shares, default=None)
+
+    def _require_fit(self, misfit: CalibrationMismatch | None) -> None:
+        if misfit is not None:
+            raise misfit
+
+
+def _share_in(notes: Mapping[str, Any]) -> float | None:
+    """Return the share that notes hold, which may come from anywhere."""
+    share = notes.get("invalid_share")
+    return float(share) if isinstance(share, int | float) and 0 <= share <= 1 else None
+
+
+class _Takes:
+    """Averages takes, and keeps some of them by themselves."""
+
+    def __init__(self) -> None:
+        self._kept: list[_Array] = []
+
+    def average(self, takes: _Array) -> tuple[_Array, _Array]:
+        self._kept.append(takes[-JUDGED_FRAMES:].copy())
+        averaged: tuple[_Array, _Array] = tm.average_takes(takes)
+        return averaged
+
+    def frames(self) -> list[_Array]:
+        """Return frames (N, H, W)."""
+        return list(np.concatenate(self._kept, axis=1))
+
+
+def _capture(
+    camera: Camera, job: Job, wanted: Wanted, takes: _Takes, go_on: Callable[[], None]
+) -> CalibrationCapture:
+    def progress(done: int, total: int) -> None:
+        job.report(_EVALUATING * done / total, "capturing")
+        go_on()
+
+    def average(of_one_image: _Array) -> tuple[_Array, _Array]:
+        job.report(_EVALUATING, "averaging")
+        go_on()
+        return takes.average(of_one_image)
+
+    return capture_calibration(camera, takes=wanted.frames, average=average, progress=progress)

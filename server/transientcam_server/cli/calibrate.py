@@ -1,0 +1,199 @@
+"""The verb ``calibrate`` of the ``transientcam`` command.
+
+What is heavy is imported when the verb runs, so that ``transientcam --help`` stays quick.
+"""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+
+from transientcam.cli.options import TokenOption
+
+if TYPE_CHECKING:
+    from transientcam_driver import Camera
+    from transientcam_server.imaging.calibration import Calibration
+
+
+def calibrate(
+    url: Annotated[
+        str | None,
+        typer.Argument(metavar="[URL]", help="A daemon, whose camera is measured and calibrated."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="The .npz to write; a daemon keeps its own as well."),
+    ] = None,
+    camera: Annotated[
+        str | None,
+        typer.Option(help="Without a daemon: usb[:SERIAL] or sim:SCENE  [default: usb]"),
+    ] = None,
+    takes: Annotated[
+        int, typer.Option(min=2, max=10_000, help="How often each image is captured.")
+    ] = 40,
+    sequence: Annotated[
+        str | None,
+        typer.Option(
+            help="Without a daemon: what to calibrate for, a sequence as JSON, as in "
+            "'{\"harmonics\": 4}', or a file of it.  [default: what the daemon starts with]"
+        ),
+    ] = None,
+    name: Annotated[str, typer.Option(help="What the daemon should call it.")] = "",
+    activate: Annotated[
+        bool, typer.Option("--activate", help="Let the daemon use it at once.")
+    ] = False,
+    token: TokenOption = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Measure each pixel's gain and phase, while the light shines at the sensor (Sec. 4.2).
+
+    Put filter and diffusor before the lens first. A daemon measures with its present sequence, and
+    keeps what it measures; without one, the file is good for `serve --calibration FILE`.
+    """
+    if output is not None and not output.parent.is_dir():  # said before anything is captured
+        raise typer.BadParameter(f"there is no folder {output.parent}", param_hint="--output")
+    if url is None:
+        _refuse({"--name": name, "--activate": activate}, "needs the URL of a daemon")
+        if output is None:
+            raise typer.BadParameter("names the file to write", param_hint="--output")
+        result = _captured(camera or "usb", takes, sequence, output)
+    else:
+        _refuse({"--camera": camera, "--sequence": sequence}, "is the daemon's, if there is one")
+        result = _asked(url, {"name": name, "frames": takes, "activate": activate}, output, token)
+    if as_json:
+        typer.echo(json.dumps(result, indent=2))
+    elif url is None:
+        _tell(result)
+    else:
+        _tell_asked(result)
+
+
+def _refuse(options: dict[str, Any], reason: str) -> None:
+    for hint, value in options.items():
+        if value:
+            raise typer.BadParameter(reason, param_hint=hint)
+
+
+def _asked(
+    url: str, wanted: dict[str, Any], output: Path | None, token: str | None
+) -> dict[str, Any]:
+    """Let a daemon measure, and return what came of it; Ctrl-C ends it there, too."""
+    from rich.progress import Progress
+
+    from transientcam import Camera
+
+    with Camera(url, token=token) as camera, Progress(console=Console(stderr=True)) as shown:
+        task = shown.add_task("waiting", total=1.0)
+
+        def tell(job: Mapping[str, Any]) -> None:
+            shown.update(task, description=job["step"], completed=job["progress"])
+
+        job = camera.calibrations.measure(**wanted)
+        try:
+            job = camera.wait_for(job["id"], on_progress=tell)
+        except KeyboardInterrupt:
+            camera.jobs.cancel(job["id"])
+            raise
+        tell(job)
+        if job["state"] == "cancelled":
+            raise typer.Exit(code=1)
+        identity = job["result"]["calibration"]
+        if output is not None:
+            output.write_bytes(camera.calibrations.export(identity))
+        return {
+            "calibration": camera.calibrations.get(identity),
+            "measured": job["result"],
+            "file": None if output is None else str(output),
+        }
+
+
+def _tell_asked(result: dict[str, Any]) -> None:
+    calibration, measured = result["calibration"], result["measured"]
+    device, name = calibration["device"], calibration["name"]
+    lines = [
+        calibration["id"] + (f" ({name})" if name else ""),
+        f"  {device['width']} x {device['height']} pixels of {device['serial']} "
+        f"at {calibration['temperature_c']:.1f} °C, {measured['bad_pixels']} of them bad",
+        f"  {measured['rejected_images']} of {measured['images']} images left out as outliers",
+    ]
+    if calibration["active"]:
+        lines.append("  in use")
+    if result["file"] is not None:
+        lines.append(f"  downloaded into {result['file']}")
+    for line in lines:
+        typer.echo(line)
+
+
+def _captured(camera: str, takes: int, sequence: str | None, output: Path) -> dict[str, Any]:
+    from transientcam_driver import Sequence, open_camera
+
+    wanted = Sequence.from_document(_document(sequence)) if sequence is not None else None
+    with open_camera(camera) as opened:
+        if wanted is not None:
+            opened.configure(wanted)
+        measured = _measure(opened, takes)
+    measured.capture.save(output)
+    return _result(measured, output)
+
+
+def _measure(camera: "Camera", takes: int) -> "Calibration":
+    from rich.progress import Progress
+
+    import transientcam_moments as tm
+    from transientcam_driver import capture_calibration
+    from transientcam_server.imaging.calibration import evaluate
+
+    with Progress(console=Console(stderr=True)) as shown:
+        task = shown.add_task("capturing", total=None)
+        capture = capture_calibration(
+            camera,
+            takes=takes,
+            average=tm.average_takes,
+            progress=lambda done, total: shown.update(task, completed=done, total=total),
+        )
+        shown.update(task, description="evaluating")
+        return evaluate(capture)
+
+
+def _document(text: str) -> dict[str, Any]:
+    source = text if text.lstrip().startswith("{") else Path(text).read_text(encoding="utf-8")
+    try:
+        document = json.loads(source)
+    except json.JSONDecodeError as error:
+        raise typer.BadParameter(f"is no JSON: {error}", param_hint="--sequence") from error
+    if not isinstance(document, dict):
+        raise typer.BadParameter("is no JSON object", param_hint="--sequence")
+    return document
+
+
+def _result(measured: "Calibration", output: Path) -> dict[str, Any]:
+    capture = measured.capture
+    images, height, width = capture.images.shape
+    return {
+        "file": str(output),
+        "calibration_id": measured.id,
+        "serial": capture.serial,
+        "width": width,
+        "height": height,
+        "temperature_c": capture.temperature_c,
+        "images": images,
+        "takes": len(capture.kept),
+        "rejected_images": capture.rejected_images,
+        "bad_pixels": int(measured.bad.sum()),
+        "sequence": capture.sequence.to_document(),
+    }
+
+
+def _tell(result: dict[str, Any]) -> None:
+    captured = result["images"] * result["takes"]
+    lines = (
+        f"{result['file']}: {result['calibration_id']}",
+        f"  {result['width']} x {result['height']} pixels of {result['serial']} "
+        f"at {result['temperature_c']:.1f} °C, {result['bad_pixels']} of them bad",
+        f"  {result['rejected_images']} of {captured} images left out as outliers",
+    )
+    for line in lines:
+        typer.echo(line)

@@ -1,0 +1,294 @@
+"""The verbs ``tradeoff`` and ``plan`` of the ``transientcam`` command."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+if TYPE_CHECKING:
+    import transientcam_moments as tm
+    from transientcam_driver import Camera
+    from transientcam_server.imaging.products import Recipe
+
+
+def tradeoff(
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="Folder for results; what it holds is not redone."),
+    ],
+    scene: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A scene of `transientcam scenes`, a .toml or measured:FILE.npz; may be repeated."
+            "  [default: mirrors]"
+        ),
+    ] = None,
+    sequence_grid: Annotated[
+        str, typer.Option(help="paper, quick, or a .toml with [[sequence]] tables.")
+    ] = "paper",
+    repetitions: Annotated[int, typer.Option(min=1, help="Captures a point.")] = 5,
+    seed: Annotated[int, typer.Option(min=0, help="Of all chance.")] = 1,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print what was written as JSON.")
+    ] = False,
+) -> None:
+    """Measure what accuracy costs in time on scenes whose truth is known.
+
+    An interrupted run loses nothing: tables, plots and page are made of what is there, and the
+    same command goes on where it stopped.
+    """
+    import transientcam_moments as tm
+    from transientcam_experiments import tradeoff as measuring
+    from transientcam_experiments.tradeoff import plots
+
+    plots.require()
+    grid = measuring.load_grid(sequence_grid)
+    scenes = scene or ["mirrors"]
+    points = {
+        name: measuring.points_of(grid, scene=name, repetitions=repetitions, seed=seed)
+        for name in scenes
+    }
+    records = measuring.Records(output)
+    console = Console(stderr=True)
+    interrupted = False
+    with _progress(console) as progress:
+        left = (point for each in points.values() for point in each if point.key not in records)
+        if any(point.kind == "computing" for point in left):  # only times need compiled kernels
+            compiling = progress.add_task("compiling kernels", total=None)
+            tm.kernels.compile(
+                progress=lambda done, total, _: progress.update(
+                    compiling, completed=done, total=total
+                )
+            )
+            progress.remove_task(compiling)
+        try:
+            for name, each in points.items():
+                task = progress.add_task(name, total=len(each))
+                measuring.measure(
+                    each,
+                    records,
+                    scene=name,
+                    seed=seed,
+                    progress=partial(_advance, progress, task),
+                )
+        except KeyboardInterrupt:
+            interrupted = True
+        written = measuring.report(output, records) if len(records) else []
+    if as_json:
+        document = {"points": len(records), "written": [str(path) for path in written]}
+        typer.echo(json.dumps(document))
+    else:
+        console.print(f"{len(records)} points; see {output / 'index.html'}")
+    if interrupted:
+        console.print("Interrupted. The same command goes on where it stopped.")
+        raise typer.Exit(130)
+
+
+def _advance(progress: Progress, task: TaskID, kind: str) -> None:
+    progress.advance(task)
+
+
+def plan(
+    range_std_m: Annotated[
+        float | None, typer.Option(help="Standard deviation of the range, at most.")
+    ] = None,
+    separation_m: Annotated[
+        float | None, typer.Option(help="Distance at which two equal returns are both found.")
+    ] = None,
+    separation_share: Annotated[
+        float, typer.Option(help="In what share of all captures they are.")
+    ] = 0.9,
+    bound_width: Annotated[
+        float | None,
+        typer.Option(help="Width of the bounds on the density over its mean, at most."),
+    ] = None,
+    capture_s: Annotated[float | None, typer.Option(help="Time of one capture, at most.")] = None,
+    frame_rate_hz: Annotated[
+        float | None, typer.Option(help="Frames a second back to back, at least.")
+    ] = None,
+    computing_share: Annotated[
+        float | None,
+        typer.Option(help="Share of the time that reconstruction may take here, at most."),
+    ] = None,
+    fixed: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fix", help="A field of the sequence that must stay, as in zeroth=on-off; repeatable."
+        ),
+    ] = None,
+    camera: Annotated[
+        str, typer.Option(help="The camera, and the scene before it; one capture is taken.")
+    ] = "sim:mirrors",
+    brightness_dn_per_s: Annotated[
+        float | None,
+        typer.Option(
+            help="Zeroth moment of a typical pixel in DN for each second of exposure, in the place "
+            "of a capture."
+        ),
+    ] = None,
+    returns: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--return", help="With that: RANGE_M or RANGE_M:WEIGHT; repeatable.  [default: 2]"
+        ),
+    ] = None,
+    ambient_dn_per_s: Annotated[
+        float, typer.Option(help="Light that is not the camera's, in DN for each second.")
+    ] = 0.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for programs.")] = False,
+) -> None:
+    """Find the sequence for a target accuracy or a budget of time, and say what it will cost.
+
+    The exit code is 1, with the best that can be achieved, where the target is out of reach.
+    """
+    import transientcam_moments as tm
+    from transientcam_driver import Sequence, open_camera
+    from transientcam_server.errors.exceptions import Problem
+    from transientcam_server.planning import Goal
+    from transientcam_server.planning.planner import Accuracy
+    from transientcam_server.planning.scene import given
+    from transientcam_server.settings import ReconstructionSettings, SensorSettings
+
+    document = _fields(fixed or [])
+    goal = Goal(
+        range_std_m=range_std_m,
+        separation_m=separation_m,
+        separation_share=separation_share,
+        bound_width=bound_width,
+        capture_s=capture_s,
+        frame_rate_hz=frame_rate_hz,
+        computing_share=computing_share,
+        base=Sequence.from_document(document),
+        fixed=frozenset(document),
+    )
+    console = Console(stderr=True)
+    with open_camera(camera) as opened:
+        accuracy = Accuracy(opened, ReconstructionSettings(), SensorSettings())
+        if computing_share is not None:
+            with console.status("compiling kernels"):
+                tm.kernels.compile()  # what is to be timed is the daemon's speed
+        with console.status("looking at the scene"):
+            if brightness_dn_per_s is None:
+                scene = accuracy.statistic(*_captured(opened), ambient_dn_per_s)
+            else:
+                scene = given(
+                    brightness_dn_per_s,
+                    [_return(text) for text in returns or ["2"]],
+                    ambient_dn_per_s=ambient_dn_per_s,
+                )
+        with console.status("predicting"):
+            try:
+                made = accuracy.plan(goal, scene)
+            except Problem as problem:
+                if as_json:
+                    typer.echo(json.dumps({"detail": problem.detail, **problem.extensions}))
+                else:
+                    console.print(problem.detail, style="red", soft_wrap=True)
+                raise typer.Exit(1) from problem
+    if as_json:
+        typer.echo(json.dumps(made.to_document()))
+    else:
+        for line in _told(made.to_document(), computing=computing_share is not None):
+            typer.echo(line)
+
+
+def _captured(camera: "Camera") -> tuple["Recipe", "tm.Reconstruction"]:
+    """Have a good look: as many harmonics as matter, and little noise."""
+    from transientcam_driver import Sequence
+    from transientcam_server.imaging.products import STAGES, Recipe
+    from transientcam_server.settings import ReconstructionSettings
+
+    applied = camera.configure(
+        camera.capabilities.nearest(Sequence(harmonics=6, takes=16, exposure_s=0.0015))
+    )
+    camera.start()
+    frame = camera.read_frame()
+    camera.stop()
+    full_scale = 2.0**camera.capabilities.bits - 1.0
+    recipe = Recipe(applied, ReconstructionSettings(), full_scale)
+    return recipe, STAGES["moments"].compute(recipe, frame)
+
+
+def _fields(texts: list[str]) -> dict[str, Any]:
+    """Read NAME=VALUE; a value is JSON or else a word."""
+    document = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise typer.BadParameter(f"{text!r} is not NAME=VALUE", param_hint="--fix")
+        try:
+            document[name] = json.loads(value)
+        except json.JSONDecodeError:
+            document[name] = value
+    return document
+
+
+def _return(text: str) -> tuple[float, float]:
+    range_m, colon, weight = text.partition(":")
+    try:
+        parts = float(range_m), float(weight) if colon else 1.0
+    except ValueError:
+        parts = (0.0, 0.0)
+    if not all(0 < part < float("inf") for part in parts):
+        raise typer.BadParameter(f"{text!r} is not RANGE_M:WEIGHT", param_hint="--return")
+    return parts
+
+
+def _told(document: dict[str, Any], *, computing: bool) -> Iterator[str]:
+    std = document["predicted"]["range_std_m"]
+    yield json.dumps(document["sequence"])
+    time_ms, rate_hz = document["capture_s"] * 1e3, document["frame_rate_hz"]
+    yield f"captures in {time_ms:.1f} ms ({rate_hz:.1f} Hz back to back)"
+    if computing:
+        yield (
+            f"reconstructs in {document['reconstruct_s'] * 1e3:.1f} ms, "
+            f"{document['computing_share']:.1%} of the time"
+        )
+    yield (
+        f"range to {std['median'] * 1e3:.2f} mm ({std['low'] * 1e3:.2f} to "
+        f"{std['high'] * 1e3:.2f}), 90 % of the pixels to {std['p90'] * 1e3:.2f} mm"
+    )
+    if document["predicted"]["beyond_scene"]:
+        yield "at best: this sees more of the scene than it was judged by"
+    if document["predicted"]["separation_share"] is not None:
+        yield f"finds both returns in {document['predicted']['separation_share']:.0%} of captures"
+    if document["predicted"]["bound_width"] is not None:
+        yield f"bounds {document['predicted']['bound_width']:.3g} times the mean density apart"
+    for name, what in (("half_time", "half the time"), ("twice_accuracy", "twice the accuracy")):
+        other = document[name]
+        if other is None:
+            yield f"{what}: nothing does"
+            continue
+        errors = (
+            "" if other["error_factor"] is None else f"{other['error_factor']:.2g} x the error, "
+        )
+        yield f"{what}: {errors}{other['time_factor']:.2g} x the time: " + json.dumps(
+            other["sequence"]
+        )
+
+
+@contextmanager
+def _progress(console: Console) -> Iterator[Progress]:
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=console,
+    ) as progress:
+        yield progress

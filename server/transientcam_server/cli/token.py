@@ -1,0 +1,108 @@
+"""The verbs ``token create``, ``token list`` and ``token revoke``."""
+
+import json
+import os
+from datetime import timedelta
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+app = typer.Typer(no_args_is_help=True, help="Make and revoke tokens: who may use this camera.")
+
+_Config = Annotated[
+    Path | None, typer.Option(help="Settings in TOML.  [default: ./transientcam.toml]")
+]
+_File = Annotated[
+    Path | None, typer.Option("--tokens-file", help="Where the tokens are kept, if elsewhere.")
+]
+_Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
+
+
+@app.command()
+def create(
+    name: Annotated[str, typer.Argument(help="Who or what it is for, such as bench-2.")],
+    role: Annotated[
+        Literal["viewer", "operator", "admin"],
+        typer.Option(help="viewer looks, operator controls, admin takes over from anybody."),
+    ] = "viewer",
+    days: Annotated[
+        float | None, typer.Option(min=0.0, help="How long it is valid.  [default: for ever]")
+    ] = None,
+    config: _Config = None,
+    tokens_file: _File = None,
+    as_json: _Json = False,
+) -> None:
+    """Make a token and print it, this once."""
+    from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
+
+    if not 1 <= len(name) <= 80 or not name.isprintable():
+        raise typer.BadParameter("it must have 1 to 80 printable characters", param_hint="NAME")
+    file = TokenFile(_path(config, tokens_file))
+    now = utc_now()
+    expires = None if days is None else now + timedelta(days=days)
+    token, text = file.create(name, Role.named(role), now=now, expires=expires)
+    if as_json:
+        typer.echo(json.dumps({**_document(token.model_dump(mode="json")), "token": text}))
+        return
+    typer.echo(text)
+    Console(stderr=True).print(
+        f"Token {token.id}, {role}, for {name}. It is shown only now; a running service accepts "
+        "it at once.",
+        soft_wrap=True,
+        markup=False,
+        highlight=False,
+    )
+
+
+@app.command("list")
+def list_tokens(config: _Config = None, tokens_file: _File = None, as_json: _Json = False) -> None:
+    """List the tokens there are, not what they are."""
+    from transientcam_server.api.auth.tokens import TokenFile, utc_now
+
+    file = TokenFile(_path(config, tokens_file))
+    tokens = file.tokens()
+    if as_json:
+        typer.echo(json.dumps([_document(token.model_dump(mode="json")) for token in tokens]))
+        return
+    if not tokens:
+        typer.echo(f"There are no tokens in {file.path}.")
+        return
+    table = Table("id", "name", "role", "made", "expires", box=None)
+    for token in tokens:
+        expires = "never" if token.expires is None else f"{token.expires:%Y-%m-%d %H:%M}"
+        if token.expired(utc_now()):
+            expires += " (over)"
+        made = f"{token.created:%Y-%m-%d}"
+        table.add_row(token.id, escape(token.name), token.role, made, expires)
+    Console().print(table)
+
+
+@app.command()
+def revoke(
+    token_id: Annotated[str, typer.Argument(metavar="ID", help="As `token list` shows it.")],
+    config: _Config = None,
+    tokens_file: _File = None,
+    as_json: _Json = False,
+) -> None:
+    """Make a token invalid; whoever uses it is sent away."""
+    from transientcam_server.api.auth.tokens import TokenFile
+
+    token = TokenFile(_path(config, tokens_file)).revoke(token_id)
+    if as_json:
+        typer.echo(json.dumps(_document(token.model_dump(mode="json"))))
+    else:
+        typer.echo(f"Token {token.id} of {token.name} is not valid any more.")
+
+
+def _path(config: Path | None, tokens_file: Path | None) -> Path:
+    from transientcam_server.daemon.configuration import tokens_file_of
+
+    return tokens_file or tokens_file_of(config, environment=os.environ)
+
+
+def _document(kept: dict[str, object]) -> dict[str, object]:
+    return {key: value for key, value in kept.items() if key != "sha256"}

@@ -1,0 +1,134 @@
+"""The service tells the local network where it is (mDNS, DNS-SD: RFC 6762, RFC 6763).
+
+What is told, and how it is read: `transientcam.discovery`.
+"""
+
+import asyncio
+import contextlib
+import ipaddress
+import logging
+import os
+import socket
+from collections.abc import AsyncIterator, Mapping
+from pathlib import Path
+from typing import Final
+
+import ifaddr
+from zeroconf import Error, InterfaceChoice, ServiceInfo
+from zeroconf.asyncio import AsyncZeroconf
+
+from transientcam.discovery import SERVICE_TYPE, WEB_TYPE
+from transientcam_driver import Capabilities
+from transientcam_server.api.middleware.security import own_names
+from transientcam_server.settings import Settings
+
+_log = logging.getLogger(__name__)
+_LABEL_BYTES: Final = 63  # RFC 1035, 2.3.4
+_EVERYWHERE: Final = ("0.0.0.0", "::")  # noqa: S104 - compared with, not bound to
+_MARKS_OF_CONTAINERS: Final = (".dockerenv", "run/.containerenv")
+_VARIABLES_OF_CONTAINERS: Final = ("container", "KUBERNETES_SERVICE_HOST")
+
+
+def wanted(settings: Settings, *, in_container: bool) -> bool:
+    """Return whether to announce: ``auto`` is where other machines could come, and would find us.
+
+    A container's network is mostly one of its own, in which nobody listens.
+    """
+    if settings.announce == "auto":
+        return not settings.on_loopback and not in_container
+    return settings.announce == "on"
+
+
+def inside_container(
+    environment: Mapping[str, str] = os.environ, *, root: Path = Path("/")
+) -> bool:
+    """Return whether this process runs in a container, as far as those let it know."""
+    marked = any((root / mark).exists() for mark in _MARKS_OF_CONTAINERS)
+    return marked or any(name in environment for name in _VARIABLES_OF_CONTAINERS)
+
+
+@contextlib.asynccontextmanager
+async def announced(
+    settings: Settings, capabilities: Capabilities, *, port: int
+) -> AsyncIterator[None]:
+    """Announce the service within the block, if that is wanted; what fails is logged, no more."""
+    if not wanted(settings, in_container=inside_container()):
+        yield
+        return
+    # asking whether the names are free takes more than a second, which nobody has to wait for
+    announcing = asyncio.create_task(_announce(settings, capabilities, port))
+    try:
+        yield
+    finally:
+        announcing.cancel()
+        await asyncio.gather(announcing, return_exceptions=True)
+
+
+async def _announce(settings: Settings, capabilities: Capabilities, port: int) -> None:
+    try:
+        network = AsyncZeroconf(interfaces=_interfaces(settings.host))
+    except OSError as error:
+        _log.warning("the service is not announced: %s", error.strerror or error)
+        return
+    try:
+        for service in _services(settings, capabilities, port):
+            broadcast = await network.async_register_service(service, allow_name_change=True)
+            await broadcast
+            _log.info("announced as %s", service.name)
+        await asyncio.Event().wait()
+    except (Error, OSError) as error:
+        _log.warning("the service is not announced: %s", error)
+    finally:
+        await network.async_unregister_all_services()
+        await network.async_close()
+
+
+def _services(settings: Settings, capabilities: Capabilities, port: int) -> list[ServiceInfo]:
+    instance = _instance(f"{capabilities.model} {capabilities.serial}")
+    told = {
+        "path": "/",
+        "api": "v1",
+        "sn": capabilities.serial,
+        "fw": str(capabilities.firmware),
+        "tls": "0" if settings.tls_certificate is None else "1",
+    }
+    return [
+        ServiceInfo(
+            kind,
+            f"{instance}.{kind}",
+            port=port,
+            parsed_addresses=_addresses(settings.host),
+            properties=told,
+            server=f"{own_names()[-1]}.",
+        )
+        for kind in (SERVICE_TYPE, WEB_TYPE)
+    ]
+
+
+def _instance(name: str) -> str:
+    """Return ``name`` as one label of a domain name."""
+    label = name.replace(".", "-").encode()[:_LABEL_BYTES]
+    return label.decode(errors="ignore")
+
+
+def _interfaces(host: str) -> list[str] | InterfaceChoice:
+    return InterfaceChoice.All if host in _EVERYWHERE else [_address(host)]
+
+
+def _addresses(host: str) -> list[str]:
+    """Return where the service can be reached."""
+    if host not in _EVERYWHERE:
+        return [_address(host)]
+    found = [str(ip.ip[0] if ip.is_IPv6 else ip.ip) for a in ifaddr.get_adapters() for ip in a.ips]
+    return [each for each in found if _is_ours_alone(each)] or ["127.0.0.1"]
+
+
+def _is_ours_alone(address: str) -> bool:
+    """Whether an address means this machine whoever uses it."""
+    ip = ipaddress.ip_address(address)
+    return not ip.is_loopback and not (ip.version == 6 and ip.is_link_local)
+
+
+def _address(host: str) -> str:
+    """Return the address that a name stands for; addresses stand for themselves."""
+    return str(socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)[0][4][0])

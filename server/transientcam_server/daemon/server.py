@@ -1,0 +1,202 @@
+"""The service as a process: its socket, its server, its signals."""
+
+import logging
+import os
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import AsyncExitStack, contextmanager
+from functools import partial
+from typing import Final
+
+import uvicorn
+from fastapi import FastAPI
+
+from transientcam.cli import INTERRUPTED
+from transientcam.wire import MAX_CLIENT_MESSAGE_BYTES
+from transientcam_server import logs
+from transientcam_server.daemon.announcement import announced
+from transientcam_server.daemon.connections import BoundedConnection, BoundedStream
+from transientcam_server.daemon.systemd import ServiceManager, supervised
+from transientcam_server.errors.exceptions import AddressUnavailable
+from transientcam_server.service import Service
+from transientcam_server.settings import Settings
+
+USER_TIMEOUT_MS: Final = 20_000
+"""A client that acknowledges nothing for so long is gone, whatever its WebSocket says."""
+NOTSENT_LOWAT_BYTES: Final = 128 * 1024
+"""What the kernel keeps of a message beyond what is on the wire: frames wait here, not there."""
+PING_S: Final = 10.0
+SHUTDOWN_S: Final = 3
+_BACKLOG = 1024
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """Return a listening socket; its connections inherit its options.
+
+    Raises
+    ------
+    AddressUnavailable
+        If the address cannot be listened on.
+    """
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        listener = socket.socket(family, kind, protocol)
+        try:
+            _prepare(listener)
+            listener.bind(address)
+            listener.listen(_BACKLOG)
+        except OSError:
+            listener.close()
+            raise
+    except OSError as error:
+        raise AddressUnavailable(host, port, error.strerror or str(error)) from error
+    return listener
+
+
+def _prepare(listener: socket.socket) -> None:
+    listener.setblocking(False)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    for option, value in (
+        ("TCP_USER_TIMEOUT", USER_TIMEOUT_MS),
+        ("TCP_NOTSENT_LOWAT", NOTSENT_LOWAT_BYTES),
+    ):
+        if hasattr(socket, option):  # Linux; elsewhere the pings have to do
+            listener.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
+
+
+def address(listener: socket.socket, *, tls: bool = False) -> str:
+    """Return the URL of the service behind a listening socket."""
+    scheme = "https" if tls else "http"
+    host, port = listener.getsockname()[:2]
+    if host in ("0.0.0.0", "::"):  # noqa: S104 - compared with, not bound to
+        host = socket.gethostname()
+    return f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"
+
+
+class Server(uvicorn.Server):
+    """uvicorn, which says when it listens and lets streams say goodbye before it closes them."""
+
+    def __init__(
+        self, app: FastAPI, settings: Settings, *, on_listening: Callable[[], None]
+    ) -> None:
+        super().__init__(
+            uvicorn.Config(
+                app,
+                lifespan="on",
+                # a class would do as well, but could not know its limits
+                http=partial(BoundedConnection, limits=settings.limits),  # type: ignore[arg-type]
+                ssl_certfile=settings.tls_certificate,
+                ssl_keyfile=settings.tls_key,
+                ws=partial(BoundedStream, limits=settings.limits),  # type: ignore[arg-type]
+                ws_per_message_deflate=False,  # 17 ms a frame for a tenth of its size
+                ws_ping_interval=PING_S,
+                ws_ping_timeout=PING_S,
+                ws_max_size=MAX_CLIENT_MESSAGE_BYTES,
+                log_config=None,
+                log_level="info" if settings.log_level == "debug" else "warning",
+                access_log=False,  # `requests` logs what it may: queries are not repeated
+                server_header=False,
+                proxy_headers=False,
+                timeout_graceful_shutdown=SHUTDOWN_S,
+            )
+        )
+        self._settings = settings
+        self._service: Service = app.state.service
+        self._around = AsyncExitStack()
+        self._on_listening = on_listening
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start, then say so."""
+        await super().startup(sockets)
+        if self.started and sockets:
+            port = sockets[0].getsockname()[1]
+            capabilities = self._service.camera.capabilities
+            announcement = announced(self._settings, capabilities, port=port)
+            await self._around.enter_async_context(announcement)
+            manager = ServiceManager.of(os.environ)
+            await self._around.enter_async_context(supervised(self._service.acquisition, manager))
+        if self.started:
+            self._on_listening()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Let every stream be told that it ends, then stop."""
+        await self._around.aclose()
+        await self._service.say_goodbye()
+        await super().shutdown(sockets)
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Take SIGINT and SIGTERM as a wish to end, which is then fulfilled and forgotten.
+
+        uvicorn's own raises them once more at the end, which would kill this process before it
+        closed its camera.
+        """
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        wishes = (signal.SIGINT, signal.SIGTERM)
+        before = {wish: signal.signal(wish, self.handle_exit) for wish in wishes}
+        try:
+            yield
+        finally:
+            for wish, handler in before.items():
+                signal.signal(wish, handler)
+
+    @property
+    def signals(self) -> tuple[int, ...]:
+        """Which signals asked it to end."""
+        return tuple(self._captured_signals)
+
+
+def serve(
+    app: FastAPI,
+    settings: Settings,
+    listener: socket.socket,
+    *,
+    on_listening: Callable[[], None],
+) -> None:
+    """Serve on a listening socket until a signal ends it; ``on_listening`` once it answers.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If the signal was SIGINT.
+    """
+    server = Server(app, settings, on_listening=on_listening)
+    server.run(sockets=[listener])
+    if signal.SIGINT in server.signals:
+        raise KeyboardInterrupt
+
+
+@contextmanager
+def ending_without() -> Iterator[Callable[[threading.Thread], None]]:
+    """Do not wait, at the end of the block and of the process, for what is handed to its value.
+
+    A compiler that is at work cannot be interrupted, and takes longer for one kernel than those
+    wait who have asked the process to end. What it has finished is on the disk; what it has not
+    is lost in any case. Where nothing is at work the process ends as any other.
+    """
+    at_work: list[threading.Thread] = []
+    code = 0
+    try:
+        yield at_work.append
+    except KeyboardInterrupt:
+        if not any(each.is_alive() for each in at_work):
+            raise
+        code = INTERRUPTED
+    if any(each.is_alive() for each in at_work):
+        logging.shutdown()
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        os._exit(code)
+
+
+def configure_logging(settings: Settings) -> None:
+    """Log to standard error, one line a message."""
+    logs.configure(level=settings.log_level, form=settings.log_format)

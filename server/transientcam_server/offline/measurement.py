@@ -1,0 +1,273 @@
+"""Reconstruction of a measurement in a file: the daemon's arithmetic without a camera.
+
+Three kinds of ``.npz`` are understood: ``moments`` with ``base_frequency_hz``; photons in
+``counts`` (n_bins,) or ``meas`` (H, W, n_bins) with ``bin_s``; a transient cube ``h`` (H, W, T)
+with ``start_opl_m`` and ``bin_opl_m``, its time axis an optical path length.
+"""
+
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.lib.npyio import NpzFile
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam_server.errors.exceptions import InputError
+from transientcam_server.settings import ReconstructionSettings
+
+_Array = NDArray[Any]
+
+DEFAULT_FREQUENCY_HZ: Final = 23e6
+DEFAULT_HARMONICS: Final = 4
+MAX_HARMONICS: Final = 32
+BLOCK_PIXELS: Final = 8192
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measurement:
+    """Moments of a scene, complex64 or complex128 (m+1, H, W), and the frequency they belong to."""
+
+    moments: _Array
+    base_frequency_hz: float
+
+    @property
+    def harmonics(self) -> int:
+        """The order m."""
+        return int(self.moments.shape[0]) - 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reconstruction:
+    """What `reconstruct` finds; the fields are the arrays of the file it is written to.
+
+    Attributes
+    ----------
+    time_s
+        (T,), from 0 to one period, the period excluded.
+    density
+        (T, H, W), in the unit of the moments per second.
+    cumulative
+        (T, H, W), light up to each time.
+    range_m
+        (H, W), of the first return; NaN without one.
+    direct, indirect, uniform
+        (H, W), weight of the first return, of the later ones, and spread evenly over all times.
+    flags
+        (H, W), `transientcam_moments.Flags`.
+    """
+
+    time_s: _Array
+    density: _Array
+    cumulative: _Array
+    range_m: _Array
+    direct: _Array
+    indirect: _Array
+    uniform: _Array
+    flags: _Array
+
+
+def load(
+    path: Path,
+    *,
+    frequency_hz: float | None = None,
+    harmonics: int | None = None,
+    background: Literal["none", "median"] = "none",
+) -> Measurement:
+    """Return the moments that a file holds or that follow from its impulse responses.
+
+    Parameters
+    ----------
+    frequency_hz, harmonics
+        For impulse responses, the modulation to measure them with (23 MHz, 4); for moments, which
+        have their own, at most as many harmonics as there are.
+    background
+        ``median`` subtracts each pixel's median from counts: photons that came at any time.
+
+    Raises
+    ------
+    InputError
+        Naming the file, the key, what it is and what it must be.
+    OSError
+        If the file cannot be read.
+    """
+    arrays = _read(path)
+    if "moments" in arrays:
+        return _of_moments(path, arrays, frequency_hz, harmonics)
+    if frequency_hz is not None and not (np.isfinite(frequency_hz) and frequency_hz > 0.0):
+        raise InputError("--frequency-hz", "value", f"{frequency_hz}", "a positive number")
+    if harmonics is not None and not 1 <= harmonics <= MAX_HARMONICS:
+        raise InputError("--harmonics", "value", f"{harmonics}", f"from 1 to {MAX_HARMONICS}")
+    f_hz, m = frequency_hz or DEFAULT_FREQUENCY_HZ, harmonics or DEFAULT_HARMONICS
+    if "counts" in arrays or "meas" in arrays:
+        time_s, response = _of_counts(path, arrays, background=background)
+    elif "h" in arrays:
+        time_s, response = _of_cube(path, arrays)
+    else:
+        found = ", ".join(sorted(arrays)) or "nothing"
+        raise InputError(str(path), "content", found, "moments, counts, meas or h")
+    return Measurement(moments_of(response, time_s, frequency_hz=f_hz, harmonics=m), f_hz)
+
+
+def moments_of(response: _Array, time_s: _Array, *, frequency_hz: float, harmonics: int) -> _Array:
+    """Return the moments complex128 (m+1, H, W) of impulse responses (H, W, T).
+
+    ``b_j = sum_k h_k exp(2 pi i j f t_k)``, the definition of Sec. 4 for a sum of impulses.
+    """
+    orders = np.arange(harmonics + 1)
+    kernel = np.exp(2j * np.pi * frequency_hz * np.outer(time_s, orders))
+    # row by row, so that a large half-precision cube is never held a second time in full
+    rows = [np.asarray(row, dtype=np.float64) @ kernel for row in response]
+    return np.ascontiguousarray(np.moveaxis(np.stack(rows), -1, 0))
+
+
+def reconstruct(
+    measurement: Measurement,
+    *,
+    bins: int,
+    settings: ReconstructionSettings,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Reconstruction:
+    """Reconstruct every pixel, in blocks of pixels; ``progress`` is told how many are done."""
+    rad_s = 2.0 * np.pi * measurement.base_frequency_hz
+    time_s = 2.0 * np.pi * np.arange(bins) / (bins * rad_s)
+    chosen = settings.for_moments(base_frequency_hz=measurement.base_frequency_hz)
+    # smoothing needs neighbours, so it comes before the pixels are taken apart
+    smoothed = tm.Reconstruction(measurement.moments, chosen).smoothed
+    height, width = smoothed.shape[1:]
+    flat = smoothed.reshape(smoothed.shape[0], -1)
+    pixels = flat.shape[1]
+    real = np.float32 if flat.dtype == np.complex64 else np.float64
+    density, cumulative = (np.empty((bins, pixels), dtype=real) for _ in range(2))
+    images: dict[str, _Array] = {name: np.empty(pixels, dtype=real) for name in _IMAGES}
+    images["flags"] = np.empty(pixels, dtype=np.uint8)
+    for block in _blocks(pixels, bins):
+        found = tm.Reconstruction(flat[:, block], chosen)
+        density[:, block] = rad_s * tm.density(found.coefficients, rad_s * time_s)
+        cumulative[:, block] = tm.cumulative(found.coefficients, rad_s * time_s)
+        for name, image in images.items():
+            image[block] = getattr(found, name)
+        progress(block.stop, pixels)
+    shape = (height, width)
+    return Reconstruction(
+        time_s=time_s,
+        density=density.reshape(bins, *shape),
+        cumulative=cumulative.reshape(bins, *shape),
+        **{name: image.reshape(shape) for name, image in images.items()},
+    )
+
+
+def save(path: Path, result: Reconstruction) -> None:
+    """Write a reconstruction as ``.npz``, whole or not at all."""
+    part = path.with_name(path.name + ".part")
+    try:
+        with part.open("wb") as file:
+            np.savez(file, **{name: getattr(result, name) for name in Reconstruction.__slots__})
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+_IMAGES = ("range_m", "direct", "indirect", "uniform")
+
+
+def _blocks(pixels: int, bins: int) -> Iterator[slice]:
+    """Yield slices of pixels, few enough that a block's density stays small."""
+    step = max(1, min(BLOCK_PIXELS, BLOCK_PIXELS * 64 // bins))
+    for start in range(0, pixels, step):
+        yield slice(start, min(start + step, pixels))
+
+
+def _read(path: Path) -> dict[str, _Array]:
+    try:
+        # no pickle: a measurement from elsewhere must not be able to run anything
+        with path.open("rb") as opened:
+            file = np.load(opened, allow_pickle=False)
+            if not isinstance(file, NpzFile):
+                raise InputError(str(path), "content", "a single array", "an .npz of named arrays")
+            with file:
+                return {name: file[name] for name in file}
+    except (zipfile.BadZipFile, ValueError, EOFError) as error:
+        raise InputError(str(path), "content", f"unreadable ({error})", "an .npz of arrays") from (
+            error
+        )
+
+
+def _of_moments(
+    path: Path, arrays: Mapping[str, _Array], frequency_hz: float | None, harmonics: int | None
+) -> Measurement:
+    moments = arrays["moments"]
+    if moments.ndim == 1:
+        moments = moments[:, np.newaxis, np.newaxis]
+    if moments.ndim != 3 or not 2 <= moments.shape[0] <= MAX_HARMONICS + 1 or not moments.size:
+        raise InputError(
+            str(path), "moments", f"of shape {arrays['moments'].shape}", "(m+1, H, W), m = 1 to 32"
+        )
+    if moments.dtype.kind not in "cfiu":
+        raise InputError(str(path), "moments", f"{moments.dtype}", "complex numbers")
+    f_hz = _scalar(path, arrays, "base_frequency_hz")
+    if frequency_hz is not None and frequency_hz != f_hz:
+        raise InputError(
+            "--frequency-hz", "value", f"{frequency_hz:g}", f"the {f_hz:g} of these moments"
+        )
+    m = moments.shape[0] - 1
+    if harmonics is not None and not 1 <= harmonics <= m:
+        raise InputError("--harmonics", "value", f"{harmonics}", f"from 1 to {m}, as in {path}")
+    moments = moments[: (harmonics or m) + 1]
+    dtype = np.complex64 if moments.dtype == np.complex64 else np.complex128
+    moments = np.ascontiguousarray(moments, dtype=dtype)
+    _some_finite(path, "moments", moments)
+    return Measurement(moments, f_hz)
+
+
+def _of_counts(
+    path: Path, arrays: Mapping[str, _Array], *, background: str
+) -> tuple[_Array, _Array]:
+    key = "counts" if "counts" in arrays else "meas"
+    counts = arrays[key]
+    if counts.ndim not in (1, 3) or counts.shape[-1] < 2 or not counts.size:
+        raise InputError(str(path), key, f"of shape {counts.shape}", "(n_bins,) or (H, W, n_bins)")
+    if counts.dtype.kind not in "fiu":
+        raise InputError(str(path), key, f"{counts.dtype}", "numbers")
+    if counts.ndim == 1:
+        counts = counts[np.newaxis, np.newaxis]
+    counts = counts.astype(np.float64)
+    bin_s = _scalar(path, arrays, "bin_s")
+    _some_finite(path, key, counts.sum(axis=-1)[np.newaxis])
+    if background == "median":
+        # fewer photons than the background are noise of it, not negative light
+        counts = np.maximum(counts - np.median(counts, axis=-1, keepdims=True), 0.0)
+    return np.arange(counts.shape[-1]) * bin_s, counts
+
+
+def _of_cube(path: Path, arrays: Mapping[str, _Array]) -> tuple[_Array, _Array]:
+    h = arrays["h"]
+    if h.ndim != 3 or not h.size or h.dtype.kind not in "fiu":
+        found = f"{h.dtype} of shape {h.shape}"
+        raise InputError(str(path), "h", found, "numbers of shape (H, W, T)")
+    start_m = _scalar(path, arrays, "start_opl_m", positive=False)
+    bin_m = _scalar(path, arrays, "bin_opl_m")
+    _some_finite(path, "h", h.sum(axis=-1, dtype=np.float64)[np.newaxis])
+    return (start_m + np.arange(h.shape[-1]) * bin_m) / tm.SPEED_OF_LIGHT_M_S, h
+
+
+def _scalar(path: Path, arrays: Mapping[str, _Array], key: str, *, positive: bool = True) -> float:
+    expected = "a positive number" if positive else "a finite number"
+    if key not in arrays:
+        raise InputError(str(path), key, "missing", expected)
+    array = arrays[key]
+    if array.size != 1 or array.dtype.kind not in "fiu":
+        raise InputError(str(path), key, f"{array.dtype} of shape {array.shape}", expected)
+    value = float(array.reshape(()))
+    if not np.isfinite(value) or (positive and value <= 0.0):
+        raise InputError(str(path), key, f"{value}", expected)
+    return value
+
+
+def _some_finite(path: Path, key: str, planes: _Array) -> None:
+    """Refuse an array without a single usable pixel; unusable ones beside others are flagged."""
+    if not np.isfinite(planes).all(axis=0).any():
+        raise InputError(str(path), key, "NaN or infinite in every pixel", "finite somewhere")

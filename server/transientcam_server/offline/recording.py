@@ -1,0 +1,187 @@
+"""Products of every frame of a recording, into a file that an interruption does not spoil.
+
+What is done stays: run again, it goes on after the last frame that is in the file.
+"""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver import RawFrame
+from transientcam_server.errors.exceptions import InputError
+from transientcam_server.imaging.products import PRODUCTS, STAGES, Product, View
+from transientcam_server.imaging.recipe import Reconstruction
+from transientcam_server.recording import hdf5, swmr
+from transientcam_server.recording.reader import Recording
+from transientcam_server.recording.recipe import recorded_recipe
+from transientcam_server.recording.writer import synchronise_directory
+from transientcam_server.settings import ReconstructionSettings
+
+DEFAULT_PRODUCTS: Final = ("range", "direct", "indirect", "brightness", "validity", "flags")
+KNOWN_PRODUCTS: Final = tuple(
+    name for name, product in PRODUCTS.items() if name not in ("raw", "truth")
+)
+_SERIES: Final = ("device_time_s", "host_time_s", "frame")
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What to compute, and how; ``bins`` times of flight for products over time."""
+
+    products: tuple[str, ...] = DEFAULT_PRODUCTS
+    settings: ReconstructionSettings = field(default_factory=ReconstructionSettings)
+    bins: int = 256
+
+
+class Reconstructor:
+    """Computes products of frames, each stage once a frame."""
+
+    def __init__(self, recording: Recording, wanted: Wanted) -> None:
+        capabilities = recording.header.capabilities
+        self._recipe = recorded_recipe(recording.header, Reconstruction(1, wanted.settings))
+        self._size = capabilities.height, capabilities.width
+        self.products = [PRODUCTS[name] for name in wanted.products]
+        self.time_s = np.arange(wanted.bins) / (wanted.bins * self._recipe.base_frequency_hz)
+
+    def shape(self, product: Product) -> tuple[int, ...]:
+        """Shape of a product of one frame."""
+        return product.shape(self._recipe.applied, *self._size, times=len(self.time_s))
+
+    def compute(self, raw: RawFrame) -> dict[str, NDArray[Any]]:
+        """Return the products of a frame by name."""
+        stages: dict[str, Any] = {"raw": raw}
+
+        def stage(name: str) -> Any:
+            if name not in stages:
+                needs = [stage(each) for each in STAGES[name].needs]
+                stages[name] = STAGES[name].compute(self._recipe, *needs)
+            return stages[name]
+
+        results = {}
+        for product in self.products:
+            view = (View(tuple(self.time_s)),) if product.over_time else ()
+            needs = [stage(each) for each in product.needs]
+            results[product.name] = product.compute(self._recipe, *view, *needs)
+        return results
+
+
+def reconstruct(
+    recording: Recording,
+    output: Path,
+    wanted: Wanted,
+    *,
+    progress: Progress = lambda done, total: None,
+) -> int:
+    """Compute products of all frames into ``output``; return how many were there already.
+
+    Until it is whole it is called ``<output>.part``.
+
+    Raises
+    ------
+    InputError
+        If what was begun was another recording, or with other settings.
+    DamagedFrame
+        If a frame is not what was recorded; those before it stay done.
+    FileExistsError
+        If the output is there already.
+    OSError
+        If the disk does not take it.
+    """
+    if output.exists():
+        raise FileExistsError(17, "it is there already", str(output))
+    reconstructor = Reconstructor(recording, wanted)
+    part = output.with_name(output.name + ".part")
+    document = _document(recording, wanted)
+    if part.exists():
+        file = _resumed(part, document)
+    else:
+        file = hdf5.open_file(part, "x", libver=swmr.LIBVER)
+        _lay_out(file, recording, reconstructor, document)
+    rows = swmr.Appender(file, list(wanted.products), list(_SERIES))
+    done = rows.rows
+    try:
+        for index in range(done, recording.frames):
+            progress(index, recording.frames)
+            raw = recording.frame(index)
+            series = {
+                "device_time_s": raw.device_time_s,
+                "host_time_s": raw.host_time_s,
+                "frame": raw.number,
+            }
+            rows.append(reconstructor.compute(raw), series)
+        progress(recording.frames, recording.frames)
+    finally:
+        rows.close()
+    part.rename(output)
+    synchronise_directory(output.parent)
+    return done
+
+
+def _document(recording: Recording, wanted: Wanted) -> dict[str, str]:
+    """Return what has to agree for a file to be gone on with."""
+    header = recording.header
+    return {
+        "format": "transientcam products",
+        "recording_id": header.recording_id,
+        "title": header.name,
+        "Conventions": "CF-1.11",
+        "sequence": json.dumps(header.applied.to_document()),
+        "reconstruction": json.dumps(wanted.settings.model_dump(), sort_keys=True),
+        "calibration": json.dumps(dict(header.calibration)),
+        "products": json.dumps([*wanted.products, wanted.bins]),
+    }
+
+
+def _lay_out(
+    file: hdf5.File, recording: Recording, reconstructor: Reconstructor, document: Mapping[str, str]
+) -> None:
+    file.attrs.update(document)
+    file.attrs["versions"] = json.dumps(dict(recording.header.versions))
+    swmr.create_series(file, "device_time_s", "<f8", units="s")
+    swmr.create_series(file, "host_time_s", "<f8", units="s")
+    swmr.create_series(file, "frame", "<u8")
+    file["frame"].make_scale("frame")
+    for name in ("device_time_s", "host_time_s"):
+        file[name].dims[0].attach_scale(file["frame"])
+    for product in reconstructor.products:
+        description, shape = product.description, reconstructor.shape(product)
+        blocks = swmr.create_blocks(
+            file, product.name, shape, description.dtype, units=description.unit
+        )
+        blocks.attrs["long_name"] = description.summary
+        axes = ("frame", *description.axes)
+        for axis, (name, size) in enumerate(zip(axes, (0, *shape), strict=True)):
+            if name not in file:
+                values = reconstructor.time_s if name == "time" else np.arange(size)
+                file.create_dataset(name, data=values).make_scale(name)
+            blocks.dims[axis].attach_scale(file[name])
+
+
+def _resumed(part: Path, document: Mapping[str, str]) -> hdf5.File:
+    """Return the file that was begun, made whole first."""
+    scratch = part.with_name(part.name + ".resuming")
+    try:
+        with hdf5.open_file(part, "r", libver="latest", swmr=True) as begun:
+            _require_same(part, begun.attrs, document)
+            products: Sequence[str] = json.loads(document["products"])[:-1]
+            rows = min(len(begun[name]) for name in (*products, *_SERIES))
+            swmr.salvage(begun, scratch, rows, row_axis="frame")
+        scratch.rename(part)
+    except (KeyError, RuntimeError) as error:
+        raise InputError(str(part), "its content", swmr.in_words(error), "products") from error
+    finally:
+        scratch.unlink(missing_ok=True)
+    return hdf5.open_file(part, "r+", libver=swmr.LIBVER)
+
+
+def _require_same(part: Path, begun: Mapping[str, Any], document: Mapping[str, str]) -> None:
+    for key, value in document.items():
+        if begun.get(key) != value:
+            expected = f"{value} to go on with; delete the file to begin anew"
+            raise InputError(str(part), key, str(begun.get(key)), expected)

@@ -1,0 +1,88 @@
+"""The Pareto front of the scene before the camera, remembered for a while."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from transientcam_driver import AppliedSequence
+from transientcam_server.imaging.frame import Frame
+from transientcam_server.imaging.pipeline import Pipeline
+from transientcam_server.planning import Choice, Goal
+from transientcam_server.planning.planner import Accuracy, range_error
+
+REMEMBERED_S: Final = 10.0
+_WIDE_BOUNDS: Final = 1e9  # a target that anything reaches: it only has the bounds predicted
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    made_with: tuple[int, int]
+    frame: int
+    until_s: float
+    choices: list[Choice]
+
+
+class Fronts:
+    """Predicts what the scene's frames could cost; on the event loop, computing on workers."""
+
+    def __init__(
+        self,
+        accuracy: Accuracy,
+        pipeline: Pipeline,
+        *,
+        simulated: bool,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._accuracy = accuracy
+        self._pipeline = pipeline
+        self._simulated = simulated
+        self._clock = clock
+        self._known: dict[str, _Known] = {}
+        self._asking = asyncio.Lock()
+
+    async def of(self, frame: Frame, by: str) -> dict[str, Any]:
+        """Return the front and the frame's own place, as JSON has them."""
+        async with self._asking:
+            known = self._known.get(by)
+            made_with = frame.raw.epoch, frame.recipe.reconstruction_id
+            if known is None or known.made_with != made_with or self._clock() > known.until_s:
+                choices = await self._predicted(frame, by)
+                known = _Known(made_with, frame.number, self._clock() + REMEMBERED_S, choices)
+                self._known[by] = known
+        return {
+            "compared_by": by,
+            "scene_of_frame": known.frame,
+            "current": await self._current(frame),
+            "front": [choice.to_document() for choice in known.choices],
+        }
+
+    def forget(self) -> None:
+        """Predict anew when asked next: the scene is another one."""
+        self._known.clear()
+
+    async def _predicted(self, frame: Frame, by: str) -> list[Choice]:
+        found = await frame.stage("returns")
+        scene, _ = await self._pipeline.run(self._accuracy.statistic, frame.recipe, found, 0.0)
+        goal = Goal(
+            base=frame.recipe.applied.sequence,
+            bound_width=_WIDE_BOUNDS if by == "bound_width" else None,
+        )
+        choices, _ = await self._pipeline.run_long(self._accuracy.front, goal, scene)
+        return choices
+
+    async def _current(self, frame: Frame) -> dict[str, Any]:
+        found = await frame.stage("returns")
+        applied: AppliedSequence = frame.recipe.applied
+        error = None
+        if self._simulated:
+            truth = await frame.stage("truth")
+            error, _ = await self._pipeline.run(range_error, found, truth)
+        return {
+            "meta": frame.meta(),
+            "sequence": applied.sequence.to_document(),
+            "capture_s": applied.capture_s,
+            "frame_rate_hz": applied.frame_rate_hz,
+            "range_error_m": error,
+        }

@@ -1,0 +1,123 @@
+import asyncio
+import re
+from pathlib import Path
+
+import httpx
+import pytest
+from fastapi import FastAPI
+
+from tests.server.contract import check_answer
+from transientcam_server.api import problems
+from transientcam_server.api.docs import pages
+from transientcam_server.errors.kinds import KINDS
+
+
+@pytest.mark.parametrize("slug", sorted(KINDS))
+def test_every_kind_of_problem_has_a_page(steady: httpx.Client, slug: str) -> None:
+    response = steady.get(f"/problems/{slug}")
+
+    assert response.status_code == 200
+    assert KINDS[slug].title in response.text
+    assert slug in steady.get("/problems").text
+
+
+def test_the_documentation_needs_no_other_host(http: httpx.Client) -> None:
+    page = http.get("/docs").text
+
+    assert "//" not in re.sub(r"<!--.*?-->", "", page)
+    scripts = re.findall(r'(?:src|href)="(/[^"]+)"', page)
+    assert len(scripts) == 4
+    for path in scripts:
+        assert http.get(path).status_code == 200
+
+
+@pytest.mark.parametrize("path", ["/docs/redoc.standalone.js", "/docs/..%2fcore.py", "/docs/x"])
+def test_only_the_files_of_the_documentation_are_served(steady: httpx.Client, path: str) -> None:
+    assert steady.get(path).status_code == 404
+
+
+@pytest.mark.parametrize("method", ["GET", "HEAD", "PUT", "POST", "DELETE"])
+@pytest.mark.parametrize("path", ["/api/v1/nothing", "/api/nothing", "/api", "/nothing", "/a/b"])
+def test_an_unknown_path_is_a_problem_and_never_the_page(
+    steady: httpx.Client, method: str, path: str
+) -> None:
+    response = steady.request(method, path, headers={"Accept": "text/html"})
+
+    assert response.status_code == 404
+    assert response.headers["content-type"] == "application/problem+json"
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "allowed"),
+    [
+        ("DELETE", "/api/v1/sequence", "PUT"),
+        ("GET", "/api/v1/sequence/validate", "POST"),
+        ("POST", "/api/v1/frames/latest/range", "GET"),
+        ("PATCH", "/livez", "GET"),
+    ],
+)
+def test_a_method_that_does_not_apply_is_refused_with_those_that_do(
+    steady: httpx.Client, method: str, path: str, allowed: str
+) -> None:
+    response = steady.request(method, path)
+
+    assert response.status_code == 405
+    assert allowed in response.headers["allow"]
+
+
+def _app(static: Path, monkeypatch: pytest.MonkeyPatch) -> FastAPI:
+    monkeypatch.setattr(pages, "STATIC", static)
+    app = FastAPI(docs_url=None)
+
+    @app.get("/api/v1/known")
+    async def known() -> dict[str, bool]:
+        return {"known": True}
+
+    pages.add_dashboard(app)
+    problems.install(app)
+    return app
+
+
+def _get(app: FastAPI, path: str, method: str = "GET") -> httpx.Response:
+    async def request() -> httpx.Response:
+        transport = httpx.ASGITransport(app)
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
+            return await client.request(method, path, headers={"Accept": "text/html"})
+
+    return asyncio.run(request())
+
+
+def test_without_a_built_dashboard_a_page_says_how_to_build_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    response = _get(_app(tmp_path / "absent", monkeypatch), "/")
+
+    assert response.status_code == 200
+    assert "Node.js" in response.text
+
+
+def test_a_built_dashboard_is_served_beside_the_interface(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "assets").mkdir()
+    (tmp_path / "index.html").write_text("<p>dashboard</p>")
+    (tmp_path / "assets" / "a.js").write_text("1;")
+    app = _app(tmp_path, monkeypatch)
+
+    assert _get(app, "/").text == "<p>dashboard</p>"
+    assert _get(app, "/assets/a.js").text == "1;"
+    assert _get(app, "/api/v1/known").json() == {"known": True}
+
+
+@pytest.mark.parametrize("path", ["/api/v1/nothing", "/assets/b.js", "/somewhere", "/%2e%2e/x"])
+def test_beside_a_built_dashboard_an_unknown_path_is_a_problem_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: str
+) -> None:
+    (tmp_path / "index.html").write_text("<p>dashboard</p>")
+    app = _app(tmp_path, monkeypatch)
+
+    for method in ("GET", "POST"):
+        response = _get(app, path, method)
+        assert response.status_code == 404
+        check_answer(app.openapi(), response)
+    assert _get(app, "/api/v1/known", "POST").status_code == 405

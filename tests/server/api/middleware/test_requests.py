@@ -1,0 +1,107 @@
+import logging
+
+import httpx
+import pytest
+
+from tests.serving import Served
+from transientcam_server.api.middleware.requests import REQUEST_ID_HEADER
+from transientcam_server.api.middleware.security import SECURITY_HEADERS
+
+
+def test_a_request_keeps_the_id_it_comes_with(http: httpx.Client) -> None:
+    answer = http.get("/api/v1/nothing", headers={REQUEST_ID_HEADER: "trace-7/a.b"})
+
+    assert answer.headers[REQUEST_ID_HEADER] == "trace-7/a.b"
+    assert answer.json()["request_id"] == "trace-7/a.b"
+
+
+@pytest.mark.parametrize("sent", [None, "", "two words", "x" * 129, 'a"b', "a,b"])
+def test_without_one_that_may_stand_in_a_log_it_gets_one(
+    http: httpx.Client, sent: str | None
+) -> None:
+    headers = {} if sent is None else {REQUEST_ID_HEADER: sent}
+
+    answers = [http.get("/livez", headers=headers) for _ in range(2)]
+
+    given = [answer.headers[REQUEST_ID_HEADER] for answer in answers]
+    assert given[0] != given[1]
+    assert sent not in given
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/livez",
+        "/api/v1/info",
+        "/api/v1/sequence",
+        "/api/v1/frames/latest",
+        "/api/v1/frames/latest/flags.npy",
+        "/api/v1/frames/latest/nothing",
+        "/nothing",
+        "/docs",
+    ],
+)
+def test_head_tells_what_get_would_without_a_body(http: httpx.Client, path: str) -> None:
+    http.put("/api/v1/acquisition", json={"running": False})  # both are about the same frame
+    try:
+        get, head = http.get(path), http.head(path)
+    finally:
+        http.put("/api/v1/acquisition", json={"running": True})
+
+    assert head.status_code == get.status_code
+    assert head.content == b""
+    assert head.headers["content-type"] == get.headers["content-type"]
+    assert "content-length" in head.headers
+
+
+def test_head_of_what_has_no_get_is_not_allowed(http: httpx.Client) -> None:
+    answer = http.head("/api/v1/acquisition/safe-off")
+
+    assert (answer.status_code, answer.headers["allow"]) == (405, "POST")
+    assert "HEAD" in http.delete("/api/v1/sequence").headers["allow"].split(", ")
+
+
+def test_a_failure_is_answered_counted_and_logged_with_its_id(
+    served: Served,
+    http: httpx.Client,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    def fail() -> None:
+        raise ZeroDivisionError("secret")
+
+    monkeypatch.setattr(served.service, "not_ready", fail)
+
+    # it is not documented, because it is a mistake of the service
+    with httpx.Client(base_url=served.url) as client:
+        answer = client.get("/readyz", headers={REQUEST_ID_HEADER: "abc"})
+
+    assert answer.status_code == 500
+    assert answer.json()["type"] == "/problems/internal-error"
+    assert answer.json()["request_id"] == answer.headers[REQUEST_ID_HEADER] == "abc"
+    assert "secret" not in answer.text
+    for name, value in SECURITY_HEADERS.items():
+        assert answer.headers[name] == value
+    (record,) = [each for each in caplog.records if each.exc_info]
+    assert "/readyz" in record.getMessage()
+    assert http.get("/livez").status_code == 200
+    text = http.get("/metrics").text
+    assert 'transientcam_http_requests_total{status="5xx"} 1.0' in text
+
+
+def test_changes_are_logged_without_their_query(
+    http: httpx.Client, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.INFO):
+        http.put("/api/v1/acquisition?token=secret", json={"running": True})
+        http.get("/api/v1/acquisition?token=secret")
+
+    ours = [
+        each
+        for each in caplog.records
+        if each.name == "transientcam_server.api.middleware.requests"
+    ]
+    (record,) = ours
+    assert record.getMessage() == "PUT /api/v1/acquisition: 200, for anybody"
+    assert record.levelname == "INFO"
+    assert all("secret" not in each.getMessage() for each in caplog.records if each in ours)

@@ -1,0 +1,122 @@
+"""Planning over REST: recommendations, refusals, and the front of the scene that is seen."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.server.contract import hold_to_contract
+from tests.serving import Served, serving
+from transientcam_server.planning import candidates
+
+FIXED = {"base_frequency_hz": 23e6, "harmonics": 3}
+SCENE = {"brightness_dn_per_s": 8e5, "returns": [{"range_m": 1.5}, {"range_m": 3.0, "weight": 0.5}]}
+
+
+@pytest.fixture(scope="module")
+def noisy_daemon() -> Iterator[Served]:
+    with serving("sim:mirrors?seed=2") as daemon:
+        daemon.start_all_workers()
+        yield daemon
+
+
+@pytest.fixture(scope="module")
+def noisy(noisy_daemon: Served) -> Iterator[httpx.Client]:
+    with httpx.Client(base_url=noisy_daemon.url, timeout=60.0) as client:
+        hold_to_contract(client, noisy_daemon.app.openapi())
+        client.get("/api/v1/frames/latest", params={"wait_s": 10.0})
+        yield client
+
+
+def ask(client: httpx.Client, **request: Any) -> httpx.Response:
+    return client.post("/api/v1/plan", json={"fixed": FIXED, **request})
+
+
+def test_a_plan_for_the_scene_before_the_camera_is_a_sequence_it_takes(noisy: httpx.Client) -> None:
+    answer = ask(noisy, target={"range_std_m": 0.005}).json()
+
+    assert answer["predicted"]["range_std_m"]["median"] <= 0.005
+    assert answer["sequence"]["harmonics"] == 3
+    checked = noisy.post("/api/v1/sequence/validate", json=answer["sequence"]).json()
+    assert checked["capture_s"] == pytest.approx(answer["capture_s"])
+    assert answer["half_time"]["error_factor"] > 1
+    assert answer["twice_accuracy"]["time_factor"] > 1
+
+
+def test_a_given_scene_needs_no_frame(noisy: httpx.Client) -> None:
+    answer = ask(noisy, budget={"capture_s": 0.2}, scene=SCENE).json()
+
+    assert answer["capture_s"] <= 0.2
+    assert answer["reconstruct_s"] > 0
+    assert answer["computing_share"] == pytest.approx(
+        answer["reconstruct_s"] * answer["frame_rate_hz"]
+    )
+
+
+def test_ambient_light_costs_accuracy(noisy: httpx.Client) -> None:
+    dark, lit = (
+        ask(noisy, budget={"capture_s": 0.1}, scene=SCENE | {"ambient_dn_per_s": ambient}).json()
+        for ambient in (0.0, 2e6)
+    )
+
+    errors = [each["predicted"]["range_std_m"]["median"] for each in (dark, lit)]
+    assert errors[1] > 1.3 * errors[0]
+
+
+def test_an_impossible_target_is_refused_with_the_best_achievable(noisy: httpx.Client) -> None:
+    response = ask(noisy, target={"range_std_m": 1e-7}, scene=SCENE)
+
+    problem = response.json()
+    assert response.status_code == 422
+    assert problem["type"] == "/problems/target-unreachable"
+    assert problem["field"] == "range_std_m"
+    assert problem["limit"] > 1e-7
+    assert noisy.post("/api/v1/sequence/validate", json=problem["best"]["sequence"]).is_success
+
+
+@pytest.mark.parametrize(
+    ("request_body", "field"),
+    [
+        ({}, "target"),
+        ({"target": {"range_std_m": -1}}, "target.range_std_m"),
+        ({"target": {"range": 1}}, "target.range"),
+        ({"budget": {"frame_rate_hz": "fast"}}, "budget.frame_rate_hz"),
+        ({"fixed": {"harmonics": 99}, "budget": {"capture_s": 1}}, "harmonics"),
+        ({"scene": {"brightness_dn_per_s": 0}, "budget": {"capture_s": 1}}, None),
+    ],
+)
+def test_a_request_that_cannot_be_meant_is_refused_by_name(
+    noisy: httpx.Client, request_body: dict[str, Any], field: str | None
+) -> None:
+    response = noisy.post("/api/v1/plan", json=request_body)
+
+    assert response.status_code == 422
+    if field is not None:
+        assert response.json()["field"] == field
+
+
+def test_the_front_falls_and_the_current_frame_says_where_it_stands(
+    noisy: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(candidates, "HARMONICS", (3,))
+
+    answer = noisy.get("/api/v1/tradeoff").json()
+
+    times_s = [each["capture_s"] for each in answer["front"]]
+    errors_m = [each["predicted"]["range_std_m"]["median"] for each in answer["front"]]
+    assert len(times_s) > 3
+    assert times_s == sorted(times_s)
+    assert errors_m == sorted(errors_m, reverse=True)
+    current = answer["current"]
+    assert 0 < current["range_error_m"]["median"] < 0.05
+    # noise is most of what the median pixel is off by
+    assert current["meta"]["predicted_range_std_m"]["median"] == pytest.approx(
+        current["range_error_m"]["median"] / 0.6745, rel=0.5
+    )
+
+
+def test_a_frames_metadata_predict_its_range(noisy: httpx.Client) -> None:
+    meta = noisy.get("/api/v1/frames/latest/range.npy").headers["transientcam-meta"]
+
+    assert '"predicted_range_std_m":{"median":0.0' in meta

@@ -1,0 +1,370 @@
+"""The acquisition's thread against a camera that does as it is told."""
+
+import queue
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from transientcam_driver import (
+    AppliedSequence,
+    Camera,
+    CameraFault,
+    CameraLost,
+    CameraNotFound,
+    FrameTimeout,
+    RawFrame,
+    Sequence,
+    SequenceError,
+)
+from transientcam_server.camera.acquisition import STALLED_MIN_S, Acquisition
+from transientcam_server.camera.events import Back, Captured, Event, Lost, SequenceChanged
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import JobCancelled, Problem
+
+PATIENCE_S = 60.0
+APPLIED = AppliedSequence(
+    sequence=Sequence(),
+    epoch=1,
+    images=16,
+    capture_s=0.09,
+    frame_rate_hz=10.6,
+    unambiguous_range_m=6.5,
+    data_rate_bytes_s=6e6,
+    low_frequency_hz=0.9e6,
+)
+
+
+class ScriptedCamera:
+    """Delivers and fails in the order it is told; says nothing in between."""
+
+    def __init__(self) -> None:
+        self.applied = APPLIED
+        self.script: queue.SimpleQueue[RawFrame | Exception] = queue.SimpleQueue()
+        self.absent: list[Exception] = []
+        self.calls: list[str] = []
+        self.gone = False
+
+    def deliver(self, number: int, *, epoch: int = 1) -> None:
+        self.script.put(cast("RawFrame", SimpleNamespace(number=number, epoch=epoch)))
+
+    def read_frame(self, *, timeout_s: float) -> RawFrame:
+        try:
+            item = self.script.get(timeout=0.01)
+        except queue.Empty:
+            raise FrameTimeout(timeout_s) from None
+        if isinstance(item, Exception):
+            self.gone = isinstance(item, CameraLost)
+            raise item
+        return item
+
+    def configure(self, sequence: Sequence) -> AppliedSequence:
+        if sequence.harmonics > 30:
+            raise SequenceError("harmonics", sequence.harmonics, "at most 30")
+        self.applied = replace(self.applied, sequence=sequence, epoch=self.applied.epoch + 1)
+        return self.applied
+
+    def start(self) -> None:
+        self.calls.append("start")
+
+    def stop(self) -> None:
+        self.calls.append("stop")
+
+    def safe_off(self) -> None:
+        self.calls.append("safe_off")
+
+    def status(self) -> str:
+        if self.gone:
+            raise CameraLost("it is disconnected")
+        return "fine"
+
+    def reconnect(self) -> None:
+        self.calls.append("reconnect")
+        if self.absent:
+            raise self.absent.pop(0)
+        self.gone = False
+
+
+class Running:
+    """An acquisition on a scripted camera, and what it reported."""
+
+    def __init__(self) -> None:
+        self.camera = ScriptedCamera()
+        self.events: queue.SimpleQueue[Event] = queue.SimpleQueue()
+        self.now_s = 0.0
+        self.acquisition = Acquisition(
+            cast("Camera", self.camera), report=self.events.put, clock=lambda: self.now_s
+        )
+
+    def event(self) -> Event:
+        return self.events.get(timeout=PATIENCE_S)
+
+
+@contextmanager
+def running() -> Iterator[Running]:
+    one = Running()
+    one.acquisition.start()
+    try:
+        yield one
+    finally:
+        one.acquisition.stop()
+
+
+def numbers(*events: Event) -> list[int]:
+    return [event.raw.number for event in events if isinstance(event, Captured)]
+
+
+def test_frames_are_reported_with_the_sequence_they_were_captured_with() -> None:
+    with running() as one:
+        one.camera.deliver(1)
+        first = one.event()
+        applied = one.acquisition.configure(Sequence(harmonics=4)).result(PATIENCE_S)
+        changed = one.event()
+        one.camera.deliver(2, epoch=applied.epoch)
+        second = one.event()
+
+    assert isinstance(first, Captured)
+    assert first.applied == APPLIED
+    assert changed == SequenceChanged(applied)
+    assert isinstance(second, Captured)
+    assert second.applied == applied
+
+
+def test_a_refused_command_is_answered_to_who_gave_it_and_changes_nothing() -> None:
+    with running() as one:
+        future = one.acquisition.configure(Sequence(harmonics=31))
+        with pytest.raises(SequenceError):
+            future.result(PATIENCE_S)
+        one.camera.deliver(1)
+
+        assert numbers(one.event()) == [1]
+
+
+def test_a_lost_camera_is_reported_once_looked_for_and_reported_back_with_its_first_frame() -> None:
+    with running() as one:
+        one.camera.absent = [CameraNotFound("SIM"), CameraNotFound("SIM")]
+        one.camera.script.put(CameraLost("unplugged"))
+        lost = one.event()
+        one.camera.deliver(7)
+        back, captured = one.event(), one.event()
+
+    assert isinstance(lost, Lost)
+    assert "unplugged" in lost.reason
+    assert isinstance(back, Back)
+    assert numbers(captured) == [7]
+    assert one.camera.calls.count("reconnect") == 3
+    # the light is on again only after the camera was found
+    assert one.camera.calls[-2:] == ["start", "safe_off"]
+
+
+def test_a_camera_that_fails_at_once_each_time_is_lost_all_along() -> None:
+    with running() as one:
+        for _ in range(3):
+            one.camera.script.put(CameraFault("the interlock was opened"))
+        lost = one.event()
+        one.camera.deliver(1)
+        back = one.event()
+
+    assert isinstance(lost, Lost)
+    assert isinstance(back, Back)
+
+
+def test_what_is_counted_anew_after_a_loss_is_reported_as_another_sequence() -> None:
+    with running() as one:
+        one.camera.script.put(CameraLost("unplugged"))
+        one.event()
+        one.camera.applied = replace(APPLIED, epoch=5)
+        one.camera.deliver(1, epoch=5)
+
+        assert one.event() == SequenceChanged(one.camera.applied)
+        assert isinstance(one.event(), Back)
+        assert numbers(one.event()) == [1]
+
+
+def test_stopping_stops_the_camera_and_starting_starts_it_again() -> None:
+    with running() as one:
+        one.camera.deliver(1)
+        one.event()
+        one.acquisition.set_running(False).result(PATIENCE_S)
+        assert one.acquisition.status().state == "stopped"
+        assert one.camera.calls == ["start", "stop"]
+
+        one.acquisition.set_running(True).result(PATIENCE_S)
+        one.camera.deliver(2)
+        assert numbers(one.event()) == [2]
+        assert one.acquisition.status().state == "streaming"
+
+    assert one.camera.calls == ["start", "stop", "start", "safe_off"]
+
+
+def test_a_loss_is_noticed_while_nothing_is_read() -> None:
+    with running() as one:
+        one.acquisition.set_running(False).result(PATIENCE_S)
+        one.camera.gone = True
+
+        assert isinstance(one.event(), Lost)
+        assert isinstance(one.event(), Back)
+
+
+def test_an_error_nobody_thought_of_does_not_end_the_acquisition() -> None:
+    with running() as one:
+        one.camera.script.put(ZeroDivisionError())
+        one.camera.deliver(1)
+
+        assert numbers(one.event()) == [1]
+
+
+def test_commands_are_run_on_the_one_thread_that_owns_the_camera() -> None:
+    with running() as one:
+        thread = one.acquisition.submit(threading.current_thread).result(PATIENCE_S)
+
+    assert thread.name == "acquisition"
+
+
+def test_a_command_that_was_taken_back_is_not_run() -> None:
+    ran: list[Any] = []
+    one = Running()
+    future = one.acquisition.submit(lambda: ran.append(1))
+    assert future.cancel()
+    one.acquisition.start()
+    one.acquisition.submit(lambda: None).result(PATIENCE_S)
+    one.acquisition.stop()
+
+    assert not ran
+
+
+# -- while something has the camera for itself ---------------------------------------------------
+
+
+def until(told: threading.Event, go_on: Callable[[], None]) -> None:
+    """Work that lasts until it is told to end, or broken off."""
+    while not told.wait(0.001):
+        go_on()
+
+
+def test_meanwhile_nothing_is_read_and_what_would_disturb_it_is_refused() -> None:
+    with running() as one:
+        begun, end = threading.Event(), threading.Event()
+
+        def work(camera: Any, go_on: Callable[[], None]) -> None:
+            begun.set()
+            until(end, go_on)
+
+        occupied = one.acquisition.occupy("job-1", work)
+        assert begun.wait(PATIENCE_S)
+        one.camera.deliver(1)
+        for disturb in (
+            lambda: one.acquisition.configure(Sequence()),
+            lambda: one.acquisition.set_running(True),
+            lambda: one.acquisition.occupy("job-2", lambda camera, go_on: None),
+        ):
+            with pytest.raises(Problem) as caught:
+                disturb()
+            assert caught.value.kind is kinds.CAMERA_BUSY
+            assert caught.value.extensions["job"] == "job-1"
+        assert one.acquisition.status().state == "calibrating"
+        status: Any = one.acquisition.device_status().result(PATIENCE_S)
+        assert status == "fine"
+        assert one.events.empty()
+        end.set()
+        occupied.result(PATIENCE_S)
+
+        assert numbers(one.event()) == [1]
+        assert one.acquisition.status().state == "streaming"
+
+
+@pytest.mark.parametrize("command", ["safe_off", "stop"])
+def test_switching_the_light_off_breaks_it_off(command: str) -> None:
+    with running() as one:
+        occupied = one.acquisition.occupy(
+            "job-1", lambda camera, go_on: until(threading.Event(), go_on)
+        )
+        if command == "safe_off":
+            one.acquisition.safe_off().result(PATIENCE_S)
+        else:
+            one.acquisition.set_running(False).result(PATIENCE_S)
+
+        with pytest.raises(JobCancelled):
+            occupied.result(PATIENCE_S)
+        assert one.acquisition.status().state == "stopped"
+
+
+def test_what_it_counted_anew_is_reported_and_frames_of_it_are_known() -> None:
+    with running() as one:
+        one.acquisition.occupy(
+            "job-1", lambda camera, go_on: camera.configure(APPLIED.sequence)
+        ).result(PATIENCE_S)
+        changed = one.event()
+        one.camera.deliver(1, epoch=2)
+
+        assert changed == SequenceChanged(one.camera.applied)
+        assert numbers(one.event()) == [1]
+
+
+def test_a_sequence_that_it_left_behind_is_put_back() -> None:
+    """As where the camera was lost meanwhile, and could not be told."""
+
+    def leave(camera: Any, go_on: Callable[[], None]) -> None:
+        camera.configure(Sequence(harmonics=7))
+        raise CameraLost("unplugged")
+
+    with running() as one:
+        with pytest.raises(CameraLost):
+            one.acquisition.occupy("job-1", leave).result(PATIENCE_S)
+        changed = one.event()
+
+    assert isinstance(changed, SequenceChanged)
+    assert changed.applied.sequence == APPLIED.sequence
+
+
+def test_one_that_was_taken_back_has_the_camera_no_more() -> None:
+    one = Running()
+    occupied = one.acquisition.occupy("job-1", lambda camera, go_on: None)
+    assert occupied.cancel()
+
+    one.acquisition.require_free()
+
+
+def test_the_rate_is_measured_over_the_last_frames() -> None:
+    with running() as one:
+        for number in range(1, 6):
+            one.now_s = number / 20.0
+            one.camera.deliver(number)
+            one.event()
+        status = one.acquisition.status()
+
+    assert status.frames == 5
+    assert status.rate_hz == pytest.approx(20.0)
+
+
+def test_silence_for_much_longer_than_a_frame_takes_is_a_stall() -> None:
+    with running() as one:
+        one.camera.deliver(1)
+        one.event()
+        one.now_s += STALLED_MIN_S - 0.1
+        early = one.acquisition.status()
+        one.now_s += 0.2
+        late = one.acquisition.status()
+        # a capture of ten seconds has all the time it needs
+        one.camera.applied = replace(APPLIED, frame_rate_hz=0.1)
+        patient = one.acquisition.status()
+
+    assert [each.stalled for each in (early, late, patient)] == [False, True, False]
+
+
+def test_the_camera_is_told_to_switch_off_at_the_end_even_when_it_is_gone() -> None:
+    one = Running()
+
+    def gone() -> None:
+        one.camera.calls.append("safe_off")
+        raise CameraLost("unplugged")
+
+    one.camera.safe_off = gone  # type: ignore[method-assign]  # the script's last line
+    one.acquisition.start()
+    one.acquisition.stop()
+
+    assert one.camera.calls[-1] == "safe_off"

@@ -1,0 +1,83 @@
+"""What the encodings of a stream write, read by the wire contract."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from transientcam import density, wire
+from transientcam.reflection import step_up
+from transientcam_driver import Sequence, open_camera
+from transientcam_server.imaging.encodings.compact import (
+    JUDGED_PHASES,
+    STREAM_ENCODINGS,
+    encoding_name,
+    measured_error,
+    travelling,
+)
+from transientcam_server.imaging.products import PRODUCTS
+
+_META: dict[str, Any] = {"frame": 1}
+
+
+def _planes(pixels: int) -> Any:
+    """Coefficients of random densities of three harmonics, as the product is."""
+    draw = np.random.default_rng(4)
+    reflection = draw.uniform(0.0, 0.97, (3, pixels)) * np.exp(
+        1j * draw.uniform(0.0, 2.0 * np.pi, (3, pixels))
+    )
+    return step_up(draw.uniform(1.0, 100.0, pixels), reflection).astype(np.float32)
+
+
+def test_every_encoding_of_the_contract_can_be_written_and_is_named_as_there() -> None:
+    assert set(STREAM_ENCODINGS) == set(wire.ENCODINGS)
+    assert [encoding_name(each) for each in STREAM_ENCODINGS.values()] == list(STREAM_ENCODINGS)
+
+
+@pytest.mark.parametrize("name", sorted(PRODUCTS))
+def test_the_channel_table_says_what_the_messages_of_each_encoding_hold(name: str) -> None:
+    product = PRODUCTS[name]
+    with open_camera("sim:wall") as camera:
+        applied = camera.configure(Sequence(harmonics=3))
+    if product.over_time:
+        return
+    shape = product.shape(applied, 4, 6)
+    array = (
+        _planes(24).reshape(7, 4, 6)
+        if name == "coefficients"
+        else np.ones(shape, product.description.dtype)
+    )
+    for chosen in product.description.encodings:
+        encoding = STREAM_ENCODINGS[chosen]
+        data = encoding.encode(product, array, _META, {}, 3)
+        travelled = wire.unpack(data, max_bytes=2**20)
+
+        dtype, lengths = travelling(product, encoding, shape)
+        assert (travelled["array"]["dtype"], travelled["array"]["shape"]) == (dtype, list(lengths))
+        frame = wire.parse_frame(data)
+        assert (frame.array.shape, frame.channel) == (shape, 3)
+
+
+def test_the_stated_error_is_the_largest_over_pixels_at_the_phases_judged() -> None:
+    planes = _planes(200)
+    coded = wire.encode_reflection16(planes)
+
+    median, most = measured_error(planes, coded)
+
+    phase_rad = np.arange(JUDGED_PHASES) * 2.0 * np.pi / JUDGED_PHASES
+    worst = []
+    brightness = np.frombuffer(coded.fields["brightness"]["data"], "<f4")
+    again = wire.decode_reflection16(coded.array, brightness)
+    for pixel in range(200):
+        exact = density(planes[:, pixel].astype(np.float64), phase_rad)
+        found = density(again[:, pixel].astype(np.float64), phase_rad)
+        worst.append(np.abs(found - exact).max() / exact.max())
+    assert most == pytest.approx(max(worst), rel=1e-3)
+    assert median == pytest.approx(np.median(worst), rel=1e-2)
+
+
+def test_a_frame_without_light_has_no_error() -> None:
+    planes = np.zeros((7, 5), np.float32)
+    planes[:, 2:] = np.nan
+
+    assert measured_error(planes, wire.encode_reflection16(planes)) == (0.0, 0.0)

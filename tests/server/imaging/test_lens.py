@@ -1,0 +1,93 @@
+"""Where the pixels look, and who says so."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+import pytest
+
+from transientcam_driver import open_camera
+from transientcam_driver.simulation.build import find_scene
+from transientcam_driver.simulation.light.paths import camera_rays
+from transientcam_server.imaging.lens import Intrinsics, known_intrinsics
+from transientcam_server.settings import LensSettings
+
+SIZE: dict[str, Any] = {"width": 163, "height": 120}
+SCENE = Intrinsics.of_field(40.0, **SIZE, source="scene")
+
+
+def test_points_lie_where_the_simulated_camera_looks() -> None:
+    viewpoint = find_scene("mirrors").camera
+    assert viewpoint is not None
+    rays = camera_rays(viewpoint, **SIZE).reshape(120, 163, 3)
+    forward = viewpoint.look_at_m - viewpoint.position_m
+    forward = forward / np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    axes = np.stack([right, np.cross(forward, right), forward])  # x right, y down, z forward
+
+    points = Intrinsics.of_field(viewpoint.field_of_view_deg, **SIZE).points(np.ones((120, 163)))
+
+    np.testing.assert_allclose(points, np.einsum("kc,yxc->kyx", axes, rays), atol=1e-6)
+
+
+def test_a_point_is_as_far_away_as_its_range_says() -> None:
+    range_m = np.random.default_rng(1).uniform(0.1, 6.0, (120, 163))
+    range_m[3, 4] = np.nan
+    odd = Intrinsics(200.0, 230.0, 70.0, 65.0, **SIZE)
+
+    points = odd.points(range_m)
+
+    np.testing.assert_allclose(np.linalg.norm(points, axis=0), range_m, rtol=1e-5)
+    assert np.isnan(points[:, 3, 4]).all()
+    # pixel by pixel, by the definition
+    x, y, z = points[:, 100, 20]
+    assert (x / z, y / z) == pytest.approx(((20 - 70.0) / 200.0, (100 - 65.0) / 230.0), rel=1e-5)
+
+
+def test_half_the_field_of_view_is_at_the_edge_of_the_frame() -> None:
+    lens = Intrinsics.of_field(90.0, width=101, height=51)
+
+    assert (lens.cx, lens.cy) == (50.0, 25.0)
+    # the edge is half a pixel beyond the centre of the last one
+    assert (100.5 - lens.cx) / lens.fx == pytest.approx(1.0)
+    assert lens.fx == lens.fy
+
+
+def test_what_the_settings_say_goes_before_the_scene() -> None:
+    given = LensSettings(field_of_view_deg=90.0)
+
+    found = known_intrinsics(given, **SIZE, scene_field_deg=40.0)
+
+    assert found == Intrinsics.of_field(90.0, **SIZE, source="settings")
+
+
+def test_a_lens_that_was_calibrated_is_given_in_pixels() -> None:
+    found = known_intrinsics(LensSettings(fx_px=200.0, cy_px=61.5), **SIZE)
+
+    assert found == Intrinsics(200.0, 200.0, 81.0, 61.5, 163, 120, "settings")
+
+
+def test_a_scene_knows_the_field_of_view_of_its_camera() -> None:
+    with open_camera("sim:mirrors?noise=off") as camera:
+        assert camera.simulation is not None
+        field_deg = camera.simulation.field_of_view_deg
+
+    assert known_intrinsics(LensSettings(), **SIZE, scene_field_deg=field_deg) == SCENE
+
+
+def test_a_recording_says_what_was_known_when_it_was_made() -> None:
+    found = known_intrinsics(LensSettings(), **SIZE, recorded=asdict(SCENE))
+
+    assert asdict(found) == asdict(SCENE) | {"source": "recording"}
+
+
+@pytest.mark.parametrize(
+    "recorded", [None, {}, {**asdict(SCENE), "fx": 0.0}, {**asdict(SCENE), "fx": "wide"}, {"fx": 1}]
+)
+def test_without_anything_that_is_known_a_usual_field_of_view_is_assumed(
+    recorded: dict[str, object] | None,
+) -> None:
+    found = known_intrinsics(LensSettings(), **SIZE, recorded=recorded)
+
+    assert found == Intrinsics.of_field(45.0, **SIZE, source="assumed")

@@ -1,0 +1,251 @@
+"""Each thing is computed once for all who ask, on workers, and only when somebody does."""
+
+import asyncio
+import threading
+from collections.abc import Awaitable, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from transientcam import wire
+from transientcam_driver import Camera, RawFrame, open_camera
+from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging import frame as module
+from transientcam_server.imaging import products
+from transientcam_server.imaging.encodings.encoding import MSGPACK, NPY
+from transientcam_server.imaging.frame import Frame
+from transientcam_server.imaging.pipeline import Pipeline
+from transientcam_server.imaging.products import View
+from transientcam_server.settings import ReconstructionSettings
+
+
+@pytest.fixture(scope="module")
+def camera() -> Iterator[Camera]:
+    with open_camera("sim:mirrors?noise=off") as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def raw(camera: Camera) -> RawFrame:
+    camera.start()
+    frame = camera.read_frame()
+    camera.stop()
+    return frame
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of stages in the order they were computed, with the thread that did it."""
+    computed: list[str] = []
+
+    def counted(name: str, compute: Callable[..., Any]) -> Callable[..., Any]:
+        def run(*arguments: Any) -> Any:
+            assert threading.current_thread().name.startswith("worker")
+            computed.append(name)
+            return compute(*arguments)
+
+        return run
+
+    for name, stage in products.STAGES.items():
+        monkeypatch.setitem(
+            products.STAGES, name, replace(stage, compute=counted(name, stage.compute))
+        )
+    return computed
+
+
+def with_frame(
+    camera: Camera, raw: RawFrame, test: Callable[[Pipeline, Frame], Awaitable[None]]
+) -> None:
+    async def main() -> None:
+        with ThreadPoolExecutor(2, thread_name_prefix="worker") as executor:
+            pipeline = Pipeline(camera, ReconstructionSettings(), executor, workers=2)
+            try:
+                await test(pipeline, pipeline.frame(raw, camera.applied))
+            finally:
+                await pipeline.close()
+
+    asyncio.run(main())
+
+
+def test_nothing_is_computed_that_nobody_asks_for(
+    camera: Camera, raw: RawFrame, calls: list[str]
+) -> None:
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        assert frame.meta()["reconstruct_s"] is None
+        assert frame.meta()["pixels"] is None
+        await frame.product(pipeline.product("raw"))
+        assert calls == []
+        await frame.product(pipeline.product("coefficients"))
+        assert calls == ["moments", "coefficients"]
+
+    with_frame(camera, raw, test)
+
+
+def test_all_who_ask_at_once_share_one_computation_and_the_same_bytes(
+    camera: Camera, raw: RawFrame, calls: list[str]
+) -> None:
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        wanted = [pipeline.product(name) for name in ("range", "direct", "range", "coefficients")]
+        asking = [frame.encoded(product, MSGPACK, channel=0) for product in wanted for _ in "abc"]
+        encoded = await asyncio.gather(*asking)
+
+        assert sorted(calls) == ["coefficients", "moments", "returns"]
+        assert encoded[0] is encoded[1] is encoded[6]
+        assert encoded[0] is not encoded[3]
+
+    with_frame(camera, raw, test)
+
+
+def test_the_meta_tells_what_the_computation_took_and_found(camera: Camera, raw: RawFrame) -> None:
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        await frame.product(pipeline.product("range"))
+        meta = frame.meta()
+
+        assert meta["reconstruct_s"] > 0.0
+        assert meta["pixels"]["total"] == 163 * 120
+        # which pixels are there is known of each answer alone
+        assert set(meta) == set(wire.FrameMeta.__annotations__) - {"region", "decimation"}
+        assert set(meta["pixels"]) == set(wire.PixelCounts.__annotations__)
+
+    with_frame(camera, raw, test)
+
+
+def test_frames_are_counted_from_one(camera: Camera, raw: RawFrame) -> None:
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        assert frame.number == 1
+        assert pipeline.frame(raw, camera.applied).number == 2
+
+    with_frame(camera, raw, test)
+
+
+def test_one_who_stops_waiting_does_not_stop_it_for_the_others(
+    camera: Camera, raw: RawFrame
+) -> None:
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        product = pipeline.product("range")
+        impatient = asyncio.ensure_future(frame.product(product))
+        patient = asyncio.ensure_future(frame.product(product))
+        await asyncio.sleep(0)
+        impatient.cancel()
+
+        assert (await patient).shape == (120, 163)
+
+    with_frame(camera, raw, test)
+
+
+def test_a_failure_is_told_to_all_who_ask_and_logged_once(
+    camera: Camera, raw: RawFrame, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(*_: Any) -> Any:
+        raise ZeroDivisionError
+
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        broken = replace(pipeline.product("direct"), compute=fail)
+        following = pipeline.frame(raw, camera.applied)
+        results = await asyncio.gather(
+            frame.product(broken),
+            frame.encoded(broken, NPY),
+            following.product(broken),
+            frame.product(pipeline.product("range")),
+            return_exceptions=True,
+        )
+        assert all(isinstance(each, Problem) for each in results[:3])
+        assert isinstance(results[3], np.ndarray)
+
+    with_frame(camera, raw, test)
+    assert [record.levelname for record in caplog.records] == ["ERROR"]
+
+
+def test_what_was_asked_at_some_times_of_flight_is_not_kept_forever(
+    camera: Camera, raw: RawFrame
+) -> None:
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        product = pipeline.product("transient")
+        for index in range(20):
+            await frame.encoded(product, NPY, View((index * 1e-9,)))
+
+        assert len(frame._over_time) <= 4
+
+    with_frame(camera, raw, test)
+
+
+def test_long_answers_leave_a_worker_to_everything_else(camera: Camera, raw: RawFrame) -> None:
+    gate = threading.Event()
+
+    def wait_at_the_gate(*_: Any) -> Any:
+        assert gate.wait(20.0)
+        return np.zeros((1, 120, 163), dtype=np.float32)
+
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        endless = replace(pipeline.product("transient"), compute=wait_at_the_gate)
+        long = [
+            asyncio.ensure_future(frame.product(endless, View((index * 1e-9,))))
+            for index in range(5)
+        ]
+        # with both workers at the gate this would never end
+        assert (await frame.product(pipeline.product("range"))).shape == (120, 163)
+        gate.set()
+        await asyncio.gather(*long)
+
+    with_frame(camera, raw, test)
+
+
+def test_former_frames_leave_a_worker_to_the_newest(camera: Camera, raw: RawFrame) -> None:
+    gate = threading.Event()
+
+    def wait_at_the_gate(*_: Any) -> Any:
+        assert gate.wait(20.0)
+        return np.zeros((120, 163), dtype=np.float32)
+
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        endless = replace(pipeline.product("range"), needs=("raw",), compute=wait_at_the_gate)
+        former = [
+            asyncio.ensure_future(frame.bare().encoded(endless, MSGPACK, channel=index))
+            for index in range(5)
+        ]
+        # with both workers at the gate this would never end
+        assert (await frame.product(pipeline.product("range"))).shape == (120, 163)
+        gate.set()
+        await asyncio.gather(*former)
+
+    with_frame(camera, raw, test)
+
+
+def test_a_bare_frame_is_the_same_with_nothing_computed(
+    camera: Camera, raw: RawFrame, calls: list[str]
+) -> None:
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        first = await frame.product(pipeline.product("range"))
+        bare = frame.bare()
+        assert (bare.number, bare.raw, bare.recipe) == (frame.number, frame.raw, frame.recipe)
+        assert bare.meta()["reconstruct_s"] is None
+        np.testing.assert_array_equal(await bare.product(pipeline.product("range")), first)
+        assert calls == ["moments", "returns"] * 2
+
+    with_frame(camera, raw, test)
+
+
+def test_too_many_times_of_flight_are_refused_before_anything_is_computed(
+    camera: Camera, raw: RawFrame, calls: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "MAX_ANSWER_BYTES", 163 * 120 * 4)
+
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        with pytest.raises(Problem, match="at most 1"):
+            await frame.product(pipeline.product("transient"), View((0.0, 1e-9)))
+        assert calls == []
+
+    with_frame(camera, raw, test)
+
+
+def test_an_unknown_product_is_answered_with_the_known_ones(camera: Camera, raw: RawFrame) -> None:
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        with pytest.raises(Problem) as caught:
+            pipeline.product("x" * 1000)
+        assert caught.value.extensions["known"] == sorted(wire.PRODUCTS)
+        assert len(str(caught.value.extensions["value"])) < 100
+
+    with_frame(camera, raw, test)

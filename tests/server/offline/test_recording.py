@@ -1,0 +1,135 @@
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import transientcam_moments as tm
+from transientcam_driver import Sequence, open_camera
+from transientcam_driver.clock import VirtualClock
+from transientcam_server.errors.exceptions import InputError
+from transientcam_server.imaging.products import PRODUCTS, STAGES, Recipe
+from transientcam_server.offline.recording import DEFAULT_PRODUCTS, Wanted, reconstruct
+from transientcam_server.recording import Header, Recording, RecordingWriter
+from transientcam_server.settings import ReconstructionSettings
+
+FRAMES = 4
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording of the simulated camera."""
+    path = tmp_path_factory.mktemp("offline") / "a.h5"
+    with open_camera("sim:mirrors?seed=5", clock=VirtualClock()) as camera:
+        applied = camera.configure(Sequence(harmonics=2, zeroth="estimated", exposure_s=5e-4))
+        camera.start()
+        writer = RecordingWriter(path, Header("id", "name", 1e9, applied, camera.capabilities))
+        for _ in range(FRAMES):
+            writer.append(camera.read_frame())
+        writer.close({})
+    return path
+
+
+def test_products_are_those_the_service_computes(path: Path, tmp_path: Path) -> None:
+    output = tmp_path / "products.h5"
+    with Recording(path) as recording:
+        assert reconstruct(recording, output, Wanted()) == 0
+        raw = recording.frame(2)
+        recipe = Recipe(recording.header.applied, ReconstructionSettings(), 4095.0)
+
+    moments = STAGES["moments"].compute(recipe, raw)
+    returns = STAGES["returns"].compute(recipe, moments)
+    with h5py.File(output) as file:
+        for name in DEFAULT_PRODUCTS:
+            product = PRODUCTS[name]
+            stage = returns if product.needs == ("returns",) else moments
+            np.testing.assert_array_equal(file[name][2], product.compute(recipe, stage))
+            assert file[name].attrs["units"] == product.description.unit
+        assert len(file["range"]) == FRAMES
+        np.testing.assert_array_equal(file["frame"][()], np.arange(FRAMES))
+
+
+def test_a_transient_has_the_times_of_flight_asked_for(path: Path, tmp_path: Path) -> None:
+    with Recording(path) as recording:
+        reconstruct(recording, tmp_path / "t.h5", Wanted(products=("transient",), bins=8))
+        base_frequency_hz = recording.header.applied.sequence.base_frequency_hz
+
+    with h5py.File(tmp_path / "t.h5") as file:
+        assert file["transient"].shape == (FRAMES, 8, 120, 163)
+        assert file["transient"].dims[1][0].name == "/time"
+        np.testing.assert_allclose(file["time"][()], np.arange(8) / 8 / base_frequency_hz)
+
+
+def test_an_interrupted_run_is_gone_on_with_and_ends_the_same(path: Path, tmp_path: Path) -> None:
+    class Interruption(Exception):  # noqa: N818 - none is a mistake
+        pass
+
+    def interrupt(done: int, total: int) -> None:
+        if done == 2:
+            raise Interruption
+
+    whole, resumed = tmp_path / "whole.h5", tmp_path / "resumed.h5"
+    with Recording(path) as recording:
+        reconstruct(recording, whole, Wanted())
+        with pytest.raises(Interruption):
+            reconstruct(recording, resumed, Wanted(), progress=interrupt)
+        assert not resumed.exists()
+        assert reconstruct(recording, resumed, Wanted()) == 2
+
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["resumed.h5", "whole.h5"]
+    with h5py.File(whole) as one, h5py.File(resumed) as other:
+        assert dict(one.attrs) == dict(other.attrs)
+        for name in one:
+            np.testing.assert_array_equal(one[name][()], other[name][()])
+
+
+def test_what_was_begun_otherwise_is_not_gone_on_with(path: Path, tmp_path: Path) -> None:
+    output = tmp_path / "a.h5"
+
+    def interrupt(done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    with Recording(path) as recording:
+        with pytest.raises(KeyboardInterrupt):
+            reconstruct(recording, output, Wanted(), progress=interrupt)
+        other = Wanted(settings=ReconstructionSettings(bias=0.01))
+        with pytest.raises(InputError, match=r"reconstruction is .*0\.004.*0\.01"):
+            reconstruct(recording, output, other)
+        reconstruct(recording, output, Wanted())
+        with pytest.raises(FileExistsError):
+            reconstruct(recording, output, Wanted())
+
+
+def test_the_calibration_that_was_recorded_is_used(path: Path, tmp_path: Path) -> None:
+    with Recording(path) as recording:
+        header, frames = recording.header, list(recording)
+    gains = np.full((3, 120, 163), 2.0, np.complex64)
+    bad = np.zeros((120, 163), dtype=np.bool_)
+    calibrated = tmp_path / "calibrated.h5"
+    writer = RecordingWriter(
+        calibrated,
+        Header(
+            "id",
+            "name",
+            1e9,
+            header.applied,
+            header.capabilities,
+            calibration={"id": "of this camera"},
+            calibration_planes=gains,
+            calibration_bad=bad,
+        ),
+    )
+    writer.append(frames[0])
+    writer.close({})
+    with Recording(calibrated) as recording:
+        reconstruct(recording, tmp_path / "out.h5", Wanted(products=("moments",)))
+
+    settings = ReconstructionSettings().for_moments(
+        base_frequency_hz=header.applied.sequence.base_frequency_hz,
+        zeroth="estimated",
+        takes=1,
+        full_scale=4095.0,
+    )
+    expected = tm.reconstruct(frames[0].images, settings, calibration=gains, bad_pixels=bad)
+    with h5py.File(tmp_path / "out.h5") as file:
+        np.testing.assert_array_equal(file["moments"][0], expected.moments)
