@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 
-from transientcam.reflection import step_down, step_up
+from transientcam.density import step_down, step_up
 
 
 def _moments(harmonics: int, seed: int) -> NDArray[Any]:

@@ -9,8 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam.frame import Frame
-from transientcam.npz import npz_bytes
+from transientcam.frame import Frame, npz_bytes
 from transientcam.wire import encode_frame
 
 

@@ -10,8 +10,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam.density import step_down, step_up
 from transientcam.errors import ProtocolError
-from transientcam.reflection import step_down, step_up
 from transientcam.wire import fields
 from transientcam.wire.arrays import array_document, parse_array
 from transientcam.wire.contract import ENCODINGS, REFLECTION16, U16

@@ -18,11 +18,10 @@ from transientcam_driver.simulation.handle import Simulation
 from transientcam_driver.simulation.imperfections import DeviceProfile
 from transientcam_driver.simulation.light.measured import load_responses
 from transientcam_driver.simulation.light.transport import GivenScenery, Scenery, SurfaceScenery
-from transientcam_driver.simulation.outlook import Outlook
 from transientcam_driver.simulation.responses import SparseResponses
 from transientcam_driver.simulation.scene.file import BUILT_IN, list_scenes, load_scene
 from transientcam_driver.simulation.scene.scene import Background, Diffusor, Scene, TimeZero
-from transientcam_driver.simulation.world import World
+from transientcam_driver.simulation.world import Outlook, World
 
 MEASURED = "measured"
 DEFAULT_WIDTH, DEFAULT_HEIGHT = 163, 120

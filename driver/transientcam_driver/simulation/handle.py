@@ -8,11 +8,10 @@ from transientcam_driver.sequence import Sequence
 from transientcam_driver.simulation.device.faults import Fault
 from transientcam_driver.simulation.device.usb_device import EmulatedDevice
 from transientcam_driver.simulation.explain import Explanation
-from transientcam_driver.simulation.outlook import Outlook
 from transientcam_driver.simulation.responses import Truth
 from transientcam_driver.simulation.scene.scene import Scene
 from transientcam_driver.simulation.sensor import Sensor
-from transientcam_driver.simulation.world import World
+from transientcam_driver.simulation.world import Outlook, World
 
 Staging = Callable[[str, Mapping[str, str]], tuple[Scene, World]]
 """Prepares a scene by its name, with choices of effects."""

@@ -88,10 +88,10 @@ def serve(
     settings = load_settings(command_line, file=config, environment=os.environ)
 
     import transientcam_moments as tm
-    from transientcam_server import long_lived
     from transientcam_server.api.app import build_app
     from transientcam_server.camera.source import open_camera
     from transientcam_server.daemon import server
+    from transientcam_server.daemon import server as long_lived
 
     server.configure_logging(settings)
     # the address first: where another daemon has it, the camera is not touched

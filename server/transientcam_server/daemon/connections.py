@@ -16,7 +16,6 @@ from websockets.protocol import State
 from transientcam_server.api.problems import problem_response
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.patience import Patience
 from transientcam_server.settings import LimitSettings
 
 _LARGE_BYTES = 1 << 16
@@ -227,3 +226,38 @@ def _bytes(response: Response) -> bytes:
 
 def _headers(response: Response) -> list[bytes]:
     return [name + b": " + value for name, value in response.raw_headers]
+
+
+class Patience:
+    """Aborts a connection that takes nothing for ``limit_s`` while something waits to be written.
+
+    A client that takes little is slow, not gone: what counts is that what waits gets less.
+    """
+
+    def __init__(
+        self, transport: asyncio.WriteTransport, *, limit_s: float, loop: asyncio.AbstractEventLoop
+    ) -> None:
+        self._transport = transport
+        self._limit_s = limit_s
+        self._loop = loop
+        self._timer: asyncio.TimerHandle | None = None
+        self._left_bytes = 0
+
+    def begin(self) -> None:
+        """Start to lose it: there is more to write than the connection takes at once."""
+        self.end()
+        self._left_bytes = self._transport.get_write_buffer_size()
+        self._timer = self._loop.call_later(self._limit_s, self._look)
+
+    def end(self) -> None:
+        """Find it again: the connection takes more."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _look(self) -> None:
+        if self._transport.get_write_buffer_size() < self._left_bytes:
+            self.begin()
+        else:
+            self._timer = None
+            self._transport.abort()

@@ -1,5 +1,6 @@
 """The service as a process: its socket, its server, its signals."""
 
+import gc
 import logging
 import os
 import signal
@@ -200,3 +201,25 @@ def ending_without() -> Iterator[Callable[[threading.Thread], None]]:
 def configure_logging(settings: Settings) -> None:
     """Log to standard error, one line a message."""
     logs.configure(level=settings.log_level, form=settings.log_format)
+
+
+NAME: Final = "long-lived"
+
+
+def set_aside() -> None:
+    """Collect once more, and from then on pass over everything that is there now."""
+    gc.collect()
+    gc.freeze()
+
+
+def set_aside_after(compiling: threading.Thread) -> threading.Thread:
+    """Set aside what is there now, and once more what the compiler leaves when it has ended."""
+    set_aside()
+
+    def wait() -> None:
+        compiling.join()
+        set_aside()
+
+    waiting = threading.Thread(target=wait, name=NAME, daemon=True)
+    waiting.start()
+    return waiting

@@ -16,7 +16,8 @@ from transientcam_driver import RawFrame
 from transientcam_server.errors.exceptions import InputError
 from transientcam_server.imaging.products import PRODUCTS, STAGES, Product, View
 from transientcam_server.imaging.recipe import Reconstruction
-from transientcam_server.recording import hdf5, swmr
+from transientcam_server.recording import swmr
+from transientcam_server.recording import swmr as hdf5
 from transientcam_server.recording.reader import Recording
 from transientcam_server.recording.recipe import recorded_recipe
 from transientcam_server.recording.writer import synchronise_directory

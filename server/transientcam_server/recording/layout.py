@@ -15,7 +15,8 @@ from isal import isal_zlib
 from numpy.typing import NDArray
 
 from transientcam_driver import AppliedSequence, Capabilities, ImageLabel, RawFrame, Sequence
-from transientcam_server.recording import hdf5, swmr
+from transientcam_server.recording import swmr
+from transientcam_server.recording import swmr as hdf5
 
 FORMAT: Final = "transientcam recording"
 FORMAT_VERSION: Final = 1

@@ -17,7 +17,6 @@ from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.recording import layout, recovery
-from transientcam_server.recording.annotating import annotate
 from transientcam_server.recording.descriptions import Descriptions, of_recorder
 from transientcam_server.recording.directory import Directory, id_of
 from transientcam_server.recording.layout import Header
@@ -27,9 +26,8 @@ from transientcam_server.recording.problems import (
     unfinished,
     unknown,
 )
-from transientcam_server.recording.recorder import Limits, Recorder
-from transientcam_server.recording.totals import Totals
-from transientcam_server.recording.writer import RecordingWriter
+from transientcam_server.recording.recorder import Limits, Recorder, Totals
+from transientcam_server.recording.writer import RecordingWriter, annotate
 from transientcam_server.settings import RecordingSettings
 
 _STOP_WITHIN_S: Final = 60.0

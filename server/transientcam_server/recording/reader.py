@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from transientcam_driver import DriverError, RawFrame
 from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
-from transientcam_server.recording import hdf5, layout, swmr
+from transientcam_server.recording import layout, swmr
+from transientcam_server.recording import swmr as hdf5
 
 
 class Recording:

@@ -8,8 +8,8 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Final, Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Literal, get_args
 
 from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_server.recording.layout import Header
@@ -290,3 +290,28 @@ class Recorder:
             "frames": self._writer.frames,
             "dropped_frames": self._dropped,
         }
+
+
+@dataclass(frozen=True, slots=True)
+class Totals:
+    """Frames and bytes of all recordings; ``ended`` counts recordings by why they ended."""
+
+    frames: int = 0
+    dropped_frames: int = 0
+    size_bytes: int = 0
+    ended: Mapping[str, int] = field(default_factory=lambda: dict.fromkeys(get_args(Reason), 0))
+
+    def with_running(self, progress: Progress) -> "Totals":
+        """Return the totals together with a recording that has not ended."""
+        return replace(
+            self,
+            frames=self.frames + progress.frames,
+            dropped_frames=self.dropped_frames + progress.dropped_frames,
+            size_bytes=self.size_bytes + progress.size_bytes,
+        )
+
+    def after(self, progress: Progress) -> "Totals":
+        """Return the totals after a recording has ended."""
+        reason = progress.reason or "failed"
+        ended = {**self.ended, reason: self.ended[reason] + 1}
+        return replace(self.with_running(progress), ended=ended)

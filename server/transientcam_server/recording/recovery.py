@@ -6,7 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
-from transientcam_server.recording import hdf5, layout, swmr
+from transientcam_server.recording import layout, swmr
+from transientcam_server.recording import swmr as hdf5
 from transientcam_server.recording.reader import Recording
 from transientcam_server.recording.writer import synchronise_directory
 

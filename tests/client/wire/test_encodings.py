@@ -11,8 +11,8 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from transientcam import density, wire
+from transientcam.density import step_up
 from transientcam.errors import ProtocolError
-from transientcam.reflection import step_up
 from transientcam.wire.encodings import decoded
 
 _PHASES_RAD = np.linspace(0.0, 2.0 * np.pi, 256, endpoint=False)

@@ -9,8 +9,7 @@ import pytest
 from tests.driver.conftest import OpenCamera
 from transientcam_driver import Camera, CameraLost, EffectError, SceneError, Sequence, Simulation
 from transientcam_driver.sequence import ImageLabel
-from transientcam_driver.simulation.outlook import Outlook
-from transientcam_driver.simulation.world import World
+from transientcam_driver.simulation.world import Outlook, World
 
 
 def _simulation(camera: Camera) -> Simulation:

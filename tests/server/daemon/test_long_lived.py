@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from transientcam_server.long_lived import set_aside_after
+from transientcam_server.daemon.server import set_aside_after
 
 
 @pytest.fixture(autouse=True)

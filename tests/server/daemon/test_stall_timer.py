@@ -1,6 +1,6 @@
 from typing import Any, cast
 
-from transientcam_server.patience import Patience
+from transientcam_server.daemon.connections import Patience
 
 LIMIT_S = 20.0
 

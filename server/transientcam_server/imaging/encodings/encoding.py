@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam import Frame, wire
-from transientcam.npz import npz_bytes
+from transientcam.frame import npz_bytes
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.encodings import files, pictures

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from transientcam import density, wire
-from transientcam.reflection import step_up
+from transientcam.density import step_up
 from transientcam_driver import Sequence, open_camera
 from transientcam_server.imaging.encodings.compact import (
     JUDGED_PHASES,
