@@ -2,7 +2,8 @@
 
 import transientcam_moments as tm
 from transientcam_driver import Camera, Sequence, list_scenes
-from transientcam_server.imaging.products import STAGES, Recipe
+from transientcam_server.imaging.products import STAGES
+from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.settings import ReconstructionSettings
 
 SEED = 1

@@ -8,17 +8,16 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, replace
 from functools import partial
 from importlib.metadata import version
-from typing import Annotated, Any, Final
-
-from fastapi import Depends, Request
+from typing import Any, Final
 
 from transientcam import wire
 from transientcam_driver import AppliedSequence, CalibrationError
 from transientcam_driver.calibration.file import DEVICE_FIELDS
 from transientcam_server.api.auth.guard import Guard
 from transientcam_server.api.metrics import Metrics
+from transientcam_server.broadcast.channel import Channel
 from transientcam_server.broadcast.hub import Hub
-from transientcam_server.broadcast.outbox import Channel, Goodbye
+from transientcam_server.broadcast.outbox import Goodbye
 from transientcam_server.camera.acquisition import Acquisition
 from transientcam_server.camera.calibration_store import Calibrations
 from transientcam_server.camera.calibrator import CalibrationDesk
@@ -352,13 +351,3 @@ def _last_active(camera: Camera, kept: Calibrations) -> Calibration | None:
     except (Problem, CalibrationError) as error:
         _log.warning("%s was active last, but cannot be used: %s", active_id, error)
         return None
-
-
-# async, or FastAPI takes a thread for it
-async def _service(request: Request) -> Service:
-    service: Service = request.app.state.service
-    return service
-
-
-ServiceOf = Annotated[Service, Depends(_service)]
-"""The service that a route belongs to."""

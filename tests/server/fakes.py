@@ -4,7 +4,7 @@ from types import SimpleNamespace
 from typing import cast
 
 from transientcam import wire
-from transientcam_server.broadcast.outbox import Channel
+from transientcam_server.broadcast.channel import Channel
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.products import PRODUCTS
 

@@ -3,7 +3,7 @@ from typing import Any
 import pytest
 
 from tests.serving import Served
-from transientcam_server.broadcast.outbox import Channel
+from transientcam_server.broadcast.channel import Channel
 from transientcam_server.camera.acquisition import AcquisitionStatus
 
 HEALTHY: dict[str, Any] = {

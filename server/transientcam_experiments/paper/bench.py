@@ -21,7 +21,8 @@ from transientcam_driver import (
 )
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.imaging.calibration import Calibration, evaluate
-from transientcam_server.imaging.products import STAGES, Recipe
+from transientcam_server.imaging.products import STAGES
+from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import AppliedSequence, Camera, RawFrame, Truth
 from transientcam_experiments.tradeoff.truth import Sample, count_returns, cumulative
-from transientcam_server.imaging.products import STAGES, Recipe
+from transientcam_server.imaging.noise import MEDIAN_OF_NORMAL
+from transientcam_server.imaging.products import STAGES
+from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
 PHASES: Final = 128
 """Times of flight over one period at which densities are compared."""
-MEDIAN_OF_NORMAL: Final = 0.674490
-"""Median of the absolute value of a standard normal variable."""
 OUTLIER_M: Final = 0.1
 """A range further off than this is an outlier."""
 

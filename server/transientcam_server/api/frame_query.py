@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal
 from fastapi import Depends, Path, Query, Request, Response
 from pydantic import FiniteFloat
 
+from transientcam_server.api.negotiation import negotiate
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.encodings.encoding import (
@@ -16,12 +17,11 @@ from transientcam_server.imaging.encodings.encoding import (
     MSGPACK,
     PNG,
     Encoding,
-    negotiate,
 )
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.pixel import pixel_csv, pixel_json
-from transientcam_server.imaging.products import Product, View
-from transientcam_server.imaging.view import Crop
+from transientcam_server.imaging.products import Product
+from transientcam_server.imaging.view import Crop, View
 
 MAX_BINS: Final = 4096
 DEFAULT_BINS: Final = 64

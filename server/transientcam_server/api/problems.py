@@ -1,7 +1,6 @@
 """Errors as RFC 9457 problem documents, and the one place where foreign errors become problems."""
 
 import logging
-import math
 from collections.abc import Callable, Iterable
 from http import HTTPStatus
 from typing import Any
@@ -9,113 +8,31 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
-from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 from starlette.routing import compile_path
 
-from transientcam.errors import ProtocolError
 from transientcam.wire import PROBLEM_MEDIA_TYPE
 from transientcam_driver import (
-    CalibrationMismatch,
-    CameraError,
-    CameraLost,
-    CameraNotFound,
     DriverError,
-    EffectError,
-    SequenceError,
 )
 from transientcam_moments import ParameterError
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.errors.kinds import ProblemKind
+from transientcam_server.errors.translation import (
+    ProblemDocument,
+    _plain,
+    _shortened,
+    problem_document,
+    problem_of,
+)
 from transientcam_server.logs import request_id
 
 _log = logging.getLogger(__name__)
-_SHOWN_CHARACTERS = 200
 _KIND_OF_STATUS = {
     kind.status: kind
     for kind in (kinds.BAD_REQUEST, kinds.NOT_FOUND, kinds.METHOD_NOT_ALLOWED, kinds.TOO_LARGE)
 }
-
-
-class ProblemDocument(BaseModel):
-    """A problem as RFC 9457 describes it."""
-
-    model_config = ConfigDict(extra="allow")
-
-    type: str = Field(description="identifies the kind of problem; a page of this service")
-    title: str = Field(description="the kind of problem in one sentence")
-    status: int = Field(description="the HTTP status")
-    detail: str = Field(description="this occurrence in one sentence")
-    instance: str | None = Field(default=None, description="the path that was asked for")
-    request_id: str | None = Field(
-        default=None, description="names the request in the service's log; also in X-Request-ID"
-    )
-    field: str | None = Field(default=None, description="the part of the request that was refused")
-    value: Any = Field(default=None, description="what it was")
-    limit: Any = Field(default=None, description="what it may be")
-
-
-def problem_document(problem: Problem, *, instance: str | None = None) -> dict[str, Any]:
-    """Return a problem as the map that travels as JSON and inside stream messages."""
-    document: dict[str, Any] = {
-        "type": problem.kind.type,
-        "title": problem.kind.title,
-        "status": problem.kind.status,
-        "detail": problem.detail,
-    }
-    if instance is not None:
-        document["instance"] = instance
-    return document | {key: _plain(value) for key, value in problem.extensions.items()}
-
-
-def problem_of(error: Exception) -> Problem:
-    """Return the problem that stands for any error of this project.
-
-    An error that belongs to none of its packages becomes ``internal-error``, without its text:
-    that goes to the log alone.
-    """
-    match error:
-        case Problem():
-            return error
-        case SequenceError():
-            return Problem(
-                kinds.INVALID_SEQUENCE,
-                str(error),
-                field=error.field,
-                value=error.value,
-                limit=error.limit,
-            )
-        case CalibrationMismatch():
-            return Problem(
-                kinds.CALIBRATION_MISFIT,
-                f"{str(error)[0].upper()}{str(error)[1:]}.",
-                field=error.field,
-                value=error.value,
-                limit=error.needed,
-            )
-        case CameraLost() | CameraNotFound():
-            return Problem(kinds.CAMERA_LOST, str(error))
-        case ParameterError() | EffectError():
-            return Problem(
-                kinds.INVALID_REQUEST,
-                str(error),
-                field=error.field,
-                value=error.value,
-                limit=error.limit,
-            )
-        case CameraError() | DriverError():
-            return Problem(kinds.CAMERA_FAILED, str(error))
-        case ProtocolError():
-            return Problem(
-                kinds.BAD_MESSAGE,
-                str(error),
-                field=error.field,
-                value=error.value,
-                limit=error.limit,
-            )
-        case _:
-            return Problem(kinds.INTERNAL_ERROR, "The service failed; its log says more.")
 
 
 def problem_response(problem: Problem, *, instance: str | None = None) -> Response:
@@ -276,27 +193,5 @@ def _mistake(each: dict[str, Any]) -> dict[str, Any]:
     return {"field": ".".join(parts), "value": value, "limit": limit}
 
 
-def _plain(value: object) -> object:
-    """Return a value as JSON can carry it: no NaN, nothing long, no foreign type."""
-    match value:
-        case None | bool() | int():
-            return value
-        case float():
-            return value if math.isfinite(value) else str(value)
-        case str():
-            return _shortened(value)
-        case dict():
-            return {str(key): _plain(each) for key, each in list(value.items())[:64]}
-        case list() | tuple():
-            return [_plain(each) for each in value[:64]]
-        case _:
-            return _shortened(str(value))
-
-
 def _shown(value: object) -> str:
     return "missing" if value is None else _shortened(repr(value))
-
-
-def _shortened(text: str) -> str:
-    text = text.encode("utf-8", "replace").decode()  # JSON may bring half a character
-    return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"

@@ -1,10 +1,45 @@
-"""Numbers of channels: what travels to several clients has one number, so its bytes are shared."""
+"""Channels of the stream: one product for one client, numbered so that clients share bytes."""
 
 from collections import Counter
 from collections.abc import Hashable, Iterable
+from dataclasses import dataclass
 from itertools import count
+from typing import Final
 
-from transientcam_server.broadcast.outbox import Channel
+from transientcam_server.imaging.encodings.encoding import MSGPACK, Encoding
+from transientcam_server.imaging.products import Product
+from transientcam_server.imaging.view import WHOLE, Crop
+
+UNNUMBERED: Final = -1
+"""The number of a channel that has none yet."""
+_EARLY_PERIODS = 0.1
+
+
+@dataclass(slots=True)
+class Channel:
+    """One product for one client: in which form and how often, and what of it was lost."""
+
+    number: int
+    product: Product
+    max_rate_hz: float | None
+    encoding: Encoding = MSGPACK
+    crop: Crop = WHOLE
+    next_due_s: float = float("-inf")
+    dropped: int = 0
+    dropped_total: int = 0
+
+    def take(self, time_s: float) -> bool:
+        """Return whether the frame captured at ``time_s`` is due, and count on from there."""
+        if self.max_rate_hz is None:
+            return True
+        period_s = 1.0 / self.max_rate_hz
+        # a little early will do: frames come with jitter, also at the very rate asked for
+        if time_s < self.next_due_s - _EARLY_PERIODS * period_s:
+            return False
+        # by schedule, so that the mean rate is the one asked for; anew after a pause
+        late = time_s - self.next_due_s > period_s
+        self.next_due_s = (time_s if late else self.next_due_s) + period_s
+        return True
 
 
 class ChannelNumbers:

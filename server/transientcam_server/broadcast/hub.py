@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from transientcam import wire
-from transientcam_server.broadcast.channel import ChannelNumbers
-from transientcam_server.broadcast.outbox import Channel, Goodbye, Outbox
+from transientcam_server.broadcast.channel import Channel, ChannelNumbers
+from transientcam_server.broadcast.outbox import Goodbye, Outbox
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.frame import Frame

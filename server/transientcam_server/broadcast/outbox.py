@@ -10,16 +10,11 @@ from typing import Any, Final, Protocol
 
 from transientcam import wire
 from transientcam_server.api.auth.guard import ANYBODY
-from transientcam_server.imaging.encodings.encoding import MSGPACK, Encoding
+from transientcam_server.broadcast.channel import Channel
 from transientcam_server.imaging.frame import Frame
-from transientcam_server.imaging.products import Product
-from transientcam_server.imaging.view import WHOLE, Crop
 
 MAX_WAITING_MESSAGES: Final = 64
 """A client that lets more than this many notices and answers wait is not there any more."""
-UNNUMBERED: Final = -1
-"""The number of a channel that has none yet."""
-_EARLY_PERIODS = 0.1
 
 
 class Past(Protocol):
@@ -46,33 +41,6 @@ class Goodbye:
 
     code: wire.CloseCode
     reason: str
-
-
-@dataclass(slots=True)
-class Channel:
-    """One product for one client: in which form and how often, and what of it was lost."""
-
-    number: int
-    product: Product
-    max_rate_hz: float | None
-    encoding: Encoding = MSGPACK
-    crop: Crop = WHOLE
-    next_due_s: float = float("-inf")
-    dropped: int = 0
-    dropped_total: int = 0
-
-    def take(self, time_s: float) -> bool:
-        """Return whether the frame captured at ``time_s`` is due, and count on from there."""
-        if self.max_rate_hz is None:
-            return True
-        period_s = 1.0 / self.max_rate_hz
-        # a little early will do: frames come with jitter, also at the very rate asked for
-        if time_s < self.next_due_s - _EARLY_PERIODS * period_s:
-            return False
-        # by schedule, so that the mean rate is the one asked for; anew after a pause
-        late = time_s - self.next_due_s > period_s
-        self.next_due_s = (time_s if late else self.next_due_s) + period_s
-        return True
 
 
 @dataclass(frozen=True, slots=True)

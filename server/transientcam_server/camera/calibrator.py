@@ -36,7 +36,8 @@ from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.history import History
 from transientcam_server.imaging.noise import invalid_share
 from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.products import STAGES, Recipe
+from transientcam_server.imaging.products import STAGES
+from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.planning.planner import Accuracy
 
 _log = logging.getLogger(__name__)

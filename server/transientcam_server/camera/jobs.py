@@ -14,9 +14,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
-from transientcam_server.api.problems import problem_document, problem_of
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import JobCancelled, Problem
+from transientcam_server.errors.translation import problem_document, problem_of
 
 _log = logging.getLogger(__name__)
 MAX_UNFINISHED: Final = 8

@@ -1,4 +1,4 @@
-"""The verbs ``serve``, ``reconstruct`` and ``compile`` of the ``transientcam`` command.
+"""The verbs ``serve`` and ``replay`` of the ``transientcam`` command.
 
 What is heavy is imported when a verb runs, so that ``transientcam --help`` stays quick.
 """
@@ -6,24 +6,13 @@ What is heavy is imported when a verb runs, so that ``transientcam --help`` stay
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    TaskProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
-if TYPE_CHECKING:
-    from transientcam_server.offline.measurement import Measurement, Reconstruction
-
-Background = Literal["none", "median"]
-_Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
+from transientcam.cli.options import JsonOption
+from transientcam_server.cli.options import RecordingArgument
 
 
 def serve(
@@ -66,7 +55,7 @@ def serve(
         bool,
         typer.Option("--check", help="Only say which settings hold, and where each was given."),
     ] = False,
-    as_json: _Json = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Run the daemon: a camera on the network, with its dashboard."""
     from transientcam_server.daemon.configuration import load_settings
@@ -91,7 +80,6 @@ def serve(
     from transientcam_server.api.app import build_app
     from transientcam_server.camera.source import open_camera
     from transientcam_server.daemon import server
-    from transientcam_server.daemon import server as long_lived
 
     server.configure_logging(settings)
     # the address first: where another daemon has it, the camera is not touched
@@ -102,7 +90,7 @@ def serve(
             compiling = tm.kernels.compile_in_background()
             leave(compiling)
             app = build_app(opened, settings)
-            long_lived.set_aside_after(compiling)
+            server.set_aside_after(compiling)
             server.serve(
                 app,
                 settings,
@@ -118,24 +106,24 @@ def _camera_names() -> list[str]:
 
 
 def _check(command_line: dict[str, Any], config: Path | None, *, as_json: bool) -> None:
-    from transientcam_server.daemon import check as checking
+    from transientcam_server.daemon import check as settings_check
     from transientcam_server.daemon.configuration import load
     from transientcam_server.errors.exceptions import SettingsError
 
     try:
         configuration = load(command_line, file=config, environment=os.environ)
-        checking.require_usable(configuration)
+        settings_check.require_usable(configuration)
     except SettingsError as error:
         if not as_json:
             raise
-        mistakes = checking.mistakes_document(error)
+        mistakes = settings_check.mistakes_document(error)
         typer.echo(json.dumps({"valid": False, "mistakes": mistakes}, default=str))
         raise typer.Exit(code=1) from error
-    document = checking.to_document(configuration)
+    document = settings_check.to_document(configuration)
     if as_json:
         typer.echo(json.dumps({"valid": True, "settings": document}))
         return
-    for line in checking.to_toml(document):
+    for line in settings_check.to_toml(document):
         typer.echo(line)
 
 
@@ -151,161 +139,24 @@ def _announce(url: str, camera: str, *, as_json: bool) -> None:
     )
 
 
-def reconstruct(
-    input: Annotated[  # noqa: A002 - it is what the argument is called in the help
-        Path,
-        typer.Argument(
-            help="An .npz with moments and base_frequency_hz, counts and bin_s, or h with "
-            "start_opl_m and bin_opl_m; or a recording."
-        ),
-    ],
-    output: Annotated[
-        Path,
-        typer.Option("--output", "-o", help="The .npz to write; of a recording, the .h5."),
-    ],
-    frequency_hz: Annotated[
-        float | None, typer.Option(help="Base frequency for impulse responses.  [default: 23e6]")
+def replay(
+    recording: RecordingArgument,
+    speed: Annotated[
+        str, typer.Option(help="original, fast (as fast as it can be read) or a factor.")
+    ] = "original",
+    loop: Annotated[bool, typer.Option("--loop", help="Begin anew after the last frame.")] = False,
+    host: Annotated[
+        str | None, typer.Option(help="Address to listen on.  [default: 127.0.0.1]")
     ] = None,
-    harmonics: Annotated[
-        int | None,
-        typer.Option(help="How many multiples of it; at most those of the moments.  [default: 4]"),
+    port: Annotated[
+        int | None, typer.Option(help="TCP port; 0 takes any free one.  [default: 8000]")
     ] = None,
-    bins: Annotated[int, typer.Option(min=1, max=65536, help="Times of flight.")] = 256,
-    bias: Annotated[
-        float, typer.Option(help="Least uniform part of a pixel, over its brightness (Sec. 4.3).")
-    ] = 4e-3,
-    smoothing_px: Annotated[
-        float, typer.Option(min=0.0, max=10.0, help="Standard deviation of a Gaussian smoothing.")
-    ] = 0.0,
-    threshold: Annotated[
-        float, typer.Option(min=0.0, help="Weight of the first return, over the strongest.")
-    ] = 0.1,
-    background: Annotated[
-        Background, typer.Option(help="What to subtract from photon counts first.")
-    ] = "none",
-    product: Annotated[
-        list[str] | None,
-        typer.Option(help="Of a recording: what to compute; may be repeated.  [default: images]"),
+    config: Annotated[
+        Path | None, typer.Option(help="Settings in TOML.  [default: ./transientcam.toml]")
     ] = None,
-    plot: Annotated[Path | None, typer.Option(help="Also draw a picture into this .png.")] = None,
-    as_json: _Json = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Reconstruct a measurement in a file: density, cumulative density, range, direct, indirect.
-
-    Of a recording every frame is reconstructed; run again, it goes on where it stopped.
-    """
-    from pydantic import ValidationError
-
-    from transientcam_server.cli import recordings
-    from transientcam_server.offline import measurement as offline
-    from transientcam_server.offline import plot as pictures
-    from transientcam_server.settings import ReconstructionSettings
-
-    if plot is not None:
-        pictures.require()
-    try:
-        settings = ReconstructionSettings(
-            smoothing_px=smoothing_px, bias=bias, return_threshold=threshold
-        )
-    except ValidationError as error:
-        mistake = error.errors()[0]
-        raise typer.BadParameter(f"{mistake['loc'][0]}: {mistake['msg']}") from error
-    if recordings.is_recording(input):
-        recordings.reconstruct_recording(
-            input, output, products=product, settings=settings, bins=bins, as_json=as_json
-        )
-        return
-    measurement = offline.load(
-        input, frequency_hz=frequency_hz, harmonics=harmonics, background=background
-    )
-    console = Console(stderr=True)
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-        console=console,
-    ) as progress:
-        task = progress.add_task("reconstructing", total=None)
-
-        def advance(done: int, total: int) -> None:
-            progress.update(task, completed=done, total=total)
-
-        result = offline.reconstruct(measurement, bins=bins, settings=settings, progress=advance)
-        progress.update(task, description="writing")
-        offline.save(output, result)
-        if plot is not None:
-            progress.update(task, description="drawing")
-            pictures.save_picture(plot, result)
-    if as_json:
-        typer.echo(json.dumps(_document(measurement, result, output)))
-    else:
-        _tell(console, _document(measurement, result, output))
-
-
-def _document(measurement: "Measurement", result: "Reconstruction", output: Path) -> dict[str, Any]:
-    import numpy as np
-
-    import transientcam_moments as tm
-
-    height, width = result.flags.shape
-    counts = {
-        str(flag.name).lower(): int(np.count_nonzero(result.flags & flag.value))
-        for flag in filter(None, tm.Flags)
-    }
-    return {
-        "file": str(output),
-        "width": width,
-        "height": height,
-        "harmonics": measurement.harmonics,
-        "base_frequency_hz": measurement.base_frequency_hz,
-        "times": result.time_s.size,
-        "flagged": counts,
-    }
-
-
-def _tell(console: Console, document: dict[str, Any]) -> None:
-    console.print(
-        "{file}: {width} x {height} pixels, m = {harmonics} at ".format(**document)
-        + f"{document['base_frequency_hz'] / 1e6:g} MHz, {document['times']} times of flight",
-        soft_wrap=True,
-    )
-    for flag, count in document["flagged"].items():
-        if count:
-            console.print(f"  {count} pixels flagged {flag.replace('_', ' ')}")
-
-
-def compile_kernels(
-    harmonics: Annotated[
-        list[int], typer.Option(min=1, max=32, help="Orders m to compile for; may be repeated.")
-    ] = [3, 4, 8],  # noqa: B006 - typer copies it
-    as_json: _Json = False,
-) -> None:
-    """Compile the kernels of the reconstruction now, for images and packages."""
-    import transientcam_moments as tm
-
-    if not tm.kernels.state()["enabled"]:
-        if as_json:
-            typer.echo(json.dumps(tm.kernels.state()))
-        else:
-            typer.echo("Kernels are off (TRANSIENTCAM_KERNELS); everything is left to NumPy.")
-        return
-    console = Console(stderr=as_json)
-    with Progress(
-        TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=console
-    ) as progress:
-        task = progress.add_task("compiling", total=None)
-
-        def advance(done: int, total: int, name: str) -> None:
-            progress.update(task, completed=done, total=total, description=name or "compiled")
-
-        tm.kernels.compile(harmonics=harmonics, progress=advance)
-    state = tm.kernels.state()
-    if as_json:
-        typer.echo(json.dumps(state))
-    else:
-        for failure in state["failed"]:
-            console.print(f"failed: {failure}", soft_wrap=True)
-        console.print(f"{len(state['compiled'])} kernels are ready.")
-    if state["failed"]:
-        raise typer.Exit(code=1)
+    """Serve a recording as if it were the camera: every frame again, bit for bit."""
+    looped = "on" if loop else "off"
+    spec = f"recording:{recording}?speed={speed}&loop={looped}"
+    serve(camera=spec, host=host, port=port, config=config, as_json=as_json)

@@ -11,6 +11,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from transientcam.cli.options import JsonOption
+
 app = typer.Typer(no_args_is_help=True, help="Make and revoke tokens: who may use this camera.")
 
 _Config = Annotated[
@@ -19,7 +21,6 @@ _Config = Annotated[
 _File = Annotated[
     Path | None, typer.Option("--tokens-file", help="Where the tokens are kept, if elsewhere.")
 ]
-_Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 
 
 @app.command()
@@ -34,7 +35,7 @@ def create(
     ] = None,
     config: _Config = None,
     tokens_file: _File = None,
-    as_json: _Json = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Make a token and print it, this once."""
     from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
@@ -59,7 +60,9 @@ def create(
 
 
 @app.command("list")
-def list_tokens(config: _Config = None, tokens_file: _File = None, as_json: _Json = False) -> None:
+def list_tokens(
+    config: _Config = None, tokens_file: _File = None, as_json: JsonOption = False
+) -> None:
     """List the tokens there are, not what they are."""
     from transientcam_server.api.auth.tokens import TokenFile, utc_now
 
@@ -86,7 +89,7 @@ def revoke(
     token_id: Annotated[str, typer.Argument(metavar="ID", help="As `token list` shows it.")],
     config: _Config = None,
     tokens_file: _File = None,
-    as_json: _Json = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Make a token invalid; whoever uses it is sent away."""
     from transientcam_server.api.auth.tokens import TokenFile

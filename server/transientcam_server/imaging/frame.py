@@ -21,15 +21,9 @@ from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import calibration_id
 from transientcam_server.imaging.encodings.encoding import Encoding
-from transientcam_server.imaging.products import (
-    BOUNDS_RADIUS,
-    EVERYTHING,
-    STAGES,
-    Product,
-    Recipe,
-    View,
-    pixel_counts,
-)
+from transientcam_server.imaging.products import BOUNDS_RADIUS, STAGES, Product, pixel_counts
+from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.imaging.view import EVERYTHING, View
 
 if TYPE_CHECKING:  # it makes frames
     from transientcam_server.imaging.pipeline import Pipeline

@@ -1,5 +1,6 @@
 """How well a calibration still does: the share of pixels whose moments contradict each other."""
 
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -40,3 +41,37 @@ def invalid_share(found: tm.Reconstruction, noise: tm.noise.MomentNoise) -> floa
     # noise moves no eigenvalue by more than the norm of its own Toeplitz matrix
     std = np.sqrt(len(variance) * variance.mean(axis=0))
     return float((eigenvalue < -DEVIATIONS * std)[lit].mean())
+
+
+JUDGED_PIXELS: Final = 512
+"""Pixels of each frame whose deviation is predicted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Uncertainty:
+    """Predicted deviation of a frame's range.
+
+    Attributes
+    ----------
+    median_m, p90_m
+        Half of the pixels, and 90 % of them, are better.
+    first_order_share
+        Share of the pixels where first order holds; that of the others is by the order of
+        magnitude.
+    """
+
+    median_m: float
+    p90_m: float
+    first_order_share: float
+
+    def to_document(self) -> dict[str, float]:
+        """Return it as a frame's metadata have it."""
+        return {
+            "median": self.median_m,
+            "p90": self.p90_m,
+            "first_order_share": self.first_order_share,
+        }
+
+
+MEDIAN_OF_NORMAL: Final = 0.674490
+"""Median of the absolute value of a standard normal variable."""

@@ -22,8 +22,8 @@ from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import Calibration
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.lens import Intrinsics
-from transientcam_server.imaging.products import PRODUCTS, Product, Recipe
-from transientcam_server.imaging.recipe import Reconstruction
+from transientcam_server.imaging.products import PRODUCTS, Product
+from transientcam_server.imaging.recipe import Recipe, Reconstruction
 from transientcam_server.settings import ReconstructionSettings
 
 _log = logging.getLogger(__name__)

@@ -10,7 +10,8 @@ import numpy as np
 
 import transientcam_moments as tm
 from transientcam_driver import Truth
-from transientcam_server.imaging.products import BOUNDS_RADIUS, Recipe
+from transientcam_server.imaging.products import BOUNDS_RADIUS
+from transientcam_server.imaging.recipe import Recipe
 
 _TRUE_RETURNS: Final = 16
 

@@ -1,8 +1,8 @@
 """What can be computed from a frame, and from what: the registry of stages and products.
 
 A *stage* is an intermediate result, a *product* an array that clients can ask for. Both name the
-stages they need; `transientcam_server.imaging.pipeline` computes each at most once a frame, and only if
-somebody asked. The functions here are pure, so any executor may run them.
+stages they need; `transientcam_server.imaging.frame` computes each at most once a frame, and
+only on request. The functions here are pure, so any executor may run them.
 """
 
 from collections.abc import Callable
@@ -15,66 +15,14 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam import wire
 from transientcam_driver import AppliedSequence, RawFrame
-from transientcam_server.imaging.calibration import Calibration, nominal_gains
-from transientcam_server.imaging.lens import ASSUMED_FIELD_OF_VIEW_DEG, Intrinsics
-from transientcam_server.imaging.view import WHOLE, Crop
-from transientcam_server.settings import ReconstructionSettings
+from transientcam_server.imaging.calibration import nominal_gains
+from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.imaging.view import Crop, View
 
 _Array = NDArray[Any]
 BOUNDS_RADIUS: Final = 0.93
 """Of the Poisson kernel that densities between `bounds` are smoothed with: the paper's (Fig. 7)."""
 _BOUNDS_BLOCK: Final = 2**20
-
-
-@dataclass(frozen=True, slots=True)
-class Recipe:
-    """What a computation may know beside the results it needs.
-
-    ``full_scale`` is the largest value that the sensor gives, in DN. Without a ``calibration``,
-    gains are the nominal ones. ``reconstruction_id`` counts the settings there were. Without
-    ``intrinsics`` a usual field of view is assumed.
-    """
-
-    applied: AppliedSequence
-    settings: ReconstructionSettings
-    full_scale: float
-    calibration: Calibration | None = None
-    reconstruction_id: int = 1
-    intrinsics: Intrinsics | None = None
-
-    def lens(self, height: int, width: int) -> Intrinsics:
-        """Return where the pixels look, as it is known or else assumed."""
-        if self.intrinsics is not None:
-            return self.intrinsics
-        return Intrinsics.of_field(ASSUMED_FIELD_OF_VIEW_DEG, width=width, height=height)
-
-    @property
-    def base_frequency_hz(self) -> float:
-        """The frequency whose period is the unambiguous time of flight."""
-        return self.applied.sequence.base_frequency_hz
-
-
-@dataclass(frozen=True, slots=True)
-class View:
-    """Which part of a product is wanted; equal views of one frame are the same bytes.
-
-    Attributes
-    ----------
-    time_s
-        Times of flight of a product over time.
-    crop
-        Region and decimation.
-    y
-        Row of a streak, in pixels of the whole frame.
-    """
-
-    time_s: tuple[float, ...] = ()
-    crop: Crop = WHOLE
-    y: int | None = None
-
-
-EVERYTHING: Final = View()
-"""All of a product that has no times of flight."""
 
 
 @dataclass(frozen=True, slots=True)

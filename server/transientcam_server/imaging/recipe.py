@@ -3,8 +3,11 @@
 from dataclasses import dataclass
 from typing import Any
 
+from transientcam_driver import AppliedSequence
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging.calibration import Calibration
+from transientcam_server.imaging.lens import ASSUMED_FIELD_OF_VIEW_DEG, Intrinsics
 from transientcam_server.settings import ReconstructionSettings
 
 
@@ -55,3 +58,31 @@ def require_harmonics(settings: ReconstructionSettings, harmonics: int, *, field
         if field == "harmonics"
         else f"one that does with {harmonics} harmonics",
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """What a computation may know beside the results it needs.
+
+    ``full_scale`` is the largest value that the sensor gives, in DN. Without a ``calibration``,
+    gains are the nominal ones. ``reconstruction_id`` counts the settings there were. Without
+    ``intrinsics`` a usual field of view is assumed.
+    """
+
+    applied: AppliedSequence
+    settings: ReconstructionSettings
+    full_scale: float
+    calibration: Calibration | None = None
+    reconstruction_id: int = 1
+    intrinsics: Intrinsics | None = None
+
+    def lens(self, height: int, width: int) -> Intrinsics:
+        """Return where the pixels look, as it is known or else assumed."""
+        if self.intrinsics is not None:
+            return self.intrinsics
+        return Intrinsics.of_field(ASSUMED_FIELD_OF_VIEW_DEG, width=width, height=height)
+
+    @property
+    def base_frequency_hz(self) -> float:
+        """The frequency whose period is the unambiguous time of flight."""
+        return self.applied.sequence.base_frequency_hz

@@ -134,3 +134,26 @@ def _invalid(field: str, value: object, limit: str) -> Problem:
         value=value,
         limit=limit,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Which part of a product is wanted; equal views of one frame are the same bytes.
+
+    Attributes
+    ----------
+    time_s
+        Times of flight of a product over time.
+    crop
+        Region and decimation.
+    y
+        Row of a streak, in pixels of the whole frame.
+    """
+
+    time_s: tuple[float, ...] = ()
+    crop: Crop = WHOLE
+    y: int | None = None
+
+
+EVERYTHING: Final = View()
+"""All of a product that has no times of flight."""

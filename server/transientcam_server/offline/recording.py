@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from transientcam_driver import RawFrame
 from transientcam_server.errors.exceptions import InputError
-from transientcam_server.imaging.products import PRODUCTS, STAGES, Product, View
+from transientcam_server.imaging.products import PRODUCTS, STAGES, Product
 from transientcam_server.imaging.recipe import Reconstruction
+from transientcam_server.imaging.view import View
 from transientcam_server.recording import swmr
-from transientcam_server.recording import swmr as hdf5
 from transientcam_server.recording.reader import Recording
 from transientcam_server.recording.recipe import recorded_recipe
 from transientcam_server.recording.writer import synchronise_directory
@@ -102,7 +102,7 @@ def reconstruct(
     if part.exists():
         file = _resumed(part, document)
     else:
-        file = hdf5.open_file(part, "x", libver=swmr.LIBVER)
+        file = swmr.open_file(part, "x", libver=swmr.LIBVER)
         _lay_out(file, recording, reconstructor, document)
     rows = swmr.Appender(file, list(wanted.products), list(_SERIES))
     done = rows.rows
@@ -140,7 +140,7 @@ def _document(recording: Recording, wanted: Wanted) -> dict[str, str]:
 
 
 def _lay_out(
-    file: hdf5.File, recording: Recording, reconstructor: Reconstructor, document: Mapping[str, str]
+    file: swmr.File, recording: Recording, reconstructor: Reconstructor, document: Mapping[str, str]
 ) -> None:
     file.attrs.update(document)
     file.attrs["versions"] = json.dumps(dict(recording.header.versions))
@@ -164,11 +164,11 @@ def _lay_out(
             blocks.dims[axis].attach_scale(file[name])
 
 
-def _resumed(part: Path, document: Mapping[str, str]) -> hdf5.File:
+def _resumed(part: Path, document: Mapping[str, str]) -> swmr.File:
     """Return the file that was begun, made whole first."""
     scratch = part.with_name(part.name + ".resuming")
     try:
-        with hdf5.open_file(part, "r", libver="latest", swmr=True) as begun:
+        with swmr.open_file(part, "r", libver="latest", swmr=True) as begun:
             _require_same(part, begun.attrs, document)
             products: Sequence[str] = json.loads(document["products"])[:-1]
             rows = min(len(begun[name]) for name in (*products, *_SERIES))
@@ -178,7 +178,7 @@ def _resumed(part: Path, document: Mapping[str, str]) -> hdf5.File:
         raise InputError(str(part), "its content", swmr.in_words(error), "products") from error
     finally:
         scratch.unlink(missing_ok=True)
-    return hdf5.open_file(part, "r+", libver=swmr.LIBVER)
+    return swmr.open_file(part, "r+", libver=swmr.LIBVER)
 
 
 def _require_same(part: Path, begun: Mapping[str, Any], document: Mapping[str, str]) -> None:

@@ -1,7 +1,6 @@
 """The accuracy of a camera: of the frames it captures, and of sequences it might capture."""
 
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,8 @@ from transientcam_driver import Truth
 from transientcam_server.camera.source import Camera
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.products import Recipe
+from transientcam_server.imaging.noise import JUDGED_PIXELS, Uncertainty
+from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.planning import Choice, Goal, Plan, candidates, choices_on_front, plan
 from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.scene import SceneStatistic, of_frame
@@ -19,34 +19,6 @@ from transientcam_server.planning.timing import ComputingTime
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
 _Array = NDArray[Any]
-JUDGED_PIXELS: Final = 512
-"""Pixels of each frame whose deviation is predicted."""
-
-
-@dataclass(frozen=True, slots=True)
-class Uncertainty:
-    """Predicted deviation of a frame's range.
-
-    Attributes
-    ----------
-    median_m, p90_m
-        Half of the pixels, and 90 % of them, are better.
-    first_order_share
-        Share of the pixels where first order holds; that of the others is by the order of
-        magnitude.
-    """
-
-    median_m: float
-    p90_m: float
-    first_order_share: float
-
-    def to_document(self) -> dict[str, float]:
-        """Return it as a frame's metadata have it."""
-        return {
-            "median": self.median_m,
-            "p90": self.p90_m,
-            "first_order_share": self.first_order_share,
-        }
 
 
 class Accuracy:

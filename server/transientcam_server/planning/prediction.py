@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import Sequence
-from transientcam_experiments.tradeoff.capture import MEDIAN_OF_NORMAL
+from transientcam_server.imaging.noise import MEDIAN_OF_NORMAL
 from transientcam_server.planning.scene import SceneStatistic
 from transientcam_server.settings import ReconstructionSettings
 

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from transientcam_driver import AppliedSequence, Capabilities, ImageLabel, RawFrame, Sequence
 from transientcam_server.recording import swmr
-from transientcam_server.recording import swmr as hdf5
 
 FORMAT: Final = "transientcam recording"
 FORMAT_VERSION: Final = 1
@@ -90,7 +89,7 @@ def checksum(images: NDArray[np.uint16]) -> int:
     return isal_zlib.crc32(np.ascontiguousarray(images, dtype="<u2").data.cast("B"))
 
 
-def create(file: hdf5.File, header: Header, annotations: Mapping[str, Any]) -> None:
+def create(file: swmr.File, header: Header, annotations: Mapping[str, Any]) -> None:
     """Lay out an empty recording, complete but for its frames."""
     capabilities, labels = header.capabilities, header.applied.labels
     file.attrs.update(
@@ -133,7 +132,7 @@ def create(file: hdf5.File, header: Header, annotations: Mapping[str, Any]) -> N
 
 
 def _create_calibration(
-    file: hdf5.File, planes: NDArray[Any], bad: NDArray[np.bool_] | None
+    file: swmr.File, planes: NDArray[Any], bad: NDArray[np.bool_] | None
 ) -> None:
     file.create_dataset("moment", data=np.arange(len(planes), dtype="<i4"))
     file["moment"].make_scale("moment")
@@ -149,7 +148,7 @@ def _create_calibration(
 _LABEL_DTYPES: Final[dict[object, str]] = {int: "<i4", float: "<f8", bool: "|u1"}
 
 
-def _scale(file: hdf5.File) -> None:
+def _scale(file: swmr.File) -> None:
     """Name the axes, so that xarray and netCDF know them."""
     for axis, name in enumerate(_AXES):
         file["raw"].dims[axis].attach_scale(file[name])
@@ -179,7 +178,7 @@ def row(raw: RawFrame, *, dropped_frames: int) -> dict[str, object]:
     }
 
 
-def read_header(file: hdf5.File) -> Header:
+def read_header(file: swmr.File) -> Header:
     """Return what `create` wrote.
 
     Raises
@@ -224,7 +223,7 @@ def _capabilities(document: Mapping[str, Any]) -> Capabilities:
     return Capabilities(**given)
 
 
-def read_labels(file: hdf5.File) -> tuple[ImageLabel, ...]:
+def read_labels(file: swmr.File) -> tuple[ImageLabel, ...]:
     """Return what each image shows."""
     columns = {name: file[name][()].tolist() for name in _LABELS.keys() - {"index"}}
     columns["index"] = list(range(file["raw"].shape[1]))
@@ -235,7 +234,7 @@ def read_labels(file: hdf5.File) -> tuple[ImageLabel, ...]:
     )
 
 
-def read_document(file: hdf5.File, name: str) -> dict[str, Any]:
+def read_document(file: swmr.File, name: str) -> dict[str, Any]:
     """Return a JSON document in a scalar dataset; empty where none was written or it is torn."""
     try:
         document = json.loads(bytes(file[name][()]).rstrip(b"\0") or b"{}")

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from transientcam_driver import DriverError, RawFrame
 from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
 from transientcam_server.recording import layout, swmr
-from transientcam_server.recording import swmr as hdf5
 
 
 class Recording:
@@ -35,7 +34,7 @@ class Recording:
             pass  # says what is wrong better than h5py
         try:
             # the writer of an unfinished one may be alive or dead: only SWMR readers may look
-            self._file = hdf5.open_file(
+            self._file = swmr.open_file(
                 path, "r", libver="latest", swmr=path.name.endswith(".part")
             )
         except OSError as error:

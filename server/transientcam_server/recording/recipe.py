@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_server.imaging.lens import known_intrinsics
-from transientcam_server.imaging.products import Recipe
-from transientcam_server.imaging.recipe import Reconstruction
+from transientcam_server.imaging.recipe import Recipe, Reconstruction
 from transientcam_server.recording.layout import Header
 from transientcam_server.settings import LensSettings
 

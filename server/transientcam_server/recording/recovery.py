@@ -7,7 +7,6 @@ from pathlib import Path
 
 from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
 from transientcam_server.recording import layout, swmr
-from transientcam_server.recording import swmr as hdf5
 from transientcam_server.recording.reader import Recording
 from transientcam_server.recording.writer import synchronise_directory
 
@@ -37,7 +36,7 @@ def recover(part: Path, *, target: Path | None = None) -> Path:
         with Recording(part) as recording:
             frames = whole_frames(recording)
         _require_room(part, path.parent)
-        with hdf5.open_file(part, "r", libver="latest", swmr=True) as source:
+        with swmr.open_file(part, "r", libver="latest", swmr=True) as source:
             swmr.salvage(source, scratch, frames, row_axis=layout.ROW_AXIS)
         with Recording(scratch) as copy:
             if copy.frames != frames:

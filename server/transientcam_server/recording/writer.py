@@ -8,7 +8,6 @@ from typing import Any
 
 from transientcam_driver import RawFrame
 from transientcam_server.recording import layout, swmr
-from transientcam_server.recording import swmr as hdf5
 from transientcam_server.recording.layout import Header
 
 
@@ -33,7 +32,7 @@ class RecordingWriter:
         self.part = path.with_name(path.name + ".part")
         if path.exists():
             raise FileExistsError(17, "there is a recording already", str(path))
-        file = hdf5.open_file(self.part, "x", libver=swmr.LIBVER)
+        file = swmr.open_file(self.part, "x", libver=swmr.LIBVER)
         try:
             layout.create(file, header, annotations or {})
             self._rows = swmr.Appender(file, ["raw"], list(layout.SERIES))
@@ -118,7 +117,7 @@ def annotate(path: Path, annotations: Mapping[str, Any]) -> None:
     data = layout.encoded(annotations)
     if len(data) > layout.ANNOTATIONS_BYTES:
         raise ValueError(f"annotations of {len(data)} bytes")
-    with hdf5.open_file(path, "r") as file:
+    with swmr.open_file(path, "r") as file:
         offset = file["annotations"].id.get_offset()
     if offset is None:
         raise OSError(95, "its annotations have no fixed place", str(path))

@@ -19,11 +19,10 @@ import transientcam_moments as tm
 from transientcam_driver import Camera, Sequence, SequenceError, Truth, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.simulation.responses import Responses, SparseResponses
-from transientcam_experiments import tradeoff
+from transientcam_experiments import commands, tradeoff
 from transientcam_experiments.tradeoff import capture, computing, estimating, transport
 from transientcam_experiments.tradeoff.records import key_of
 from transientcam_experiments.tradeoff.truth import count_returns, cumulative, sample_pixels
-from transientcam_server.cli import plan
 from transientcam_server.errors.exceptions import InputError
 from transientcam_server.settings import ReconstructionSettings
 
@@ -429,7 +428,7 @@ def test_the_command_measures_reports_and_says_so_as_json(
     grid.write_text("harmonics = []\n[[sequence]]\nharmonics = 2\n")
     output = tmp_path / "results"
 
-    plan.tradeoff(output=output, sequence_grid=str(grid), repetitions=2, as_json=True)
+    commands.tradeoff(output=output, sequence_grid=str(grid), repetitions=2, as_json=True)
 
     said = json.loads(capsys.readouterr().out)
     assert said["points"] == len(tradeoff.Records(output))

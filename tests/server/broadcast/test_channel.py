@@ -1,8 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from transientcam_server.broadcast.channel import ChannelNumbers
-from transientcam_server.broadcast.outbox import UNNUMBERED, Channel
+from transientcam_server.broadcast.channel import UNNUMBERED, Channel, ChannelNumbers
 from transientcam_server.imaging.encodings.compact import STREAM_ENCODINGS
 from transientcam_server.imaging.encodings.encoding import MSGPACK, Encoding
 from transientcam_server.imaging.products import PRODUCTS

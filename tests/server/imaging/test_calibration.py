@@ -32,7 +32,8 @@ from transientcam_server.imaging.calibration import (
     nominal_gains,
 )
 from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.products import STAGES, Recipe
+from transientcam_server.imaging.products import STAGES
+from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]

@@ -15,7 +15,8 @@ from transientcam_driver import AppliedSequence, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.capture import Shot, capture
 from transientcam_moments.comparisons import sra_table
-from transientcam_server.imaging.products import STAGES, Recipe
+from transientcam_server.imaging.products import STAGES
+from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.planning.timing import ComputingTime
 from transientcam_server.settings import Estimator, ReconstructionSettings
 

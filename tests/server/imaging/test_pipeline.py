@@ -18,7 +18,7 @@ from transientcam_server.imaging import products
 from transientcam_server.imaging.encodings.encoding import MSGPACK, NPY
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.products import View
+from transientcam_server.imaging.view import View
 from transientcam_server.settings import ReconstructionSettings
 
 

@@ -8,7 +8,8 @@ import transientcam_moments as tm
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.errors.exceptions import InputError
-from transientcam_server.imaging.products import PRODUCTS, STAGES, Recipe
+from transientcam_server.imaging.products import PRODUCTS, STAGES
+from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.offline.recording import DEFAULT_PRODUCTS, Wanted, reconstruct
 from transientcam_server.recording import Header, Recording, RecordingWriter
 from transientcam_server.settings import ReconstructionSettings

@@ -17,7 +17,8 @@ from transientcam_experiments.tradeoff.capture import repeatability
 from transientcam_server import planning
 from transientcam_server.cli import plan as commands_accuracy
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.products import STAGES, Recipe
+from transientcam_server.imaging.products import STAGES
+from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.planning import Goal, plan
 from transientcam_server.planning import scene as statistic
 from transientcam_server.planning.planner import Accuracy

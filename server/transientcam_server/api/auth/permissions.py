@@ -14,10 +14,10 @@ from fastapi.routing import APIRoute
 from transientcam.wire import LEASE_HEADER
 from transientcam_server.api.auth.guard import Principal
 from transientcam_server.api.auth.tokens import Role
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.problems import document_problems
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.service import ServiceOf
 
 _READS: Final = frozenset(("GET", "HEAD", "OPTIONS"))
 _Endpoint = TypeVar("_Endpoint", bound=Callable[..., Any])

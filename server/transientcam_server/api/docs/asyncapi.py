@@ -6,7 +6,7 @@ from pydantic import TypeAdapter
 
 from transientcam import wire
 from transientcam_server.api.documents.frame import FrameDocument
-from transientcam_server.api.problems import ProblemDocument
+from transientcam_server.errors.translation import ProblemDocument
 
 PATH: Final = "/asyncapi.json"
 _SCHEMAS: Final = "#/components/schemas/"

@@ -10,7 +10,8 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from transientcam_server.api.metrics import Metrics
-from transientcam_server.api.problems import problem_of, problem_response
+from transientcam_server.api.problems import problem_response
+from transientcam_server.errors.translation import problem_of
 from transientcam_server.logs import request_id
 
 _log = logging.getLogger(__name__)

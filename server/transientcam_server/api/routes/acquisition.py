@@ -6,10 +6,11 @@ from fastapi import APIRouter
 
 from transientcam_server.api.auth.permissions import needs
 from transientcam_server.api.auth.tokens import Role
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.camera import AcquisitionDocument, AcquisitionRequest
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
-from transientcam_server.service import Service, ServiceOf
+from transientcam_server.service import Service
 
 router = APIRouter(tags=["acquisition"])
 

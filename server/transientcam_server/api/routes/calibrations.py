@@ -12,6 +12,7 @@ from starlette.requests import ClientDisconnect
 from transientcam_server.api import downloads
 from transientcam_server.api.auth.permissions import needs
 from transientcam_server.api.auth.tokens import Role
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.calibration import (
     MAX_NAME,
     ActivationRequest,
@@ -29,7 +30,7 @@ from transientcam_server.camera.calibration_store import Stored
 from transientcam_server.camera.calibrator import Drift, Wanted
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.service import Service, ServiceOf
+from transientcam_server.service import Service
 
 router = APIRouter(tags=["calibrations"])
 

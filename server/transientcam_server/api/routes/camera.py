@@ -8,8 +8,8 @@ from typing import Any
 from fastapi import APIRouter
 
 from transientcam_driver import CameraError, Status
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.camera import CameraDocument
-from transientcam_server.service import ServiceOf
 
 router = APIRouter(tags=["camera"])
 

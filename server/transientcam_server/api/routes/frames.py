@@ -4,6 +4,7 @@ from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Query, Response
 
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.frame import FrameDocument, HistoryDocument
 from transientcam_server.api.documents.pixel import PixelDocument
 from transientcam_server.api.frame_query import (
@@ -25,7 +26,7 @@ from transientcam_server.api.frame_query import (
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.imaging.frame import Frame
-from transientcam_server.service import Service, ServiceOf
+from transientcam_server.service import Service
 
 router = APIRouter(tags=["frames"])
 

@@ -5,12 +5,13 @@ from fastapi import APIRouter
 import transientcam_moments as tm
 from transientcam import wire
 from transientcam_server.api.auth.permissions import PrincipalOf
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.docs import asyncapi
 from transientcam_server.api.documents.frame import HistoryDocument
 from transientcam_server.api.documents.service import InfoDocument, VersionsDocument
 from transientcam_server.imaging.encodings.encoding import ENCODINGS
 from transientcam_server.imaging.products import Product
-from transientcam_server.service import VERSION, ServiceOf
+from transientcam_server.service import VERSION
 
 router = APIRouter(tags=["info"])
 versions = APIRouter(tags=["info"])

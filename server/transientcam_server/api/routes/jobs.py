@@ -4,11 +4,11 @@ from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Path, Query, Response
 
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.job import JobDocument, JobsDocument
 from transientcam_server.api.problems import documented
 from transientcam_server.camera.jobs import Job
 from transientcam_server.errors import kinds
-from transientcam_server.service import ServiceOf
 
 router = APIRouter(tags=["jobs"])
 MAX_WAIT_S: Final = 30.0

@@ -7,6 +7,7 @@ from fastapi import APIRouter, Header, Response
 from transientcam.wire import LEASE_HEADER
 from transientcam_server.api.auth.permissions import PrincipalOf, needs
 from transientcam_server.api.auth.tokens import Role
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.lease import (
     GrantedLeaseDocument,
     LeaseDocument,
@@ -16,7 +17,7 @@ from transientcam_server.api.documents.lease import (
 from transientcam_server.api.problems import documented
 from transientcam_server.camera import lease as leases
 from transientcam_server.errors import kinds
-from transientcam_server.service import Service, ServiceOf
+from transientcam_server.service import Service
 
 router = APIRouter(tags=["lease"])
 _THE_SAME: Final = LeaseRenewal()

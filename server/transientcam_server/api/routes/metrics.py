@@ -4,10 +4,10 @@ from typing import Any, Final
 
 from fastapi import APIRouter, Response
 
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.metrics import CONTENT_TYPE
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
-from transientcam_server.service import ServiceOf
 
 router = APIRouter(tags=["health"])
 

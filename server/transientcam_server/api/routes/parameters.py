@@ -8,12 +8,12 @@ from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, JsonValue
 
 from transientcam_driver import Capabilities, Sequence, SequenceError
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.camera import AcquisitionRequest
 from transientcam_server.api.documents.document import Document
 from transientcam_server.api.documents.sequence import SequenceDocument, SubPhasesDocument
 from transientcam_server.api.routes import parameters
 from transientcam_server.recording.replay import ReplayCamera
-from transientcam_server.service import ServiceOf
 from transientcam_server.settings import (
     HistorySettings,
     ReconstructionSettings,

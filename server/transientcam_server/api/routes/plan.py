@@ -7,12 +7,13 @@ from fastapi import APIRouter, Query
 from transientcam_driver import Sequence
 from transientcam_server.api.auth.permissions import needs
 from transientcam_server.api.auth.tokens import Role
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.plan import PlanDocument, PlanRequest, TradeoffDocument
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.planning import Goal
 from transientcam_server.planning.scene import SceneStatistic, given
-from transientcam_server.service import Service, ServiceOf
+from transientcam_server.service import Service
 
 router = APIRouter(tags=["accuracy"])
 _FRAME_WITHIN_S = 10.0

@@ -7,14 +7,15 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
 
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.middleware.requests import asks_for_head
 from transientcam_server.api.problems import documented
-from transientcam_server.broadcast.outbox import Channel
+from transientcam_server.broadcast.channel import Channel
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.encodings.encoding import COLOUR_JPEG
 from transientcam_server.imaging.frame import Frame
-from transientcam_server.service import Service, ServiceOf
+from transientcam_server.service import Service
 
 router = APIRouter(tags=["frames"])
 

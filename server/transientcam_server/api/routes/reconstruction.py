@@ -6,10 +6,10 @@ from fastapi import APIRouter, Response
 from pydantic import ConfigDict, JsonValue
 
 from transientcam_server.api import etags
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.imaging.recipe import Reconstruction
-from transientcam_server.service import ServiceOf
 from transientcam_server.settings import ReconstructionSettings
 
 router = APIRouter(tags=["reconstruction"])

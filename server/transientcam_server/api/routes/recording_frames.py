@@ -4,6 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Path, Query, Response
 
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.frame import FrameDocument
 from transientcam_server.api.documents.pixel import PixelDocument
 from transientcam_server.api.documents.recording import TimelineDocument
@@ -25,7 +26,7 @@ from transientcam_server.errors import kinds
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.recording.frames import Settings, timeline
-from transientcam_server.service import Service, ServiceOf
+from transientcam_server.service import Service
 
 router = APIRouter(prefix="/recordings/{recording}/frames", tags=["recordings"])
 

@@ -9,6 +9,7 @@ from fastapi.responses import FileResponse
 from transientcam_server.api import downloads
 from transientcam_server.api.auth.permissions import needs
 from transientcam_server.api.auth.tokens import Role
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.recording import (
     RecordingChange,
     RecordingDocument,
@@ -21,7 +22,6 @@ from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.recording.library import Wanted
 from transientcam_server.recording.recorder import Limits
-from transientcam_server.service import ServiceOf
 
 router = APIRouter(tags=["recordings"])
 

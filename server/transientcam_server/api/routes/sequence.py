@@ -10,11 +10,11 @@ from transientcam_driver import AppliedSequence, Sequence
 from transientcam_server.api import etags
 from transientcam_server.api.auth.permissions import needs
 from transientcam_server.api.auth.tokens import Role
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.sequence import AppliedDocument, SequenceDocument
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.imaging.recipe import require_harmonics
-from transientcam_server.service import ServiceOf
 
 router = APIRouter(tags=["sequence"])
 

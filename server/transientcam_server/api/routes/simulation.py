@@ -7,6 +7,7 @@ from typing import Final
 from fastapi import APIRouter
 
 from transientcam_driver import SceneInfo, Simulation, list_scenes
+from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.explain import ExplanationDocument
 from transientcam_server.api.documents.simulation import (
     FaultRequest,
@@ -16,7 +17,7 @@ from transientcam_server.api.documents.simulation import (
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.service import Service, ServiceOf
+from transientcam_server.service import Service
 
 router = APIRouter(tags=["simulation"])
 

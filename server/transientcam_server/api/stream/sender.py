@@ -8,11 +8,12 @@ from fastapi import WebSocket
 
 from transientcam import wire
 from transientcam_server.api.metrics import Metrics
-from transientcam_server.api.problems import problem_document
 from transientcam_server.api.stream.rate_limit import Allowance
-from transientcam_server.broadcast.outbox import Channel, Delivery, Goodbye, Outbox
+from transientcam_server.broadcast.channel import Channel
+from transientcam_server.broadcast.outbox import Delivery, Goodbye, Outbox
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.products import View
+from transientcam_server.errors.translation import problem_document
+from transientcam_server.imaging.view import View
 
 _AT_ONCE = 4
 """Deliveries after which others have their turn."""

@@ -9,12 +9,14 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from transientcam import wire
 from transientcam.errors import ProtocolError
 from transientcam_server.api.auth.guard import log_refusal
-from transientcam_server.api.problems import problem_document, problem_of, problem_response
+from transientcam_server.api.problems import problem_response
 from transientcam_server.api.stream.rate_limit import Allowance
 from transientcam_server.api.stream.sender import Sender
-from transientcam_server.broadcast.outbox import UNNUMBERED, Channel, Goodbye, Outbox
+from transientcam_server.broadcast.channel import UNNUMBERED, Channel
+from transientcam_server.broadcast.outbox import Goodbye, Outbox
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors.translation import problem_document, problem_of
 from transientcam_server.imaging.encodings.compact import STREAM_ENCODINGS
 from transientcam_server.imaging.view import Crop
 from transientcam_server.service import Service

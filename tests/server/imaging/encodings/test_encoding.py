@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 
 from transientcam import wire
+from transientcam_server.api.negotiation import negotiate
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.encodings.encoding import (
     COLOUR_JPEG,
@@ -19,7 +20,6 @@ from transientcam_server.imaging.encodings.encoding import (
     PNG,
     TIFF,
     Encoding,
-    negotiate,
 )
 from transientcam_server.imaging.products import PRODUCTS
 

@@ -1,0 +1,176 @@
+"""The verb ``reconstruct`` of the ``transientcam`` command.
+
+What is heavy is imported when a verb runs, so that ``transientcam --help`` stays quick.
+"""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+from rich.console import Console
+
+from transientcam.cli.options import JsonOption
+from transientcam_server.cli.progress import progress_bar, progress_bars
+
+if TYPE_CHECKING:
+    from transientcam_server.offline.measurement import Measurement, Reconstruction
+    from transientcam_server.settings import ReconstructionSettings
+
+Background = Literal["none", "median"]
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+def reconstruct(
+    input: Annotated[  # noqa: A002 - it is what the argument is called in the help
+        Path,
+        typer.Argument(
+            help="An .npz with moments and base_frequency_hz, counts and bin_s, or h with "
+            "start_opl_m and bin_opl_m; or a recording."
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="The .npz to write; of a recording, the .h5."),
+    ],
+    frequency_hz: Annotated[
+        float | None, typer.Option(help="Base frequency for impulse responses.  [default: 23e6]")
+    ] = None,
+    harmonics: Annotated[
+        int | None,
+        typer.Option(help="How many multiples of it; at most those of the moments.  [default: 4]"),
+    ] = None,
+    bins: Annotated[int, typer.Option(min=1, max=65536, help="Times of flight.")] = 256,
+    bias: Annotated[
+        float, typer.Option(help="Least uniform part of a pixel, over its brightness (Sec. 4.3).")
+    ] = 4e-3,
+    smoothing_px: Annotated[
+        float, typer.Option(min=0.0, max=10.0, help="Standard deviation of a Gaussian smoothing.")
+    ] = 0.0,
+    threshold: Annotated[
+        float, typer.Option(min=0.0, help="Weight of the first return, over the strongest.")
+    ] = 0.1,
+    background: Annotated[
+        Background, typer.Option(help="What to subtract from photon counts first.")
+    ] = "none",
+    product: Annotated[
+        list[str] | None,
+        typer.Option(help="Of a recording: what to compute; may be repeated.  [default: images]"),
+    ] = None,
+    plot: Annotated[Path | None, typer.Option(help="Also draw a picture into this .png.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Reconstruct a measurement in a file: density, cumulative density, range, direct, indirect.
+
+    Of a recording every frame is reconstructed; run again, it goes on where it stopped.
+    """
+    from pydantic import ValidationError
+
+    from transientcam_server.offline import measurement as offline
+    from transientcam_server.offline import plot as pictures
+    from transientcam_server.settings import ReconstructionSettings
+
+    if plot is not None:
+        pictures.require()
+    try:
+        settings = ReconstructionSettings(
+            smoothing_px=smoothing_px, bias=bias, return_threshold=threshold
+        )
+    except ValidationError as error:
+        mistake = error.errors()[0]
+        raise typer.BadParameter(f"{mistake['loc'][0]}: {mistake['msg']}") from error
+    if _is_recording(input):
+        _reconstruct_recording(
+            input, output, products=product, settings=settings, bins=bins, as_json=as_json
+        )
+        return
+    measurement = offline.load(
+        input, frequency_hz=frequency_hz, harmonics=harmonics, background=background
+    )
+    console = Console(stderr=True)
+    with progress_bars(console=console) as progress:
+        task = progress.add_task("reconstructing", total=None)
+
+        def advance(done: int, total: int) -> None:
+            progress.update(task, completed=done, total=total)
+
+        result = offline.reconstruct(measurement, bins=bins, settings=settings, progress=advance)
+        progress.update(task, description="writing")
+        offline.save(output, result)
+        if plot is not None:
+            progress.update(task, description="drawing")
+            pictures.save_picture(plot, result)
+    if as_json:
+        typer.echo(json.dumps(_document(measurement, result, output)))
+    else:
+        _tell(console, _document(measurement, result, output))
+
+
+def _document(measurement: "Measurement", result: "Reconstruction", output: Path) -> dict[str, Any]:
+    import numpy as np
+
+    import transientcam_moments as tm
+
+    height, width = result.flags.shape
+    counts = {
+        str(flag.name).lower(): int(np.count_nonzero(result.flags & flag.value))
+        for flag in filter(None, tm.Flags)
+    }
+    return {
+        "file": str(output),
+        "width": width,
+        "height": height,
+        "harmonics": measurement.harmonics,
+        "base_frequency_hz": measurement.base_frequency_hz,
+        "times": result.time_s.size,
+        "flagged": counts,
+    }
+
+
+def _tell(console: Console, document: dict[str, Any]) -> None:
+    console.print(
+        "{file}: {width} x {height} pixels, m = {harmonics} at ".format(**document)
+        + f"{document['base_frequency_hz'] / 1e6:g} MHz, {document['times']} times of flight",
+        soft_wrap=True,
+    )
+    for flag, count in document["flagged"].items():
+        if count:
+            console.print(f"  {count} pixels flagged {flag.replace('_', ' ')}")
+
+
+def _is_recording(path: Path) -> bool:
+    """Whether a file is HDF5, which of all inputs only recordings are."""
+    with path.open("rb") as file:
+        return file.read(len(_HDF5)) == _HDF5
+
+
+def _reconstruct_recording(
+    recording: Path,
+    output: Path,
+    *,
+    products: list[str] | None,
+    settings: "ReconstructionSettings",
+    bins: int,
+    as_json: bool = False,
+) -> None:
+    """Reconstruct every frame of a recording, going on where an earlier run stopped."""
+    from transientcam_server.offline import recording as offline
+    from transientcam_server.recording import Recording
+
+    wanted = tuple(dict.fromkeys(products or offline.DEFAULT_PRODUCTS))
+    for name in wanted:
+        if name not in offline.KNOWN_PRODUCTS:
+            known = ", ".join(offline.KNOWN_PRODUCTS)
+            raise typer.BadParameter(f"{name!r} is none of {known}", param_hint="--product")
+    what = offline.Wanted(wanted, settings, bins)
+    with Recording(recording) as opened, progress_bar("reconstructing") as advance:
+        before = offline.reconstruct(opened, output, what, progress=advance)
+        frames = opened.frames
+    if as_json:
+        document = {"file": str(output), "products": wanted, "frames": frames, "before": before}
+        typer.echo(json.dumps(document))
+        return
+    resumed = f", {before} of them before" if before else ""
+    Console(stderr=True).print(
+        f"{output}: {', '.join(wanted)} of {frames} frames{resumed}", soft_wrap=True
+    )

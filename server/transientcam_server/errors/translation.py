@@ -1,0 +1,124 @@
+"""The one place where errors of the other packages become problems."""
+
+import math
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from transientcam.errors import ProtocolError
+from transientcam_driver import (
+    CalibrationMismatch,
+    CameraError,
+    CameraLost,
+    CameraNotFound,
+    DriverError,
+    EffectError,
+    SequenceError,
+)
+from transientcam_moments import ParameterError
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import Problem
+
+_SHOWN_CHARACTERS = 200
+
+
+class ProblemDocument(BaseModel):
+    """A problem as RFC 9457 describes it."""
+
+    model_config = ConfigDict(extra="allow")
+
+    type: str = Field(description="identifies the kind of problem; a page of this service")
+    title: str = Field(description="the kind of problem in one sentence")
+    status: int = Field(description="the HTTP status")
+    detail: str = Field(description="this occurrence in one sentence")
+    instance: str | None = Field(default=None, description="the path that was asked for")
+    request_id: str | None = Field(
+        default=None, description="names the request in the service's log; also in X-Request-ID"
+    )
+    field: str | None = Field(default=None, description="the part of the request that was refused")
+    value: Any = Field(default=None, description="what it was")
+    limit: Any = Field(default=None, description="what it may be")
+
+
+def problem_document(problem: Problem, *, instance: str | None = None) -> dict[str, Any]:
+    """Return a problem as the map that travels as JSON and inside stream messages."""
+    document: dict[str, Any] = {
+        "type": problem.kind.type,
+        "title": problem.kind.title,
+        "status": problem.kind.status,
+        "detail": problem.detail,
+    }
+    if instance is not None:
+        document["instance"] = instance
+    return document | {key: _plain(value) for key, value in problem.extensions.items()}
+
+
+def problem_of(error: Exception) -> Problem:
+    """Return the problem that stands for any error of this project.
+
+    An error that belongs to none of its packages becomes ``internal-error``, without its text:
+    that goes to the log alone.
+    """
+    match error:
+        case Problem():
+            return error
+        case SequenceError():
+            return Problem(
+                kinds.INVALID_SEQUENCE,
+                str(error),
+                field=error.field,
+                value=error.value,
+                limit=error.limit,
+            )
+        case CalibrationMismatch():
+            return Problem(
+                kinds.CALIBRATION_MISFIT,
+                f"{str(error)[0].upper()}{str(error)[1:]}.",
+                field=error.field,
+                value=error.value,
+                limit=error.needed,
+            )
+        case CameraLost() | CameraNotFound():
+            return Problem(kinds.CAMERA_LOST, str(error))
+        case ParameterError() | EffectError():
+            return Problem(
+                kinds.INVALID_REQUEST,
+                str(error),
+                field=error.field,
+                value=error.value,
+                limit=error.limit,
+            )
+        case CameraError() | DriverError():
+            return Problem(kinds.CAMERA_FAILED, str(error))
+        case ProtocolError():
+            return Problem(
+                kinds.BAD_MESSAGE,
+                str(error),
+                field=error.field,
+                value=error.value,
+                limit=error.limit,
+            )
+        case _:
+            return Problem(kinds.INTERNAL_ERROR, "The service failed; its log says more.")
+
+
+def _plain(value: object) -> object:
+    """Return a value as JSON can carry it: no NaN, nothing long, no foreign type."""
+    match value:
+        case None | bool() | int():
+            return value
+        case float():
+            return value if math.isfinite(value) else str(value)
+        case str():
+            return _shortened(value)
+        case dict():
+            return {str(key): _plain(each) for key, each in list(value.items())[:64]}
+        case list() | tuple():
+            return [_plain(each) for each in value[:64]]
+        case _:
+            return _shortened(str(value))
+
+
+def _shortened(text: str) -> str:
+    text = text.encode("utf-8", "replace").decode()  # JSON may bring half a character
+    return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
