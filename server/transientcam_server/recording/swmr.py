@@ -20,7 +20,16 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
-from transientcam_server.recording import swmr
+File: TypeAlias = Any
+"""An open h5py.File."""
+
+
+Dataset: TypeAlias = Any
+"""An h5py.Dataset."""
+
+
+open_file: Final[Callable[..., Any]] = h5py.File
+
 
 LIBVER: Final = ("v110", "v110")
 _SERIES_CHUNK: Final = 1024
@@ -62,8 +71,8 @@ def in_words(error: Exception) -> str:
 
 
 def create_blocks(
-    file: swmr.File, name: str, shape: Sequence[int], dtype: str, **attributes: object
-) -> swmr.Dataset:
+    file: File, name: str, shape: Sequence[int], dtype: str, **attributes: object
+) -> Dataset:
     """Create a dataset of blocks (rows, *shape), one chunk a row."""
     dataset = file.create_dataset(
         name,
@@ -79,7 +88,7 @@ def create_blocks(
     return dataset
 
 
-def create_series(file: swmr.File, name: str, dtype: str, **attributes: object) -> swmr.Dataset:
+def create_series(file: File, name: str, dtype: str, **attributes: object) -> Dataset:
     """Create a dataset of numbers, one a row."""
     dataset = file.create_dataset(name, (0,), dtype, maxshape=(None,), chunks=(_SERIES_CHUNK,))
     dataset.attrs.update(attributes)
@@ -98,7 +107,7 @@ class Appender:
         one whose length counts the rows last.
     """
 
-    def __init__(self, file: swmr.File, blocks: Sequence[str], series: Sequence[str]) -> None:
+    def __init__(self, file: File, blocks: Sequence[str], series: Sequence[str]) -> None:
         self._file = file
         self._blocks = {name: file[name] for name in blocks}
         self._series = {name: file[name] for name in series}
@@ -154,7 +163,7 @@ class Appender:
             os.close(self._descriptor)
 
 
-def salvage(source: swmr.File, target: Path, rows: int, *, row_axis: str) -> None:
+def salvage(source: File, target: Path, rows: int, *, row_axis: str) -> None:
     """Copy what is consistent of an unfinished file into a new one that anything can open.
 
     Chunks are copied as they are. ``row_axis`` is the series whose length counts the rows; every
@@ -162,7 +171,7 @@ def salvage(source: swmr.File, target: Path, rows: int, *, row_axis: str) -> Non
     (`h5clear`) were tried and fail on such files: the end of the allocated space that the file
     states is out of date.
     """
-    with swmr.open_file(target, "w", libver=LIBVER) as copy:
+    with open_file(target, "w", libver=LIBVER) as copy:
         copy.attrs.update(source.attrs)
         growing = [name for name, item in source.items() if item.maxshape[:1] == (None,)]
         for name, dataset in source.items():
@@ -176,7 +185,7 @@ def salvage(source: swmr.File, target: Path, rows: int, *, row_axis: str) -> Non
         raise ValueError(f"no series {row_axis}")
 
 
-def _copy_rows(dataset: swmr.Dataset, copy: swmr.File, rows: int) -> None:
+def _copy_rows(dataset: Dataset, copy: File, rows: int) -> None:
     if dataset.ndim == 1:
         create_series(copy, dataset.name, dataset.dtype)
         copy[dataset.name].resize(rows, 0)
@@ -195,13 +204,13 @@ _SCALE_ATTRIBUTES: Final = frozenset(
 )
 
 
-def _copy_attributes(dataset: swmr.Dataset, copy: swmr.Dataset) -> None:
+def _copy_attributes(dataset: Dataset, copy: Dataset) -> None:
     for name in dataset.attrs:
         if name not in _SCALE_ATTRIBUTES:
             copy.attrs[name] = dataset.attrs[name]
 
 
-def _restore_scales(source: swmr.File, copy: swmr.File) -> None:
+def _restore_scales(source: File, copy: File) -> None:
     for name, dataset in source.items():
         if dataset.is_scale:
             copy[name].make_scale(name)
@@ -209,14 +218,3 @@ def _restore_scales(source: swmr.File, copy: swmr.File) -> None:
         for axis, dimension in enumerate(dataset.dims):
             for scale in dimension.values():
                 copy[name].dims[axis].attach_scale(copy[scale.name])
-
-
-File: TypeAlias = Any
-"""An open h5py.File."""
-
-
-Dataset: TypeAlias = Any
-"""An h5py.Dataset."""
-
-
-open_file: Final[Callable[..., Any]] = h5py.File
