@@ -40,7 +40,7 @@ def test_one_return_is_one(estimate: Estimator, m: int) -> None:
 
     found = estimate(oracles.moments_of_returns(phase, np.ones((1, 3)), m))
 
-    assert np.all((found.weight > 0).sum(axis=0) == 1)
+    assert np.all((found.weight > 1e-9).sum(axis=0) == 1)  # rounding may leave a second one
     assert oracles.around(found.phase_rad[0] - phase[0]).max() < 1e-6
     assert found.weight[0] == pytest.approx(np.ones(3), abs=1e-6)
 
