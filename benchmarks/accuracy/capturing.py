@@ -2,7 +2,6 @@
 
 import transientcam_moments as tm
 from transientcam_driver import Camera, Sequence, list_scenes
-from transientcam_server.imaging.products import STAGES
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.settings import ReconstructionSettings
 
@@ -22,7 +21,7 @@ def captured(
     applied = camera.configure(sequence)
     recipe = Recipe(applied, SETTINGS, 2.0**camera.capabilities.bits - 1.0)
     camera.start()
-    found = [STAGES["moments"].compute(recipe, camera.read_frame()) for _ in range(frames)]
+    found = [recipe.reconstruct(camera.read_frame()) for _ in range(frames)]
     camera.stop()
     return recipe, found
 

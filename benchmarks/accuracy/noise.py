@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from benchmarks.accuracy.capturing import SEED, SETTINGS, captured, short
+from benchmarks.accuracy.capturing import SEED, captured, short
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.measuring import spec_of
-from transientcam_server.planning.planner import Accuracy
+from transientcam_server.camera.source import noise_of
 from transientcam_server.settings import SensorSettings
 
 
@@ -49,10 +49,10 @@ def predicted_and_observed() -> list[Compared]:
     """Predict the deviation of the range of `mirrors` from its mean frame, and observe it."""
     compared = []
     with open_camera(spec_of("mirrors", seed=SEED), clock=VirtualClock()) as camera:
-        accuracy = Accuracy(camera, SETTINGS, SensorSettings())
+        model = noise_of(camera, SensorSettings())
         for sequence in NOISE:
             recipe, found = captured(camera, sequence, FRAMES)
-            noise = accuracy.noise(recipe, found[0])
+            noise = model.of_moments(recipe, found[0])
             mean = np.mean([each.smoothed for each in found], axis=0)
             predicted = tm.noise.return_noise(tm.pisarenko(mean), noise)
             ranges = np.stack([np.asarray(each.range_m, dtype=float) for each in found])

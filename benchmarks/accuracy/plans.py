@@ -10,8 +10,9 @@ from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.capture import repeatability
 from transientcam_experiments.tradeoff.measuring import spec_of
+from transientcam_server.camera.source import noise_of
 from transientcam_server.planning import Goal, plan
-from transientcam_server.planning.planner import Accuracy
+from transientcam_server.planning.planner import Planner
 from transientcam_server.planning.prediction import Predictor
 from transientcam_server.settings import SensorSettings
 
@@ -44,9 +45,10 @@ def planned(scene: str) -> Iterator[Planned]:
     if scene not in known_scenes():
         return
     with open_camera(spec_of(scene, seed=SEED + 1), clock=VirtualClock()) as camera:
-        accuracy = Accuracy(camera, SETTINGS, SensorSettings())
+        noise = noise_of(camera, SensorSettings())
+        planner = Planner(camera.capabilities, noise, SETTINGS)
         recipe, (look,) = captured(camera, Sequence(harmonics=6, takes=16, exposure_s=0.0015), 1)
-        predictor = Predictor(accuracy.statistic(recipe, look, 0.0), accuracy.sensor, SETTINGS)
+        predictor = Predictor(planner.statistic(recipe, look, 0.0), noise.sensor, SETTINGS)
         for wanted, goal in GOALS.items():
             best = plan(
                 goal, predictor, camera.capabilities, reconstruct_s=lambda _: 1e-3

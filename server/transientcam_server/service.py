@@ -8,23 +8,20 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, replace
 from functools import partial
 from importlib.metadata import version
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from transientcam import wire
 from transientcam_driver import AppliedSequence, CalibrationError
 from transientcam_driver.calibration.file import DEVICE_FIELDS
-from transientcam_server.api.auth.guard import Guard
-from transientcam_server.api.metrics import Metrics
 from transientcam_server.broadcast.channel import Channel
 from transientcam_server.broadcast.hub import Hub
-from transientcam_server.broadcast.outbox import Goodbye
 from transientcam_server.camera.acquisition import Acquisition
-from transientcam_server.camera.calibration_store import Calibrations
-from transientcam_server.camera.calibrator import CalibrationDesk
+from transientcam_server.camera.calibration_store import CalibrationStore
+from transientcam_server.camera.calibrator import Calibrator
 from transientcam_server.camera.events import Back, Captured, Event, Lost, SequenceChanged
-from transientcam_server.camera.jobs import Job, JobDesk
-from transientcam_server.camera.lease import Alarm, Change, Lease, LeaseDesk
-from transientcam_server.camera.source import Camera
+from transientcam_server.camera.jobs import Job, Jobs
+from transientcam_server.camera.lease import Alarm, Change, Lease, LeaseManager
+from transientcam_server.camera.source import Camera, noise_of
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import (
     NOMINAL_ID,
@@ -32,13 +29,13 @@ from transientcam_server.imaging.calibration import (
     calibration_id,
     load_calibration,
 )
-from transientcam_server.imaging.encodings.compact import encoding_name, travelling
 from transientcam_server.imaging.history import History
 from transientcam_server.imaging.lens import Intrinsics, known_intrinsics
 from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.recipe import Reconstruction, require_harmonics
+from transientcam_server.imaging.recipe import SettingsVersion, require_harmonics
+from transientcam_server.imaging.workers import Workers
 from transientcam_server.planning.front import Fronts
-from transientcam_server.planning.planner import Accuracy
+from transientcam_server.planning.planner import Planner
 from transientcam_server.recording import Header
 from transientcam_server.recording.frames import RecordedFramesOf
 from transientcam_server.recording.library import Library, Wanted
@@ -47,9 +44,19 @@ from transientcam_server.settings import ReconstructionSettings, Settings
 
 _log = logging.getLogger(__name__)
 VERSION: Final = version("transientcam")
-_GOODBYE_S = 1.0
-_TOKENS_EVERY_S = 1.0
-_NO_MORE = "the token is not valid any more"
+_CLOSING_S = 1.0
+
+
+class Observer(Protocol):
+    """Is notified of what happens to frames, on the event loop; must return at once."""
+
+    def happened(self, event: Event) -> None:
+        """Take an event of the acquisition."""
+        ...
+
+    def superseded(self, meta: Mapping[str, Any]) -> None:
+        """Take the metadata of a frame that is the newest no more."""
+        ...
 
 
 class Service:
@@ -59,8 +66,10 @@ class Service:
     ----------
     applied
         The sequence that frames are captured with from now on.
-    previews
-        How many clients are shown a film.
+    mjpeg_clients
+        How many clients are sent a preview as MJPEG.
+    observers
+        Notified of every event of the acquisition, and of every frame that was the newest.
     """
 
     def __init__(self, camera: Camera, settings: Settings) -> None:
@@ -68,41 +77,41 @@ class Service:
         self.settings = settings
         self.hub = Hub()
         self.history = History(settings.history)
-        self.previews = 0
-        self.guard = Guard(settings)
+        self.mjpeg_clients = 0
+        self.observers: list[Observer] = []
         self._executor = ThreadPoolExecutor(settings.workers, thread_name_prefix="worker")
-        self.accuracy = Accuracy(camera, settings.reconstruction, settings.sensor)
-        kept = Calibrations(settings.calibrations, given=settings.calibration)
+        self.workers = Workers(self._executor, count=settings.workers)
+        noise = noise_of(camera, settings.sensor)
+        self.planner = Planner(camera.capabilities, noise, settings.reconstruction)
+        kept = CalibrationStore(settings.calibrations, given=settings.calibration)
         self.pipeline = Pipeline(
             camera,
             settings.reconstruction,
-            self._executor,
-            workers=settings.workers,
-            judge=self.accuracy.judge,
+            self.workers,
+            noise=noise,
             calibration=_calibration(camera, settings, kept),
             intrinsics=lambda: self.intrinsics,
         )
-        self.fronts = Fronts(self.accuracy, self.pipeline, simulated=camera.simulation is not None)
+        self.fronts = Fronts(self.planner, self.workers, simulated=camera.simulation is not None)
         self._loop: asyncio.AbstractEventLoop | None = None
         self.acquisition = Acquisition(camera, report=self._from_acquisition)
         self.applied: AppliedSequence = camera.applied
-        self.jobs = JobDesk(report=self._job_changed)
-        self.calibrations = CalibrationDesk(
+        self.jobs = Jobs(report=self._job_changed)
+        self.calibrations = Calibrator(
             camera,
             kept,
             acquisition=self.acquisition,
             pipeline=self.pipeline,
-            accuracy=self.accuracy,
+            noise=noise,
             jobs=self.jobs,
             history=self.history,
             tell=partial(self.hub.tell, "calibration-changed"),
         )
-        self.lease = LeaseDesk(report=self._lease_changed, alarm=self._alarm)
+        self.lease = LeaseManager(report=self._lease_changed, alarm=self._alarm)
         self.recordings = Library(
             settings.recordings, header=self._recording_header, tell=self._tell_from_thread
         )
         self.recorded_frames = RecordedFramesOf(self.recordings, self.pipeline, lens=settings.lens)
-        self.metrics = Metrics(self)
         self.identity = {"name": "transientcam", "version": VERSION}
 
     @contextlib.asynccontextmanager
@@ -111,57 +120,29 @@ class Service:
         self._loop = asyncio.get_running_loop()
         await asyncio.to_thread(self.recordings.open)
         self.acquisition.start()
-        watching = asyncio.create_task(self._watch_tokens())
         try:
             yield
         finally:
-            watching.cancel()
-            await asyncio.gather(watching, return_exceptions=True)
             self.lease.close()
             self.hub.close()
             self.jobs.cancel_all()
             await self._loop.run_in_executor(self._executor, self.acquisition.stop)
             await self.jobs.close()
             await self._loop.run_in_executor(self._executor, self.recordings.close)
-            await self.pipeline.close()
+            await self.workers.close()
             self._executor.shutdown(wait=True, cancel_futures=True)
 
-    async def say_goodbye(self) -> None:
+    async def close_streams(self) -> None:
         """Tell every stream that it ends, and give those that listen the time to hear it."""
         self.hub.close()
         self.jobs.cancel_all()
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(_GOODBYE_S):
+            async with asyncio.timeout(_CLOSING_S):
                 await self.hub.deserted.wait()
-
-    async def _watch_tokens(self) -> None:
-        """Send those away whose token was revoked or has expired since they came."""
-        while True:
-            await asyncio.sleep(_TOKENS_EVERY_S)
-            for outbox in self.hub.outboxes:
-                if not self.guard.still_valid(outbox.owner):
-                    outbox.put(Goodbye(wire.CloseCode.AUTHENTICATION_FAILED, _NO_MORE))
 
     def channel_table(self, channels: Iterable[Channel]) -> tuple[wire.Channel, ...]:
         """Return what frames of these channels look like with the present sequence."""
-        return tuple(map(self._described, channels))
-
-    def _described(self, channel: Channel) -> wire.Channel:
-        capabilities, product = self.camera.capabilities, channel.product
-        rows, columns = channel.crop.shape(capabilities.height, capabilities.width)
-        shape = product.shape(self.applied, rows, columns)
-        dtype, shape = travelling(product, channel.encoding, shape)
-        return wire.Channel(
-            channel=channel.number,
-            product=product.name,
-            unit=product.description.unit,
-            axes=product.description.axes,
-            dtype=dtype,
-            shape=shape,
-            encoding=encoding_name(channel.encoding),
-            region=channel.crop.region,
-            decimation=channel.crop.decimation,
-        )
+        return tuple(each.describe(self.camera.capabilities, self.applied) for each in channels)
 
     @property
     def intrinsics(self) -> Intrinsics:
@@ -208,7 +189,7 @@ class Service:
         if history_s is None:
             return await asyncio.to_thread(self.recordings.start, wanted)
         # it waits for its past, also if nobody waits for the answer any more
-        return await asyncio.shield(self.pipeline.start(self._record_past(wanted, history_s)))
+        return await asyncio.shield(self.workers.start(self._record_past(wanted, history_s)))
 
     async def _record_past(self, wanted: Wanted, history_s: float) -> dict[str, Any]:
         described = await asyncio.to_thread(self.recordings.start, replace(wanted, past=True))
@@ -224,7 +205,7 @@ class Service:
         """Return what a recording that starts now has to know to be evaluated alone."""
         camera, simulation = self.camera, self.camera.simulation
         applied = camera.applied
-        calibration = self.pipeline.calibration_for(applied)
+        gains = self.pipeline.gains_for(applied)
         return Header(
             recording_id=recording_id,
             name=name,
@@ -236,13 +217,13 @@ class Service:
                 "scene": None if simulation is None else simulation.scene,
                 "intrinsics": asdict(self.intrinsics),
             },
-            calibration={"id": calibration_id(calibration)},
-            calibration_planes=None if calibration is None else calibration.gains,
-            calibration_bad=None if calibration is None else calibration.bad,
+            calibration={"id": calibration_id(gains)},
+            calibration_planes=None if gains is None else gains.planes,
+            calibration_bad=None if gains is None else gains.bad,
             reconstruction=self.pipeline.reconstruction.settings.model_dump(),
         )
 
-    def reconstruct_with(self, settings: ReconstructionSettings) -> Reconstruction:
+    def reconstruct_with(self, settings: ReconstructionSettings) -> SettingsVersion:
         """Compute frames from the next one on with other settings.
 
         Raises
@@ -254,16 +235,18 @@ class Service:
         before = self.pipeline.reconstruction
         now = self.pipeline.reconstruction = before.followed_by(settings)
         if now is not before:
-            self.accuracy.reconstruct_with(settings)
+            self.planner.reconstruct_with(settings)
             self.hub.tell("reconstruction-changed", {"reconstruction": now.to_document()})
         return now
 
     def _happened(self, event: Event) -> None:
-        self.metrics.happened(event)
+        for observer in self.observers:
+            observer.happened(event)
         match event:
             case Captured(raw, applied):
                 if self.hub.latest is not None:
-                    self.metrics.superseded(self.hub.latest.meta())
+                    for observer in self.observers:
+                        observer.superseded(self.hub.latest.meta())
                 frame = self.pipeline.frame(raw, applied)
                 self.history.append(frame)
                 self.hub.publish(frame)
@@ -323,7 +306,7 @@ def _log_failure(stopped: Future[None]) -> None:
         _log.error("the capture could not be stopped: %s", stopped.exception())
 
 
-def _calibration(camera: Camera, settings: Settings, kept: Calibrations) -> Calibration | None:
+def _calibration(camera: Camera, settings: Settings, kept: CalibrationStore) -> Calibration | None:
     """Load the calibration that is given, or was active last; refuse one of another camera."""
     path = settings.calibration
     if path is None:
@@ -337,7 +320,7 @@ def _calibration(camera: Camera, settings: Settings, kept: Calibrations) -> Cali
     return loaded
 
 
-def _last_active(camera: Camera, kept: Calibrations) -> Calibration | None:
+def _last_active(camera: Camera, kept: CalibrationStore) -> Calibration | None:
     """Load what was active last, if it is still there and of this camera."""
     active_id = kept.active_id
     if active_id == NOMINAL_ID:

@@ -12,11 +12,11 @@ import pytest
 from websockets.client import ClientProtocol
 from websockets.uri import parse_uri
 
+import transientcam_moments as tm
 from tests.server.streaming import streaming
 from tests.serving import Served
 from transientcam import wire
 from transientcam_server.broadcast.outbox import Delivery
-from transientcam_server.imaging.products import STAGES
 
 LATEST = "/api/v1/frames/latest"
 PATIENCE_S = 60.0
@@ -230,7 +230,7 @@ def test_a_failing_product_is_told_once_and_again_only_after_it_worked(served: S
 def test_a_stage_that_fails_takes_only_what_stands_on_it(
     served: Served, http: httpx.Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(STAGES, "returns", replace(STAGES["returns"], compute=_break))
+    monkeypatch.setattr(tm.Reconstruction, "returns", property(_break))
     http.get(LATEST, params={"wait_s": 10.0})
     following = {"wait_s": 10.0, "after": http.get(LATEST).json()["frame"]}
 

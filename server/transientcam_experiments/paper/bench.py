@@ -21,7 +21,6 @@ from transientcam_driver import (
 )
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.imaging.calibration import Calibration, evaluate
-from transientcam_server.imaging.products import STAGES
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.settings import ReconstructionSettings
 
@@ -168,13 +167,13 @@ class Bench:
             applied = camera.configure(sequence)
             calibration.capture.require_fit(applied, camera.capabilities)
             full_scale = 2.0**camera.capabilities.bits - 1.0
-            recipe = Recipe(applied, ReconstructionSettings(), full_scale, calibration)
+            recipe = Recipe(applied, ReconstructionSettings(), full_scale, calibration.gains)
             assert camera.simulation is not None  # noqa: S101 - only simulated ones are opened
             camera.start()
             for _ in range(frames):
                 frame = camera.read_frame()
                 truth = camera.simulation.truth()
-                found: tm.Reconstruction = STAGES["moments"].compute(recipe, frame)
+                found: tm.Reconstruction = recipe.reconstruct(frame)
                 shots.append(Shot(found, truth, applied, frame.device_time_s - WARM_UP_S))
             camera.stop()
         return shots

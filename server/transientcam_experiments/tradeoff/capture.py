@@ -12,7 +12,6 @@ import transientcam_moments as tm
 from transientcam_driver import AppliedSequence, Camera, RawFrame, Truth
 from transientcam_experiments.tradeoff.truth import Sample, count_returns, cumulative
 from transientcam_server.imaging.noise import MEDIAN_OF_NORMAL
-from transientcam_server.imaging.products import STAGES
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.settings import ReconstructionSettings
 
@@ -116,7 +115,7 @@ def repeatability(ranges: _Array) -> float | None:
 
 
 def _of_shot(shot: Shot, sample: Sample, recipe: Recipe) -> tuple[_Array, dict[str, float]]:
-    found: tm.Reconstruction = STAGES["moments"].compute(recipe, shot.frame)
+    found: tm.Reconstruction = recipe.reconstruct(shot.frame)
     truth = shot.truth
     f_hz = recipe.base_frequency_hz
     lit = np.isfinite(truth.range_m) & (truth.brightness > 0)

@@ -16,7 +16,6 @@ from transientcam_experiments.tradeoff.grid import Grid
 from transientcam_experiments.tradeoff.records import Record, Records, key_of
 from transientcam_experiments.tradeoff.truth import Sample, sample_pixels
 from transientcam_moments.comparisons import Technique
-from transientcam_server.imaging.products import STAGES
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.settings import ReconstructionSettings
 
@@ -203,7 +202,7 @@ class _Bench:
                 applied = camera.configure(sequence)
                 (shot,) = capture.capture(camera, 1)
                 recipe = Recipe(applied, self._settings, 2.0**camera.capabilities.bits - 1.0)
-            b = STAGES["moments"].compute(recipe, shot.frame).moments.astype(np.complex128)
+            b = recipe.reconstruct(shot.frame).moments.astype(np.complex128)
             # rounding to single precision took from what biasing had given
             biased = tm.bias(b, self._settings.bias).moments
             truth = shot.truth

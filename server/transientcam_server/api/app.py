@@ -8,10 +8,11 @@ from fastapi import APIRouter, Depends, FastAPI
 
 from transientcam_server.api import problems
 from transientcam_server.api.auth import permissions
-from transientcam_server.api.auth.guard import Authentication
+from transientcam_server.api.auth.guard import Authentication, Guard
 from transientcam_server.api.docs import pages
-from transientcam_server.api.middleware.requests import Requests
-from transientcam_server.api.middleware.security import BodyLimit, SameSite, SecurityHeaders
+from transientcam_server.api.metrics import Metrics
+from transientcam_server.api.middleware.requests import RequestLog
+from transientcam_server.api.middleware.security import BodyLimit, OriginCheck, SecurityHeaders
 from transientcam_server.api.routes import (
     acquisition,
     calibrations,
@@ -21,7 +22,6 @@ from transientcam_server.api.routes import (
     info,
     jobs,
     lease,
-    metrics,
     parameters,
     plan,
     preview,
@@ -30,6 +30,9 @@ from transientcam_server.api.routes import (
     recordings,
     sequence,
     simulation,
+)
+from transientcam_server.api.routes import (
+    metrics as metrics_route,
 )
 from transientcam_server.api.stream import websocket
 from transientcam_server.camera.source import Camera
@@ -62,10 +65,13 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     The camera stays the caller's: it is neither opened nor closed here.
     """
     service = Service(camera, settings)
+    metrics = Metrics(service)
+    service.observers.append(metrics)
+    guard = Guard(settings)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        async with service.running():
+        async with service.running(), websocket.watching_tokens(service.hub, guard):
             yield
 
     app = FastAPI(
@@ -80,20 +86,22 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
         swagger_ui_oauth2_redirect_url=None,
     )
     app.state.service = service
+    app.state.metrics = metrics
+    app.state.guard = guard
     api = APIRouter(prefix=API)
     for resource in _RESOURCES:
         api.include_router(resource.router, dependencies=[Depends(permissions.admit)])
     api.include_router(websocket.router)
     app.include_router(api)
-    for router in (info.versions, health.router, metrics.router, pages.router):
+    for router in (info.versions, health.router, metrics_route.router, pages.router):
         app.include_router(router)
     pages.add_dashboard(app)
     problems.install(app)
     permissions.describe(app, [resource.router for resource in _RESOURCES], prefix=API)
     # the last one added is the first to see a request
     app.add_middleware(BodyLimit, counted_elsewhere=frozenset((f"{API}{calibrations.IMPORT}",)))
-    app.add_middleware(Authentication, guard=service.guard)
-    app.add_middleware(SameSite, settings=settings)
-    app.add_middleware(Requests, metrics=service.metrics)
+    app.add_middleware(Authentication, guard=guard)
+    app.add_middleware(OriginCheck, settings=settings)
+    app.add_middleware(RequestLog, metrics=metrics)
     app.add_middleware(SecurityHeaders)
     return app

@@ -1,9 +1,10 @@
-"""What routes ask FastAPI for."""
+"""What routes depend on: the service, its metrics, and who may use it."""
 
 from typing import Annotated
 
 from fastapi import Depends, Request
 
+from transientcam_server.api.metrics import Metrics
 from transientcam_server.service import Service
 
 
@@ -15,3 +16,12 @@ async def _service(request: Request) -> Service:
 
 ServiceOf = Annotated[Service, Depends(_service)]
 """The service that a route belongs to."""
+
+
+async def _metrics(request: Request) -> Metrics:
+    metrics: Metrics = request.app.state.metrics
+    return metrics
+
+
+MetricsOf = Annotated[Metrics, Depends(_metrics)]
+"""The metrics of that service."""

@@ -73,7 +73,7 @@ class Wanted:
         height, width = frame.shape
         crop = Crop.parse(self.region, self.decimation, height=height, width=width)
         times_s = self._times_s(frame) if product.over_time else ()
-        y = self._row(crop, height) if product.name == "streak" else None
+        y = self._row(crop, height) if product.of_row else None
         return View(times_s, crop, y)
 
     def _require_meaning(self, product: Product) -> None:
@@ -83,7 +83,7 @@ class Wanted:
             raise invalid(field, self.bins or self.time_s, limit)
         if self.time_s is not None and self.bins is not None:
             raise invalid("bins", self.bins, "left out where time_s is given")
-        if self.y is not None and product.name != "streak":
+        if self.y is not None and not product.of_row:
             raise invalid("y", self.y, "left out: this product has more than one row")
 
     def _times_s(self, frame: Frame) -> tuple[float, ...]:
@@ -171,10 +171,15 @@ async def product_answer(
         meta = found.meta() | view.crop.to_meta(*found.shape)
         headers |= {
             "Transientcam-Frame": str(found.number),
-            "Transientcam-Unit": chosen.png_unit if encoding is PNG else chosen.description.unit,
+            "Transientcam-Unit": _unit(chosen, encoding),
             "Transientcam-Meta": json.dumps(meta, separators=(",", ":")),
         }
     return Response(data, media_type=encoding.media_type, headers=headers)
+
+
+def _unit(product: Product, encoding: Encoding) -> str:
+    steps = product.png_steps if encoding is PNG else None
+    return product.description.unit if steps is None else steps.unit
 
 
 async def pixel_answer(
@@ -184,7 +189,7 @@ async def pixel_answer(
     for field, value, length in (("x", x, frame.shape[1]), ("y", y, frame.shape[0])):
         if value >= length:
             raise invalid(field, value, f"from 0 to {length - 1}")
-    truth = await frame.stage("truth") if simulated and not as_csv else None
+    truth = await frame.truth() if simulated and not as_csv else None
     body = await frame.with_moments(pixel_csv if as_csv else pixel_json, truth, x, y, bins)
     media_type = "text/csv" if as_csv else "application/json"
     return Response(body, media_type=media_type, headers={"Cache-Control": "no-store"})

@@ -5,7 +5,7 @@ they happen. Each service has a registry of its own.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import prometheus_client as prometheus
 from prometheus_client import Histogram
@@ -16,9 +16,7 @@ import transientcam_moments as tm
 from transientcam_server.camera.events import Back, Captured, Event, Lost
 from transientcam_server.imaging.calibration import NOMINAL_ID
 from transientcam_server.recording.library import Library
-
-if TYPE_CHECKING:  # it makes its metrics
-    from transientcam_server.service import Service
+from transientcam_server.service import Service
 
 CONTENT_TYPE: Final = prometheus.CONTENT_TYPE_LATEST
 _FLAGS: Final = [str(flag.name).lower() for flag in tm.Flags if flag]
@@ -30,7 +28,7 @@ _COMPUTING_S: Final = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 5.0)
 class Metrics:
     """The metrics of one service."""
 
-    def __init__(self, service: "Service") -> None:
+    def __init__(self, service: Service) -> None:
         self.registry = prometheus.CollectorRegistry()
         self._frame_interval = Histogram(
             "transientcam_frame_interval_seconds",
@@ -105,7 +103,7 @@ class Metrics:
 class _ServiceCollector(Collector):
     """Reads what the service counts anyway."""
 
-    def __init__(self, service: "Service", metrics: Metrics) -> None:
+    def __init__(self, service: Service, metrics: Metrics) -> None:
         self._service = service
         self._metrics = metrics
 
@@ -242,7 +240,7 @@ class _ServiceCollector(Collector):
         yield GaugeMetricFamily(
             "transientcam_preview_clients",
             "Clients that are shown a film now.",
-            self._service.previews,
+            self._service.mjpeg_clients,
         )
         yield CounterMetricFamily(
             "transientcam_frames_dropped",

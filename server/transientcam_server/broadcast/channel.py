@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Final
 
+from transientcam import wire
+from transientcam_driver import AppliedSequence, Capabilities
+from transientcam_server.imaging.encodings.compact import encoding_name, travelling
 from transientcam_server.imaging.encodings.encoding import MSGPACK, Encoding
 from transientcam_server.imaging.products import Product
 from transientcam_server.imaging.view import WHOLE, Crop
@@ -27,6 +30,24 @@ class Channel:
     next_due_s: float = float("-inf")
     dropped: int = 0
     dropped_total: int = 0
+
+    def describe(self, capabilities: Capabilities, applied: AppliedSequence) -> wire.Channel:
+        """Return what its frames look like with a sequence of a camera."""
+        rows, columns = self.crop.shape(capabilities.height, capabilities.width)
+        whole = self.product.shape(applied, rows, columns)
+        dtype, shape = travelling(self.product, self.encoding, whole)
+        description = self.product.description
+        return wire.Channel(
+            channel=self.number,
+            product=description.name,
+            unit=description.unit,
+            axes=description.axes,
+            dtype=dtype,
+            shape=shape,
+            encoding=encoding_name(self.encoding),
+            region=self.crop.region,
+            decimation=self.crop.decimation,
+        )
 
     def take(self, time_s: float) -> bool:
         """Return whether the frame captured at ``time_s`` is due, and count on from there."""

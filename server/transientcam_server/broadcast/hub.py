@@ -10,7 +10,7 @@ from typing import Any
 
 from transientcam import wire
 from transientcam_server.broadcast.channel import Channel, ChannelNumbers
-from transientcam_server.broadcast.outbox import Goodbye, Outbox
+from transientcam_server.broadcast.outbox import Close, Outbox
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.frame import Frame
@@ -117,4 +117,4 @@ class Hub:
             outbox.put(_SHUTDOWN)
 
 
-_SHUTDOWN = Goodbye(wire.CloseCode.GOING_AWAY, "the service shuts down")
+_SHUTDOWN = Close(wire.CloseCode.GOING_AWAY, "the service shuts down")

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
 from transientcam import wire
-from transientcam_server.api.auth.guard import ANYBODY
 from transientcam_server.broadcast.channel import Channel
 from transientcam_server.imaging.frame import Frame
 
@@ -36,7 +35,7 @@ class Past(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Goodbye:
+class Close:
     """The last thing a client is told."""
 
     code: wire.CloseCode
@@ -51,7 +50,7 @@ class Delivery:
     channels: tuple[Channel, ...]
 
 
-Message = wire.Hello | wire.Notice | wire.ErrorMessage | Goodbye
+Message = wire.Hello | wire.Notice | wire.ErrorMessage | Close
 Item = Delivery | Message
 
 
@@ -65,11 +64,11 @@ class Outbox:
     Attributes
     ----------
     owner
-        Whom the client has shown to be.
+        As whom the client has authenticated; None before it has.
     """
 
     def __init__(self, *, depth: int) -> None:
-        self.owner = ANYBODY
+        self.owner: object | None = None
         self._depth = depth
         self._channels: tuple[Channel, ...] = ()
         self._credits: int | None = None
@@ -129,7 +128,7 @@ class Outbox:
         """Let a message wait; a client with too many of them is told goodbye instead."""
         if len(self._waiting) >= MAX_WAITING_MESSAGES:
             self._waiting.clear()
-            item = Goodbye(wire.CloseCode.TRY_AGAIN_LATER, "too many messages waited")
+            item = Close(wire.CloseCode.TRY_AGAIN_LATER, "too many messages waited")
         self._waiting.append(item)
         self._changed.set()
 

@@ -218,7 +218,7 @@ class Acquisition:
             frames=self._frames,
             frame_age_s=age_s,
             reason=self._lost,
-            stalled=state in ("starting", "streaming") and age_s > self._patience_s(),
+            stalled=state in ("starting", "streaming") and age_s > self._stall_after_s(),
         )
 
     def _state(self) -> State:
@@ -230,7 +230,7 @@ class Acquisition:
             return "stopped"
         return "streaming" if self._started else "starting"
 
-    def _patience_s(self) -> float:
+    def _stall_after_s(self) -> float:
         applied = self._camera.applied
         return max(STALLED_MIN_S, STALLED_PERIODS / applied.frame_rate_hz)
 

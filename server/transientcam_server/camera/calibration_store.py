@@ -54,7 +54,7 @@ class Stored:
     notes: Mapping[str, Any]
 
 
-class Calibrations:
+class CalibrationStore:
     """The calibrations that are there. Reads and writes files, so call it on a worker.
 
     Parameters

@@ -20,8 +20,8 @@ from transientcam_driver import (
 )
 from transientcam_driver.calibration.capture import DEFAULT_TAKES
 from transientcam_server.camera.acquisition import Acquisition
-from transientcam_server.camera.calibration_store import Calibrations, Stored
-from transientcam_server.camera.jobs import Job, JobDesk
+from transientcam_server.camera.calibration_store import CalibrationStore, Stored
+from transientcam_server.camera.jobs import Job, Jobs
 from transientcam_server.camera.source import Camera
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
@@ -34,11 +34,9 @@ from transientcam_server.imaging.calibration import (
 )
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.history import History
-from transientcam_server.imaging.noise import invalid_share
+from transientcam_server.imaging.noise import NoiseModel, invalid_share
 from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.products import STAGES
 from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.planning.planner import Accuracy
 
 _log = logging.getLogger(__name__)
 _Array = NDArray[Any]
@@ -77,7 +75,7 @@ class Drift:
         }
 
 
-class CalibrationDesk:
+class Calibrator:
     """Where calibrations are asked for; on the event loop, everything slow on workers.
 
     Parameters
@@ -91,12 +89,12 @@ class CalibrationDesk:
     def __init__(
         self,
         camera: Camera,
-        kept: Calibrations,
+        kept: CalibrationStore,
         *,
         acquisition: Acquisition,
         pipeline: Pipeline,
-        accuracy: Accuracy,
-        jobs: JobDesk,
+        noise: NoiseModel,
+        jobs: Jobs,
         history: History,
         tell: Callable[[Mapping[str, Any]], None],
         clock: Callable[[], float] = time.monotonic,
@@ -105,7 +103,7 @@ class CalibrationDesk:
         self._camera = camera
         self._acquisition = acquisition
         self._pipeline = pipeline
-        self._accuracy = accuracy
+        self._noise = noise
         self._jobs = jobs
         self._history = history
         self._tell = tell
@@ -118,7 +116,8 @@ class CalibrationDesk:
     @property
     def active_id(self) -> str:
         """The calibration that is used wherever it is good for the sequence."""
-        return calibration_id(self._pipeline.calibration)
+        calibration = self._pipeline.calibration
+        return calibration_id(None if calibration is None else calibration.gains)
 
     @property
     def active_since_s(self) -> float | None:
@@ -135,7 +134,7 @@ class CalibrationDesk:
         """Return which gains are used with a sequence, and why not those of the active one."""
         misfit = self._pipeline.misfit(applied)
         return {
-            "calibration_id": calibration_id(self._pipeline.calibration_for(applied)),
+            "calibration_id": calibration_id(self._pipeline.gains_for(applied)),
             "reason": None if misfit is None else str(misfit),
         }
 
@@ -155,7 +154,7 @@ class CalibrationDesk:
         if wanted_id != NOMINAL_ID:
             stored = await asyncio.to_thread(self.kept.get, wanted_id)
             self._require_fit(self.misfit(stored, applied()))
-            loaded, _ = await self._pipeline.run_long(load_calibration, stored.path)
+            loaded, _ = await self._pipeline.workers.run_long(load_calibration, stored.path)
             # the sequence may be another one by now
             loaded.capture.require_fit(applied(), self._camera.capabilities)
             calibration = loaded
@@ -211,15 +210,17 @@ class CalibrationDesk:
             )
             capture = await asyncio.wrap_future(measuring)
             job.report(_EVALUATING, "evaluating")
-            calibration, _ = await self._pipeline.run_long(evaluate, capture)
-            share, _ = await self._pipeline.run_long(self._share_of_takes, calibration, takes, once)
+            calibration, _ = await self._pipeline.workers.run_long(evaluate, capture)
+            share, _ = await self._pipeline.workers.run_long(
+                self._share_of_takes, calibration, takes, once
+            )
             notes = {"name": wanted.name, "invalid_share": share}
             stored = await asyncio.to_thread(self.kept.add, replace(capture, notes=notes))
             if wanted.activate:
                 await self.activate(stored.id, applied)
             return {
                 "calibration": stored.id,
-                "bad_pixels": int(calibration.bad.sum()),
+                "bad_pixels": calibration.gains.bad_pixels,
                 "rejected_images": capture.rejected_images,
                 "images": int(capture.kept.size),
                 "invalid_share": share,
@@ -247,7 +248,7 @@ class CalibrationDesk:
                 frame = self._history.frame(number)
             except Problem:  # no older ones are there
                 break
-            if frame.recipe.calibration is calibration:
+            if frame.recipe.gains is calibration.gains:
                 share = await self._share_of(frame)
                 if share is not None:
                     shares.append(share)
@@ -257,26 +258,26 @@ class CalibrationDesk:
 
     async def _share_of(self, frame: Frame) -> float | None:
         try:
-            found = await frame.stage("moments")
-            share, _ = await self._pipeline.run(self._share, frame.recipe, found)
+            found = await frame.reconstruction("moments")
+            share, _ = await self._pipeline.workers.run(self._share, frame.recipe, found)
         except Exception:  # one frame that cannot be computed says nothing of the calibration
             _log.exception("frame %d: counting its invalid pixels failed", frame.number)
             return None
         return share
 
     def _share(self, recipe: Recipe, found: tm.Reconstruction) -> float | None:
-        return invalid_share(found, self._accuracy.noise(recipe, found))
+        return invalid_share(found, self._noise.of_moments(recipe, found))
 
     def _share_of_takes(
         self, calibration: Calibration, takes: "_Takes", once: AppliedSequence
     ) -> float | None:
         """Return the share of the measurement's own frames, each by itself; runs on a worker."""
         full_scale = 2.0**self._camera.capabilities.bits - 1.0
-        recipe = Recipe(once, self._pipeline.reconstruction.settings, full_scale, calibration)
+        recipe = Recipe(once, self._pipeline.reconstruction.settings, full_scale, calibration.gains)
         shares = []
         for images in takes.frames():
             raw = RawFrame(0, 0, images, once.labels, 0.0, 0.0, 0.0, 0.0, 0)
-            found = STAGES["moments"].compute(recipe, raw)
+            found = recipe.reconstruct(raw)
             if (share := self._share(recipe, found)) is not None:
                 shares.append(share)
         return min(shares, default=None)

@@ -93,7 +93,7 @@ Work = Callable[[Job], Awaitable[dict[str, Any]]]
 """Does a job and returns its result; what it raises is the job's problem."""
 
 
-class JobDesk:
+class Jobs:
     """Where jobs are started, looked after and cancelled.
 
     Parameters

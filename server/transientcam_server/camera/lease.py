@@ -60,7 +60,7 @@ Report = Callable[[Change, Lease, Lease | None], None]
 """Told of every change: what, the lease it is about, and the one that this one replaced."""
 
 
-class LeaseDesk:
+class LeaseManager:
     """Where the lease is asked for, renewed and given back.
 
     Parameters

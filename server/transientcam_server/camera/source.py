@@ -13,7 +13,9 @@ from transientcam_driver import (
     Simulation,
     Status,
 )
+from transientcam_server.imaging.noise import NoiseModel
 from transientcam_server.recording.replay import PREFIX, ReplayCamera, parse_replay
+from transientcam_server.settings import SensorSettings
 
 
 class Camera(Protocol):
@@ -76,6 +78,12 @@ class Camera(Protocol):
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None: ...
+
+
+def noise_of(camera: Camera, sensor: SensorSettings) -> NoiseModel:
+    """Return the noise of a camera: a simulated one has its sensor, a real one the settings'."""
+    model = sensor if camera.simulation is None else camera.simulation.sensor
+    return NoiseModel(model, bits=camera.capabilities.bits)
 
 
 def open_camera(spec: str) -> Camera:

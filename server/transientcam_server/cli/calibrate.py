@@ -174,7 +174,7 @@ def _result(measured: "Calibration", output: Path) -> dict[str, Any]:
     images, height, width = capture.images.shape
     return {
         "file": str(output),
-        "calibration_id": measured.id,
+        "calibration_id": measured.gains.id,
         "serial": capture.serial,
         "width": width,
         "height": height,
@@ -182,7 +182,7 @@ def _result(measured: "Calibration", output: Path) -> dict[str, Any]:
         "images": images,
         "takes": len(capture.kept),
         "rejected_images": capture.rejected_images,
-        "bad_pixels": int(measured.bad.sum()),
+        "bad_pixels": measured.gains.bad_pixels,
         "sequence": capture.sequence.to_document(),
     }
 

@@ -70,9 +70,10 @@ def plan(
     """
     import transientcam_moments as tm
     from transientcam_driver import Sequence, open_camera
+    from transientcam_server.camera.source import noise_of
     from transientcam_server.errors.exceptions import Problem
     from transientcam_server.planning import Goal
-    from transientcam_server.planning.planner import Accuracy
+    from transientcam_server.planning.planner import Planner
     from transientcam_server.planning.scene import given
     from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
@@ -90,13 +91,15 @@ def plan(
     )
     console = Console(stderr=True)
     with open_camera(camera) as opened:
-        accuracy = Accuracy(opened, ReconstructionSettings(), SensorSettings())
+        planner = Planner(
+            opened.capabilities, noise_of(opened, SensorSettings()), ReconstructionSettings()
+        )
         if computing_share is not None:
             with console.status("compiling kernels"):
                 tm.kernels.compile()  # what is to be timed is the daemon's speed
         with console.status("looking at the scene"):
             if brightness_dn_per_s is None:
-                scene = accuracy.statistic(*_captured(opened), ambient_dn_per_s)
+                scene = planner.statistic(*_captured(opened), ambient_dn_per_s)
             else:
                 scene = given(
                     brightness_dn_per_s,
@@ -105,7 +108,7 @@ def plan(
                 )
         with console.status("predicting"):
             try:
-                made = accuracy.plan(goal, scene)
+                made = planner.plan(goal, scene)
             except Problem as problem:
                 if as_json:
                     typer.echo(json.dumps({"detail": problem.detail, **problem.extensions}))
@@ -115,14 +118,13 @@ def plan(
     if as_json:
         typer.echo(json.dumps(made.to_document()))
     else:
-        for line in _told(made.to_document(), computing=computing_share is not None):
+        for line in _lines(made.to_document(), computing=computing_share is not None):
             typer.echo(line)
 
 
 def _captured(camera: "Camera") -> tuple["Recipe", "tm.Reconstruction"]:
-    """Have a good look: as many harmonics as matter, and little noise."""
+    """Capture the scene with as many harmonics as matter and little noise."""
     from transientcam_driver import Sequence
-    from transientcam_server.imaging.products import STAGES
     from transientcam_server.imaging.recipe import Recipe
     from transientcam_server.settings import ReconstructionSettings
 
@@ -134,7 +136,7 @@ def _captured(camera: "Camera") -> tuple["Recipe", "tm.Reconstruction"]:
     camera.stop()
     full_scale = 2.0**camera.capabilities.bits - 1.0
     recipe = Recipe(applied, ReconstructionSettings(), full_scale)
-    return recipe, STAGES["moments"].compute(recipe, frame)
+    return recipe, recipe.reconstruct(frame)
 
 
 def _fields(texts: list[str]) -> dict[str, Any]:
@@ -162,7 +164,7 @@ def _return(text: str) -> tuple[float, float]:
     return parts
 
 
-def _told(document: dict[str, Any], *, computing: bool) -> Iterator[str]:
+def _lines(document: dict[str, Any], *, computing: bool) -> Iterator[str]:
     std = document["predicted"]["range_std_m"]
     yield json.dumps(document["sequence"])
     time_ms, rate_hz = document["capture_s"] * 1e3, document["frame_rate_hz"]

@@ -83,14 +83,17 @@ def serve(
 
     server.configure_logging(settings)
     # the address first: where another daemon has it, the camera is not touched
-    with server.ending_without() as leave, server.listen(settings.host, settings.port) as listener:
+    with (
+        server.exit_without_joining() as leave,
+        server.listen(settings.host, settings.port) as listener,
+    ):
         url = server.address(listener, tls=settings.tls_certificate is not None)
         with open_camera(settings.camera) as opened:
             # NumPy serves until the compiled kernels are ready
             compiling = tm.kernels.compile_in_background()
             leave(compiling)
             app = build_app(opened, settings)
-            server.set_aside_after(compiling)
+            server.freeze_startup_objects(compiling)
             server.serve(
                 app,
                 settings,

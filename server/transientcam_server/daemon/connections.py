@@ -28,7 +28,7 @@ class BoundedConnection(HttpToolsProtocol):
         super().__init__(*arguments, **options)
         self._limits = limits
         self._deadline: asyncio.TimerHandle | None = None
-        self._patience: Patience | None = None
+        self._patience: StallTimer | None = None
         self._in_head = True
         self._head_bytes = 0
 
@@ -37,7 +37,7 @@ class BoundedConnection(HttpToolsProtocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Take part, or refuse where there are too many already."""
         super().connection_made(cast("asyncio.Transport", transport))  # uvloop has its own class
-        self._patience = Patience(self.transport, limit_s=self._limits.stalled_s, loop=self.loop)
+        self._patience = StallTimer(self.transport, limit_s=self._limits.stalled_s, loop=self.loop)
         problem = self._too_many()
         if problem is None:
             self._expect_within(self._limits.head_s)
@@ -152,12 +152,12 @@ class BoundedStream(WebSocketsSansIOProtocol):
     def __init__(self, *arguments: Any, limits: LimitSettings, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self._limits = limits
-        self._patience: Patience | None = None
+        self._patience: StallTimer | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Take part."""
         super().connection_made(transport)
-        self._patience = Patience(self.transport, limit_s=self._limits.stalled_s, loop=self.loop)
+        self._patience = StallTimer(self.transport, limit_s=self._limits.stalled_s, loop=self.loop)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the timer."""
@@ -228,7 +228,7 @@ def _headers(response: Response) -> list[bytes]:
     return [name + b": " + value for name, value in response.raw_headers]
 
 
-class Patience:
+class StallTimer:
     """Aborts a connection that takes nothing for ``limit_s`` while something waits to be written.
 
     A client that takes little is slow, not gone: what counts is that what waits gets less.

@@ -128,7 +128,7 @@ class Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Let every stream be told that it ends, then stop."""
         await self._around.aclose()
-        await self._service.say_goodbye()
+        await self._service.close_streams()
         await super().shutdown(sockets)
 
     @contextmanager
@@ -176,7 +176,7 @@ def serve(
 
 
 @contextmanager
-def ending_without() -> Iterator[Callable[[threading.Thread], None]]:
+def exit_without_joining() -> Iterator[Callable[[threading.Thread], None]]:
     """Do not wait, at the end of the block and of the process, for what is handed to its value.
 
     A compiler that is at work cannot be interrupted, and takes longer for one kernel than those
@@ -212,7 +212,7 @@ def set_aside() -> None:
     gc.freeze()
 
 
-def set_aside_after(compiling: threading.Thread) -> threading.Thread:
+def freeze_startup_objects(compiling: threading.Thread) -> threading.Thread:
     """Set aside what is there now, and once more what the compiler leaves when it has ended."""
     set_aside()
 

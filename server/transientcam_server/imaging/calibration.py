@@ -1,4 +1,4 @@
-"""What a calibration measurement says of each pixel: its gains, and whether it is any good."""
+"""Gains of each pixel, from a calibration measurement or nominal, and bad pixels."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,25 +16,36 @@ NOMINAL_ID = "nominal"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Calibration:
-    """A measurement, evaluated.
+class Gains:
+    """What moments are divided by, of one calibration.
 
     Attributes
     ----------
     id
-        Name of the measurement.
-    capture
-        The measurement.
-    gains : array, shape (m + 1, H, W), complex64
-        What to divide moments by.
+        Name of the calibration.
+    planes : array, shape (m + 1, H, W), complex64
+        The gain of each moment and pixel.
     bad : boolean array, shape (H, W)
-        Pixels that are hot, stuck, noisy or dead, and show their neighbours' mean instead.
+        Pixels that are hot, stuck, noisy or dead, and show their neighbours' mean instead; None
+        where none are known.
     """
 
     id: str
+    planes: _Array
+    bad: _Array | None
+
+    @property
+    def bad_pixels(self) -> int:
+        """How many pixels are bad."""
+        return 0 if self.bad is None else int(np.count_nonzero(self.bad))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """A calibration measurement and the gains that follow from it."""
+
     capture: CalibrationCapture
-    gains: _Array
-    bad: _Array
+    gains: Gains
 
 
 def load_calibration(path: Path) -> Calibration:
@@ -61,12 +72,12 @@ def evaluate(capture: CalibrationCapture) -> Calibration:
     measured[0] = _brightness(measured, nominal)
     # a brightness stays in digital numbers, as with nominal gains
     gains = tm.calibration_of(measured) * np.complex64(nominal[0])
-    return Calibration(capture.id, capture, gains, bad)
+    return Calibration(capture, Gains(capture.id, gains, bad))
 
 
-def calibration_id(calibration: Calibration | None) -> str:
-    """Return what a frame's metadata call the gains it was computed with."""
-    return NOMINAL_ID if calibration is None else calibration.id
+def calibration_id(gains: Gains | None) -> str:
+    """Return the calibration id in the metadata of frames computed with these gains."""
+    return NOMINAL_ID if gains is None else gains.id
 
 
 def nominal_gains(sequence: Sequence) -> _Array:

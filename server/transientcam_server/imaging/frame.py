@@ -1,40 +1,43 @@
-"""One capture and everything computed of it, each thing once for all who ask.
+"""One capture and everything computed of it, each thing once for all who request it.
 
-A `Frame` remembers every stage, product and encoding as a task: the first who asks starts it, all
-others wait for the same one. Everything here lives on the event loop and computes nothing there.
+A product takes two hops to a worker: one computes the stages of the reconstruction that were
+requested meanwhile, all in one go, the other makes the array and its bytes. Everything here lives
+on the event loop and computes nothing there.
 """
 
 import asyncio
-import logging
 import math
+import time
 from collections import OrderedDict
 from collections.abc import Callable, Coroutine, Hashable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, TypeVar
+from functools import partial
+from typing import Any, Final, TypeVar
 
+import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_driver import RawFrame
+from transientcam import Frame as EncodedFrame
+from transientcam_driver import RawFrame, Truth
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import calibration_id
 from transientcam_server.imaging.encodings.encoding import Encoding
-from transientcam_server.imaging.products import BOUNDS_RADIUS, STAGES, Product, pixel_counts
+from transientcam_server.imaging.noise import NoiseModel
+from transientcam_server.imaging.products import PRODUCTS, Product
 from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.imaging.stages import STAGES, Computed, compute
 from transientcam_server.imaging.view import EVERYTHING, View
+from transientcam_server.imaging.workers import Workers
 
-if TYPE_CHECKING:  # it makes frames
-    from transientcam_server.imaging.pipeline import Pipeline
-
-_log = logging.getLogger(__name__)
 _T = TypeVar("_T")
 _Array = NDArray[Any]
+_Memory = OrderedDict[Hashable, "asyncio.Future[Any]"]
 MAX_ANSWER_BYTES = 512 * 1024 * 1024
 """A product over time with more than this is not computed."""
-_REMEMBERED_TIME_AXES = 2
-_REMEMBERED_CROPS = 32
+_REMEMBERED_TIME_AXES: Final = 2
+_REMEMBERED_CROPS: Final = 32
 
 
 class Frame:
@@ -47,37 +50,50 @@ class Frame:
     raw
         The labelled images.
     recipe
-        Sequence and settings that its products are computed with.
+        Sequence, settings and gains that its products are computed with.
     past
         Whether it is a former or a recorded one, whose computation delays no new one.
     """
 
     def __init__(
         self,
-        pipeline: "Pipeline",
+        workers: Workers,
         number: int,
         raw: RawFrame,
         recipe: Recipe,
         *,
+        noise: NoiseModel | None = None,
+        truth: Callable[[float | None], Truth] | None = None,
         past: bool = False,
     ) -> None:
         self.number = number
         self.raw = raw
         self.recipe = recipe
         self.past = past
-        self._pipeline = pipeline
-        self._run = pipeline.run_long if past else pipeline.run
+        self._workers = workers
+        self._run = workers.run_long if past else workers.run
+        self._noise = noise
+        self._truth = truth
+        self._computed = Computed()
         self._reconstruct_s: float | None = None
-        self._pixels: dict[str, int] | None = None
-        self._rejected_images: int | None = None
-        self._deviation: dict[str, float] | None = None
-        self._known: dict[Hashable, asyncio.Task[Any]] = {}
-        self._over_time: OrderedDict[Hashable, asyncio.Task[Any]] = OrderedDict()
-        self._crops: OrderedDict[Hashable, asyncio.Task[Any]] = OrderedDict()
+        self._stages: dict[str, asyncio.Future[tm.Reconstruction]] = {}
+        self._requested: set[str] = set()
+        self._computing: asyncio.Task[None] | None = None
+        self._whole: _Memory = OrderedDict()
+        self._over_time: _Memory = OrderedDict()
+        self._crops: _Memory = OrderedDict()
 
     def bare(self) -> "Frame":
         """Return the same frame with nothing computed: what is kept of one that is history."""
-        return Frame(self._pipeline, self.number, self.raw, self.recipe, past=True)
+        return Frame(
+            self._workers,
+            self.number,
+            self.raw,
+            self.recipe,
+            noise=self._noise,
+            truth=self._truth,
+            past=True,
+        )
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -87,13 +103,13 @@ class Frame:
 
     def meta(self) -> dict[str, Any]:
         """Return what is known of the frame, as the wire contract has it."""
-        sequence = self.recipe.applied.sequence
+        sequence, found = self.recipe.applied.sequence, self._computed.reconstruction
         height, width = self.shape
         return {
             "frame": self.number,
             "sequence_id": self.raw.epoch,
-            "calibration_id": calibration_id(self.recipe.calibration),
-            "reconstruction_id": self.recipe.reconstruction_id,
+            "calibration_id": calibration_id(self.recipe.gains),
+            "reconstruction_id": self.recipe.settings_version,
             "device_time_s": self.raw.device_time_s,
             "host_time_s": self.raw.host_time_s,
             "capture_s": self.raw.capture_s,
@@ -107,14 +123,83 @@ class Frame:
             "height": height,
             "temperature_c": self.raw.temperature_c,
             "lost_images": self.raw.lost_images,
-            "rejected_images": self._rejected_images,
-            "pixels": self._pixels,
-            "predicted_range_std_m": self._deviation,
+            "rejected_images": None if found is None else found.rejected_images,
+            "pixels": self._computed.pixels,
+            "predicted_range_std_m": self._computed.range_noise,
         }
 
-    async def stage(self, name: str) -> Any:
-        """Return an intermediate result."""
-        return await self._once(("stage", name), lambda: self._compute_stage(name), self._known)
+    # -- the first hop: stages of the reconstruction -------------------------------------------
+
+    async def reconstruction(self, stage: str) -> tm.Reconstruction:
+        """Return the reconstruction with at least this stage computed (`STAGES`)."""
+        future = self._stages.get(stage)
+        if future is None:
+            future = self._stages[stage] = asyncio.get_running_loop().create_future()
+            self._requested.add(stage)
+            if self._computing is None:
+                self._computing = self._workers.start(self._compute_requested())
+        return await _shared(future)
+
+    async def truth(self) -> Truth:
+        """Return the ground truth of the simulated scene at the time of the capture."""
+        return await self._once("truth", self._compute_truth, self._whole)
+
+    async def with_moments(self, compute: Callable[..., _T], *arguments: Any) -> _T:
+        """Return what ``compute(recipe, reconstruction, meta, *arguments)`` gives on a worker.
+
+        Raises
+        ------
+        Problem
+            ``product-failed`` if it raised.
+        """
+        with self._failure_of("moments"):
+            found = await self.reconstruction("moments")
+            value, _ = await self._run(compute, self.recipe, found, self.meta(), *arguments)
+        return value
+
+    async def _compute_requested(self) -> None:
+        """Compute the stages requested in this turn of the loop in one go, then later ones."""
+        await asyncio.sleep(0)
+        requested: set[str] = set()
+        try:
+            while self._requested:
+                requested, self._requested = self._requested, set()
+                self._computed, elapsed_s = await self._run(
+                    compute, self._computed, self.recipe, self.raw, self._noise, requested
+                )
+                self._reconstruct_s = (self._reconstruct_s or 0.0) + elapsed_s
+                for stage in requested:
+                    self._settle(self._stages[stage], self._computed, stage)
+        finally:
+            self._computing = None
+            for stage in requested | self._requested:
+                self._stages[stage].cancel()  # nothing to those that are done
+
+    @staticmethod
+    def _settle(
+        future: "asyncio.Future[tm.Reconstruction]", computed: Computed, stage: str
+    ) -> None:
+        failure = computed.failures.get(stage)
+        if failure is not None:
+            future.set_exception(failure)
+            future.exception()  # retrieved here, or asyncio logs it where no caller is left
+        elif computed.reconstruction is not None:
+            future.set_result(computed.reconstruction)
+
+    async def _compute_truth(self) -> Truth:
+        assert self._truth is not None  # noqa: S101 - other cameras have no product of it
+        # of the newest frame, now is near enough
+        middle_s = self.raw.device_time_s + 0.5 * self.raw.capture_s if self.past else None
+        truth, _ = await self._run(self._truth, middle_s)
+        return truth
+
+    async def _input(self, product: Product) -> Any:
+        """Return what a product is computed from."""
+        if product.needs in STAGES:
+            return await self.reconstruction(product.needs)
+        return self.raw if product.needs == "raw" else await self.truth()
+
+    # -- the second hop: arrays and bytes ------------------------------------------------------
 
     async def product(self, product: Product, view: View = EVERYTHING) -> _Array:
         """Return a product, whole unless it is one over time; times only for those.
@@ -122,14 +207,14 @@ class Frame:
         Raises
         ------
         Problem
-            ``product-failed`` if its computation raised, ``answer-too-large`` if nobody would
-            want to wait for it.
+            ``product-failed`` if its computation raised, ``answer-too-large`` if it would take
+            more memory than an answer may.
         """
         view = view if product.over_time else EVERYTHING
         array: _Array = await self._once(
-            ("product", product.name, view),
+            _array_key(product, view),
             lambda: self._compute_product(product, view),
-            self._over_time if product.over_time else self._known,
+            self._arrays(product),
         )
         return array
 
@@ -141,8 +226,14 @@ class Frame:
         *,
         channel: int | None = None,
     ) -> bytes:
-        """Return a product as bytes, encoded once for all who ask for the same ones."""
-        whole = self._known if view.crop.is_whole else self._crops
+        """Return a product as bytes, encoded once for all who request the same ones.
+
+        Raises
+        ------
+        Problem
+            As `product`.
+        """
+        whole = self._whole if view.crop.is_whole else self._crops
         data: bytes = await self._once(
             ("encoded", product.name, view, encoding.name, channel),
             lambda: self._encode(product, encoding, view, channel),
@@ -150,98 +241,71 @@ class Frame:
         )
         return data
 
-    async def with_moments(self, compute: Callable[..., _T], *arguments: Any) -> _T:
-        """Return what ``compute(recipe, moments, meta, *arguments)`` gives on a worker.
-
-        Raises
-        ------
-        Problem
-            ``product-failed`` if it raised.
-        """
-        with self._failure_of("moments"):
-            moments = await self.stage("moments")
-            value, _ = await self._run(compute, self.recipe, moments, self.meta(), *arguments)
-        return value
-
-    async def _once(
-        self,
-        key: Hashable,
-        work: Callable[[], Coroutine[Any, Any, _T]],
-        known: dict[Hashable, asyncio.Task[Any]],
-    ) -> _T:
-        task = known.get(key)
-        if task is None:
-            task = known[key] = self._pipeline.start(work())
-            # a frame may stay for long; times of flight and regions are endless
-            while len(self._over_time) > 2 * _REMEMBERED_TIME_AXES:
-                self._over_time.popitem(last=False)
-            while len(self._crops) > _REMEMBERED_CROPS:
-                self._crops.popitem(last=False)
-        # one who stops waiting must not stop it for the others; most find it done
-        result: _T = task.result() if task.done() else await asyncio.shield(task)
-        return result
-
-    async def _compute_stage(self, name: str) -> Any:
-        if name == "raw":
-            return self.raw
-        if name == "truth":
-            result, _ = await self._run(self._pipeline.truth, self._middle_s())
-            return result
-        stage = STAGES[name]
-        needs = await asyncio.gather(*map(self.stage, stage.needs))
-        result, elapsed_s = await self._run(stage.compute, self.recipe, *needs)
-        self._reconstruct_s = (self._reconstruct_s or 0.0) + elapsed_s
-        if name == "moments":
-            self._pixels, _ = await self._run(pixel_counts, result)
-            self._rejected_images = result.rejected_images
-        if name == "returns":
-            self._deviation = await self._judged(result)
-        return result
-
-    def _middle_s(self) -> float | None:
-        """Return when a former frame was captured; of the newest, now is near enough."""
-        return self.raw.device_time_s + 0.5 * self.raw.capture_s if self.past else None
-
-    async def _judged(self, found: Any) -> dict[str, float] | None:
-        """Return the predicted deviation of the range; a failure of that spoils no range."""
-        if self._pipeline.judge is None:
-            return None
-        try:
-            deviation, _ = await self._run(self._pipeline.judge, self.recipe, found)
-        except Exception:
-            _log.exception("frame %d: predicting the range's deviation failed", self.number)
-            return None
-        return deviation
-
     async def _compute_product(self, product: Product, view: View) -> _Array:
-        if product.over_time:
-            self._refuse_too_large(product, view)
+        self._require_size(product, view)
         with self._failure_of(product.name):
-            needs = await asyncio.gather(*map(self.stage, product.needs))
-            if product.over_time:
-                work = self._pipeline.run_long(product.compute, self.recipe, view, *needs)
-            else:
-                work = self._run(product.compute, self.recipe, *needs)
-            array, _ = await work
+            given = await self._input(product)
+            run = self._workers.run_long if product.over_time else self._run
+            array, _ = await run(product.compute, self.recipe, given, view)
         return array
 
     async def _encode(
         self, product: Product, encoding: Encoding, view: View, channel: int | None
     ) -> bytes:
-        beside = (self.product(self._pipeline.product(name)) for name in encoding.beside)
-        array, *others = await asyncio.gather(self.product(product, view), *beside)
-        long = product.over_time or encoding.slow
-        run = self._pipeline.run_long if long else self._run
-        meta = self.meta() | view.crop.to_meta(*self.shape)
-        extra = self._extra(product, view) | dict(zip(encoding.beside, others, strict=True))
+        """Compute and encode in one hop; an array that is there already is only encoded."""
+        self._require_size(product, view)
+        beside = await asyncio.gather(*(self.product(PRODUCTS[name]) for name in encoding.beside))
+        run = self._workers.run_long if product.over_time or encoding.slow else self._run
         with self._failure_of(product.name):
-            data, _ = await run(_written, encoding, product, view, array, meta, extra, channel)
-        self._pipeline.note_success(product.name)
+            known = self._arrays(product).get(_array_key(product, view))
+            array = None if known is None else await _shared(known)
+            given = await self._input(product) if known is None else None
+            extra = product.with_fields(self.recipe, self.raw, view)
+            framed = partial(
+                EncodedFrame,
+                product.name,
+                product.description.unit,
+                product.description.axes,
+                self.meta() | view.crop.to_meta(*self.shape),
+                channel=channel,
+                extra=extra | dict(zip(encoding.beside, beside, strict=True)),
+            )
+            (array, data), _ = await run(
+                _made, product, encoding, self.recipe, given, array, view, framed
+            )
+        self._remember(product, view, array)
+        self._workers.note_success(product.name)
         return data
+
+    def _arrays(self, product: Product) -> _Memory:
+        return self._over_time if product.over_time else self._whole
+
+    def _remember(self, product: Product, view: View, array: _Array) -> None:
+        future: asyncio.Future[_Array] = asyncio.get_running_loop().create_future()
+        future.set_result(array)
+        self._arrays(product).setdefault(_array_key(product, view), future)
+        self._forget_oldest()
+
+    async def _once(
+        self, key: Hashable, work: Callable[[], Coroutine[Any, Any, _T]], memory: _Memory
+    ) -> _T:
+        task = memory.get(key)
+        if task is None:
+            task = memory[key] = self._workers.start(work())
+            self._forget_oldest()
+        result: _T = await _shared(task)
+        return result
+
+    def _forget_oldest(self) -> None:
+        """Keep few: a frame may stay for long, and times of flight and regions are endless."""
+        while len(self._over_time) > 2 * _REMEMBERED_TIME_AXES:
+            self._over_time.popitem(last=False)
+        while len(self._crops) > _REMEMBERED_CROPS:
+            self._crops.popitem(last=False)
 
     @contextmanager
     def _failure_of(self, name: str) -> Iterator[None]:
-        """Around the making of a product: what goes wrong is that product's problem alone."""
+        """Turn what goes wrong with a product into that product's problem alone."""
         try:
             yield
         except Problem:
@@ -256,7 +320,7 @@ class Frame:
                 limit=error.limit,
             ) from error
         except Exception as error:
-            self._pipeline.note_failure(name, self.number)
+            self._workers.note_failure(name, self.number)
             raise Problem(
                 kinds.PRODUCT_FAILED,
                 f"Computing {name} of frame {self.number} failed.",
@@ -264,21 +328,9 @@ class Frame:
                 frame=self.number,
             ) from error
 
-    def _extra(self, product: Product, view: View) -> dict[str, Any]:
-        """Return what only this product's messages hold."""
-        extra: dict[str, Any] = {"time_s": list(view.time_s)} if product.over_time else {}
-        match product.name:
-            case "raw":
-                extra["labels"] = [asdict(label) for label in self.raw.labels]
-            case "streak":
-                extra["y"] = view.y
-            case "bounds":
-                extra["radius"] = BOUNDS_RADIUS
-            case "pointcloud":
-                extra["intrinsics"] = asdict(self.recipe.lens(*self.shape))
-        return extra
-
-    def _refuse_too_large(self, product: Product, view: View) -> None:
+    def _require_size(self, product: Product, view: View) -> None:
+        if not product.over_time:
+            return
         rows, columns = view.crop.shape(*self.shape)
         values = math.prod(product.shape(self.recipe.applied, rows, columns, times=1))
         limit = MAX_ANSWER_BYTES // (4 * values)
@@ -293,17 +345,32 @@ class Frame:
             )
 
 
-def _written(
-    encoding: Encoding,
+def _array_key(product: Product, view: View) -> Hashable:
+    return "product", product.name, view if product.over_time else EVERYTHING
+
+
+async def _shared(future: "asyncio.Future[_T]") -> _T:
+    """Wait for what others may wait for too: a caller that stops waiting does not stop it."""
+    return future.result() if future.done() else await asyncio.shield(future)
+
+
+def _made(
     product: Product,
+    encoding: Encoding,
+    recipe: Recipe,
+    given: Any,
+    array: _Array | None,
     view: View,
-    array: _Array,
-    meta: dict[str, Any],
-    extra: dict[str, Any],
-    channel: int | None,
-) -> bytes:
-    """Cut a product, and those beside it, to what is wanted of them, and encode it."""
+    framed: "partial[EncodedFrame]",
+) -> tuple[_Array, bytes]:
+    """Return a product, computed where ``array`` is None, and the bytes of what the view shows."""
+    begin_s = time.perf_counter()
+    whole = product.compute(recipe, given, view) if array is None else array
+    shown, extra = whole, framed.keywords["extra"]
     if not product.over_time:  # those were computed for no more than that
-        array = view.crop.apply(array, product.description.axes)
+        shown = view.crop.apply(whole, product.description.axes)
         extra |= {name: view.crop.apply(extra[name]) for name in encoding.beside}
-    return encoding.encode(product, array, meta, extra, channel)
+    # in the type of the contract, also where the computation worked in another one
+    shown = np.asarray(shown, dtype=product.description.dtype, order="C")
+    frame = framed(array=shown, encode_s=time.perf_counter() - begin_s, extra=extra)
+    return whole, encoding.encode(frame)

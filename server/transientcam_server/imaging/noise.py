@@ -1,16 +1,128 @@
-"""How well a calibration still does: the share of pixels whose moments contradict each other."""
+"""The noise of frames: of their moments and of their range, and what it does not explain."""
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from transientcam_server.imaging.recipe import Recipe
 
 _Array = NDArray[Any]
-DEVIATIONS: Final = 4.0
-"""What noise explains: so many of its standard deviations."""
+SAMPLED_PIXELS: Final = 512
+"""Pixels of each frame whose deviation is predicted."""
+MEDIAN_OF_NORMAL: Final = 0.674490
+"""Median of the absolute value of a standard normal variable."""
+EXPLAINED_DEVIATIONS: Final = 4.0
+"""Standard deviations of a negative eigenvalue that noise explains."""
+
+
+class SensorModel(Protocol):
+    """What `NoiseModel` takes of a sensor, simulated or set by hand."""
+
+    @property
+    def gain_e_per_dn(self) -> float: ...  # noqa: D102 - named and used as in tm.noise.Sensor
+    @property
+    def full_well_e(self) -> float: ...  # noqa: D102
+    @property
+    def read_noise_e(self) -> float: ...  # noqa: D102
+    @property
+    def dark_dn(self) -> float: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True)
+class RangeNoise:
+    """Predicted standard deviation of a frame's range.
+
+    Attributes
+    ----------
+    median_m, p90_m
+        Half of the pixels, and 90 % of them, are better.
+    first_order_share
+        Share of the pixels where first order holds; that of the others is by the order of
+        magnitude.
+    """
+
+    median_m: float
+    p90_m: float
+    first_order_share: float
+
+    def to_document(self) -> dict[str, float]:
+        """Return it as a frame's metadata have it."""
+        return {
+            "median": self.median_m,
+            "p90": self.p90_m,
+            "first_order_share": self.first_order_share,
+        }
+
+
+class NoiseModel:
+    """What the noise of one sensor does to frames; pure, so any worker may call it.
+
+    Attributes
+    ----------
+    sensor : tm.noise.Sensor
+        Gain, full well, read noise and offset.
+    """
+
+    def __init__(self, model: SensorModel, *, bits: int) -> None:
+        self.sensor = tm.noise.Sensor(
+            gain_e_per_dn=model.gain_e_per_dn,
+            full_well_e=model.full_well_e,
+            read_noise_e=model.read_noise_e,
+            dark_dn=model.dark_dn,
+            bits=bits,
+        )
+
+    def of_moments(self, recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoise:
+        """Return the noise of a frame's smoothed moments (m + 1, H, W)."""
+        sequence = recipe.applied.sequence
+        sub_phases = sequence.sub_phases
+        noise = tm.noise.moment_noise(
+            np.asarray(found.smoothed[0].real),
+            self.sensor,
+            calibration=tm.nominal_calibration(
+                sequence.harmonics, sub_phases.phases_rad, sub_phases.weights, sequence.zeroth
+            ),
+            zeroth=sequence.zeroth,
+            takes=sequence.takes,
+        )
+        return tm.noise.smoothed(noise, recipe.settings.smoothing_px)
+
+    def of_range(self, recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
+        """Predict the deviation of a frame's range from its own returns, by a sample of pixels.
+
+        None where no pixel has a range. With another estimator than Pisarenko's it is that of
+        Pisarenko's nevertheless, which is cheap enough for every frame.
+        """
+        seen = np.flatnonzero(np.asarray(found.has_range).ravel())
+        if not seen.size:
+            return None
+        sample = seen[:: max(1, seen.size // SAMPLED_PIXELS)]
+
+        def sampled(planes: _Array) -> _Array:
+            return np.asarray(planes).reshape((planes.shape[0], -1))[:, sample]
+
+        returns = tm.Returns(
+            sampled(found.returns.phase_rad),
+            sampled(found.returns.weight),
+            np.asarray(found.returns.uniform).ravel()[sample],
+            np.asarray(found.returns.count).ravel()[sample],
+        )
+        noise = tm.noise.MomentNoise(sampled(self.of_moments(recipe, found).variance))
+        deviation = tm.noise.return_noise(
+            returns, noise, threshold=recipe.settings.return_threshold
+        )
+        std_m = tm.range_m(deviation.direct_phase_std_rad, recipe.base_frequency_hz)
+        known = np.isfinite(std_m)
+        if not known.any():
+            return None
+        return RangeNoise(
+            float(np.median(std_m[known])),
+            float(np.quantile(std_m[known], 0.9)),
+            float(deviation.holds.mean()),
+        )
 
 
 def invalid_share(found: tm.Reconstruction, noise: tm.noise.MomentNoise) -> float | None:
@@ -40,38 +152,4 @@ def invalid_share(found: tm.Reconstruction, noise: tm.noise.MomentNoise) -> floa
     variance = np.asarray(noise.variance)
     # noise moves no eigenvalue by more than the norm of its own Toeplitz matrix
     std = np.sqrt(len(variance) * variance.mean(axis=0))
-    return float((eigenvalue < -DEVIATIONS * std)[lit].mean())
-
-
-JUDGED_PIXELS: Final = 512
-"""Pixels of each frame whose deviation is predicted."""
-
-
-@dataclass(frozen=True, slots=True)
-class Uncertainty:
-    """Predicted deviation of a frame's range.
-
-    Attributes
-    ----------
-    median_m, p90_m
-        Half of the pixels, and 90 % of them, are better.
-    first_order_share
-        Share of the pixels where first order holds; that of the others is by the order of
-        magnitude.
-    """
-
-    median_m: float
-    p90_m: float
-    first_order_share: float
-
-    def to_document(self) -> dict[str, float]:
-        """Return it as a frame's metadata have it."""
-        return {
-            "median": self.median_m,
-            "p90": self.p90_m,
-            "first_order_share": self.first_order_share,
-        }
-
-
-MEDIAN_OF_NORMAL: Final = 0.674490
-"""Median of the absolute value of a standard normal variable."""
+    return float((eigenvalue < -EXPLAINED_DEVIATIONS * std)[lit].mean())

@@ -1,14 +1,7 @@
-"""Makes frames of captures, and has workers compute what is asked of them.
+"""Makes frames of captures: each with the settings, gains and lens of its moment."""
 
-Everything here lives on the event loop and computes nothing there.
-"""
-
-import asyncio
-import logging
-import time
-from collections.abc import Callable, Coroutine
-from concurrent.futures import Executor
-from typing import Any, Protocol, TypeVar
+from collections.abc import Callable
+from typing import Protocol
 
 from transientcam_driver import (
     AppliedSequence,
@@ -16,23 +9,22 @@ from transientcam_driver import (
     Capabilities,
     RawFrame,
     Simulation,
+    Truth,
 )
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.calibration import Calibration
+from transientcam_server.imaging.calibration import Calibration, Gains
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.lens import Intrinsics
+from transientcam_server.imaging.noise import NoiseModel
 from transientcam_server.imaging.products import PRODUCTS, Product
-from transientcam_server.imaging.recipe import Recipe, Reconstruction
+from transientcam_server.imaging.recipe import Recipe, SettingsVersion
+from transientcam_server.imaging.workers import Workers
 from transientcam_server.settings import ReconstructionSettings
-
-_log = logging.getLogger(__name__)
-_T = TypeVar("_T")
-Judge = Callable[[Recipe, Any], dict[str, float] | None]
 
 
 class Source(Protocol):
-    """What a pipeline has to know of a camera."""
+    """What a pipeline takes of a camera."""
 
     @property
     def capabilities(self) -> Capabilities:
@@ -41,49 +33,49 @@ class Source(Protocol):
 
     @property
     def simulation(self) -> Simulation | None:
-        """Who knows the truth."""
+        """The simulation behind it, which has the ground truth; None for a real camera."""
         ...
 
 
 class Pipeline:
-    """Makes frames of captures and computes on ``executor`` what is asked of them.
+    """Makes frames of the captures of one camera; on the event loop.
 
-    ``judge`` predicts the deviation of the range of each frame whose returns are computed;
-    ``intrinsics`` says where the pixels of the next frame look.
+    ``noise`` predicts the deviation of the range of each frame whose returns are computed;
+    ``intrinsics`` returns where the pixels of the next frame look.
 
     Attributes
     ----------
+    workers
+        What computes for its frames.
+    products
+        What this camera's frames can be asked for; only a simulated camera has a ground truth.
     reconstruction
         How frames are computed from the next one on.
     calibration
-        Used for those whose sequence it is good for, from the next one on.
+        Used for those whose sequence it fits, from the next one on.
     """
 
     def __init__(
         self,
         camera: Source,
         settings: ReconstructionSettings,
-        executor: Executor,
+        workers: Workers,
         *,
-        workers: int,
-        judge: Judge | None = None,
+        noise: NoiseModel | None = None,
         calibration: Calibration | None = None,
         intrinsics: Callable[[], Intrinsics] | None = None,
     ) -> None:
-        self.judge = judge
-        self._intrinsics = intrinsics
+        self.workers = workers
         self.calibration = calibration
+        self.reconstruction = SettingsVersion(1, settings)
+        self._noise = noise
+        self._intrinsics = intrinsics
         self._capabilities = camera.capabilities
-        self.reconstruction = Reconstruction(1, settings)
-        self._executor = executor
-        self._tasks: set[asyncio.Task[Any]] = set()
-        self._frames = 0
-        self._failing: set[str] = set()
         self._full_scale = 2.0**camera.capabilities.bits - 1.0
-        # what may take long leaves one worker to everything else
-        self._long = asyncio.Semaphore(workers - 1)
-        self._truth = None if camera.simulation is None else camera.simulation.truth
-        self.products = {
+        self._truth = _truth_of(camera.simulation)
+        self._frames = 0
+        self._recipe: Recipe | None = None
+        self.products: dict[str, Product] = {
             name: product
             for name, product in PRODUCTS.items()
             if name != "truth" or self._truth is not None
@@ -92,33 +84,41 @@ class Pipeline:
     def frame(self, raw: RawFrame, applied: AppliedSequence) -> Frame:
         """Return the next frame, counted from 1."""
         self._frames += 1
-        calibration = self.calibration_for(applied)
         recipe = Recipe(
             applied,
             self.reconstruction.settings,
             self._full_scale,
-            calibration,
+            self.gains_for(applied),
             self.reconstruction.id,
             None if self._intrinsics is None else self._intrinsics(),
         )
-        return Frame(self, self._frames, raw, recipe)
+        if recipe != self._recipe:  # else the same one: it holds what need not be prepared again
+            self._recipe = recipe
+        return self.recorded_frame(self._frames, raw, self._recipe)
 
-    def calibration_for(self, applied: AppliedSequence) -> Calibration | None:
-        """Return the calibration given, if it is good for this sequence."""
-        return self.calibration if self.misfit(applied) is None else None
+    def recorded_frame(
+        self, number: int, raw: RawFrame, recipe: Recipe, *, past: bool = False
+    ) -> Frame:
+        """Return a frame with a number and a recipe of its own, as of a recording."""
+        return Frame(
+            self.workers, number, raw, recipe, noise=self._noise, truth=self._truth, past=past
+        )
+
+    def gains_for(self, applied: AppliedSequence) -> Gains | None:
+        """Return the gains of the calibration, if it fits this sequence."""
+        if self.calibration is None or self.misfit(applied) is not None:
+            return None
+        return self.calibration.gains
 
     def misfit(self, applied: AppliedSequence) -> CalibrationMismatch | None:
-        """Say why the calibration given is not good for a sequence; None if it is, or is none."""
+        """Return why the calibration does not fit a sequence; None if it does, or is none."""
         if self.calibration is None:
             return None
         return self.calibration.capture.misfit(applied, self._capabilities)
 
     def beside(self, camera: Source) -> "Pipeline":
         """Return one for frames of another camera, as of a recording, on the same workers."""
-        other = Pipeline(camera, self.reconstruction.settings, self._executor, workers=2)
-        other._long = self._long
-        other._tasks = self._tasks
-        return other
+        return Pipeline(camera, self.reconstruction.settings, self.workers)
 
     def product(self, name: str) -> Product:
         """Return a product this camera has.
@@ -140,51 +140,8 @@ class Pipeline:
                 known=known,
             ) from None
 
-    async def run(self, compute: Callable[..., _T], *arguments: Any) -> tuple[_T, float]:
-        """Return what ``compute`` gives on a worker, and the seconds it took there."""
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._executor, _timed, compute, *arguments)
 
-    async def run_long(self, compute: Callable[..., _T], *arguments: Any) -> tuple[_T, float]:
-        """Do as `run` does, but never on the last free worker."""
-        async with self._long:
-            return await self.run(compute, *arguments)
-
-    def start(self, work: Coroutine[Any, Any, _T]) -> "asyncio.Task[_T]":
-        """Start something that several may wait for."""
-        task = asyncio.get_running_loop().create_task(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._finished)
-        return task
-
-    async def close(self) -> None:
-        """Abandon everything that is still being computed."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-
-    def note_failure(self, name: str, number: int) -> None:
-        """Log a failure with its cause, the first of a series; call it while handling that."""
-        if name not in self._failing:
-            self._failing.add(name)
-            _log.exception("frame %d: making %s failed", number, name)
-
-    def note_success(self, name: str) -> None:
-        """Note that a product works, so that its next failure is logged again."""
-        self._failing.discard(name)
-
-    def truth(self, device_time_s: float | None = None) -> Any:
-        """Return the ground truth of the simulated scene, now or at a time; runs on a worker."""
-        assert self._truth is not None  # noqa: S101 - such a camera has no product that asks
-        return self._truth(device_time_s=device_time_s)
-
-    def _finished(self, task: "asyncio.Task[Any]") -> None:
-        self._tasks.discard(task)
-        if not task.cancelled():
-            task.exception()  # whoever waits sees it; nobody waiting is no reason to complain
-
-
-def _timed(compute: Callable[..., _T], *arguments: Any) -> tuple[_T, float]:
-    begin_s = time.perf_counter()
-    value = compute(*arguments)
-    return value, time.perf_counter() - begin_s
+def _truth_of(simulation: Simulation | None) -> Callable[[float | None], Truth] | None:
+    if simulation is None:
+        return None
+    return lambda device_time_s: simulation.truth(device_time_s=device_time_s)

@@ -1,12 +1,12 @@
-"""What can be computed from a frame, and from what: the registry of stages and products.
+"""The registry of products: what clients can ask of a frame, and how each follows from it.
 
-A *stage* is an intermediate result, a *product* an array that clients can ask for. Both name the
-stages they need; `transientcam_server.imaging.frame` computes each at most once a frame, and
-only on request. The functions here are pure, so any executor may run them.
+A product names the one input it is computed from: ``raw`` images, the simulated ``truth``, or a
+stage of the reconstruction (`transientcam_server.imaging.stages`). The functions here are pure,
+so any worker may run them.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam import wire
-from transientcam_driver import AppliedSequence, RawFrame
-from transientcam_server.imaging.calibration import nominal_gains
+from transientcam_driver import AppliedSequence, RawFrame, Truth
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.imaging.view import Crop, View
 
@@ -26,11 +25,15 @@ _BOUNDS_BLOCK: Final = 2**20
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
-    """An intermediate result: ``compute(recipe, *results of needs)``."""
+class Steps:
+    """Steps of a 16-bit PNG: how many there are in one unit, and the unit of one step."""
 
-    needs: tuple[str, ...]
-    compute: Callable[..., Any]
+    per_unit: float
+    unit: str
+
+
+def _no_fields(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
+    return {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,27 +44,40 @@ class Product:
     ----------
     description
         Name, unit and axes, as the wire contract has them.
-    needs, compute
-        As for a stage; a product over time takes a `View` after the recipe, and is computed for
-        its crop alone.
+    needs
+        Its input: ``raw``, ``truth`` or the name of a stage.
+    compute
+        Called as ``compute(recipe, input, view)``, on a worker. A product over time is computed
+        for the crop of the view alone, any other one whole.
     over_time
         Whether it is evaluated at times of flight that the request names.
-    png_scale, png_unit
-        Steps of a 16-bit PNG in one unit, and what one step is then; None where the product is
-        no image.
+    of_row
+        Whether it is one row of the picture, which the request may name.
+    steps
+        Of a 16-bit PNG; None for steps of one unit.
+    fields
+        Called as ``fields(recipe, raw, view)``: what the messages of this product alone hold.
     """
 
     description: wire.Product
-    needs: tuple[str, ...]
-    compute: Callable[..., _Array]
+    needs: str
+    compute: Callable[[Recipe, Any, View], _Array]
     over_time: bool = False
-    png_scale: float | None = None
-    png_unit: str = ""
+    of_row: bool = False
+    steps: Steps | None = None
+    fields: Callable[[Recipe, RawFrame, View], dict[str, Any]] = _no_fields
 
     @property
     def name(self) -> str:
         """The name clients ask by."""
         return self.description.name
+
+    @property
+    def png_steps(self) -> Steps | None:
+        """Steps of a 16-bit PNG; None where the product is no image."""
+        if len(self.description.axes) != 2:
+            return None
+        return self.steps or Steps(1.0, self.description.unit)
 
     def shape(
         self, applied: AppliedSequence, height: int, width: int, *, times: int = 0
@@ -75,65 +91,14 @@ class Product:
             return ()
         return tuple(lengths[axis] for axis in self.description.axes)
 
-
-# -- stages ------------------------------------------------------------------------------------
-
-
-def _reconstruction(recipe: Recipe, raw: RawFrame) -> tm.Reconstruction:
-    sequence = recipe.applied.sequence
-    calibration = recipe.calibration
-    settings = recipe.settings.for_moments(
-        base_frequency_hz=sequence.base_frequency_hz,
-        zeroth=sequence.zeroth,
-        takes=sequence.takes,
-        full_scale=recipe.full_scale,
-    )
-    reconstruction = tm.reconstruct(
-        raw.by_take.reshape(raw.images.shape),
-        settings,
-        calibration=nominal_gains(sequence) if calibration is None else calibration.gains,
-        bad_pixels=None if calibration is None else calibration.bad,
-    )
-    return _computed(reconstruction, "moments", "flags", "validity")
+    def with_fields(self, recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
+        """Return what messages of this product hold beside the array and the frame's metadata."""
+        times = {"time_s": list(view.time_s)} if self.over_time else {}
+        return times | self.fields(recipe, raw, view)
 
 
-def _computed(reconstruction: tm.Reconstruction, *names: str) -> tm.Reconstruction:
-    """Compute properties now, so that no product has to that needs no more than reading them."""
-    for name in names:
-        getattr(reconstruction, name)
-    return reconstruction
-
-
-def _coefficients(recipe: Recipe, reconstruction: tm.Reconstruction) -> tm.Coefficients:
-    return reconstruction.coefficients
-
-
-def _returns(recipe: Recipe, reconstruction: tm.Reconstruction) -> tm.Reconstruction:
-    return _computed(reconstruction, "returns", "direct", "range_m")
-
-
-STAGES: Final[dict[str, Stage]] = {
-    "moments": Stage(("raw",), _reconstruction),
-    "coefficients": Stage(("moments",), _coefficients),
-    "returns": Stage(("moments",), _returns),
-}
-"""Intermediate results by name; ``raw`` and ``truth`` are there without computing."""
-
-
-def pixel_counts(reconstruction: tm.Reconstruction) -> dict[str, int]:
-    """Return how many pixels carry each flag."""
-    flags = reconstruction.flags
-    counts = {"total": int(flags.size), "valid": int(np.count_nonzero(flags == 0))}
-    for flag in tm.Flags:
-        if flag:
-            counts[str(flag.name).lower()] = int(np.count_nonzero(flags & flag.value))
-    return counts
-
-
-# -- products ----------------------------------------------------------------------------------
-
-
-def _coefficient_planes(recipe: Recipe, coefficients: tm.Coefficients) -> _Array:
+def _coefficient_planes(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
+    coefficients = found.coefficients
     m = coefficients.polynomial.shape[0] - 1
     planes = np.empty((2 * m + 1, *coefficients.error.shape), dtype=np.float32)
     planes[0] = coefficients.error
@@ -142,16 +107,18 @@ def _coefficient_planes(recipe: Recipe, coefficients: tm.Coefficients) -> _Array
     return planes
 
 
-def _transient(recipe: Recipe, view: View, coefficients: tm.Coefficients) -> _Array:
+def _transient(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
     rad_s = 2.0 * np.pi * recipe.base_frequency_hz
     # h is per radian: g(tau) = 2 pi f h(2 pi f tau)
-    density: _Array = tm.density(_cropped(coefficients, view.crop), rad_s * np.array(view.time_s))
+    density: _Array = tm.density(
+        _cropped(found.coefficients, view.crop), rad_s * np.array(view.time_s)
+    )
     return np.float32(rad_s) * density
 
 
-def _cumulative(recipe: Recipe, view: View, coefficients: tm.Coefficients) -> _Array:
+def _cumulative(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
     phase_rad = 2.0 * np.pi * recipe.base_frequency_hz * np.array(view.time_s)
-    cumulative: _Array = tm.cumulative(_cropped(coefficients, view.crop), phase_rad)
+    cumulative: _Array = tm.cumulative(_cropped(found.coefficients, view.crop), phase_rad)
     return cumulative
 
 
@@ -159,20 +126,20 @@ def _cropped(coefficients: tm.Coefficients, crop: Crop) -> tm.Coefficients:
     return tm.Coefficients(*map(crop.apply, coefficients))
 
 
-def _streak(recipe: Recipe, view: View, coefficients: tm.Coefficients) -> _Array:
+def _streak(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
     """Return the density (T, W) of one row, of the columns that the crop leaves."""
-    height, width = coefficients.error.shape
+    height, width = found.coefficients.error.shape
     y = height // 2 if view.y is None else view.y
     x, _, columns, _ = view.crop.region or (0, 0, width, height)
     line = Crop((x, y, columns, 1), view.crop.decimation)
-    return _transient(recipe, View(view.time_s, line), coefficients)[:, 0]
+    return _transient(recipe, found, View(view.time_s, line))[:, 0]
 
 
-def _bounds(recipe: Recipe, view: View, reconstruction: tm.Reconstruction) -> _Array:
+def _bounds(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
     """Return what every smoothed density with these moments lies between (2, T, H, W)."""
     rad_s = 2.0 * np.pi * recipe.base_frequency_hz
     phase_rad = rad_s * np.array(view.time_s)
-    moments = view.crop.apply(reconstruction.moments)
+    moments = view.crop.apply(found.moments)
     planes = moments.reshape(len(moments), -1)
     between = np.empty((2, len(phase_rad), planes.shape[1]), dtype=np.float32)
     # pixel by pixel they need several arrays as large as the answer
@@ -184,12 +151,12 @@ def _bounds(recipe: Recipe, view: View, reconstruction: tm.Reconstruction) -> _A
     return between.reshape(2, len(phase_rad), *moments.shape[1:])
 
 
-def _pointcloud(recipe: Recipe, found: tm.Reconstruction) -> _Array:
+def _pointcloud(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
     range_m = found.range_m
     return recipe.lens(*range_m.shape).points(range_m)
 
 
-def _return_planes(recipe: Recipe, found: tm.Reconstruction) -> _Array:
+def _return_planes(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
     """Return time of flight and weight (2 m, H, W) of each return, the strongest first."""
     phase_rad, weight = found.returns.phase_rad, found.returns.weight
     order = np.argsort(-weight, axis=0, kind="stable")
@@ -200,43 +167,72 @@ def _return_planes(recipe: Recipe, found: tm.Reconstruction) -> _Array:
     return planes
 
 
-def _product(
-    name: str, needs: tuple[str, ...], compute: Callable[..., _Array], *, over_time: bool = False
-) -> Product:
-    description = wire.PRODUCTS[name]
-    png_scale, png_unit = None, ""
-    if len(description.axes) == 2:
-        png_scale, png_unit = _PNG_STEPS.get(name, (1.0, description.unit))
-    return Product(description, needs, compute, over_time, png_scale, png_unit)
+def _property(name: str) -> Callable[[Recipe, tm.Reconstruction, View], _Array]:
+    """Return a computation that reads a property of the reconstruction."""
+
+    def read(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
+        array: _Array = getattr(found, name)
+        return array
+
+    return read
 
 
-_PNG_STEPS = {
-    "range": (1e3, "mm"),
-    "truth": (1e3, "mm"),
-    "validity": (1e4, "1e-4"),
-    "streak": (1e-7, "1e7 DN/s"),
-}
+def _images(recipe: Recipe, raw: RawFrame, view: View) -> _Array:
+    return raw.images
+
+
+def _true_range(recipe: Recipe, truth: Truth, view: View) -> _Array:
+    return truth.range_m
+
+
+def _labels(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
+    return {"labels": [asdict(label) for label in raw.labels]}
+
+
+def _row(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
+    return {"y": view.y}
+
+
+def _radius(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
+    return {"radius": BOUNDS_RADIUS}
+
+
+def _intrinsics(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
+    height, width = raw.images.shape[-2:]
+    return {"intrinsics": asdict(recipe.lens(height, width))}
+
+
+_MILLIMETRES: Final = Steps(1e3, "mm")
+_WIRE: Final = wire.PRODUCTS
 
 PRODUCTS: Final[dict[str, Product]] = {
     product.name: product
     for product in (
-        _product("range", ("returns",), lambda _, found: found.range_m),
-        _product("direct", ("returns",), lambda _, found: found.direct),
-        _product("indirect", ("returns",), lambda _, found: found.indirect),
-        _product("uniform", ("returns",), lambda _, found: found.uniform),
-        _product("brightness", ("moments",), lambda _, found: found.brightness),
-        _product("validity", ("moments",), lambda _, found: found.validity),
-        _product("flags", ("moments",), lambda _, found: found.flags),
-        _product("coefficients", ("coefficients",), _coefficient_planes),
-        _product("moments", ("moments",), lambda _, found: found.moments),
-        _product("raw", ("raw",), lambda _, raw: raw.images),
-        _product("transient", ("coefficients",), _transient, over_time=True),
-        _product("cumulative", ("coefficients",), _cumulative, over_time=True),
-        _product("streak", ("coefficients",), _streak, over_time=True),
-        _product("bounds", ("moments",), _bounds, over_time=True),
-        _product("returns", ("returns",), _return_planes),
-        _product("pointcloud", ("returns",), _pointcloud),
-        _product("truth", ("truth",), lambda _, truth: truth.range_m),
+        Product(_WIRE["range"], "returns", _property("range_m"), steps=_MILLIMETRES),
+        Product(_WIRE["direct"], "returns", _property("direct")),
+        Product(_WIRE["indirect"], "returns", _property("indirect")),
+        Product(_WIRE["uniform"], "returns", _property("uniform")),
+        Product(_WIRE["brightness"], "moments", _property("brightness")),
+        Product(_WIRE["validity"], "moments", _property("validity"), steps=Steps(1e4, "1e-4")),
+        Product(_WIRE["flags"], "moments", _property("flags")),
+        Product(_WIRE["coefficients"], "coefficients", _coefficient_planes),
+        Product(_WIRE["moments"], "moments", _property("moments")),
+        Product(_WIRE["raw"], "raw", _images, fields=_labels),
+        Product(_WIRE["transient"], "coefficients", _transient, over_time=True),
+        Product(_WIRE["cumulative"], "coefficients", _cumulative, over_time=True),
+        Product(
+            _WIRE["streak"],
+            "coefficients",
+            _streak,
+            over_time=True,
+            of_row=True,
+            steps=Steps(1e-7, "1e7 DN/s"),
+            fields=_row,
+        ),
+        Product(_WIRE["bounds"], "moments", _bounds, over_time=True, fields=_radius),
+        Product(_WIRE["returns"], "returns", _return_planes),
+        Product(_WIRE["pointcloud"], "returns", _pointcloud, fields=_intrinsics),
+        Product(_WIRE["truth"], "truth", _true_range, steps=_MILLIMETRES),
     )
 }
-"""Every product by name."""
+"""Every product by name: an entry here and one in `transientcam.wire.PRODUCTS` make a product."""

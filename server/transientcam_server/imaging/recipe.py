@@ -1,19 +1,20 @@
-"""How images become moments and moments become returns, at present."""
+"""How images become moments and moments become returns."""
 
 from dataclasses import dataclass
 from typing import Any
 
-from transientcam_driver import AppliedSequence
+import transientcam_moments as tm
+from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.calibration import Calibration
+from transientcam_server.imaging.calibration import Gains, nominal_gains
 from transientcam_server.imaging.lens import ASSUMED_FIELD_OF_VIEW_DEG, Intrinsics
 from transientcam_server.settings import ReconstructionSettings
 
 
 @dataclass(frozen=True, slots=True)
-class Reconstruction:
-    """Settings in use, and the number that frames computed with them carry.
+class SettingsVersion:
+    """Settings of the reconstruction, and the number that frames computed with them carry.
 
     Attributes
     ----------
@@ -24,9 +25,9 @@ class Reconstruction:
     id: int
     settings: ReconstructionSettings
 
-    def followed_by(self, settings: ReconstructionSettings) -> "Reconstruction":
-        """Return what is in use once these settings are; the same where they are no others."""
-        return self if settings == self.settings else Reconstruction(self.id + 1, settings)
+    def followed_by(self, settings: ReconstructionSettings) -> "SettingsVersion":
+        """Return the next version; the same one where the settings are equal."""
+        return self if settings == self.settings else SettingsVersion(self.id + 1, settings)
 
     def to_document(self) -> dict[str, Any]:
         """Return the settings by their names, and ``reconstruction_id``."""
@@ -60,20 +61,29 @@ def require_harmonics(settings: ReconstructionSettings, harmonics: int, *, field
     )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Recipe:
-    """What a computation may know beside the results it needs.
+    """All that a frame is computed with beside its images.
 
-    ``full_scale`` is the largest value that the sensor gives, in DN. Without a ``calibration``,
-    gains are the nominal ones. ``reconstruction_id`` counts the settings there were. Without
-    ``intrinsics`` a usual field of view is assumed.
+    Attributes
+    ----------
+    applied, settings
+        The sequence that was captured, and how its images become moments and returns.
+    full_scale
+        The largest value that the sensor gives, in DN.
+    gains
+        Of the calibration; None for the nominal ones.
+    settings_version
+        Counts the settings there were.
+    intrinsics
+        Where the pixels look; None for a usual field of view.
     """
 
     applied: AppliedSequence
     settings: ReconstructionSettings
     full_scale: float
-    calibration: Calibration | None = None
-    reconstruction_id: int = 1
+    gains: Gains | None = None
+    settings_version: int = 1
     intrinsics: Intrinsics | None = None
 
     def lens(self, height: int, width: int) -> Intrinsics:
@@ -86,3 +96,19 @@ class Recipe:
     def base_frequency_hz(self) -> float:
         """The frequency whose period is the unambiguous time of flight."""
         return self.applied.sequence.base_frequency_hz
+
+    def reconstruct(self, raw: RawFrame) -> tm.Reconstruction:
+        """Return the reconstruction of a capture; it computes what is read of it."""
+        sequence, gains = self.applied.sequence, self.gains
+        settings = self.settings.for_moments(
+            base_frequency_hz=sequence.base_frequency_hz,
+            zeroth=sequence.zeroth,
+            takes=sequence.takes,
+            full_scale=self.full_scale,
+        )
+        return tm.reconstruct(
+            raw.by_take.reshape(raw.images.shape),
+            settings,
+            calibration=nominal_gains(sequence) if gains is None else gains.planes,
+            bad_pixels=None if gains is None else gains.bad,
+        )

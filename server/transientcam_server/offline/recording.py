@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from transientcam_driver import RawFrame
 from transientcam_server.errors.exceptions import InputError
-from transientcam_server.imaging.products import PRODUCTS, STAGES, Product
-from transientcam_server.imaging.recipe import Reconstruction
-from transientcam_server.imaging.view import View
+from transientcam_server.imaging.products import PRODUCTS, Product
+from transientcam_server.imaging.recipe import SettingsVersion
+from transientcam_server.imaging.view import EVERYTHING, View
 from transientcam_server.recording import swmr
 from transientcam_server.recording.reader import Recording
 from transientcam_server.recording.recipe import recorded_recipe
@@ -45,7 +45,7 @@ class Reconstructor:
 
     def __init__(self, recording: Recording, wanted: Wanted) -> None:
         capabilities = recording.header.capabilities
-        self._recipe = recorded_recipe(recording.header, Reconstruction(1, wanted.settings))
+        self._recipe = recorded_recipe(recording.header, SettingsVersion(1, wanted.settings))
         self._size = capabilities.height, capabilities.width
         self.products = [PRODUCTS[name] for name in wanted.products]
         self.time_s = np.arange(wanted.bins) / (wanted.bins * self._recipe.base_frequency_hz)
@@ -56,20 +56,14 @@ class Reconstructor:
 
     def compute(self, raw: RawFrame) -> dict[str, NDArray[Any]]:
         """Return the products of a frame by name."""
-        stages: dict[str, Any] = {"raw": raw}
-
-        def stage(name: str) -> Any:
-            if name not in stages:
-                needs = [stage(each) for each in STAGES[name].needs]
-                stages[name] = STAGES[name].compute(self._recipe, *needs)
-            return stages[name]
-
-        results = {}
-        for product in self.products:
-            view = (View(tuple(self.time_s)),) if product.over_time else ()
-            needs = [stage(each) for each in product.needs]
-            results[product.name] = product.compute(self._recipe, *view, *needs)
-        return results
+        found = self._recipe.reconstruct(raw)
+        times = View(tuple(self.time_s))
+        return {
+            product.name: product.compute(
+                self._recipe, found, times if product.over_time else EVERYTHING
+            )
+            for product in self.products
+        }
 
 
 def reconstruct(

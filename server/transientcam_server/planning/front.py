@@ -8,9 +8,9 @@ from typing import Any, Final
 
 from transientcam_driver import AppliedSequence
 from transientcam_server.imaging.frame import Frame
-from transientcam_server.imaging.pipeline import Pipeline
+from transientcam_server.imaging.workers import Workers
 from transientcam_server.planning import Choice, Goal
-from transientcam_server.planning.planner import Accuracy, range_error
+from transientcam_server.planning.planner import Planner, range_error
 
 REMEMBERED_S: Final = 10.0
 _WIDE_BOUNDS: Final = 1e9  # a target that anything reaches: it only has the bounds predicted
@@ -29,14 +29,14 @@ class Fronts:
 
     def __init__(
         self,
-        accuracy: Accuracy,
-        pipeline: Pipeline,
+        planner: Planner,
+        workers: Workers,
         *,
         simulated: bool,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._accuracy = accuracy
-        self._pipeline = pipeline
+        self._planner = planner
+        self._workers = workers
         self._simulated = simulated
         self._clock = clock
         self._known: dict[str, _Known] = {}
@@ -46,7 +46,7 @@ class Fronts:
         """Return the front and the frame's own place, as JSON has them."""
         async with self._asking:
             known = self._known.get(by)
-            made_with = frame.raw.epoch, frame.recipe.reconstruction_id
+            made_with = frame.raw.epoch, frame.recipe.settings_version
             if known is None or known.made_with != made_with or self._clock() > known.until_s:
                 choices = await self._predicted(frame, by)
                 known = _Known(made_with, frame.number, self._clock() + REMEMBERED_S, choices)
@@ -63,22 +63,22 @@ class Fronts:
         self._known.clear()
 
     async def _predicted(self, frame: Frame, by: str) -> list[Choice]:
-        found = await frame.stage("returns")
-        scene, _ = await self._pipeline.run(self._accuracy.statistic, frame.recipe, found, 0.0)
+        found = await frame.reconstruction("returns")
+        scene, _ = await self._workers.run(self._planner.statistic, frame.recipe, found, 0.0)
         goal = Goal(
             base=frame.recipe.applied.sequence,
             bound_width=_WIDE_BOUNDS if by == "bound_width" else None,
         )
-        choices, _ = await self._pipeline.run_long(self._accuracy.front, goal, scene)
+        choices, _ = await self._workers.run_long(self._planner.front, goal, scene)
         return choices
 
     async def _current(self, frame: Frame) -> dict[str, Any]:
-        found = await frame.stage("returns")
+        found = await frame.reconstruction("returns")
         applied: AppliedSequence = frame.recipe.applied
         error = None
         if self._simulated:
-            truth = await frame.stage("truth")
-            error, _ = await self._pipeline.run(range_error, found, truth)
+            truth = await frame.truth()
+            error, _ = await self._workers.run(range_error, found, truth)
         return {
             "meta": frame.meta(),
             "sequence": applied.sequence.to_document(),

@@ -1,111 +1,47 @@
-"""The accuracy of a camera: of the frames it captures, and of sequences it might capture."""
-
-from typing import Any
+"""Plans sequences for the scene that a camera sees. Runs on workers."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_driver import Truth
-from transientcam_server.camera.source import Camera
+from transientcam_driver import Capabilities, Truth
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.noise import JUDGED_PIXELS, Uncertainty
+from transientcam_server.imaging.noise import NoiseModel
 from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.planning import Choice, Goal, Plan, candidates, choices_on_front, plan
+from transientcam_server.planning.candidates import candidates
+from transientcam_server.planning.choice import Choice, choices_on_front
+from transientcam_server.planning.goal import Goal
+from transientcam_server.planning.plan import Plan, plan
 from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.scene import SceneStatistic, of_frame
 from transientcam_server.planning.timing import ComputingTime
-from transientcam_server.settings import ReconstructionSettings, SensorSettings
-
-_Array = NDArray[Any]
+from transientcam_server.settings import ReconstructionSettings
 
 
-class Accuracy:
-    """What is known of a camera's noise, and what follows from it. Runs on workers.
+class Planner:
+    """Recommends sequences from the noise of one sensor and one way to reconstruct.
 
     Parameters
     ----------
-    camera
-        A simulated one knows its sensor.
+    capabilities
+        Of the camera.
+    noise
+        Of its sensor.
     settings
         How images become range.
-    sensor
-        Of a real camera.
     """
 
     def __init__(
-        self, camera: Camera, settings: ReconstructionSettings, sensor: SensorSettings
+        self, capabilities: Capabilities, noise: NoiseModel, settings: ReconstructionSettings
     ) -> None:
-        self._capabilities = camera.capabilities
+        self._capabilities = capabilities
+        self._noise = noise
         self.reconstruct_with(settings)
-        model = sensor if camera.simulation is None else camera.simulation.sensor
-        self.sensor = tm.noise.Sensor(
-            gain_e_per_dn=model.gain_e_per_dn,
-            full_well_e=model.full_well_e,
-            read_noise_e=model.read_noise_e,
-            dark_dn=model.dark_dn,
-            bits=camera.capabilities.bits,
-        )
 
     def reconstruct_with(self, settings: ReconstructionSettings) -> None:
         """Predict from now on what images become with other settings."""
         self._settings = settings
         self._computing = ComputingTime(self._capabilities, settings)
-
-    def noise(self, recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoise:
-        """Return the noise of a frame's smoothed moments (m + 1, H, W)."""
-        sequence = recipe.applied.sequence
-        sub_phases = sequence.sub_phases
-        noise = tm.noise.moment_noise(
-            np.asarray(found.smoothed[0].real),
-            self.sensor,
-            calibration=tm.nominal_calibration(
-                sequence.harmonics, sub_phases.phases_rad, sub_phases.weights, sequence.zeroth
-            ),
-            zeroth=sequence.zeroth,
-            takes=sequence.takes,
-        )
-        return tm.noise.smoothed(noise, recipe.settings.smoothing_px)
-
-    def judge(self, recipe: Recipe, found: tm.Reconstruction) -> dict[str, float] | None:
-        """Return `uncertainty` as a frame's metadata have it."""
-        uncertainty = self.uncertainty(recipe, found)
-        return None if uncertainty is None else uncertainty.to_document()
-
-    def uncertainty(self, recipe: Recipe, found: tm.Reconstruction) -> Uncertainty | None:
-        """Predict the deviation of a frame's range from its own returns, by a sample of pixels.
-
-        None where no pixel has a range. With another estimator than Pisarenko's it is that of
-        Pisarenko's nevertheless, which is cheap enough for every frame.
-        """
-        seen = np.flatnonzero(np.asarray(found.has_range).ravel())
-        if not seen.size:
-            return None
-        chosen = seen[:: max(1, seen.size // JUDGED_PIXELS)]
-
-        def some(planes: _Array) -> _Array:
-            return np.asarray(planes).reshape((planes.shape[0], -1))[:, chosen]
-
-        returns = tm.Returns(
-            some(found.returns.phase_rad),
-            some(found.returns.weight),
-            np.asarray(found.returns.uniform).ravel()[chosen],
-            np.asarray(found.returns.count).ravel()[chosen],
-        )
-        noise = tm.noise.MomentNoise(some(self.noise(recipe, found).variance))
-        deviation = tm.noise.return_noise(
-            returns, noise, threshold=recipe.settings.return_threshold
-        )
-        std_m = tm.range_m(deviation.direct_phase_std_rad, recipe.base_frequency_hz)
-        known = np.isfinite(std_m)
-        if not known.any():
-            return None
-        return Uncertainty(
-            float(np.median(std_m[known])),
-            float(np.quantile(std_m[known], 0.9)),
-            float(deviation.holds.mean()),
-        )
 
     def statistic(
         self, recipe: Recipe, found: tm.Reconstruction, ambient_dn_per_s: float
@@ -119,7 +55,7 @@ class Accuracy:
         """
         statistic = of_frame(
             found,
-            self.noise(recipe, found),
+            self._noise.of_moments(recipe, found),
             exposure_s=recipe.applied.sequence.exposure_s,
             base_frequency_hz=recipe.base_frequency_hz,
             ambient_dn_per_s=ambient_dn_per_s,
@@ -146,7 +82,7 @@ class Accuracy:
         return choices_on_front(choices, goal.leading)
 
     def _predictor(self, scene: SceneStatistic) -> Predictor:
-        return Predictor(scene, self.sensor, self._settings)
+        return Predictor(scene, self._noise.sensor, self._settings)
 
 
 def range_error(found: tm.Reconstruction, truth: Truth) -> dict[str, float] | None:

@@ -22,7 +22,7 @@ from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import DamagedFrame, NotARecording, Problem
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.recipe import Reconstruction
+from transientcam_server.imaging.recipe import SettingsVersion
 from transientcam_server.recording.layout import Header
 from transientcam_server.recording.library import Library
 from transientcam_server.recording.reader import Recording
@@ -75,7 +75,7 @@ class RecordedFrames:
         key = number, reconstruction.id
         task = self._frames.get(key)
         if task is None or _failed(task):  # one that is not there yet may be there next time
-            task = self.pipeline.start(self._read(number, reconstruction))
+            task = self.pipeline.workers.start(self._read(number, reconstruction))
             self._frames[key] = task
         self._frames.move_to_end(key)
         while len(self._frames) > _FRAMES:
@@ -84,25 +84,20 @@ class RecordedFrames:
 
     async def host_time_s(self) -> NDArray[np.float64]:
         """Return when each of the frames that were written so far arrived, Unix time."""
-        times, _ = await self.pipeline.run(_read_times, self._find)
+        times, _ = await self.pipeline.workers.run(_read_times, self._find)
         return times
 
-    async def _read(self, number: int, reconstruction: Reconstruction) -> Frame:
-        raw, _ = await self.pipeline.run_long(_read_frame, self._find, number)
-        return Frame(
-            self.pipeline,
-            number,
-            raw,
-            recorded_recipe(self._header, reconstruction, lens=self._lens),
-            past=True,
-        )
+    async def _read(self, number: int, reconstruction: SettingsVersion) -> Frame:
+        raw, _ = await self.pipeline.workers.run_long(_read_frame, self._find, number)
+        recipe = recorded_recipe(self._header, reconstruction, lens=self._lens)
+        return self.pipeline.recorded_frame(number, raw, recipe, past=True)
 
-    def _reconstruction(self, settings: Settings) -> Reconstruction:
+    def _reconstruction(self, settings: Settings) -> SettingsVersion:
         """Return the settings it was recorded with, if this version knows them all, or today's."""
         if settings == "recorded":
             with contextlib.suppress(ValidationError):
                 recorded = ReconstructionSettings.model_validate(dict(self._header.reconstruction))
-                return Reconstruction(_RECORDED_ID, recorded)
+                return SettingsVersion(_RECORDED_ID, recorded)
         return self._camera_pipeline.reconstruction
 
 
@@ -125,10 +120,10 @@ class RecordedFramesOf:
             ``recording-damaged``.
         """
         find = partial(self._library.find, recording_id)
-        await self._pipeline.run(find)  # it may have been deleted since
+        await self._pipeline.workers.run(find)  # it may have been deleted since
         found = self._opened.get(recording_id)
         if found is None:
-            header, _ = await self._pipeline.run(_read_header, find)
+            header, _ = await self._pipeline.workers.run(_read_header, find)
             found = RecordedFrames(find, header, self._pipeline, lens=self._lens)
             self._opened[recording_id] = found
         self._opened.move_to_end(recording_id)

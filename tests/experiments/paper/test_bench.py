@@ -17,7 +17,7 @@ def wall(bench: Bench) -> Shot:
 
 def test_the_device_has_a_pattern_that_the_calibration_removes(bench: Bench, wall: Shot) -> None:
     error_m = np.abs(wall.found.range_m - wall.truth.range_m)[wall.lit]
-    gains = bench.calibration(wall.applied.sequence).gains
+    gains = bench.calibration(wall.applied.sequence).gains.planes
 
     # 10 degrees at 23 MHz from pixel to pixel, which are 0.18 m
     assert np.degrees(np.angle(gains[1] / gains[1].mean())).std() == pytest.approx(10, rel=0.2)

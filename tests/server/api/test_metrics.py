@@ -171,4 +171,4 @@ def test_the_number_of_series_does_not_grow_with_the_clients(
 
 
 def test_two_services_in_one_process_have_metrics_of_their_own(served: Served) -> None:
-    assert Metrics(served.service).registry is not served.service.metrics.registry
+    assert Metrics(served.service).registry is not served.app.state.metrics.registry

@@ -6,7 +6,7 @@ from tests.server.broadcast.outboxes import numbers, run, subscribed, waiting
 from tests.server.fakes import fake_frame
 from transientcam import wire
 from transientcam_server.broadcast.hub import Hub
-from transientcam_server.broadcast.outbox import Goodbye, Outbox
+from transientcam_server.broadcast.outbox import Close, Outbox
 from transientcam_server.errors.exceptions import Problem
 
 
@@ -54,7 +54,7 @@ def test_closing_says_goodbye_to_all_and_to_those_who_come_later() -> None:
 
         for outbox in (early, late):
             (last,) = waiting(outbox)
-            assert isinstance(last, Goodbye)
+            assert isinstance(last, Close)
             assert last.code is wire.CloseCode.GOING_AWAY
 
     run(test)

@@ -10,8 +10,8 @@ from tests.server.fakes import NOTICE, channel, fake_frame
 from transientcam import wire
 from transientcam_server.broadcast.outbox import (
     MAX_WAITING_MESSAGES,
+    Close,
     Delivery,
-    Goodbye,
     Item,
     Outbox,
 )
@@ -110,7 +110,7 @@ def test_one_who_reads_no_messages_is_told_goodbye_instead_of_filling_the_memory
 
         (last,) = waiting(outbox)
 
-        assert isinstance(last, Goodbye)
+        assert isinstance(last, Close)
         assert last.code is wire.CloseCode.TRY_AGAIN_LATER
 
     run(test)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from transientcam_server.camera.calibration_store import Calibrations
+from transientcam_server.camera.calibration_store import CalibrationStore
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import NOMINAL_ID
 from transientcam_server.settings import CalibrationSettings
@@ -16,11 +16,11 @@ def test_what_a_dead_service_left_behind_is_removed_and_what_is_being_received_i
     tmp_path: Path,
 ) -> None:
     settings = CalibrationSettings(directory=tmp_path)
-    abandoned = Calibrations(settings).new_part()
+    abandoned = CalibrationStore(settings).new_part()
 
-    today = Calibrations(settings).new_part()
+    today = CalibrationStore(settings).new_part()
     assert abandoned.exists()
-    tomorrow = Calibrations(settings, unix_s=lambda: time.time() + 25 * 3600).new_part()
+    tomorrow = CalibrationStore(settings, unix_s=lambda: time.time() + 25 * 3600).new_part()
 
     assert not abandoned.exists()
     assert not today.exists()
@@ -29,7 +29,7 @@ def test_what_a_dead_service_left_behind_is_removed_and_what_is_being_received_i
 
 def test_a_file_that_is_no_calibration_is_passed_over(tmp_path: Path) -> None:
     (tmp_path / "odd.npz").write_bytes(b"PK")
-    kept = Calibrations(CalibrationSettings(directory=tmp_path))
+    kept = CalibrationStore(CalibrationSettings(directory=tmp_path))
 
     assert kept.all() == []
     with pytest.raises(Problem, match="no calibration 'odd'"):
@@ -43,21 +43,21 @@ def test_the_active_one_is_nominal_where_it_cannot_be_known(
     if content is not None:
         (tmp_path / "active.json").write_text(content)
 
-    assert Calibrations(CalibrationSettings(directory=tmp_path)).active_id == NOMINAL_ID
+    assert CalibrationStore(CalibrationSettings(directory=tmp_path)).active_id == NOMINAL_ID
 
 
 def test_the_active_one_is_remembered(tmp_path: Path) -> None:
     settings = CalibrationSettings(directory=tmp_path / "kept")
-    Calibrations(settings).remember_active("SIM-1")
+    CalibrationStore(settings).remember_active("SIM-1")
 
-    assert Calibrations(settings).active_id == "SIM-1"
+    assert CalibrationStore(settings).active_id == "SIM-1"
     assert json.loads((tmp_path / "kept" / "active.json").read_text()) == {"id": "SIM-1"}
     assert [path.name for path in (tmp_path / "kept").iterdir()] == ["active.json"]
 
 
 def test_a_disk_that_does_not_remember_is_no_reason_to_stop(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    kept = Calibrations(CalibrationSettings(directory=tmp_path / "file" / "kept"))
+    kept = CalibrationStore(CalibrationSettings(directory=tmp_path / "file" / "kept"))
 
     kept.remember_active("SIM-1")
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from transientcam_server.camera.jobs import MAX_UNFINISHED, REMEMBERED, Job, JobDesk
+from transientcam_server.camera.jobs import MAX_UNFINISHED, REMEMBERED, Job, Jobs
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 
@@ -19,12 +19,12 @@ async def nothing(job: Job) -> dict[str, Any]:
     return {}
 
 
-def with_desk(main: Callable[[JobDesk, list[tuple[str, str]]], Awaitable[None]]) -> None:
+def with_desk(main: Callable[[Jobs, list[tuple[str, str]]], Awaitable[None]]) -> None:
     """Run ``main`` with a desk and the list of what it reports, and close it."""
 
     async def run() -> None:
         told: list[tuple[str, str]] = []
-        desk = JobDesk(report=lambda job: told.append((job.id, job.state)), clock=lambda: 100.0)
+        desk = Jobs(report=lambda job: told.append((job.id, job.state)), clock=lambda: 100.0)
         try:
             await main(desk, told)
         finally:
@@ -34,7 +34,7 @@ def with_desk(main: Callable[[JobDesk, list[tuple[str, str]]], Awaitable[None]])
 
 
 def test_a_job_says_how_far_it_is_and_what_came_of_it() -> None:
-    async def main(desk: JobDesk, told: list[tuple[str, str]]) -> None:
+    async def main(desk: Jobs, told: list[tuple[str, str]]) -> None:
         async def work(job: Job) -> dict[str, Any]:
             await asyncio.to_thread(job.report, 0.5, "counting")
             seen.append((job.state, job.progress, job.step))
@@ -70,7 +70,7 @@ def test_a_job_says_how_far_it_is_and_what_came_of_it() -> None:
     ],
 )
 def test_what_a_job_raises_is_its_problem(error: Exception, slug: str) -> None:
-    async def main(desk: JobDesk, told: list[tuple[str, str]]) -> None:
+    async def main(desk: Jobs, told: list[tuple[str, str]]) -> None:
         async def work(job: Job) -> dict[str, Any]:
             raise error
 
@@ -86,7 +86,7 @@ def test_what_a_job_raises_is_its_problem(error: Exception, slug: str) -> None:
 
 
 def test_jobs_run_one_at_a_time_in_their_order() -> None:
-    async def main(desk: JobDesk, told: list[tuple[str, str]]) -> None:
+    async def main(desk: Jobs, told: list[tuple[str, str]]) -> None:
         jobs = [desk.start("count", nothing) for _ in range(4)]
         await desk.end_of(jobs[-1], wait_s=LONG_S)
 
@@ -97,7 +97,7 @@ def test_jobs_run_one_at_a_time_in_their_order() -> None:
 
 
 def test_one_that_runs_hears_that_it_should_end_where_it_reports() -> None:
-    async def main(desk: JobDesk, told: list[tuple[str, str]]) -> None:
+    async def main(desk: Jobs, told: list[tuple[str, str]]) -> None:
         begun = threading.Event()
 
         def count(job: Job) -> None:
@@ -121,7 +121,7 @@ def test_one_that_runs_hears_that_it_should_end_where_it_reports() -> None:
 
 
 def test_one_that_waits_is_cancelled_at_once_and_never_runs() -> None:
-    async def main(desk: JobDesk, told: list[tuple[str, str]]) -> None:
+    async def main(desk: Jobs, told: list[tuple[str, str]]) -> None:
         go_on = asyncio.Event()
 
         async def work(job: Job) -> dict[str, Any]:
@@ -141,7 +141,7 @@ def test_one_that_waits_is_cancelled_at_once_and_never_runs() -> None:
 
 
 def test_one_too_many_is_refused_until_one_has_ended() -> None:
-    async def main(desk: JobDesk, told: list[tuple[str, str]]) -> None:
+    async def main(desk: Jobs, told: list[tuple[str, str]]) -> None:
         jobs = [desk.start("count", nothing) for _ in range(MAX_UNFINISHED)]
         with pytest.raises(Problem) as caught:
             desk.start("count", nothing)
@@ -154,7 +154,7 @@ def test_one_too_many_is_refused_until_one_has_ended() -> None:
 
 
 def test_old_ones_are_forgotten_and_unknown_ones_are_a_problem() -> None:
-    async def main(desk: JobDesk, told: list[tuple[str, str]]) -> None:
+    async def main(desk: Jobs, told: list[tuple[str, str]]) -> None:
         jobs = []
         for _ in range(REMEMBERED + 2):
             jobs.append(desk.start("count", nothing))
@@ -170,7 +170,7 @@ def test_old_ones_are_forgotten_and_unknown_ones_are_a_problem() -> None:
 
 
 def test_who_waits_too_short_is_told_that_it_goes_on() -> None:
-    async def main(desk: JobDesk, told: list[tuple[str, str]]) -> None:
+    async def main(desk: Jobs, told: list[tuple[str, str]]) -> None:
         go_on = asyncio.Event()
 
         async def work(job: Job) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from transientcam_server.camera.lease import Change, Lease, LeaseDesk, OnLapse
+from transientcam_server.camera.lease import Change, Lease, LeaseManager, OnLapse
 from transientcam_server.errors.exceptions import Problem
 
 
@@ -54,15 +54,15 @@ def news() -> News:
 
 
 @pytest.fixture
-def desk(time: Time, news: News) -> LeaseDesk:
+def desk(time: Time, news: News) -> LeaseManager:
     def report(change: Change, lease: Lease, former: Lease | None) -> None:
         news.append((change, lease.holder, former.holder if former else None))
 
-    return LeaseDesk(report=report, alarm=time.alarm, clock=time)
+    return LeaseManager(report=report, alarm=time.alarm, clock=time)
 
 
 def grant(
-    desk: LeaseDesk,
+    desk: LeaseManager,
     holder: str = "anna",
     *,
     rank: int = 2,
@@ -80,7 +80,7 @@ def grant(
     )
 
 
-def holder(desk: LeaseDesk) -> str | None:
+def holder(desk: LeaseManager) -> str | None:
     return None if desk.current is None else desk.current.holder
 
 
@@ -90,11 +90,11 @@ def refusal(call: Callable[[], object]) -> Problem:
     return caught.value
 
 
-def test_without_a_lease_every_change_passes(desk: LeaseDesk) -> None:
+def test_without_a_lease_every_change_passes(desk: LeaseManager) -> None:
     desk.check(None)
 
 
-def test_only_the_holder_changes_anything(desk: LeaseDesk) -> None:
+def test_only_the_holder_changes_anything(desk: LeaseManager) -> None:
     lease = grant(desk)
 
     desk.check(lease.id)
@@ -106,13 +106,13 @@ def test_only_the_holder_changes_anything(desk: LeaseDesk) -> None:
 
 
 @pytest.mark.parametrize("shown", ["", "x", "ü", "\udc80"])
-def test_a_wrong_id_is_a_lost_lease(desk: LeaseDesk, shown: str) -> None:
+def test_a_wrong_id_is_a_lost_lease(desk: LeaseManager, shown: str) -> None:
     assert refusal(lambda: desk.check(shown)).kind.slug == "lease-lost"
     grant(desk)
     assert refusal(lambda: desk.check(shown)).kind.slug == "lease-lost"
 
 
-def test_a_second_one_is_refused_and_changes_nothing(desk: LeaseDesk, news: News) -> None:
+def test_a_second_one_is_refused_and_changes_nothing(desk: LeaseManager, news: News) -> None:
     lease = grant(desk)
 
     assert refusal(lambda: grant(desk, "bert")).kind.slug == "lease-held"
@@ -120,7 +120,7 @@ def test_a_second_one_is_refused_and_changes_nothing(desk: LeaseDesk, news: News
     assert news == [("granted", "anna", None)]
 
 
-def test_a_lease_lapses_once_and_is_told(desk: LeaseDesk, time: Time, news: News) -> None:
+def test_a_lease_lapses_once_and_is_told(desk: LeaseManager, time: Time, news: News) -> None:
     lease = grant(desk, duration_s=10.0)
 
     time.pass_s(9.9)
@@ -133,7 +133,9 @@ def test_a_lease_lapses_once_and_is_told(desk: LeaseDesk, time: Time, news: News
     assert news == [("granted", "anna", None), ("lapsed", "anna", None)]
 
 
-def test_renewing_moves_the_end_and_tells_nobody(desk: LeaseDesk, time: Time, news: News) -> None:
+def test_renewing_moves_the_end_and_tells_nobody(
+    desk: LeaseManager, time: Time, news: News
+) -> None:
     lease = grant(desk, duration_s=10.0)
 
     for _ in range(5):
@@ -147,7 +149,7 @@ def test_renewing_moves_the_end_and_tells_nobody(desk: LeaseDesk, time: Time, ne
     assert news[1:] == [("lapsed", "anna", None)]
 
 
-def test_renewing_may_change_the_terms_but_not_the_id(desk: LeaseDesk) -> None:
+def test_renewing_may_change_the_terms_but_not_the_id(desk: LeaseManager) -> None:
     lease = grant(desk)
 
     renewed = desk.renew(lease.id, duration_s=60.0, on_lapse="keep")
@@ -156,7 +158,7 @@ def test_renewing_may_change_the_terms_but_not_the_id(desk: LeaseDesk) -> None:
     assert desk.remaining_s(renewed) == 60.0
 
 
-def test_giving_it_back_frees_it_at_once(desk: LeaseDesk, time: Time, news: News) -> None:
+def test_giving_it_back_frees_it_at_once(desk: LeaseManager, time: Time, news: News) -> None:
     lease = grant(desk)
 
     desk.release(lease.id)
@@ -171,7 +173,7 @@ def test_giving_it_back_frees_it_at_once(desk: LeaseDesk, time: Time, news: News
 
 
 def test_taking_over_is_no_lapse_and_says_from_whom(
-    desk: LeaseDesk, time: Time, news: News
+    desk: LeaseManager, time: Time, news: News
 ) -> None:
     first = grant(desk, duration_s=5.0)
 
@@ -184,14 +186,14 @@ def test_taking_over_is_no_lapse_and_says_from_whom(
     assert news == [("granted", "anna", None), ("taken-over", "bert", "anna")]
 
 
-def test_nobody_of_a_lower_rank_takes_it_over(desk: LeaseDesk) -> None:
+def test_nobody_of_a_lower_rank_takes_it_over(desk: LeaseManager) -> None:
     grant(desk, rank=3)
 
     assert refusal(lambda: grant(desk, "bert", rank=2, takeover=True)).kind.slug == "lease-held"
     assert grant(desk, "carl", rank=3, takeover=True).holder == "carl"
 
 
-def test_an_alarm_that_rings_early_is_set_anew(desk: LeaseDesk, time: Time, news: News) -> None:
+def test_an_alarm_that_rings_early_is_set_anew(desk: LeaseManager, time: Time, news: News) -> None:
     grant(desk, duration_s=10.0)
     (alarm,) = time.alarms
     time.alarms.clear()
@@ -204,7 +206,9 @@ def test_an_alarm_that_rings_early_is_set_anew(desk: LeaseDesk, time: Time, news
     assert news[1:] == [("lapsed", "anna", None)]
 
 
-def test_closing_forgets_the_lease_and_its_alarm(desk: LeaseDesk, time: Time, news: News) -> None:
+def test_closing_forgets_the_lease_and_its_alarm(
+    desk: LeaseManager, time: Time, news: News
+) -> None:
     grant(desk)
 
     desk.close()
@@ -214,7 +218,7 @@ def test_closing_forgets_the_lease_and_its_alarm(desk: LeaseDesk, time: Time, ne
     assert len(news) == 1
 
 
-def test_the_id_shows_up_in_no_representation(desk: LeaseDesk) -> None:
+def test_the_id_shows_up_in_no_representation(desk: LeaseManager) -> None:
     lease = grant(desk)
 
     assert lease.id not in repr(lease)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from transientcam_server.daemon.server import set_aside_after
+from transientcam_server.daemon.server import freeze_startup_objects
 
 
 @pytest.fixture(autouse=True)
@@ -31,7 +31,7 @@ def test_what_is_there_is_passed_over_and_what_the_compiler_leaves_too() -> None
 
     compiling = threading.Thread(target=compile_)
     compiling.start()
-    waiting = set_aside_after(compiling)
+    waiting = freeze_startup_objects(compiling)
     before = gc.get_freeze_count()
     finish.set()
     waiting.join()
@@ -45,7 +45,7 @@ def test_what_is_there_is_passed_over_and_what_the_compiler_leaves_too() -> None
 def test_garbage_that_comes_later_is_still_found() -> None:
     done = threading.Thread(target=lambda: None)
     done.start()
-    set_aside_after(done).join()
+    freeze_startup_objects(done).join()
     for _ in range(10):
         Node()
 

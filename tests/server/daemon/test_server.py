@@ -24,7 +24,7 @@ from transientcam_server.daemon.server import (
     USER_TIMEOUT_MS,
     Server,
     address,
-    ending_without,
+    exit_without_joining,
     listen,
 )
 from transientcam_server.errors.exceptions import AddressUnavailable
@@ -183,9 +183,9 @@ def test_an_address_that_is_not_of_this_machine_leaves_no_socket_behind() -> Non
 def test_the_end_does_not_wait_for_a_compiler() -> None:
     program = """
 import threading
-from transientcam_server.daemon.server import ending_without
+from transientcam_server.daemon.server import exit_without_joining
 
-with ending_without() as leave:
+with exit_without_joining() as leave:
     compiler = threading.Thread(target=threading.Event().wait)  # for ever
     compiler.start()
     leave(compiler)
@@ -205,10 +205,10 @@ with ending_without() as leave:
 
 def test_what_is_not_at_work_changes_nothing_at_the_end() -> None:
     idle = threading.Thread(target=str)
-    with ending_without() as leave:
+    with exit_without_joining() as leave:
         leave(idle)
 
-    with pytest.raises(KeyboardInterrupt), ending_without() as leave:  # noqa: PT012 - that is it
+    with pytest.raises(KeyboardInterrupt), exit_without_joining() as leave:  # noqa: PT012 - that is it
         leave(idle)
         raise KeyboardInterrupt
 

@@ -1,6 +1,6 @@
 from typing import Any, cast
 
-from transientcam_server.daemon.connections import Patience
+from transientcam_server.daemon.connections import StallTimer
 
 LIMIT_S = 20.0
 
@@ -42,8 +42,8 @@ class Connection:
         self.timers[-1].ring()
 
 
-def patience(connection: Connection) -> Patience:
-    return Patience(cast("Any", connection), limit_s=LIMIT_S, loop=cast("Any", connection))
+def patience(connection: Connection) -> StallTimer:
+    return StallTimer(cast("Any", connection), limit_s=LIMIT_S, loop=cast("Any", connection))
 
 
 def test_a_connection_that_takes_nothing_is_cut() -> None:

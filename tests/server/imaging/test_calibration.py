@@ -27,13 +27,14 @@ from transientcam_driver import (
 )
 from transientcam_server.imaging.calibration import (
     NOMINAL_ID,
+    Calibration,
     evaluate,
     load_calibration,
     nominal_gains,
 )
 from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.products import STAGES
 from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.imaging.workers import Workers
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
@@ -87,12 +88,16 @@ def capture_of(sensor: Sensor, sequence: Sequence) -> CalibrationCapture:
     )
 
 
-def reconstruction(images: _Array, sequence: Sequence, calibration: Any) -> tm.Reconstruction:
+def reconstruction(
+    images: _Array, sequence: Sequence, calibration: Calibration | None
+) -> tm.Reconstruction:
     with open_camera("sim:mirrors") as camera:
         applied = camera.validate(sequence)
     frame = RawFrame(0, 1, images, sequence.labels, 0.0, 0.0, 0.1, 30.0, 0)
-    recipe = Recipe(applied, UNSMOOTHED, 65535.0, calibration)
-    found: tm.Reconstruction = STAGES["moments"].compute(recipe, frame)
+    recipe = Recipe(
+        applied, UNSMOOTHED, 65535.0, None if calibration is None else calibration.gains
+    )
+    found: tm.Reconstruction = recipe.reconstruct(frame)
     return found
 
 
@@ -110,7 +115,7 @@ def test_a_pattern_of_gain_and_phase_is_removed(zeroth: Any) -> None:
     expected_m = tm.SPEED_OF_LIGHT_M_S * delay_s / 2
     assert np.abs(found.range_m - expected_m).max() < 1e-3
     assert np.abs(nominal.range_m - expected_m).max() > 0.1
-    assert not calibration.bad.any()
+    assert calibration.gains.bad_pixels == 0
 
 
 @pytest.mark.parametrize("zeroth", ["low-frequency", "on-off"])
@@ -120,7 +125,7 @@ def test_calibrated_moments_are_those_of_the_light_in_digital_numbers(zeroth: An
     b0, delay_s = np.full(SHAPE, 500.0), np.full(SHAPE, 10e-9)
 
     measured = tm.measure(sensor.images(sequence, b0, delay_s), zeroth=zeroth)
-    moments = tm.calibrate(measured, calibration.gains)
+    moments = tm.calibrate(measured, calibration.gains.planes)
 
     for j in range(4):
         expected = 500.0 * np.exp(2j * np.pi * 23e6 * j * 10e-9)
@@ -132,7 +137,7 @@ def test_an_ideal_sensor_is_calibrated_by_the_nominal_gains() -> None:
     sensor.delay_s[:] = 0.0
     sensor.gain = dict.fromkeys(range(9), np.ones(SHAPE))
 
-    gains = evaluate(capture_of(sensor, SEQUENCE)).gains
+    gains = evaluate(capture_of(sensor, SEQUENCE)).gains.planes
 
     nominal = nominal_gains(SEQUENCE)
     np.testing.assert_allclose(
@@ -151,13 +156,14 @@ def test_hot_noisy_and_dead_pixels_are_found_and_show_their_neighbours() -> None
 
     calibration = evaluate(capture)
 
-    assert np.argwhere(calibration.bad).tolist() == [[1, 2], [4, 4], [7, 8]]
-    assert np.isfinite(calibration.gains).all()
+    assert calibration.gains.bad is not None
+    assert np.argwhere(calibration.gains.bad).tolist() == [[1, 2], [4, 4], [7, 8]]
+    assert np.isfinite(calibration.gains.planes).all()
     b0, delay_s = np.full(SHAPE, 500.0), np.full(SHAPE, 10e-9)
     images = sensor.images(SEQUENCE, b0, delay_s)
-    images[:, calibration.bad] = 4000.0
+    images[:, calibration.gains.bad] = 4000.0
     found = reconstruction(images, SEQUENCE, calibration)
-    assert (found.flags[calibration.bad] & tm.Flags.REPLACED).all()
+    assert (found.flags[calibration.gains.bad] & tm.Flags.REPLACED).all()
     assert np.abs(found.range_m - tm.SPEED_OF_LIGHT_M_S * 5e-9).max() < 0.3
 
 
@@ -185,8 +191,13 @@ def range_error_m(camera: Camera, calibration: Any) -> float:
     camera.start()
     frames = [camera.read_frame() for _ in range(4)]
     camera.stop()
-    recipe = Recipe(camera.applied, ReconstructionSettings(), 4095.0, calibration)
-    ranges = [STAGES["moments"].compute(recipe, frame).range_m for frame in frames]
+    recipe = Recipe(
+        camera.applied,
+        ReconstructionSettings(),
+        4095.0,
+        None if calibration is None else calibration.gains,
+    )
+    ranges = [recipe.reconstruct(frame).range_m for frame in frames]
     error = np.median(ranges, axis=0) - camera.simulation.truth().range_m
     return float(np.nanmedian(np.abs(error - np.nanmedian(error))))
 
@@ -203,17 +214,18 @@ def with_pipeline(camera: Camera, **options: Any) -> dict[str, Any]:
 
     async def main() -> dict[str, Any]:
         with ThreadPoolExecutor(2, thread_name_prefix="worker") as executor:
-            pipeline = Pipeline(camera, ReconstructionSettings(), executor, workers=2, **options)
+            workers = Workers(executor, count=2)
+            pipeline = Pipeline(camera, ReconstructionSettings(), workers, **options)
             try:
                 camera.start()
                 frame = pipeline.frame(camera.read_frame(), camera.applied)
                 camera.stop()
                 before = frame.meta()
                 assert before["rejected_images"] is None
-                await frame.stage("moments")
+                await frame.reconstruction("moments")
                 return frame.meta()
             finally:
-                await pipeline.close()
+                await workers.close()
 
     return asyncio.run(main())
 
@@ -246,13 +258,13 @@ def test_both_orders_of_takes_give_the_same_moments() -> None:
             camera.start()
             frame = camera.read_frame()
             recipe = Recipe(camera.applied, ReconstructionSettings(), 65535.0)
-            found.append(STAGES["moments"].compute(recipe, frame).moments)
+            found.append(recipe.reconstruct(frame).moments)
 
     np.testing.assert_allclose(found[0], found[1], rtol=1e-5)
 
 
 def test_the_daemon_calibrates_and_says_when_it_cannot(calibrated: Path) -> None:
-    identity = load_calibration(calibrated).id
+    identity = load_calibration(calibrated).gains.id
     with (
         serving("sim:wall?device=prototype", calibration=calibrated) as daemon,
         RemoteCamera(daemon.url, timeout_s=60) as camera,

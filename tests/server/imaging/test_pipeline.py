@@ -1,6 +1,7 @@
 """Each thing is computed once for all who ask, on workers, and only when somebody does."""
 
 import asyncio
+import io
 import threading
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -10,15 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+import transientcam_moments as tm
 from transientcam import wire
 from transientcam_driver import Camera, RawFrame, open_camera
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging import frame as module
-from transientcam_server.imaging import products
-from transientcam_server.imaging.encodings.encoding import MSGPACK, NPY
+from transientcam_server.imaging import stages
+from transientcam_server.imaging.encodings.encoding import MSGPACK, NPY, Encoding
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.imaging.view import View
+from transientcam_server.imaging.workers import Workers
 from transientcam_server.settings import ReconstructionSettings
 
 
@@ -38,22 +41,31 @@ def raw(camera: Camera) -> RawFrame:
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Names of stages in the order they were computed, with the thread that did it."""
+    """Names of stages in the order they were computed; each on a worker."""
     computed: list[str] = []
 
-    def counted(name: str, compute: Callable[..., Any]) -> Callable[..., Any]:
-        def run(*arguments: Any) -> Any:
-            assert threading.current_thread().name.startswith("worker")
-            computed.append(name)
-            return compute(*arguments)
+    def counted(found: tm.Reconstruction, stage: str) -> None:
+        assert threading.current_thread().name.startswith("worker")
+        computed.append(stage)
+        read(found, stage)
 
-        return run
-
-    for name, stage in products.STAGES.items():
-        monkeypatch.setitem(
-            products.STAGES, name, replace(stage, compute=counted(name, stage.compute))
-        )
+    read = stages._read
+    monkeypatch.setattr(stages, "_read", counted)
     return computed
+
+
+@pytest.fixture
+def hops(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of the functions that were run on a worker, in order."""
+    ran: list[str] = []
+    run = Workers.run
+
+    async def counted(self: Workers, compute: Callable[..., Any], *arguments: Any) -> Any:
+        ran.append(compute.__name__)
+        return await run(self, compute, *arguments)
+
+    monkeypatch.setattr(Workers, "run", counted)
+    return ran
 
 
 def with_frame(
@@ -61,11 +73,12 @@ def with_frame(
 ) -> None:
     async def main() -> None:
         with ThreadPoolExecutor(2, thread_name_prefix="worker") as executor:
-            pipeline = Pipeline(camera, ReconstructionSettings(), executor, workers=2)
+            workers = Workers(executor, count=2)
+            pipeline = Pipeline(camera, ReconstructionSettings(), workers)
             try:
                 await test(pipeline, pipeline.frame(raw, camera.applied))
             finally:
-                await pipeline.close()
+                await workers.close()
 
     asyncio.run(main())
 
@@ -95,6 +108,62 @@ def test_all_who_ask_at_once_share_one_computation_and_the_same_bytes(
         assert sorted(calls) == ["coefficients", "moments", "returns"]
         assert encoded[0] is encoded[1] is encoded[6]
         assert encoded[0] is not encoded[3]
+
+    with_frame(camera, raw, test)
+
+
+def test_a_product_takes_two_hops_to_a_worker(
+    camera: Camera, raw: RawFrame, hops: list[str]
+) -> None:
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        await frame.encoded(pipeline.product("range"), MSGPACK, channel=0)
+        assert hops == ["compute", "_made"]
+
+    with_frame(camera, raw, test)
+
+
+def test_products_requested_together_share_the_first_hop(
+    camera: Camera, raw: RawFrame, hops: list[str]
+) -> None:
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        names = ("brightness", "range", "direct", "indirect", "coefficients")
+        await asyncio.gather(
+            *(frame.encoded(pipeline.product(name), MSGPACK, channel=0) for name in names)
+        )
+        assert hops == ["compute", *["_made"] * len(names)]
+
+    with_frame(camera, raw, test)
+
+
+def test_an_array_that_is_there_is_not_computed_again(camera: Camera, raw: RawFrame) -> None:
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        computed = []
+
+        def count(*_: Any) -> Any:
+            computed.append(1)
+            return np.zeros((120, 163), dtype=np.float32)
+
+        product = replace(pipeline.product("range"), compute=count)
+        await frame.encoded(product, NPY)
+        await frame.encoded(product, MSGPACK)
+        assert (await frame.product(product)).shape == (120, 163)
+        assert len(computed) == 1
+
+    with_frame(camera, raw, test)
+
+
+@pytest.mark.parametrize("encoding", [MSGPACK, NPY])
+def test_arrays_travel_in_the_type_of_the_contract_whatever_they_were_computed_in(
+    camera: Camera, raw: RawFrame, encoding: Encoding
+) -> None:
+    array = np.asfortranarray(np.arange(120.0 * 163.0).reshape(120, 163))
+
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        product = replace(pipeline.product("direct"), compute=lambda *_: array)
+        data = await frame.encoded(product, encoding)
+        found = wire.parse_frame(data).array if encoding is MSGPACK else np.load(io.BytesIO(data))
+        assert found.dtype == np.dtype("<f4")
+        np.testing.assert_array_equal(found, array)
 
     with_frame(camera, raw, test)
 
@@ -201,7 +270,7 @@ def test_former_frames_leave_a_worker_to_the_newest(camera: Camera, raw: RawFram
         return np.zeros((120, 163), dtype=np.float32)
 
     async def test(pipeline: Pipeline, frame: Frame) -> None:
-        endless = replace(pipeline.product("range"), needs=("raw",), compute=wait_at_the_gate)
+        endless = replace(pipeline.product("range"), needs="raw", compute=wait_at_the_gate)
         former = [
             asyncio.ensure_future(frame.bare().encoded(endless, MSGPACK, channel=index))
             for index in range(5)

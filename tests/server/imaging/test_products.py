@@ -238,4 +238,4 @@ def test_the_registry_is_the_contract() -> None:
     for name, product in PRODUCTS.items():
         assert product.description is wire.PRODUCTS[name]
         assert product.over_time == ("time" in product.description.axes)
-        assert (product.png_scale is not None) == (len(product.description.axes) == 2)
+        assert (product.png_steps is not None) == (len(product.description.axes) == 2)

@@ -8,8 +8,9 @@ import transientcam_moments as tm
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.errors.exceptions import InputError
-from transientcam_server.imaging.products import PRODUCTS, STAGES
+from transientcam_server.imaging.products import PRODUCTS
 from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.imaging.view import EVERYTHING
 from transientcam_server.offline.recording import DEFAULT_PRODUCTS, Wanted, reconstruct
 from transientcam_server.recording import Header, Recording, RecordingWriter
 from transientcam_server.settings import ReconstructionSettings
@@ -38,13 +39,12 @@ def test_products_are_those_the_service_computes(path: Path, tmp_path: Path) -> 
         raw = recording.frame(2)
         recipe = Recipe(recording.header.applied, ReconstructionSettings(), 4095.0)
 
-    moments = STAGES["moments"].compute(recipe, raw)
-    returns = STAGES["returns"].compute(recipe, moments)
+    found = recipe.reconstruct(raw)
     with h5py.File(output) as file:
         for name in DEFAULT_PRODUCTS:
             product = PRODUCTS[name]
-            stage = returns if product.needs == ("returns",) else moments
-            np.testing.assert_array_equal(file[name][2], product.compute(recipe, stage))
+            expected = product.compute(recipe, found, EVERYTHING)
+            np.testing.assert_array_equal(file[name][2], expected)
             assert file[name].attrs["units"] == product.description.unit
         assert len(file["range"]) == FRAMES
         np.testing.assert_array_equal(file["frame"][()], np.arange(FRAMES))

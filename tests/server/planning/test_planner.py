@@ -15,13 +15,13 @@ from transientcam_driver import Camera, Capabilities, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.capture import repeatability
 from transientcam_server import planning
-from transientcam_server.cli import plan as commands_accuracy
+from transientcam_server.camera.source import noise_of
+from transientcam_server.cli import plan as plan_verb
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.products import STAGES
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.planning import Goal, plan
-from transientcam_server.planning import scene as statistic
-from transientcam_server.planning.planner import Accuracy
+from transientcam_server.planning import scene as scene_statistic
+from transientcam_server.planning.planner import Planner
 from transientcam_server.planning.prediction import Deviation, Predictor, both_found
 from transientcam_server.planning.timing import ComputingTime
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
@@ -51,7 +51,7 @@ class ClosedForm:
     least_harmonics = 1
 
     def __init__(self, *, far_m: float = 2.0) -> None:
-        self.scene = statistic.given(1e6, [(far_m, 1.0)])
+        self.scene = scene_statistic.given(1e6, [(far_m, 1.0)])
 
     def longest_exposure_s(self) -> float:
         return 0.004
@@ -235,7 +235,7 @@ def test_a_goal_that_cannot_be_meant_is_refused(goal: Goal, capabilities: Capabi
 
 
 def test_a_given_scene_has_the_moments_of_its_returns() -> None:
-    scene = statistic.given(1e6, [(1.5, 3.0), (3.0, 1.0)])
+    scene = scene_statistic.given(1e6, [(1.5, 3.0), (3.0, 1.0)])
     period_m = tm.SPEED_OF_LIGHT_M_S / (2 * FREQUENCY_HZ)
 
     b = scene.relative_moments(2, FREQUENCY_HZ)
@@ -256,7 +256,7 @@ def test_the_scene_of_a_frame_is_what_its_moments_hold() -> None:
     found = tm.reconstruct(frame, SETTINGS.for_moments(base_frequency_hz=FREQUENCY_HZ))
     noise = tm.noise.MomentNoise(np.full((4, 12, 10), 4.0))
 
-    scene = statistic.of_frame(found, noise, exposure_s=0.001, base_frequency_hz=FREQUENCY_HZ)
+    scene = scene_statistic.of_frame(found, noise, exposure_s=0.001, base_frequency_hz=FREQUENCY_HZ)
 
     assert scene is not None
     np.testing.assert_allclose(scene.brightness_dn_per_s, 910e3, rtol=1e-4)
@@ -276,7 +276,8 @@ def test_a_dark_frame_is_no_scene() -> None:
     noise = tm.noise.MomentNoise(np.ones((3, 5, 5)))
 
     assert (
-        statistic.of_frame(found, noise, exposure_s=0.001, base_frequency_hz=FREQUENCY_HZ) is None
+        scene_statistic.of_frame(found, noise, exposure_s=0.001, base_frequency_hz=FREQUENCY_HZ)
+        is None
     )
 
 
@@ -285,7 +286,7 @@ def test_a_dark_frame_is_no_scene() -> None:
 
 def test_deviation_of_one_return_at_one_frequency_is_the_closed_form() -> None:
     sensor = tm.noise.Sensor()
-    predictor = Predictor(statistic.given(4e5, [(2.0, 1.0)]), sensor, SETTINGS)
+    predictor = Predictor(scene_statistic.given(4e5, [(2.0, 1.0)]), sensor, SETTINGS)
     sequence = Sequence(harmonics=1, exposure_s=0.001, takes=2, zeroth="estimated")
 
     predicted = predictor.range_std(sequence)
@@ -311,7 +312,7 @@ def captured(camera: Camera, sequence: Sequence, frames: int) -> list[tm.Reconst
     applied = camera.configure(sequence)
     recipe = Recipe(applied, SETTINGS, 2.0**camera.capabilities.bits - 1.0)
     camera.start()
-    found = [STAGES["moments"].compute(recipe, camera.read_frame()) for _ in range(frames)]
+    found = [recipe.reconstruct(camera.read_frame()) for _ in range(frames)]
     camera.stop()
     return found
 
@@ -319,10 +320,11 @@ def captured(camera: Camera, sequence: Sequence, frames: int) -> list[tm.Reconst
 @pytest.fixture(scope="module")
 def predictor(camera: Camera) -> Predictor:
     sequence = Sequence(harmonics=6, takes=16, exposure_s=0.0015)
-    accuracy = Accuracy(camera, SETTINGS, SensorSettings())
+    noise = noise_of(camera, SensorSettings())
+    planner = Planner(camera.capabilities, noise, SETTINGS)
     (found,) = captured(camera, sequence, 1)
     recipe = Recipe(camera.applied, SETTINGS, 4095.0)
-    return Predictor(accuracy.statistic(recipe, found, 0.0), accuracy.sensor, SETTINGS)
+    return Predictor(planner.statistic(recipe, found, 0.0), noise.sensor, SETTINGS)
 
 
 PINNED = frozenset({"base_frequency_hz"})
@@ -361,16 +363,16 @@ def test_bounds_measure_as_predicted(camera: Camera, predictor: Predictor) -> No
 
 
 def test_frames_say_their_own_deviation(camera: Camera) -> None:
-    accuracy = Accuracy(camera, SETTINGS, SensorSettings())
+    noise = noise_of(camera, SensorSettings())
     found = captured(camera, Sequence(harmonics=3), 6)
     measured_m = repeatability(np.stack([np.asarray(each.range_m) for each in found]))
 
-    said = accuracy.judge(Recipe(camera.applied, SETTINGS, 4095.0), found[0])
+    predicted = noise.of_range(Recipe(camera.applied, SETTINGS, 4095.0), found[0])
 
-    assert said is not None
-    assert measured_m == pytest.approx(said["median"], rel=0.25)
-    assert said["median"] < said["p90"]
-    assert 0.3 < said["first_order_share"] < 1.0
+    assert predicted is not None
+    assert measured_m == pytest.approx(predicted.median_m, rel=0.25)
+    assert predicted.median_m < predicted.p90_m
+    assert 0.3 < predicted.first_order_share < 1.0
 
 
 # -- computing ----------------------------------------------------------------------------------
@@ -401,7 +403,7 @@ NEARBY: dict[str, Any] = {
 
 
 def test_the_command_prints_a_plan_as_json(capsys: pytest.CaptureFixture[str]) -> None:
-    commands_accuracy.plan(**NEARBY, range_std_m=0.01, as_json=True)
+    plan_verb.plan(**NEARBY, range_std_m=0.01, as_json=True)
 
     said = json.loads(capsys.readouterr().out)
     assert said["sequence"]["harmonics"] == 3
@@ -410,7 +412,7 @@ def test_the_command_prints_a_plan_as_json(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_the_command_tells_a_plan_in_words(capsys: pytest.CaptureFixture[str]) -> None:
-    commands_accuracy.plan(**NEARBY, capture_s=0.1, separation_m=1.0, bound_width=9.0)
+    plan_verb.plan(**NEARBY, capture_s=0.1, separation_m=1.0, bound_width=9.0)
 
     first, *words = capsys.readouterr().out.splitlines()
     assert Sequence.from_document(json.loads(first)).harmonics == 3
@@ -424,7 +426,7 @@ def test_the_command_fails_with_the_best_where_a_target_is_out_of_reach(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     with pytest.raises(typer.Exit) as ended:
-        commands_accuracy.plan(**NEARBY, range_std_m=1e-9, as_json=True)
+        plan_verb.plan(**NEARBY, range_std_m=1e-9, as_json=True)
 
     assert ended.value.exit_code == 1
     assert json.loads(capsys.readouterr().out)["field"] == "range_std_m"
@@ -435,4 +437,4 @@ def test_the_command_fails_with_the_best_where_a_target_is_out_of_reach(
 )
 def test_the_command_refuses_what_it_cannot_read(mistake: dict[str, Any]) -> None:
     with pytest.raises(typer.BadParameter):
-        commands_accuracy.plan(**(NEARBY | mistake), capture_s=0.1)
+        plan_verb.plan(**(NEARBY | mistake), capture_s=0.1)

@@ -26,7 +26,7 @@ def asks_for_head(scope: Scope) -> bool:
     return bool(scope.get(_HEAD))
 
 
-class Requests:
+class RequestLog:
     """Gives every request an id, and every failure an answer.
 
     An id that the client sends in ``X-Request-ID`` is kept if it may stand in a log. HEAD is

@@ -64,7 +64,7 @@ def own_names() -> tuple[str, ...]:
     return name, short, f"{short}.local"
 
 
-class SameSite:
+class OriginCheck:
     """Refuses names this service is not called by, and pages of other sites that change things.
 
     The first keeps a foreign page from rebinding its name to this address; the second covers

@@ -1,4 +1,4 @@
-"""Calibrations: measure one, use it, take it elsewhere."""
+"""CalibrationStore: measure one, use it, take it elsewhere."""
 
 import asyncio
 import time

@@ -4,7 +4,7 @@ from typing import Any, Final
 
 from fastapi import APIRouter, Response
 
-from transientcam_server.api.dependencies import ServiceOf
+from transientcam_server.api.dependencies import MetricsOf, ServiceOf
 from transientcam_server.api.metrics import CONTENT_TYPE
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
@@ -25,7 +25,7 @@ _TEXT: Final[dict[int | str, dict[str, Any]]] = {
     response_class=Response,
     responses=_TEXT | documented(kinds.TOKEN_REQUIRED, kinds.TOKEN_REFUSED),
 )
-async def read_metrics(service: ServiceOf) -> Response:
+async def read_metrics(service: ServiceOf, metrics: MetricsOf) -> Response:
     """Return what Prometheus scrapes; where tokens are asked for, a viewer's will do."""
     await service.calibrations.drift()  # counted anew every few seconds at most
-    return Response(service.metrics.exposition(), media_type=CONTENT_TYPE)
+    return Response(metrics.exposition(), media_type=CONTENT_TYPE)

@@ -48,7 +48,7 @@ async def make_plan(service: ServiceOf, request: PlanRequest) -> PlanDocument:
         fixed=frozenset(request.fixed),
     )
     scene = await _scene(service, request)
-    made, _ = await service.pipeline.run_long(service.accuracy.plan, goal, scene)
+    made, _ = await service.workers.run_long(service.planner.plan, goal, scene)
     return PlanDocument.model_validate(made.to_document())
 
 
@@ -80,8 +80,8 @@ async def _scene(service: Service, request: PlanRequest) -> SceneStatistic:
             ambient_dn_per_s=scene.ambient_dn_per_s,
         )
     frame = await service.hub.newest(after=0, wait_s=_FRAME_WITHIN_S)
-    found = await frame.stage("returns")
-    statistic, _ = await service.pipeline.run(
-        service.accuracy.statistic, frame.recipe, found, request.ambient_dn_per_s
+    found = await frame.reconstruction("returns")
+    statistic, _ = await service.workers.run(
+        service.planner.statistic, frame.recipe, found, request.ambient_dn_per_s
     )
     return statistic

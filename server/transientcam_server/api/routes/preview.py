@@ -92,17 +92,17 @@ class _Film(StreamingResponse):
         self._pictures = pictures
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        self._service.previews += 1
+        self._service.mjpeg_clients += 1
         try:
             await super().__call__(scope, receive, send)
         finally:
-            self._service.previews -= 1
+            self._service.mjpeg_clients -= 1
             await self._pictures.aclose()
 
 
 def _require_room(service: Service) -> None:
     limit = service.settings.stream.max_clients
-    if service.hub.clients + service.previews >= limit:
+    if service.hub.clients + service.mjpeg_clients >= limit:
         raise Problem(kinds.TOO_MANY_CLIENTS, f"{limit} clients look on.", limit=limit)
 
 

@@ -9,7 +9,7 @@ from transientcam_server.api import etags
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
-from transientcam_server.imaging.recipe import Reconstruction
+from transientcam_server.imaging.recipe import SettingsVersion
 from transientcam_server.settings import ReconstructionSettings
 
 router = APIRouter(tags=["reconstruction"])
@@ -87,5 +87,5 @@ async def change_reconstruction(
     return ReconstructionDocument(**now.to_document())
 
 
-def _tag(reconstruction: Reconstruction) -> str:
+def _tag(reconstruction: SettingsVersion) -> str:
     return etags.etag(reconstruction.to_document())

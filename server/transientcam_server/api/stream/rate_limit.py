@@ -9,7 +9,7 @@ BURST_S: Final = 2.0
 MOST_ANSWERS: Final = MAX_CREDITS * MAX_SUBSCRIPTIONS
 
 
-class Allowance:
+class RateLimiter:
     """Counts what is done against what is allowed (a token bucket).
 
     ``rate_hz`` is allowed in the long run, and what that gives in `BURST_S` at once. What was
@@ -23,11 +23,11 @@ class Allowance:
         self._answers = 0
         self._counted_s = clock()
 
-    def earn(self) -> None:
+    def credit(self) -> None:
         """Allow one more."""
         self._answers = min(MOST_ANSWERS, self._answers + 1)
 
-    def spend(self) -> bool:
+    def allow(self) -> bool:
         """Count one, and return whether it was allowed."""
         if self._answers:
             self._answers -= 1

@@ -8,9 +8,9 @@ from fastapi import WebSocket
 
 from transientcam import wire
 from transientcam_server.api.metrics import Metrics
-from transientcam_server.api.stream.rate_limit import Allowance
+from transientcam_server.api.stream.rate_limit import RateLimiter
 from transientcam_server.broadcast.channel import Channel
-from transientcam_server.broadcast.outbox import Delivery, Goodbye, Outbox
+from transientcam_server.broadcast.outbox import Close, Delivery, Outbox
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.errors.translation import problem_document
 from transientcam_server.imaging.view import View
@@ -23,10 +23,10 @@ class Sender:
     """Empties an outbox into a WebSocket."""
 
     def __init__(
-        self, websocket: WebSocket, outbox: Outbox, metrics: Metrics, allowance: Allowance
+        self, websocket: WebSocket, outbox: Outbox, metrics: Metrics, rate_limiter: RateLimiter
     ) -> None:
         self._websocket = websocket
-        self._allowance = allowance
+        self._rate_limiter = rate_limiter
         self._metrics = metrics
         self._outbox = outbox
         self._failing: set[str] = set()
@@ -36,7 +36,7 @@ class Sender:
         delivered = 0
         while True:
             item = await self._outbox.next()
-            if isinstance(item, Goodbye):
+            if isinstance(item, Close):
                 await self._websocket.close(item.code, item.reason)
                 return
             if isinstance(item, Delivery):
@@ -71,7 +71,7 @@ class Sender:
             await self._tell_failed(channel, problem)
             return
         self._failing.discard(channel.product.name)
-        self._allowance.earn()  # for its acknowledgement
+        self._rate_limiter.credit()  # for its acknowledgement
         await self._websocket.send_bytes(data)
         self._metrics.sent(time.time() - delivery.frame.raw.host_time_s)
 

@@ -3,17 +3,20 @@
 import asyncio
 import logging
 import secrets
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from transientcam import wire
 from transientcam.errors import ProtocolError
-from transientcam_server.api.auth.guard import log_refusal
+from transientcam_server.api.auth.guard import Guard, Principal, log_refusal
 from transientcam_server.api.problems import problem_response
-from transientcam_server.api.stream.rate_limit import Allowance
+from transientcam_server.api.stream.rate_limit import RateLimiter
 from transientcam_server.api.stream.sender import Sender
 from transientcam_server.broadcast.channel import UNNUMBERED, Channel
-from transientcam_server.broadcast.outbox import Goodbye, Outbox
+from transientcam_server.broadcast.hub import Hub
+from transientcam_server.broadcast.outbox import Close, Outbox
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.errors.translation import problem_document, problem_of
@@ -23,6 +26,8 @@ from transientcam_server.service import Service
 
 _log = logging.getLogger(__name__)
 router = APIRouter()
+_TOKENS_EVERY_S = 1.0
+_REVOKED = "the token is not valid any more"
 
 
 @router.websocket("/stream")
@@ -48,6 +53,26 @@ async def stream(websocket: WebSocket) -> None:
         _log.debug("client %s is gone", websocket.client)
 
 
+@asynccontextmanager
+async def watching_tokens(hub: Hub, guard: Guard) -> AsyncIterator[None]:
+    """Close the streams of clients whose token is revoked or expires, to the end of the block."""
+    watching = asyncio.create_task(_watch_tokens(hub, guard))
+    try:
+        yield
+    finally:
+        watching.cancel()
+        await asyncio.gather(watching, return_exceptions=True)
+
+
+async def _watch_tokens(hub: Hub, guard: Guard) -> None:
+    while True:
+        await asyncio.sleep(_TOKENS_EVERY_S)
+        for outbox in hub.outboxes:
+            owner = outbox.owner
+            if isinstance(owner, Principal) and not guard.still_valid(owner):
+                outbox.put(Close(wire.CloseCode.AUTHENTICATION_FAILED, _REVOKED))
+
+
 class _Client:
     """One connected client."""
 
@@ -56,10 +81,12 @@ class _Client:
         self._service = service
         self._session = secrets.token_hex(8)
         self._outbox = Outbox(depth=service.settings.stream.queue_frames)
-        self._allowance = Allowance(
+        self._rate_limiter = RateLimiter(
             service.settings.stream.max_messages_hz, clock=asyncio.get_running_loop().time
         )
-        self._sender = Sender(websocket, self._outbox, service.metrics, self._allowance)
+        self._sender = Sender(
+            websocket, self._outbox, websocket.app.state.metrics, self._rate_limiter
+        )
 
     async def serve(self) -> None:
         """Subscribe, then send and receive until either end has enough."""
@@ -104,9 +131,8 @@ class _Client:
                 value="ack",
                 limit="subscribe",
             )
-        self._outbox.owner = self._service.guard.identify(
-            self._websocket.headers, first_message=message.token
-        )
+        guard: Guard = self._websocket.app.state.guard
+        self._outbox.owner = guard.identify(self._websocket.headers, first_message=message.token)
         self._subscribe(message)
 
     async def _refuse(self, problem: Problem) -> None:
@@ -133,7 +159,7 @@ class _Client:
     async def _receive_all(self) -> None:
         while True:
             data = await self._receive()
-            if not self._allowance.spend():
+            if not self._rate_limiter.allow():
                 await self._send_away()
                 return
             try:
@@ -218,7 +244,7 @@ class _Client:
             limit=limit_hz,
         )
         self._outbox.put(wire.ErrorMessage(problem_document(problem)))
-        self._outbox.put(Goodbye(wire.CloseCode.TOO_MANY_MESSAGES, problem.kind.title))
+        self._outbox.put(Close(wire.CloseCode.TOO_MANY_MESSAGES, problem.kind.title))
         # read nothing more; the sender ends the stream
         await asyncio.Event().wait()
 

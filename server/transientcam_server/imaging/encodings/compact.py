@@ -2,13 +2,14 @@
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam import density, wire
-from transientcam_server.imaging.encodings.encoding import MSGPACK, Encoding
+from transientcam import Frame, density, wire
+from transientcam_server.imaging.encodings.encoding import MSGPACK, Encoding, message
 from transientcam_server.imaging.products import Product
 
 _Array = NDArray[Any]
@@ -16,30 +17,17 @@ JUDGED_PIXELS: Final = 1024
 JUDGED_PHASES: Final = 128
 
 
-def _u16(
-    product: Product,
-    array: _Array,
-    meta: Mapping[str, Any],
-    extra: Mapping[str, Any],
-    channel: int | None,
-) -> bytes:
+def _u16(frame: Frame) -> bytes:
     begin_s = time.perf_counter()
-    coded = wire.encode_u16(array)
-    return _message(product, coded, wire.U16, begin_s, meta, extra, channel)
+    return _message(frame, wire.encode_u16(frame.array), wire.U16, begin_s, {})
 
 
-def _reflection16(
-    product: Product,
-    array: _Array,
-    meta: Mapping[str, Any],
-    extra: Mapping[str, Any],
-    channel: int | None,
-) -> bytes:
+def _reflection16(frame: Frame) -> bytes:
     begin_s = time.perf_counter()
-    coded = wire.encode_reflection16(array)
-    median, most = measured_error(array, coded)
-    said = {"approximate": True, "max_error": most, "median_error": median}
-    return _message(product, coded, wire.REFLECTION16, begin_s, meta, {**extra, **said}, channel)
+    coded = wire.encode_reflection16(frame.array)
+    median, most = measured_error(frame.array, coded)
+    error = {"approximate": True, "max_error": most, "median_error": median}
+    return _message(frame, coded, wire.REFLECTION16, begin_s, error)
 
 
 def measured_error(coefficients: _Array, coded: wire.Coded) -> tuple[float, float]:
@@ -65,23 +53,15 @@ def measured_error(coefficients: _Array, coded: wire.Coded) -> tuple[float, floa
 
 
 def _message(
-    product: Product,
-    coded: wire.Coded,
-    encoding: str,
-    begin_s: float,
-    meta: Mapping[str, Any],
-    extra: Mapping[str, Any],
-    channel: int | None,
+    frame: Frame, coded: wire.Coded, encoding: str, begin_s: float, error: Mapping[str, Any]
 ) -> bytes:
-    return wire.encode_frame(
-        product=product.name,
-        unit=product.description.unit,
-        axes=product.description.axes,
-        meta=meta,
-        array=coded.array,
-        encode_s=time.perf_counter() - begin_s,
-        channel=channel,
-        extra={**extra, "encoding": encoding, **coded.fields},
+    return message(
+        replace(
+            frame,
+            array=coded.array,
+            encode_s=frame.encode_s + time.perf_counter() - begin_s,
+            extra={**frame.extra, **error, "encoding": encoding, **coded.fields},
+        )
     )
 
 

@@ -2,15 +2,12 @@
 
 import io
 import json
-from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from transientcam_server.imaging.products import Product
+from transientcam import Frame
 
-_Array = NDArray[Any]
 _TIFF_AXES: Final = {"y": "Y", "x": "X", "time": "T"}
 _VERTEX: Final = np.dtype(
     [
@@ -25,47 +22,42 @@ _VERTEX: Final = np.dtype(
 _PLY_TYPES: Final = {"<f4": "float", "|u1": "uchar"}
 
 
-def tiff(
-    product: Product, array: _Array, meta: Mapping[str, Any], extra: Mapping[str, Any], *_: Any
-) -> bytes:
+def tiff(frame: Frame) -> bytes:
     """Return a page for each image, in the product's own type; its description says what it is."""
     import tifffile  # as long as Pillow
 
-    description = product.description
     file = io.BytesIO()
     tifffile.imwrite(
         file,
-        np.asarray(array, dtype=description.dtype),
+        frame.array,
         photometric="minisblack",
         software="transientcam",
         metadata={
-            "axes": "".join(_TIFF_AXES.get(axis, "Q") for axis in description.axes),
-            "product": product.name,
-            "unit": description.unit,
-            "meta": dict(meta),
-            **extra,
+            "axes": "".join(_TIFF_AXES.get(axis, "Q") for axis in frame.axes),
+            "product": frame.product,
+            "unit": frame.unit,
+            "meta": dict(frame.meta),
+            **frame.extra,
         },
     )
     return file.getvalue()
 
 
-def ply(
-    product: Product, array: _Array, meta: Mapping[str, Any], extra: Mapping[str, Any], *_: Any
-) -> bytes:
+def ply(frame: Frame) -> bytes:
     """Return the points that have a range as a binary PLY file.
 
     A vertex is x, y, z and range in m, the amplitude of the first return in DN, and the flags.
     """
-    there = np.isfinite(array[2])
+    there = np.isfinite(frame.array[2])
     vertices = np.empty(np.count_nonzero(there), dtype=_VERTEX)
-    for name, plane in zip(("x", "y", "z"), array, strict=True):
+    for name, plane in zip(("x", "y", "z"), frame.array, strict=True):
         vertices[name] = plane[there]
     for name, beside in (("range", "range"), ("amplitude", "direct"), ("flags", "flags")):
-        vertices[name] = extra[beside][there]
+        vertices[name] = frame.extra[beside][there]
     lines = [
         "ply",
         "format binary_little_endian 1.0",
-        f"comment {json.dumps({'unit': 'm', 'frame': meta['frame']})}",
+        f"comment {json.dumps({'unit': 'm', 'frame': frame.frame})}",
         f"element vertex {len(vertices)}",
         *(f"property {_PLY_TYPES[_VERTEX[name].str]} {name}" for name in _VERTEX.names or ()),
         "end_header\n",
@@ -73,9 +65,9 @@ def ply(
     return "\n".join(lines).encode("ascii") + vertices.tobytes()
 
 
-def csv(product: Product, array: _Array, *_: Any) -> bytes:
+def csv(frame: Frame) -> bytes:
     """Return a line for each row, with ``nan`` where there is no value."""
     file = io.StringIO()
-    whole = array.dtype.kind == "u"
-    np.savetxt(file, array, fmt="%d" if whole else "%.9g", delimiter=",")
+    whole = frame.array.dtype.kind == "u"
+    np.savetxt(file, frame.array, fmt="%d" if whole else "%.9g", delimiter=",")
     return file.getvalue().encode("ascii")

@@ -4,7 +4,11 @@ from websockets.exceptions import InvalidStatus
 
 from tests.server.streaming import streaming
 from tests.serving import Served
-from transientcam_server.api.middleware.security import MAX_BODY_BYTES, SECURITY_HEADERS, SameSite
+from transientcam_server.api.middleware.security import (
+    MAX_BODY_BYTES,
+    SECURITY_HEADERS,
+    OriginCheck,
+)
 from transientcam_server.settings import Settings
 
 CHANGE = ("PUT", "/api/v1/acquisition")
@@ -105,7 +109,7 @@ def test_a_body_that_is_too_long_is_refused(steady: httpx.Client, announced: boo
 def _allows(settings: Settings, host: str) -> bool:
     async def app(*_: object) -> None: ...
 
-    return SameSite(app, settings=settings)._is_ours(host)
+    return OriginCheck(app, settings=settings)._is_ours(host)
 
 
 def test_a_service_open_to_others_is_reached_by_address_and_configured_names_only() -> None:

@@ -42,9 +42,9 @@ def http(served: Served) -> Iterator[httpx.Client]:
 
 def nobody_looks(served: Served) -> bool:
     until_s = time.monotonic() + PATIENCE_S
-    while served.service.previews and time.monotonic() < until_s:
+    while served.service.mjpeg_clients and time.monotonic() < until_s:
         time.sleep(0.01)
-    return served.service.previews == 0
+    return served.service.mjpeg_clients == 0
 
 
 def test_every_part_is_a_picture_of_a_later_frame(served: Served, http: httpx.Client) -> None:
@@ -53,7 +53,7 @@ def test_every_part_is_a_picture_of_a_later_frame(served: Served, http: httpx.Cl
         assert response.headers["content-type"].startswith("multipart/x-mixed-replace")
         film = parts(response)
         seen = [next(film) for _ in range(4)]
-        assert served.service.previews == 1
+        assert served.service.mjpeg_clients == 1
 
     numbers = [int(headers["Transientcam-Frame"]) for headers, _ in seen]
     assert (np.diff(numbers) > 0).all()

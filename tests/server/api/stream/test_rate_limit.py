@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from transientcam_server.api.stream.rate_limit import BURST_S, MOST_ANSWERS, Allowance
+from transientcam_server.api.stream.rate_limit import BURST_S, MOST_ANSWERS, RateLimiter
 
 
 class Clock:
@@ -15,48 +15,48 @@ class Clock:
 
 
 def test_a_burst_is_allowed_and_then_no_more() -> None:
-    allowance = Allowance(10.0, clock=Clock())
+    rate_limiter = RateLimiter(10.0, clock=Clock())
 
-    allowed = [allowance.spend() for _ in range(25)]
+    allowed = [rate_limiter.allow() for _ in range(25)]
 
     assert allowed == [True] * int(10.0 * BURST_S) + [False] * 5
 
 
 def test_time_allows_more_but_no_more_than_the_burst() -> None:
     clock = Clock()
-    allowance = Allowance(10.0, clock=clock)
-    while allowance.spend():
+    rate_limiter = RateLimiter(10.0, clock=clock)
+    while rate_limiter.allow():
         pass
     clock.now_s = 0.35
-    assert [allowance.spend() for _ in range(5)] == [True, True, True, False, False]
+    assert [rate_limiter.allow() for _ in range(5)] == [True, True, True, False, False]
 
     clock.now_s = 1000.0
-    assert sum(allowance.spend() for _ in range(100)) == 20
+    assert sum(rate_limiter.allow() for _ in range(100)) == 20
 
 
 def test_what_was_asked_for_may_be_answered() -> None:
-    allowance = Allowance(1.0, clock=Clock())
+    rate_limiter = RateLimiter(1.0, clock=Clock())
     for _ in range(500):
-        allowance.earn()
-        assert allowance.spend()
-    assert [allowance.spend() for _ in range(3)] == [True, True, False]
+        rate_limiter.credit()
+        assert rate_limiter.allow()
+    assert [rate_limiter.allow() for _ in range(3)] == [True, True, False]
 
 
 def test_answers_do_not_add_up_for_ever() -> None:
-    allowance = Allowance(1.0, clock=Clock())
+    rate_limiter = RateLimiter(1.0, clock=Clock())
     for _ in range(2 * MOST_ANSWERS):
-        allowance.earn()
+        rate_limiter.credit()
 
-    assert sum(allowance.spend() for _ in range(2 * MOST_ANSWERS)) == MOST_ANSWERS + 2
+    assert sum(rate_limiter.allow() for _ in range(2 * MOST_ANSWERS)) == MOST_ANSWERS + 2
 
 
 @given(st.floats(1.0, 100.0), st.lists(st.floats(0.0, 1.0, allow_subnormal=False), max_size=200))
 def test_no_more_than_the_rate_is_ever_allowed(rate_hz: float, waits_s: list[float]) -> None:
     clock = Clock()
-    allowance = Allowance(rate_hz, clock=clock)
+    rate_limiter = RateLimiter(rate_hz, clock=clock)
     allowed = 0
     for wait_s in waits_s:
         clock.now_s += wait_s
-        allowed += allowance.spend()
+        allowed += rate_limiter.allow()
 
     assert allowed <= rate_hz * (clock.now_s + BURST_S) + 1e-6

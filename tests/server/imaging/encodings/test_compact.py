@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from transientcam import density, wire
+from transientcam import Frame, density, wire
 from transientcam.density import step_up
 from transientcam_driver import Sequence, open_camera
 from transientcam_server.imaging.encodings.compact import (
@@ -49,7 +49,7 @@ def test_the_channel_table_says_what_the_messages_of_each_encoding_hold(name: st
     )
     for chosen in product.description.encodings:
         encoding = STREAM_ENCODINGS[chosen]
-        data = encoding.encode(product, array, _META, {}, 3)
+        data = encoding.encode(Frame(name, "DN", product.description.axes, _META, array, channel=3))
         travelled = wire.unpack(data, max_bytes=2**20)
 
         dtype, lengths = travelling(product, encoding, shape)

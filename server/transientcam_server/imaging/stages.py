@@ -1,0 +1,102 @@
+"""Stages of a reconstruction: what a frame computes of it in one go, and what follows from that."""
+
+import logging
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+import transientcam_moments as tm
+from transientcam_driver import RawFrame
+from transientcam_server.imaging.noise import NoiseModel
+from transientcam_server.imaging.recipe import Recipe
+
+_log = logging.getLogger(__name__)
+
+STAGES: Final[dict[str, tuple[str, ...]]] = {
+    "moments": ("moments", "flags", "validity"),
+    "returns": ("returns", "direct", "range_m"),
+    "coefficients": ("coefficients",),
+}
+"""Properties of `tm.Reconstruction` that each stage computes, in the order they build on."""
+FIRST: Final = "moments"
+"""The stage that all others build on."""
+
+
+@dataclass(slots=True)
+class Computed:
+    """The reconstruction of one frame, as far as it was computed.
+
+    Attributes
+    ----------
+    reconstruction
+        None before the first stage, or where that failed.
+    failures
+        Of the stages that were asked for last.
+    pixels
+        How many pixels carry each flag.
+    range_noise
+        Predicted deviation of the range, as the metadata have it; None before the returns.
+    """
+
+    reconstruction: tm.Reconstruction | None = None
+    failures: dict[str, Exception] = field(default_factory=dict)
+    pixels: dict[str, int] | None = None
+    range_noise: dict[str, float] | None = None
+
+
+def compute(
+    before: Computed, recipe: Recipe, raw: RawFrame, noise: NoiseModel | None, stages: Iterable[str]
+) -> Computed:
+    """Compute stages of a frame; one that fails leaves the others as they are. Never raises."""
+    asked = set(stages)
+    computed = Computed(before.reconstruction, {}, before.pixels, before.range_noise)
+    try:
+        if computed.reconstruction is None:
+            computed.reconstruction = found = recipe.reconstruct(raw)
+            _read(found, FIRST)
+            computed.pixels = pixel_counts(found)
+        else:
+            found = computed.reconstruction
+    except Exception as error:
+        computed.reconstruction = None
+        computed.failures = dict.fromkeys(asked, error)
+        return computed
+    for stage in asked - {FIRST}:
+        try:
+            _read(found, stage)
+        except Exception as error:
+            computed.failures[stage] = error
+    if noise is not None and "returns" in asked and "returns" not in computed.failures:
+        computed.range_noise = _range_noise(noise, recipe, found, raw.number)
+    return computed
+
+
+def _read(found: tm.Reconstruction, stage: str) -> None:
+    """Compute the properties of a stage now, so that whoever reads them later need not."""
+    for name in STAGES[stage]:
+        getattr(found, name)
+
+
+def pixel_counts(found: tm.Reconstruction) -> dict[str, int]:
+    """Return how many pixels carry each flag."""
+    per_value = np.bincount(np.asarray(found.flags).ravel(), minlength=256)
+    values = np.arange(len(per_value))
+    counts = {"total": int(per_value.sum()), "valid": int(per_value[0])}
+    for flag in tm.Flags:
+        if flag:
+            counts[str(flag.name).lower()] = int(per_value[values & flag.value != 0].sum())
+    return counts
+
+
+def _range_noise(
+    noise: NoiseModel, recipe: Recipe, found: tm.Reconstruction, number: int
+) -> dict[str, float] | None:
+    """Return the predicted deviation of the range; a failure of it spoils no range."""
+    try:
+        predicted = noise.of_range(recipe, found)
+    except Exception:
+        _log.exception("capture %d: predicting the deviation of the range failed", number)
+        return None
+    return None if predicted is None else predicted.to_document()
