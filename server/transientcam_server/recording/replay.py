@@ -30,6 +30,8 @@ from transientcam_driver.protocol.status import StatusFlag
 from transientcam_server.recording.reader import Recording
 
 PREFIX: Final = "recording:"
+LOOP_BYTES: Final = 256 * 1024**2
+"""A looped recording of at most so many bytes of images is read once and kept in memory."""
 _FAST: Final = float("inf")
 _OPTIONS: Final = ("speed", "loop")
 
@@ -104,6 +106,7 @@ class ReplayCamera:
         self.counters = Counters()
         self._index = 0
         self._round = 0
+        self._kept: dict[int, RawFrame] = {}
         self._due_s = 0.0
         self._temperature_c = 0.0
 
@@ -275,7 +278,7 @@ class ReplayCamera:
         index, shift_s = self._index, self._round * self._length_s
         shift_frames = self._round * self._length_frames
         self._advance(now_s)
-        raw = self._recording.frame(index)
+        raw = self._frame(index)
         self._temperature_c = raw.temperature_c
         self.counters.frames += 1
         self.counters.images += len(raw.labels)
@@ -286,6 +289,15 @@ class ReplayCamera:
             number=raw.number + shift_frames,
             device_time_s=raw.device_time_s + shift_s,
         )
+
+    def _frame(self, index: int) -> RawFrame:
+        found = self._kept.get(index)
+        if found is None:
+            found = self._recording.frame(index)
+            if self._loop and found.images.nbytes * self._recording.frames <= LOOP_BYTES:
+                found.images.flags.writeable = False  # every round hands out the same array
+                self._kept[index] = found
+        return found
 
     def _advance(self, now_s: float) -> None:
         """Go to the next frame, and say when it is due."""

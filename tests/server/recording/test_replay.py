@@ -70,6 +70,18 @@ def test_a_frame_that_is_not_due_yet_is_a_timeout_and_comes_later(path: Path) ->
         assert_same(camera.read_frame(timeout_s=0.06), frame(1))
 
 
+def test_a_looped_recording_that_fits_into_memory_is_read_once(path: Path) -> None:
+    with ReplayCamera(path, loop=True, clock=VirtualClock()) as camera:
+        camera.start()
+        first, *_, again = [camera.read_frame() for _ in range(7)]
+        assert again.images is first.images
+        assert not again.images.flags.writeable
+
+    with ReplayCamera(path, clock=VirtualClock()) as camera:
+        camera.start()
+        assert camera.read_frame().images is not first.images
+
+
 def test_in_a_loop_numbers_and_device_times_go_on(path: Path) -> None:
     with ReplayCamera(path, loop=True, clock=VirtualClock()) as camera:
         camera.start()
