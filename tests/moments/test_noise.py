@@ -141,6 +141,25 @@ def test_no_smoothing_leaves_the_noise_as_it_is() -> None:
     assert noise.smoothing_factor(0.0) == 1.0
 
 
+@pytest.mark.parametrize("zeroth", ["low-frequency", "on-off", "estimated"])
+@pytest.mark.parametrize("sigma_px", [0.0, 0.6, 1.5])
+def test_noise_at_some_pixels_is_that_of_the_whole_image_there(
+    zeroth: str, sigma_px: float
+) -> None:
+    rng = np.random.default_rng(5)
+    brightness = rng.uniform(100.0, 2000.0, (9, 12))
+    brightness[4, 5] = np.nan
+    pixels = np.arange(brightness.size)
+
+    def noise_of(given: Array) -> noise.MomentNoise:
+        return noise.moment_noise(given, SENSOR, calibration=np.full(4, 0.5), zeroth=zeroth)
+
+    whole = noise.smoothed(noise_of(brightness), sigma_px).variance
+    found = noise.smoothed_at(noise_of, brightness, pixels, sigma_px).variance
+
+    np.testing.assert_allclose(found, whole.reshape(4, -1), rtol=1e-12)
+
+
 def test_covariance_is_diagonal_over_real_and_imaginary_parts() -> None:
     covariance = noise.MomentNoise(np.array([[1.0], [2.0], [3.0]])).covariance()
 

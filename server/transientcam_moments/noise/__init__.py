@@ -19,6 +19,7 @@ from transientcam_moments.noise.moments import (
     MomentNoise,
     moment_noise,
     smoothed,
+    smoothed_at,
     smoothing_factor,
 )
 from transientcam_moments.noise.returns import ReturnNoise, return_noise
@@ -38,5 +39,6 @@ __all__ = [
     "peak_noise",
     "return_noise",
     "smoothed",
+    "smoothed_at",
     "smoothing_factor",
 ]

@@ -1,6 +1,7 @@
 """From a sensor to the covariance of calibrated moments."""
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from transientcam_moments._arrays import (
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.four_bucket import ZEROTH_IMAGES
 from transientcam_moments.noise.sensor import Sensor
-from transientcam_moments.smoothing import SIGMA_PX, smooth
+from transientcam_moments.smoothing import SIGMA_PX, gaussian_taps, smooth
 
 
 class MomentNoise(NamedTuple):
@@ -173,6 +174,65 @@ def smoothed(noise: MomentNoise, sigma_px: float = SIGMA_PX) -> MomentNoise:
     rows, columns = (_factors(sigma_px, length) for length in variance.shape[-2:])
     left = namespace(variance).asarray(np.outer(rows, columns)).astype(variance.dtype)
     return MomentNoise(smooth(variance, sigma_px / math.sqrt(2)) * left)
+
+
+def smoothed_at(
+    noise_of: Callable[[Array], MomentNoise],
+    brightness: Array,
+    pixels: Array,
+    sigma_px: float = SIGMA_PX,
+) -> MomentNoise:
+    """Return what `smoothed` gives at some pixels, computed for their neighbours alone.
+
+    Parameters
+    ----------
+    noise_of : callable
+        Returns the noise of each pixel by itself, of a brightness of any shape, as `moment_noise`.
+    brightness : array, shape (H, W)
+        In DN; NaN where there is none.
+    pixels : array of int, shape (S,)
+        Places in the flattened image.
+    sigma_px : float
+        Standard deviation of the Gaussian, 0 to 100.
+
+    Returns
+    -------
+    MomentNoise
+        Of shape (m + 1, S).
+
+    Raises
+    ------
+    ShapeError
+        When the brightness is no image.
+    """
+    in_range("sigma_px", sigma_px, 0.0, 100.0, "0 to 100 pixels")
+    brightness = np.asarray(brightness)
+    if brightness.ndim != 2:
+        raise ShapeError("brightness", f"of shape {brightness.shape}", "(H, W)")
+    if sigma_px == 0:
+        return noise_of(brightness.reshape(-1)[pixels])
+    height, width = brightness.shape
+    row, column = np.divmod(pixels, width)
+    taps = gaussian_taps(sigma_px / math.sqrt(2))
+    shift = np.arange(len(taps)) - len(taps) // 2
+    rows, columns = row[:, None] + shift, column[:, None] + shift  # (S, taps)
+    inside = ((rows >= 0) & (rows < height))[:, :, None] & ((columns >= 0) & (columns < width))[
+        :, None, :
+    ]
+    near = brightness[
+        np.clip(rows, 0, height - 1)[:, :, None], np.clip(columns, 0, width - 1)[:, None, :]
+    ]
+    variance = noise_of(np.where(inside, near, np.nan)).variance  # (m + 1, S, taps, taps)
+    present = np.isfinite(variance).all(axis=0)
+    weight = np.outer(taps, taps) * present
+    mean = (np.where(present, variance, 0) * weight).sum(axis=(-2, -1))
+    left = _factors(sigma_px, height)[row] * _factors(sigma_px, width)[column]
+    middle = len(taps) // 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = mean / weight.sum(axis=(-2, -1))
+    own = variance[..., middle, middle]  # a pixel that is not finite stays as it is
+    chosen_mean = np.where(present[:, middle, middle], mean, own) * left
+    return MomentNoise(chosen_mean.astype(variance.dtype))
 
 
 def _taps(sigma_px: float) -> Array:

@@ -1,12 +1,14 @@
 """The noise of frames: of their moments and of their range, and what it does not explain."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from transientcam_server.imaging.calibration import nominal_gains
 from transientcam_server.imaging.recipe import Recipe
 
 _Array = NDArray[Any]
@@ -77,18 +79,19 @@ class NoiseModel:
 
     def of_moments(self, recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoise:
         """Return the noise of a frame's smoothed moments (m + 1, H, W)."""
+        noise = self._of_pixels(recipe, np.asarray(found.smoothed[0].real))
+        return tm.noise.smoothed(noise, recipe.settings.smoothing_px)
+
+    def _of_pixels(self, recipe: Recipe, brightness: _Array) -> tm.noise.MomentNoise:
+        """Return the noise of moments with this brightness, each pixel by itself."""
         sequence = recipe.applied.sequence
-        sub_phases = sequence.sub_phases
-        noise = tm.noise.moment_noise(
-            np.asarray(found.smoothed[0].real),
+        return tm.noise.moment_noise(
+            brightness,
             self.sensor,
-            calibration=tm.nominal_calibration(
-                sequence.harmonics, sub_phases.phases_rad, sub_phases.weights, sequence.zeroth
-            ),
+            calibration=nominal_gains(sequence),
             zeroth=sequence.zeroth,
             takes=sequence.takes,
         )
-        return tm.noise.smoothed(noise, recipe.settings.smoothing_px)
 
     def of_range(self, recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
         """Predict the deviation of a frame's range from its own returns, by a sample of pixels.
@@ -110,7 +113,12 @@ class NoiseModel:
             np.asarray(found.returns.uniform).ravel()[sample],
             np.asarray(found.returns.count).ravel()[sample],
         )
-        noise = tm.noise.MomentNoise(sampled(self.of_moments(recipe, found).variance))
+        noise = tm.noise.smoothed_at(
+            partial(self._of_pixels, recipe),
+            np.asarray(found.smoothed[0].real),
+            sample,
+            recipe.settings.smoothing_px,
+        )
         deviation = tm.noise.return_noise(
             returns, noise, threshold=recipe.settings.return_threshold
         )

@@ -1,0 +1,248 @@
+"""What a frame costs the running daemon, from the raw frame to the encoded product.
+
+Run it with ``python -m benchmarks.throughput [--against DIRECTORY] [--write]``. A short recording
+of the simulated camera is replayed in a loop from memory, so that nothing is simulated while the
+daemon is measured; one viewer reads the range. DIRECTORY is a checkout of an earlier commit, whose
+daemon is then measured in turn with this one's. The latency is that of the simulated camera.
+"""
+
+import argparse
+import json
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+from urllib.request import Request, urlopen
+
+from benchmarks.daemon import Process, running
+from benchmarks.machine import machine
+from benchmarks.viewers import Seen, Viewer, cut, watch
+from transientcam_driver import Sequence, open_camera
+from transientcam_driver.clock import VirtualClock
+from transientcam_server.recording import Header, RecordingWriter
+
+ROOT: Final = Path(__file__).parents[1]
+PAGE: Final = ROOT / "docs" / "throughput.md"
+SIZES: Final = ((163, 120), (640, 480))
+HARMONICS: Final = (3, 4, 8)
+RECORDED_FRAMES: Final = 4
+PACED_HZ: Final = {163: 30.0, 640: 8.0}
+"""Rate at which the cost of a frame is measured: one that every daemon keeps up with."""
+OFFERED_HZ: Final = {163: 600.0, 640: 120.0}
+"""Rate that no daemon keeps up with, for the frames a second that it delivers at most."""
+BAR_HZ: Final = 60.0
+_SETTLE_S = 2.0
+_COMPILED_WITHIN_S = 240.0
+# verbs are found by their entry point, which is that of the tree that is installed
+_SERVE = """
+import typer
+try:
+    from transientcam_server.cli.serve import serve
+except ModuleNotFoundError:
+    from transientcam_server.commands import serve
+typer.run(serve)
+"""
+_VIDEO = {"base_frequency_hz": 23e6, "harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What frames of one size and order cost one daemon.
+
+    Attributes
+    ----------
+    cpu_ms
+        Processor time of a frame that a viewer takes the range of, beyond that of a daemon that
+        replays without a viewer.
+    replay_ms
+        Processor time of a frame without a viewer.
+    rate_hz
+        Frames a second that the viewer gets where far more are offered.
+    """
+
+    cpu_ms: float
+    replay_ms: float
+    rate_hz: float
+
+
+def record(directory: Path, width: int, height: int, harmonics: int) -> tuple[Path, float]:
+    """Record some frames of the simulated camera; return the file and its frame rate."""
+    path = directory / f"{width}-{harmonics}.h5"
+    spec = f"sim:mirrors?width={width}&height={height}&seed=1"
+    with open_camera(spec, clock=VirtualClock()) as camera:
+        applied = camera.configure(Sequence(harmonics=harmonics))
+        header = Header(path.stem, path.stem, time.time(), applied, camera.capabilities)
+        writer = RecordingWriter(path, header)
+        camera.start()
+        for _ in range(RECORDED_FRAMES):
+            writer.append(camera.read_frame())
+        writer.close({})
+    return path, applied.frame_rate_hz
+
+
+@contextmanager
+def daemon_of(tree: Path, camera: str) -> Iterator[Process]:
+    """Run the daemon of a checkout once all its kernels are compiled."""
+    path = ":".join(str(tree / name) for name in ("client", "driver", "server"))
+    command = [sys.executable, "-c", _SERVE, "--port", "0", "--camera", camera]
+    with running(command, {"PYTHONPATH": path}) as process:
+        end_s = time.monotonic() + _COMPILED_WITHIN_S
+        while _kernels(process)["compiling"] is not None or not _kernels(process)["compiled"]:
+            if time.monotonic() > end_s:
+                raise TimeoutError("the kernels are still being compiled")
+            time.sleep(0.5)
+        yield process
+
+
+def _kernels(process: Process) -> Mapping[str, object]:
+    with urlopen(f"{process.url}/api/v1/info") as answer:
+        kernels: Mapping[str, object] = json.load(answer)["kernels"]
+    return kernels
+
+
+def _subscribe(*products: str) -> dict[str, object]:
+    subscriptions = [{"product": product, "max_rate_hz": None} for product in products]
+    return {"type": "subscribe", "v": 1, "token": None, "subscriptions": subscriptions}
+
+
+def viewed(process: Process, *products: str, duration_s: float) -> tuple[Seen, float, float]:
+    """Return what one viewer saw, in which time, and what the daemon spent in it."""
+    viewer = Viewer(f"ws{process.url.removeprefix('http')}/api/v1/stream", _subscribe(*products))
+    watch([viewer], duration_s=_SETTLE_S)
+    viewer.seen.numbers.clear()
+    viewer.seen.latencies_s.clear()
+    before_s = process.cpu_s()
+    elapsed_s = watch([viewer], duration_s=duration_s)
+    spent_s = process.cpu_s() - before_s
+    cut([viewer.connection])
+    return viewer.seen, elapsed_s, spent_s
+
+
+def _idle_cost_s(process: Process, duration_s: float) -> float:
+    time.sleep(_SETTLE_S)
+    before_s = process.cpu_s()
+    time.sleep(duration_s)
+    return (process.cpu_s() - before_s) / duration_s
+
+
+def measure(
+    tree: Path, recording: Path, recorded_hz: float, width: int, *, duration_s: float
+) -> Cost:
+    """Return what frames of a recording cost the daemon of a checkout."""
+    paced_hz, offered_hz = PACED_HZ[width], OFFERED_HZ[width]
+    replay = f"recording:{recording}?loop=on&speed="
+    with daemon_of(tree, f"{replay}{paced_hz / recorded_hz:.6f}") as process:
+        idle_s = _idle_cost_s(process, duration_s)
+        seen, elapsed_s, spent_s = viewed(process, "range", duration_s=duration_s)
+        rate_hz = len(set(seen.numbers)) / elapsed_s
+        assert rate_hz > 0.9 * paced_hz, f"{rate_hz:.1f} of {paced_hz:g} frames a second"
+        cpu_ms = 1e3 * (spent_s / elapsed_s - idle_s) / rate_hz
+    with daemon_of(tree, f"{replay}{offered_hz / recorded_hz:.6f}") as process:
+        seen, elapsed_s, _ = viewed(process, "range", duration_s=duration_s)
+    return Cost(cpu_ms, 1e3 * idle_s / paced_hz, len(set(seen.numbers)) / elapsed_s)
+
+
+def latency(tree: Path, *, duration_s: float) -> tuple[float, float]:
+    """Return p50 and p99 of the time from a frame's last image to a client, in ms."""
+    with daemon_of(tree, "sim:mirrors") as process:
+        body = json.dumps(_VIDEO).encode()
+        request = Request(
+            f"{process.url}/api/v1/sequence",
+            body,
+            {"content-type": "application/json"},
+            method="PUT",
+        )
+        urlopen(request).close()
+        seen, _, _ = viewed(process, "range", "coefficients", duration_s=duration_s)
+    latencies_ms = sorted(1e3 * each for each in seen.latencies_s)
+    return statistics.median(latencies_ms), latencies_ms[int(0.99 * len(latencies_ms))]
+
+
+def main() -> None:
+    """Measure and print the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--against", type=Path, help="a checkout of an earlier commit")
+    parser.add_argument("--seconds", type=float, default=8.0, help="for each figure")
+    parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
+    arguments = parser.parse_args()
+    trees = (
+        {"now": ROOT} if arguments.against is None else {"before": arguments.against, "now": ROOT}
+    )
+    costs: dict[tuple[int, int, str], Cost] = {}
+    with tempfile.TemporaryDirectory() as name:
+        for width, height in SIZES:
+            for harmonics in HARMONICS:
+                recording, rate_hz = record(Path(name), width, height, harmonics)
+                for when, tree in trees.items():
+                    costs[width, harmonics, when] = cost = measure(
+                        tree, recording, rate_hz, width, duration_s=arguments.seconds
+                    )
+                    print(f"{width} x {height}, m = {harmonics}, {when}: {cost}", flush=True)
+    latencies = {
+        when: latency(tree, duration_s=3 * arguments.seconds) for when, tree in trees.items()
+    }
+    page = report(costs, latencies, list(trees), against=arguments.against is not None)
+    print(page)
+    if arguments.write:
+        PAGE.write_text(page, encoding="utf-8")
+
+
+def report(
+    costs: Mapping[tuple[int, int, str], Cost],
+    latencies: Mapping[str, tuple[float, float]],
+    trees: list[str],
+    *,
+    against: bool,
+) -> str:
+    """Return the page."""
+    option = " --against DIRECTORY" if against else ""
+    lines = [
+        "# What a frame costs the daemon",
+        "",
+        f"Written by `python -m benchmarks.throughput{option} --write` on",
+        f"{machine()}.",
+        "",
+        "The daemon replays a short recording in a loop from memory, so nothing is simulated. One",
+        "viewer reads the range; every frame is reconstructed whole on the way (range, direct,",
+        "indirect and coefficients). *Processor time* is what a frame takes beyond a daemon that",
+        "replays without a viewer, at a rate that both keep up with; *frames/s* is what the viewer",
+        "gets where far more frames are offered. The viewer runs on the same two cores.",
+    ]
+    if against:
+        lines += ["", "*Before* is the daemon of an earlier commit, `before-house` in the history."]
+    lines += [
+        "",
+        "| image | m | daemon | processor time, ms/frame | replay alone, ms/frame | frames/s |",
+        "|---|---|---|---|---|---|",
+    ]
+    for width, height in SIZES:
+        for harmonics in HARMONICS:
+            for when in trees:
+                cost = costs[width, harmonics, when]
+                lines.append(
+                    f"| {width} x {height} | {harmonics} | {when} | {cost.cpu_ms:.2f} "
+                    f"| {cost.replay_ms:.2f} | {cost.rate_hz:.0f} |"
+                )
+    lines += [
+        "",
+        "Latency, from the arrival of a frame's last image to a client that reads range and",
+        "coefficients (simulated camera, m = 3, 0.5 ms, 163 x 120, 18.6 Hz):",
+        "",
+        "| daemon | p50, ms | p99, ms |",
+        "|---|---|---|",
+        *(f"| {when} | {p50:.1f} | {p99:.1f} |" for when, (p50, p99) in latencies.items()),
+        "",
+    ]
+    rate_hz = costs[640, 4, "now"].rate_hz
+    met = "met" if rate_hz >= BAR_HZ else "missed"
+    lines += [f"Bar: 640 x 480, m = 4: {BAR_HZ:g} frames/s, {met}.", ""]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    main()
