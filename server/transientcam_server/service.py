@@ -188,7 +188,7 @@ class Service:
         """
         if history_s is None:
             return await asyncio.to_thread(self.recordings.start, wanted)
-        # it waits for its past, also if nobody waits for the answer any more
+        # it waits for its past, also where the client is gone
         return await asyncio.shield(self.workers.start(self._record_past(wanted, history_s)))
 
     async def _record_past(self, wanted: Wanted, history_s: float) -> dict[str, Any]:

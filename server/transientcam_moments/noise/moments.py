@@ -187,7 +187,8 @@ def smoothed_at(
     Parameters
     ----------
     noise_of : callable
-        Returns the noise of each pixel by itself, of a brightness of any shape, as `moment_noise`.
+        Returns the noise of each pixel by itself, of a brightness of any shape, as `moment_noise`
+        with scalar gains: its variance must be affine in a brightness above 0.
     brightness : array, shape (H, W)
         In DN; NaN where there is none.
     pixels : array of int, shape (S,)
@@ -209,30 +210,24 @@ def smoothed_at(
     brightness = np.asarray(brightness)
     if brightness.ndim != 2:
         raise ShapeError("brightness", f"of shape {brightness.shape}", "(H, W)")
+    light = np.maximum(brightness, 0)
     if sigma_px == 0:
-        return noise_of(brightness.reshape(-1)[pixels])
-    height, width = brightness.shape
-    row, column = np.divmod(pixels, width)
+        return noise_of(light.reshape(-1)[pixels])
+    (height, width), (row, column) = light.shape, np.divmod(pixels, light.shape[1])
     taps = gaussian_taps(sigma_px / math.sqrt(2))
-    shift = np.arange(len(taps)) - len(taps) // 2
-    rows, columns = row[:, None] + shift, column[:, None] + shift  # (S, taps)
-    inside = ((rows >= 0) & (rows < height))[:, :, None] & ((columns >= 0) & (columns < width))[
-        :, None, :
-    ]
-    near = brightness[
-        np.clip(rows, 0, height - 1)[:, :, None], np.clip(columns, 0, width - 1)[:, None, :]
-    ]
-    variance = noise_of(np.where(inside, near, np.nan)).variance  # (m + 1, S, taps, taps)
-    present = np.isfinite(variance).all(axis=0)
+    radius = len(taps) // 2
+    around = np.full((height + 2 * radius, width + 2 * radius), np.nan, light.dtype)
+    around[radius : radius + height, radius : radius + width] = light
+    shift = np.arange(len(taps))
+    near = around[(row[:, None] + shift)[:, :, None], (column[:, None] + shift)[:, None, :]]
+    present = np.isfinite(near)
     weight = np.outer(taps, taps) * present
-    mean = (np.where(present, variance, 0) * weight).sum(axis=(-2, -1))
-    left = _factors(sigma_px, height)[row] * _factors(sigma_px, width)[column]
-    middle = len(taps) // 2
     with np.errstate(divide="ignore", invalid="ignore"):
-        mean = mean / weight.sum(axis=(-2, -1))
-    own = variance[..., middle, middle]  # a pixel that is not finite stays as it is
-    chosen_mean = np.where(present[:, middle, middle], mean, own) * left
-    return MomentNoise(chosen_mean.astype(variance.dtype))
+        mean = (np.where(present, near, 0) * weight).sum(axis=(1, 2)) / weight.sum(axis=(1, 2))
+    # a pixel that is not finite stays as it is
+    variance = noise_of(np.where(present[:, radius, radius], mean, np.nan)).variance
+    left = _factors(sigma_px, height)[row] * _factors(sigma_px, width)[column]
+    return MomentNoise((variance * left).astype(variance.dtype))
 
 
 def _taps(sigma_px: float) -> Array:

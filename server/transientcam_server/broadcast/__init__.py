@@ -1,1 +1,7 @@
-"""Parts."""
+"""The newest frame for every subscriber of the stream, and notices."""
+
+from transientcam_server.broadcast.channel import Channel
+from transientcam_server.broadcast.hub import Hub
+from transientcam_server.broadcast.outbox import Outbox
+
+__all__ = ["Channel", "Hub", "Outbox"]

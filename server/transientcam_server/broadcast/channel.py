@@ -54,10 +54,10 @@ class Channel:
         if self.max_rate_hz is None:
             return True
         period_s = 1.0 / self.max_rate_hz
-        # a little early will do: frames come with jitter, also at the very rate asked for
+        # a little early will do: frames come with jitter, also at the very rate requested
         if time_s < self.next_due_s - _EARLY_PERIODS * period_s:
             return False
-        # by schedule, so that the mean rate is the one asked for; anew after a pause
+        # by schedule, so that the mean rate is the one requested; anew after a pause
         late = time_s - self.next_due_s > period_s
         self.next_due_s = (time_s if late else self.next_due_s) + period_s
         return True
@@ -67,7 +67,7 @@ class ChannelNumbers:
     """Gives equal channels of all clients one number, as long as there are any.
 
     A channel's product, encoding and crop make its number, not its rate. Numbers stay small: one
-    that nobody uses any more is given to what comes next.
+    without users is given to the next new form.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""The newest frame to everybody who looks: a slow one loses frames, nobody waits for anybody.
+"""The newest frame for every subscriber: a slow one loses frames, none waits for another.
 
 Everything here lives on the event loop and never waits for a client.
 """
@@ -17,7 +17,7 @@ from transientcam_server.imaging.frame import Frame
 
 
 class Hub:
-    """Where the acquisition's frames and news meet those who want them.
+    """Hands frames and notices of the service to the outboxes of its clients.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Hub:
     dropped
         Frames that clients were too slow for, of all clients together.
     deserted
-        Set while nobody looks on.
+        Set while there are no clients.
     """
 
     def __init__(self) -> None:
@@ -41,37 +41,37 @@ class Hub:
 
     @property
     def clients(self) -> int:
-        """How many look on."""
+        """How many clients there are."""
         return len(self._outboxes)
 
     @property
     def outboxes(self) -> tuple[Outbox, ...]:
-        """Of everybody, also those who have not said yet what to send."""
+        """Of all clients, also those that have not subscribed yet."""
         return tuple(self._outboxes)
 
     def join(self, outbox: Outbox) -> None:
-        """Let an outbox take part from the next frame on."""
+        """Add an outbox, from the next frame on."""
         self._outboxes.add(outbox)
         self.deserted.clear()
         if self._closed:
             outbox.put(_SHUTDOWN)
 
     def leave(self, outbox: Outbox) -> None:
-        """Forget an outbox."""
+        """Remove an outbox."""
         self._outboxes.discard(outbox)
         self._numbers.release(outbox.channels)
         if not self._outboxes:
             self.deserted.set()
 
     def subscribe(self, outbox: Outbox, channels: Iterable[Channel], *, credit: int | None) -> None:
-        """Let an outbox get these channels, and number them: those that are alike, alike."""
+        """Subscribe an outbox to channels, and number them: equal ones alike."""
         former, chosen = outbox.channels, tuple(channels)
         self._numbers.assign(chosen)
         self._numbers.release(former)
         outbox.subscribe(chosen, credit=credit)
 
     def publish(self, frame: Frame) -> None:
-        """Hand the newest frame to everybody."""
+        """Put the newest frame into the outboxes of all subscribers."""
         self.latest = frame
         arrived, self._arrived = self._arrived, asyncio.Event()
         arrived.set()
@@ -81,13 +81,13 @@ class Hub:
             self.tell("lost-images", {"count": frame.raw.lost_images, "frame": frame.number})
 
     def tell(self, kind: str, details: Mapping[str, Any]) -> None:
-        """Tell everybody some news."""
+        """Put a notice into the outboxes of all subscribers."""
         for outbox in self.subscribers:
             outbox.put(wire.Notice(kind, details))
 
     @property
     def subscribers(self) -> tuple[Outbox, ...]:
-        """Everybody who has said what to send."""
+        """Outboxes of the clients that have subscribed."""
         return tuple(outbox for outbox in self._outboxes if outbox.channels)
 
     async def newest(self, *, after: int, wait_s: float) -> Frame:
@@ -110,7 +110,7 @@ class Hub:
         raise Problem(kinds.NO_FRAME_YET, f"{what} was captured within {wait_s:g} s of waiting.")
 
     def close(self) -> None:
-        """Send everybody away."""
+        """Close all streams, and those that join later."""
         self._closed = True
         self._arrived.set()
         for outbox in self._outboxes:

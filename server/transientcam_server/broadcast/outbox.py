@@ -36,7 +36,7 @@ class Past(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Close:
-    """The last thing a client is told."""
+    """The end of a stream: its code and reason."""
 
     code: wire.CloseCode
     reason: str
@@ -91,9 +91,9 @@ class Outbox:
         self._waiting = deque(item for item in self._waiting if not isinstance(item, Delivery))
 
     def resume(self, past: Past, *, start: int) -> None:
-        """Begin with frame ``start`` instead of the next one; a notice tells what is missing."""
+        """Begin with frame ``start`` instead of the next one; a notice lists what is missing."""
         following = (past.last or 0) + 1
-        if start > following:  # nobody is kept waiting for what may never come
+        if start > following:  # it may never come: the client is not kept waiting
             self.put(_gap(following, start - 1, "not captured yet"))
         elif start < following:
             self._resuming = past, start
@@ -125,7 +125,7 @@ class Outbox:
         return len(dropped)
 
     def put(self, item: Message) -> None:
-        """Let a message wait; a client with too many of them is told goodbye instead."""
+        """Let a message wait; a stream with too many of them is closed instead."""
         if len(self._waiting) >= MAX_WAITING_MESSAGES:
             self._waiting.clear()
             item = Close(wire.CloseCode.TRY_AGAIN_LATER, "too many messages waited")

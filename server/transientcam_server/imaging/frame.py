@@ -338,7 +338,7 @@ class Frame:
         if times > limit:
             raise Problem(
                 kinds.ANSWER_TOO_LARGE,
-                f"{times} times of flight were asked for, but an answer holds at most {limit}.",
+                f"{times} times of flight were requested, but an answer holds at most {limit}.",
                 field="time_s",
                 value=times,
                 limit=f"at most {limit}",

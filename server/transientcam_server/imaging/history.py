@@ -29,7 +29,7 @@ class _Kept:
 class History:
     """The newest frames, bounded in time and in the bytes of their raw images.
 
-    What is computed of a former frame is kept for the last few of them that were asked for; the
+    What is computed of a former frame is kept for the last few of them that were requested; the
     captures alone are what is bounded here.
 
     Attributes

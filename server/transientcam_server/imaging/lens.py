@@ -1,4 +1,4 @@
-"""Where the rays of the pixels go: a pinhole camera's intrinsics, and whence they are known."""
+"""Where the rays of the pixels go: a pinhole camera's intrinsics, and where they are known from."""
 
 import contextlib
 import math
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from transientcam_server.settings import LensSettings
 
 ASSUMED_FIELD_OF_VIEW_DEG: Final = 45.0
-"""Of a camera that nobody has said anything of."""
+"""Of a camera whose lens is not known."""
 Source = Literal["settings", "scene", "recording", "assumed"]
 
 
@@ -29,8 +29,8 @@ class Intrinsics:
     width, height
         Of the frame they belong to.
     source
-        Who says so: the ``settings`` of the service, the simulated ``scene``, the ``recording``,
-        or nobody (``assumed``).
+        Where they come from: the ``settings`` of the service, the simulated ``scene``, the
+        ``recording``, or none of these (``assumed``).
     """
 
     fx: float
@@ -65,12 +65,12 @@ class Intrinsics:
 
     @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> Self:
-        """Return what a recording says of itself.
+        """Return the intrinsics that a recording holds.
 
         Raises
         ------
         KeyError, TypeError, ValueError
-            If it says something else.
+            If it holds something else.
         """
         fx, fy, cx, cy = (float(document[name]) for name in ("fx", "fy", "cx", "cy"))
         if not (all(map(math.isfinite, (fx, fy, cx, cy))) and min(fx, fy) > 0.0):

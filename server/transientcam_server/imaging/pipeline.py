@@ -48,7 +48,7 @@ class Pipeline:
     workers
         What computes for its frames.
     products
-        What this camera's frames can be asked for; only a simulated camera has a ground truth.
+        Products that this camera's frames have; only a simulated camera has a ground truth.
     reconstruction
         How frames are computed from the next one on.
     calibration

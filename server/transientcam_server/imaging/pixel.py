@@ -25,7 +25,7 @@ def pixel_json(
     y: int,
     bins: int,
 ) -> bytes:
-    """Return what `describe_pixel` says, with the frame's meta, as JSON."""
+    """Return the description of a pixel and the frame's metadata as JSON."""
     document = {"meta": meta} | describe_pixel(recipe, image, truth, x, y, bins)
     return json.dumps(document, allow_nan=False, separators=(",", ":")).encode()
 

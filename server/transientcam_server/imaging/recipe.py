@@ -40,7 +40,7 @@ def require_harmonics(settings: ReconstructionSettings, harmonics: int, *, field
     Parameters
     ----------
     field
-        Which of the two was asked for: "estimator" or "harmonics".
+        Which of the two the request changes: "estimator" or "harmonics".
 
     Raises
     ------

@@ -33,7 +33,7 @@ class Computed:
     reconstruction
         None before the first stage, or where that failed.
     failures
-        Of the stages that were asked for last.
+        Of the stages that were requested last.
     pixels
         How many pixels carry each flag.
     range_noise
@@ -50,7 +50,7 @@ def compute(
     before: Computed, recipe: Recipe, raw: RawFrame, noise: NoiseModel | None, stages: Iterable[str]
 ) -> Computed:
     """Compute stages of a frame; one that fails leaves the others as they are. Never raises."""
-    asked = set(stages)
+    requested = set(stages)
     computed = Computed(before.reconstruction, {}, before.pixels, before.range_noise)
     try:
         if computed.reconstruction is None:
@@ -61,20 +61,20 @@ def compute(
             found = computed.reconstruction
     except Exception as error:
         computed.reconstruction = None
-        computed.failures = dict.fromkeys(asked, error)
+        computed.failures = dict.fromkeys(requested, error)
         return computed
-    for stage in asked - {FIRST}:
+    for stage in requested - {FIRST}:
         try:
             _read(found, stage)
         except Exception as error:
             computed.failures[stage] = error
-    if noise is not None and "returns" in asked and "returns" not in computed.failures:
+    if noise is not None and "returns" in requested and "returns" not in computed.failures:
         computed.range_noise = _range_noise(noise, recipe, found, raw.number)
     return computed
 
 
 def _read(found: tm.Reconstruction, stage: str) -> None:
-    """Compute the properties of a stage now, so that whoever reads them later need not."""
+    """Compute the properties of a stage now, so that later readers need not."""
     for name in STAGES[stage]:
         getattr(found, name)
 

@@ -1,4 +1,4 @@
-"""A part of the picture, and coarser: what a client asks for that wants less than every pixel."""
+"""Views of a product: a region of the picture, every n-th pixel, some times of flight."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ _IMAGE: Final = ("y", "x")
 
 @dataclass(frozen=True, slots=True)
 class Crop:
-    """Which pixels of a frame are wanted: every ``decimation``-th of ``region``, both ways.
+    """The pixels of a frame that are requested: every ``decimation``-th of ``region``, both ways.
 
     Equal crops of equal frames are the same bytes, so one may be part of a key.
 
@@ -103,7 +103,7 @@ class Crop:
         return -(-rows // self.decimation), -(-columns // self.decimation)
 
     def to_meta(self, height: int, width: int) -> dict[str, Any]:
-        """Return what a frame's meta says of it; ``region`` is always four numbers there."""
+        """Return its entries in a frame's metadata, where ``region`` is always four numbers."""
         region = self.region or (0, 0, width, height)
         return {"region": list(region), "decimation": self.decimation}
 
@@ -138,7 +138,7 @@ def _invalid(field: str, value: object, limit: str) -> Problem:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """Which part of a product is wanted; equal views of one frame are the same bytes.
+    """The part of a product that is requested; equal views of one frame are the same bytes.
 
     Attributes
     ----------

@@ -1,1 +1,6 @@
-"""Parts."""
+"""Encodings of products: files for HTTP answers, compact messages for the stream."""
+
+from transientcam_server.imaging.encodings.compact import STREAM_ENCODINGS
+from transientcam_server.imaging.encodings.encoding import ENCODINGS, Encoding
+
+__all__ = ["ENCODINGS", "STREAM_ENCODINGS", "Encoding"]

@@ -18,7 +18,7 @@ class Encoding:
     """A way to write a product: its name (also the suffix of a path) and media type.
 
     ``encode`` takes a frame whose array has the type of the contract and holds the pixels that are
-    wanted. ``fits`` says whether a product can be written so. ``beside`` names products of the
+    requested. ``fits`` tests whether a product can be written so. ``beside`` names products of the
     same frame that the writer finds in ``extra``. ``slow`` is one that takes as long as much
     computing.
     """

@@ -23,7 +23,7 @@ _PLY_TYPES: Final = {"<f4": "float", "|u1": "uchar"}
 
 
 def tiff(frame: Frame) -> bytes:
-    """Return a page for each image, in the product's own type; its description says what it is."""
+    """Return a page for each image, in the product's own type; the metadata describe it."""
     import tifffile  # as long as Pillow
 
     file = io.BytesIO()

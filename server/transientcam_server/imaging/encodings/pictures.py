@@ -19,7 +19,7 @@ def png(frame: Frame) -> bytes:
     from PIL import Image  # 60 ms that the first frame need not wait for
 
     steps_of = PRODUCTS[frame.product].png_steps
-    assert steps_of is not None  # noqa: S101 - `Encoding.fits` was asked
+    assert steps_of is not None  # noqa: S101 - `Encoding.fits` excludes it
     values = np.asarray(frame.array, dtype=np.float64)
     steps = np.nan_to_num(values * steps_of.per_unit, posinf=65535.0)
     image = Image.fromarray(np.clip(np.rint(steps), 0, 65535).astype(np.uint16))
