@@ -1,5 +1,6 @@
 """The data everything is measured on, and the lanes it is measured with."""
 
+import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,7 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from transientcam_moments._kernels import find, lookup
+from transientcam_moments._kernels.one_pass import Constants, OnePass
 from transientcam_moments._kernels.registry import REGISTRY
+from transientcam_moments.smoothing import gaussian_taps
 
 Array = NDArray[Any]
 CORES = len(os.sched_getaffinity(0))
@@ -42,6 +46,29 @@ def moments(m: int, shape: tuple[int, int], dtype: type = np.complex64) -> Array
     return np.asarray(reconstruction.moments, dtype)
 
 
+def reconstructor(m: int) -> tm.Reconstructor:
+    """Return a reconstructor with the paper's settings, whose pass has to be compiled."""
+    one_pass(m, PAPER)
+    return tm.Reconstructor(tm.Settings())
+
+
+def one_pass(m: int, shape: tuple[int, int]) -> OnePass:
+    """Return the compiled pass of such a reconstructor, which also counts the pixels it redoes."""
+    prepare = lookup("reconstruct", m, math.prod(shape))
+    if prepare is None:
+        raise RuntimeError(f"the pass isn't compiled: {tm.kernels.state()}")
+    made: OnePass = prepare(shape, constants(m))
+    return made
+
+
+def constants(m: int) -> Constants:
+    """Return what such a pass is made with."""
+    settings = tm.Settings()
+    range_per_rad_m = float(tm.range_m(np.float64(1), settings.base_frequency_hz))
+    taps = gaussian_taps(settings.smoothing_sigma_px)
+    return Constants(settings, np.ones(m + 1, np.complex128), taps, range_per_rad_m)
+
+
 @contextmanager
 def numpy_alone() -> Iterator[None]:
     """Leave everything to NumPy inside."""
@@ -55,8 +82,6 @@ def numpy_alone() -> Iterator[None]:
 
 def lane(name: str, planes: Array) -> Any:
     """Return a compiled lane, which has to be there."""
-    from transientcam_moments._kernels import find
-
     found = find(name, planes)
     if found is None:
         raise RuntimeError(f"{name} isn't compiled: {tm.kernels.state()}")

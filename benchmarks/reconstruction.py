@@ -13,7 +13,16 @@ from scipy.linalg import solve_toeplitz
 
 import transientcam_moments as tm
 from benchmarks import obvious
-from benchmarks.data import CORES, PAPER, VGA, Array, images, moments, numpy_alone
+from benchmarks.data import (
+    CORES,
+    PAPER,
+    VGA,
+    Array,
+    images,
+    moments,
+    numpy_alone,
+    reconstructor,
+)
 from benchmarks.tables import Table, verdict
 from benchmarks.timing import Timing, duration, measure
 
@@ -25,14 +34,6 @@ def tables() -> Iterator[Table]:
     """Measure m = 4 in single precision."""
     yield _whole()
     yield _coefficients()
-
-
-def workspace(m: int, shape: tuple[int, int]) -> tm.kernels.Reconstructor:
-    """Return a workspace with the paper's settings."""
-    made = tm.kernels.reconstructor(shape, m, tm.Settings())
-    if made is None:
-        raise RuntimeError(f"the lane isn't compiled: {tm.kernels.state()}")
-    return made
 
 
 def _whole() -> Table:
@@ -59,19 +60,20 @@ def _whole() -> Table:
 
 
 def _ways(raw: Array) -> Iterator[tuple[str, Callable[[], object]]]:
-    made = workspace(_M, (raw.shape[1], raw.shape[2]))
-    yield "lanes, 1 core", partial(made, raw)
+    made = reconstructor(_M)
+    yield "lanes, 1 core", lambda: _read(made(raw))
     with ThreadPoolExecutor(max(1, CORES - 1)) as executor:
-        yield f"lanes, {CORES} cores", partial(made, raw, spread=tm.kernels.over(executor, CORES))
-    settings = tm.Settings()
+        spread = tm.kernels.over(executor, CORES)
+        yield f"lanes, {CORES} cores", lambda: _read(made(raw, spread=spread))
     with numpy_alone():
-        yield "planar NumPy", partial(_stages, raw, settings)
-    yield "batched LAPACK (solve, eigh, eigvals)", partial(obvious.reconstruct, raw, settings)
+        yield "planar NumPy", lambda: _read(made(raw))
+    yield "batched LAPACK (solve, eigh, eigvals)", partial(obvious.reconstruct, raw, tm.Settings())
 
 
-def _stages(raw: Array, settings: tm.Settings) -> tuple[object, ...]:
-    r = tm.reconstruct(raw, settings)
-    return r.coefficients, r.range_m, r.direct, r.indirect, r.validity, r.flags
+def _read(found: tm.Reconstruction) -> tuple[object, ...]:
+    """Have everything computed."""
+    light = found.direct, found.indirect
+    return found.coefficients, found.range_m, *light, found.validity, found.flags
 
 
 def _coefficients() -> Table:

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 import transientcam_moments as tm
-from benchmarks.data import PAPER, VGA, images, lane, moments, numpy_alone
+from benchmarks.data import PAPER, VGA, constants, images, lane, moments, numpy_alone
 from benchmarks.tables import Table
 from benchmarks.timing import duration, measure
-from transientcam_moments._kernels.reconstruct import reconstruct_entries
-from transientcam_moments._kernels.reconstructor import Reconstructor
-from transientcam_moments.smoothing import gaussian_taps
+from transientcam_moments._kernels.one_pass import OnePass
+from transientcam_moments._kernels.reconstruct import reconstruct_stages
 
 _ORDERS = (3, 4, 8)
 _FRAMES = 15
@@ -22,7 +21,6 @@ _STAGES = {
     "smooth": "smoothing",
     "eigenvalue": "smallest eigenvalue",
     "judge": "flags, biasing",
-    "levinson": "coefficients",
     "returns": "returns",
     "gather": "redone in float64",
     "wide_eigenvalue": "redone in float64",
@@ -65,24 +63,20 @@ def _spent(m: int) -> tuple[dict[str, float], float]:
 
         return run
 
-    entries = reconstruct_entries(m, "f")
-    watched: dict[str, Any] = {name: timed(name, getattr(entries, name)) for name in _STAGES}
-    entries = entries._replace(**watched)
-    settings = tm.Settings()
-    metres = float(tm.range_m(np.float64(1), settings.base_frequency_hz))
-    taps = gaussian_taps(settings.smoothing_sigma_px)
-    workspace = Reconstructor(entries, VGA, settings, np.ones(m + 1), taps, metres)
+    stages = reconstruct_stages(m)
+    watched: dict[str, Any] = {name: timed(name, getattr(stages, name)) for name in _STAGES}
+    one_pass = OnePass(stages._replace(**watched), VGA, constants(m))
     raw = images(m, VGA)
-    best = dict.fromkeys(_STAGES, np.inf)
+    best, redone = dict.fromkeys(_STAGES, np.inf), 0
     for _ in range(_FRAMES):
         spent.update(dict.fromkeys(_STAGES, 0.0))
-        workspace(raw)
+        redone = one_pass.images(raw, None, tm.kernels.at_once).redone
         best = {name: min(best[name], spent[name]) for name in _STAGES}
     pixels = VGA[0] * VGA[1]
     columns = dict.fromkeys(_STAGES.values(), 0.0)
     for name, stage in _STAGES.items():
         columns[stage] += best[name] / pixels * 1e9
-    return columns, workspace.redone / pixels
+    return columns, redone / pixels
 
 
 def _precisions() -> Table:

@@ -44,7 +44,8 @@ from transientcam_moments.modulation import (
 from transientcam_moments.peaks import Peaks, peaks
 from transientcam_moments.pisarenko import Returns, Separation, pisarenko, separate
 from transientcam_moments.ranging import SPEED_OF_LIGHT_M_S, range_m
-from transientcam_moments.reconstruction import Reconstruction, Settings, reconstruct
+from transientcam_moments.reconstruction import Reconstruction, Settings
+from transientcam_moments.reconstructor import Reconstructor, reconstruct
 from transientcam_moments.smoothing import smooth
 from transientcam_moments.takes import Average, average_takes
 
@@ -59,6 +60,7 @@ __all__ = [
     "ParameterError",
     "Peaks",
     "Reconstruction",
+    "Reconstructor",
     "Returns",
     "Separation",
     "Settings",

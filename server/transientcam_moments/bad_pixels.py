@@ -87,29 +87,70 @@ def fill_bad_pixels(images: Array, bad: Array) -> Array:
     ShapeError
         When the shapes do not fit.
     """
-    stack, mask = as_array(images), np.asarray(bad)
-    if mask.ndim != 2 or tuple(stack.shape[-2:]) != mask.shape or mask.dtype != bool:
-        found = f"{mask.dtype} of shape {mask.shape}"
-        raise ShapeError("bad", found, f"boolean of shape {tuple(stack.shape[-2:])}")
+    stack = as_array(images)
+    mask = checked_mask(bad, tuple(stack.shape[-2:]))
     if not mask.any() or mask.all():
         return stack
     filled = np.array(stack, dtype=stack.dtype if stack.dtype.kind in "fc" else np.float32)
-    left = mask.copy()
-    while left.any():
-        y, x = np.nonzero(left)
-        total = np.zeros((*filled.shape[:-2], y.size), dtype=filled.dtype)
-        count = np.zeros(y.size, dtype=np.int64)
-        for dy, dx in _AROUND:
-            there = (y + dy >= 0) & (y + dy < mask.shape[0])
-            there &= (x + dx >= 0) & (x + dx < mask.shape[1])
-            at = np.where(there, y + dy, 0), np.where(there, x + dx, 0)
-            there &= ~left[at]
-            total += np.where(there, filled[..., at[0], at[1]], 0)
-            count += there
-        rim = count > 0
-        filled[..., y[rim], x[rim]] = (total[..., rim] / count[rim]).astype(filled.dtype)
-        left[y[rim], x[rim]] = False
+    flat = filled.reshape((*filled.shape[:-2], mask.size))
+    flat[..., np.flatnonzero(mask)] = Replacement(mask).values(flat)
     return filled
+
+
+def checked_mask(bad: Array, shape: tuple[int, ...]) -> Array:
+    """Return ``bad`` if it is a mask of images of this shape (H, W), else raise a ShapeError."""
+    mask = np.asarray(bad)
+    if mask.ndim != 2 or mask.shape != shape or mask.dtype != bool:
+        raise ShapeError("bad", f"{mask.dtype} of shape {mask.shape}", f"boolean of shape {shape}")
+    return mask
+
+
+class Replacement:
+    """What stands in for the bad pixels of one mask; see `fill_bad_pixels`.
+
+    Parameters
+    ----------
+    bad : boolean array, shape (H, W)
+        Which pixels to replace: some, but not all.
+
+    Attributes
+    ----------
+    places : integer array, shape (B,)
+        The bad pixels in a flat image.
+    """
+
+    def __init__(self, bad: Array) -> None:
+        height, width = bad.shape
+        self.places = np.flatnonzero(bad)
+        y, x = np.nonzero(bad)
+        beside = np.array(_AROUND)[:, :, None] + np.stack([y, x])
+        inside = ((beside >= 0) & (beside < [[height], [width]])).all(axis=1)
+        flat = np.where(inside, beside[:, 0] * width + beside[:, 1], self.places)
+        self._near = np.unique(np.append(flat, self.places))
+        self._own = np.searchsorted(self._near, self.places)
+        neighbours = np.searchsorted(self._near, flat)
+        self._rounds: list[tuple[Array, Array, Array]] = []
+        left = bad.ravel()[self._near]
+        while left.any():
+            usable = inside & ~left[neighbours]
+            rim = usable.any(axis=0) & left[self._own]
+            self._rounds.append((self._own[rim], neighbours[:, rim], usable[:, rim]))
+            left[self._own[rim]] = False
+
+    def values(self, images: Array) -> Array:
+        """Return the values (..., B) of the bad pixels of flat images (..., H W).
+
+        Real or complex like the images; integers become float32.
+        """
+        near = images[..., self._near]
+        if near.dtype.kind not in "fc":
+            near = near.astype(np.float32)
+        for rim, neighbours, usable in self._rounds:
+            total = np.zeros((*near.shape[:-1], rim.size), dtype=near.dtype)
+            for beside, there in zip(neighbours, usable, strict=True):
+                total += np.where(there, near[..., beside], 0)
+            near[..., rim] = (total / usable.sum(axis=0)).astype(near.dtype)
+        return near[..., self._own]
 
 
 def _deviations(image: Array) -> Array:

@@ -1,6 +1,7 @@
 """Gain and phase of every frequency, taken out by division (Sec. 4.2)."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -38,16 +39,26 @@ def calibrate(moments: Array, calibration: Array) -> Array:
         When the calibration is neither one number a plane nor of the moments' shape.
     """
     planes, trailing = moment_planes(moments, name="moments")
-    xp = namespace(planes)
+    inverse = inverse_gains(calibration, (planes.shape[0], *trailing), namespace(planes))
+    inverse = inverse.astype(planes.dtype).reshape((planes.shape[0], -1))
+    return (planes * inverse).reshape((planes.shape[0], *trailing))
+
+
+def inverse_gains(calibration: Array, shape: tuple[int, ...], xp: Any = np) -> Array:
+    """Return what moments of this shape are multiplied with: complex128, NaN where not finite.
+
+    Raises
+    ------
+    ShapeError
+        When the calibration is neither one number a plane nor of the moments' shape.
+    """
     gain = as_array(calibration)
-    if tuple(gain.shape) not in ((planes.shape[0],), (planes.shape[0], *trailing)):
-        expected = f"of shape ({planes.shape[0]},) or {(planes.shape[0], *trailing)}"
+    if tuple(gain.shape) not in (shape[:1], shape):
+        expected = f"of shape ({shape[0]},) or {shape}"
         raise ShapeError("calibration", f"of shape {tuple(gain.shape)}", expected)
     with np.errstate(all="ignore"):
         inverse = 1 / xp.asarray(gain).astype(xp.complex128)
-        inverse = xp.where(xp.isfinite(inverse), inverse, np.nan)
-    inverse = inverse.astype(planes.dtype).reshape((planes.shape[0], -1))
-    return (planes * inverse).reshape((planes.shape[0], *trailing))
+        return xp.where(xp.isfinite(inverse), inverse, np.nan)
 
 
 def calibration_of(moments: Array) -> Array:

@@ -94,10 +94,7 @@ def measure(
     """
     chosen("zeroth", zeroth, tuple(ZEROTH_IMAGES))
     stack = takes_first(images, takes)
-    m, rest = divmod(stack.shape[1] - ZEROTH_IMAGES[zeroth], 4)
-    if rest or not 1 <= m <= MAX_HARMONICS:
-        expected = f"{ZEROTH_IMAGES[zeroth]} + 4 m of them a take, m in 1..32, for {zeroth!r}"
-        raise ShapeError("images", f"{stack.shape[1]} images a take", expected)
+    m = harmonics_of(stack.shape[1], zeroth)
     if isinstance(stack, np.ndarray) and stack.dtype == np.uint16 and stack.shape[0] == 1:
         lane = _kernels.lookup("measure", m, stack[0, 0].size)
         if lane is not None:
@@ -114,6 +111,21 @@ def measure(
     else:
         b0 = xp.zeros_like(average[0])
     return xp.concatenate([b0.astype(phasors.dtype)[None], phasors])
+
+
+def harmonics_of(images: int, zeroth: str) -> int:
+    """Return m of a take of so many images.
+
+    Raises
+    ------
+    ShapeError
+        When the number of images is none that such a capture has.
+    """
+    m, rest = divmod(images - ZEROTH_IMAGES[zeroth], 4)
+    if rest or not 1 <= m <= MAX_HARMONICS:
+        expected = f"{ZEROTH_IMAGES[zeroth]} + 4 m of them a take, m in 1..32, for {zeroth!r}"
+        raise ShapeError("images", f"{images} images a take", expected)
+    return m
 
 
 def saturated(images: Array, *, full_scale: float = 4095) -> Array:

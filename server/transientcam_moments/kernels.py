@@ -9,43 +9,25 @@ kept for the next process in ``NUMBA_CACHE_DIR``, else in ``transientcam/kernels
 ``XDG_CACHE_HOME`` or ``~/.cache``, else (nothing there can be written to) not at all.
 """
 
-import math
 import threading
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, TypedDict
+from typing import TypedDict
 
-import numpy as np
-
-from transientcam_moments._arrays import MAX_HARMONICS, Array
-from transientcam_moments._kernels.margins import LEAST_WIDTH
-from transientcam_moments._kernels.reconstructor import Reconstructed, Reconstructor
-from transientcam_moments._kernels.registry import (
-    LEAST_PIXELS,
-    PRECISION_NAMES,
-    REGISTRY,
-    Key,
-)
+from transientcam_moments._arrays import MAX_HARMONICS
+from transientcam_moments._kernels.registry import PRECISION_NAMES, REGISTRY, Key
 from transientcam_moments._kernels.spread import Spread, at_once, over
-from transientcam_moments.errors import ParameterError, ShapeError
-from transientcam_moments.ranging import range_m
-from transientcam_moments.smoothing import gaussian_taps
-
-if TYPE_CHECKING:
-    from transientcam_moments.reconstruction import Settings
+from transientcam_moments.errors import ParameterError
 
 __all__ = [
     "LANES",
     "MOST_ROOTS",
     "Progress",
-    "Reconstructed",
-    "Reconstructor",
     "Spread",
     "State",
     "at_once",
     "compile",
     "compile_in_background",
     "over",
-    "reconstructor",
     "state",
 ]
 
@@ -148,55 +130,6 @@ def compile_in_background(
     return thread
 
 
-def reconstructor(
-    shape: tuple[int, int],
-    harmonics: int,
-    settings: "Settings",
-    calibration: Array | None = None,
-) -> Reconstructor | None:
-    """Return a workspace that turns raw images into range, light and coefficients in one go.
-
-    The same results as `reconstruct` gives stage by stage, without allocating anything per frame.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Height and width of the images.
-    harmonics : int
-        m.
-    settings : Settings
-        How to reconstruct.
-    calibration : array, shape (m + 1,) or (m + 1, H, W), optional
-        Gains to divide by, as `calibrate` takes them.
-
-    Returns
-    -------
-    Reconstructor or None
-        None where `reconstruct` is to be used: the lane isn't compiled (yet), images are tiny, or
-        settings ask for several takes, keep="brightness" or another estimator than Pisarenko's.
-
-    Raises
-    ------
-    ShapeError
-        When the calibration doesn't fit.
-    """
-    lane = REGISTRY.compiled.get(Key("reconstruct", harmonics, "f"))
-    usual = (settings.takes, settings.keep, settings.estimator) == (1, "harmonics", "pisarenko")
-    if lane is None or not usual or shape[1] < LEAST_WIDTH or math.prod(shape) < LEAST_PIXELS:
-        return None
-    gain = np.ones(harmonics + 1) if calibration is None else np.asarray(calibration)
-    if gain.shape not in ((harmonics + 1,), (harmonics + 1, *shape)):
-        expected = f"of shape ({harmonics + 1},) or {(harmonics + 1, *shape)}"
-        raise ShapeError("calibration", f"of shape {gain.shape}", expected)
-    with np.errstate(all="ignore"):
-        inverse = 1 / gain.astype(np.complex128)
-    metres = float(range_m(np.float64(1.0), settings.base_frequency_hz))
-    workspace: Reconstructor = lane(
-        shape, settings, inverse, gaussian_taps(settings.smoothing_sigma_px), metres
-    )
-    return workspace
-
-
 def _keys(harmonics: Sequence[int], precisions: Sequence[str]) -> list[Key]:
     for m in harmonics:
         if not 1 <= m <= MAX_HARMONICS:
@@ -204,15 +137,13 @@ def _keys(harmonics: Sequence[int], precisions: Sequence[str]) -> list[Key]:
     for precision in precisions:
         if precision not in PRECISION_NAMES:
             raise ParameterError("precisions", precision, "float32 or float64")
-    keys = [
+    return [
         Key(name, m, PRECISION_NAMES[precision])
         for m in dict.fromkeys(harmonics)
         for precision in precisions
         for name in LANES
         if _is_offered(name, m, precision)
     ]
-    # whoever wants a workspace waits for it; all others gain from the lanes
-    return sorted(keys, key=lambda key: key.name == "reconstruct")
 
 
 def _is_offered(name: str, m: int, precision: str) -> bool:

@@ -1,20 +1,19 @@
-"""The whole way from images or moments to range, each stage computed when it is first asked for."""
+"""What follows from the moments of an image: each property computed once, when first read."""
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from transientcam_moments._arrays import Array, as_array, chosen, in_range, in_turn, namespace
-from transientcam_moments.bad_pixels import fill_bad_pixels
+from transientcam_moments._arrays import Array, chosen, in_range, in_turn, namespace
+from transientcam_moments._kernels.one_pass import Planes
 from transientcam_moments.biasing import EPSILON, bias, estimate_zeroth, smallest_eigenvalue
-from transientcam_moments.calibration import calibrate
 from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
 from transientcam_moments.cumulative import cumulative
 from transientcam_moments.errors import ParameterError
 from transientcam_moments.flags import INVALID, Flags, flags
-from transientcam_moments.four_bucket import ZEROTH_IMAGES, measure, saturated, takes_first
+from transientcam_moments.four_bucket import ZEROTH_IMAGES
 from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.maximum_entropy import density
 from transientcam_moments.peaks import Peaks, peaks
@@ -27,7 +26,6 @@ from transientcam_moments.pisarenko import (
 )
 from transientcam_moments.ranging import range_m
 from transientcam_moments.smoothing import SIGMA_PX, smooth
-from transientcam_moments.takes import average_takes
 
 _OWN = ("pisarenko", "maximum-entropy", "single-frequency")
 ESTIMATORS = (
@@ -101,66 +99,13 @@ class Settings:
         return TECHNIQUES[self.estimator].least_harmonics
 
 
-def reconstruct(
-    data: Array | Sequence[Array],
-    settings: Settings | None = None,
-    *,
-    calibration: Array | None = None,
-    saturated_pixels: Array | None = None,
-    bad_pixels: Array | None = None,
-) -> "Reconstruction":
-    """Prepare the reconstruction of raw images or of moments; nothing is computed yet but moments.
-
-    Parameters
-    ----------
-    data : array
-        Real images (N, ...) in capture order, as `measure` takes them, or complex moments
-        (m + 1, ...).
-    settings : Settings, optional
-        The paper's, when left out.
-    calibration : array, shape (m + 1,) or (m + 1, ...), optional
-        Gains to divide by, as `calibrate` takes them.
-    saturated_pixels : boolean array, shape (...), optional
-        Pixels to be flagged; found in images by themselves.
-    bad_pixels : boolean array, shape (H, W), optional
-        Pixels that show the mean of their neighbours instead, and are flagged.
-
-    Returns
-    -------
-    Reconstruction
-
-    Raises
-    ------
-    ShapeError
-        When the data have no shape that belongs to images or moments.
-    """
-    settings = Settings() if settings is None else settings
-    data = data if isinstance(data, Sequence) else as_array(data)
-    kept: Array | None = None
-    if isinstance(data, Sequence) or np.dtype(data.dtype).kind != "c":
-        takes = takes_first(data, settings.takes)
-        average, kept = average_takes(takes)
-        if bad_pixels is not None:
-            average = fill_bad_pixels(average, bad_pixels)
-        moments = measure(average, zeroth=settings.zeroth)
-        if saturated_pixels is None:
-            stack = takes.reshape((-1, *moments.shape[1:]))
-            saturated_pixels = saturated(stack, full_scale=settings.full_scale)
-            if bad_pixels is not None:  # whatever they show is not shown
-                saturated_pixels = saturated_pixels & ~bad_pixels
-    else:
-        moments = data if bad_pixels is None else fill_bad_pixels(data, bad_pixels)
-    if calibration is not None:
-        moments = calibrate(moments, calibration)
-    return Reconstruction(moments, settings, saturated_pixels, bad_pixels=bad_pixels, kept=kept)
-
-
 class Reconstruction:
     """A transient image and all that follows from it.
 
-    Every property is computed when it is first asked for, from the ones it needs, and kept. All
-    have the shape of the pixels; brightnesses are in the unit of the moments, and direct +
-    indirect + uniform = brightness.
+    Every property is computed when it is first read, from the ones it needs, and kept; some are
+    there from the start where a `Reconstructor` has computed them in one pass. All have the shape
+    of the pixels; brightnesses are in the unit of the moments, and direct + indirect + uniform =
+    brightness. Arrays belong to this object alone and stay as they are.
 
     Parameters
     ----------
@@ -186,10 +131,15 @@ class Reconstruction:
         kept: Array | None = None,
     ) -> None:
         self.settings = settings
-        self.measured = moments
+        self._measured = moments
         self._saturated = saturated_pixels
         self._bad = bad_pixels
         self._kept = kept
+
+    @property
+    def measured(self) -> Array:
+        """Calibrated moments (m + 1, ...), not smoothed."""
+        return self._measured
 
     @property
     def rejected_images(self) -> int:
@@ -302,24 +252,24 @@ class Reconstruction:
         name = self.settings.estimator
         return None if name in _OWN else TECHNIQUES[name]
 
-    @property
+    @cached_property
     def brightness(self) -> Array:
         """b_0, after biasing."""
         return self.moments[0].real
 
-    @property
+    @cached_property
     def uniform(self) -> Array:
         """Brightness of the uniform part; of a rival's, all that it does not explain."""
         if self._rival is not None:
             return self.brightness - self.direct - self.indirect
         return self.returns.uniform
 
-    @property
+    @cached_property
     def direct(self) -> Array:
         """Brightness of the direct return."""
         return self._separation.direct
 
-    @property
+    @cached_property
     def indirect(self) -> Array:
         """Brightness of all later returns, and of earlier ones below the threshold."""
         return self._separation.indirect
@@ -354,3 +304,52 @@ class Reconstruction:
         """Return the brightness (T, ...) that has come back until times of flight in s."""
         turn = 2 * np.pi * self.settings.base_frequency_hz
         return cumulative(self.coefficients, turn * np.asarray(time_s, dtype=float))
+
+
+class PassedReconstruction(Reconstruction):
+    """A reconstruction most of which one compiled pass has computed.
+
+    Parameters
+    ----------
+    planes : Planes
+        Of the pass.
+    settings : Settings
+        Those it was made with.
+    measure : callable
+        Returns the calibrated moments that are not smoothed; called when they are first read.
+    kept : boolean array, shape (takes, N), optional
+        Which images went into the moments; all, when left out.
+    """
+
+    def __init__(
+        self,
+        planes: Planes,
+        settings: Settings,
+        measure: Callable[[], Array],
+        kept: Array | None = None,
+    ) -> None:
+        super().__init__(None, settings, kept=kept)
+        self._measure = measure
+        self.smoothed = planes.smoothed
+        self.validity = planes.validity
+        self.flags = planes.flags
+        self.returns = Returns(planes.phase_rad, planes.weight, planes.uniform, planes.count)
+        self.brightness = planes.brightness
+        self.uniform = planes.uniform
+        self.direct = planes.direct
+        self.indirect = planes.indirect
+        self.range_m = planes.range_m
+
+    @cached_property
+    def measured(self) -> Array:
+        """Calibrated moments (m + 1, ...), not smoothed; read from the data once more."""
+        return self._measure()
+
+    @cached_property
+    def _biased(self) -> tuple[Array, Array]:
+        biased = (self.flags & int(Flags.BIASED)) > 0
+        if self.settings.zeroth == "estimated":
+            return self.smoothed, biased
+        moments = self.smoothed.copy()
+        moments[0] = self.brightness
+        return moments, biased

@@ -32,21 +32,24 @@ def judge(
 
     ``brightness`` and ``uniform`` become b_0 and the smallest eigenvalue after biasing.
     """
+    m = len(order)
     one = simd.ones(eigenvalue, _INTERLEAVE)
     step = simd.width(one)
     for left in range(start, stop, step):
         p = min(left, stop - step)
         smallest = simd.load(one, eigenvalue, p)
         b0, rest = simd.load_complex(one, b[0], p)
-        poison = b0 * 0.0 + rest * 0.0
-        for j in range(1, len(order) + 1):
+        if estimated:
+            b0, rest = smallest / (epsilon - 1.0), one * 0.0
+            smallest = epsilon * b0
+        largest, poison = simd.absolute(b0), b0 * 0.0 + rest * 0.0
+        for j in range(1, m + 1):
             x, y = simd.load_complex(one, b[j], p)
+            largest = simd.maximum(largest, simd.maximum(simd.absolute(x), simd.absolute(y)))
             poison = poison + x * 0.0 + y * 0.0
         # so large a density would overflow
-        finite = (poison >= 0.0) & (simd.absolute(b0) < simd.overflowing(b0))
-        if estimated:
-            b0 = smallest / (epsilon - 1.0)
-            smallest = epsilon * b0
+        limit = simd.overflowing(b0) * (6.0 / (2.0 * m + 1.0))
+        finite = (poison >= 0.0) & (largest < limit)
         dark = finite & ~(b0 > least)
         biased = smallest < epsilon * b0
         raised = simd.select(biased, (b0 - smallest) / (1.0 - epsilon), b0)

@@ -1,7 +1,6 @@
 """Lanes for what happens to whole frames before and after the mathematics, in single precision."""
 
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -79,7 +78,7 @@ def smooth_lane(m: int, precision: str) -> Callable[..., Any]:
         planes = np.ascontiguousarray(moments).reshape(len(moments), -1).view(np.float32)
         out = np.empty_like(planes)
         weights = taps.astype(np.float32)
-        weight = _normalisation(height, width, taps.tobytes())
+        weight = normalisation(np.ones((height, width), bool), taps)
         finite: list[bool] = []
 
         def part(start: int, stop: int) -> None:
@@ -110,9 +109,3 @@ def separate_lane(m: int, precision: str) -> Callable[..., Any]:
         return direct.reshape(shape), indirect.reshape(shape), first.reshape(shape)
 
     return lane
-
-
-@lru_cache(maxsize=4)
-def _normalisation(height: int, width: int, taps: bytes) -> Any:
-    """Return what to multiply smoothed images with that are there everywhere."""
-    return normalisation(np.ones((height, width), bool), np.frombuffer(taps))

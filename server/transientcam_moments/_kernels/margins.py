@@ -1,5 +1,6 @@
 """What smoothing needs at the borders of an image."""
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,17 @@ def row_length(width: int, taps: int) -> int:
 
 def normalisation(present: Any, taps: Any) -> Any:
     """Return one over the weights that pixels which are there have, NaN for those that aren't."""
+    if present.all():
+        return _of_whole_images(*present.shape, taps.tobytes())
+    return _inverse_share(present, taps)
+
+
+@lru_cache(maxsize=4)
+def _of_whole_images(height: int, width: int, taps: bytes) -> Any:
+    return _inverse_share(np.ones((height, width), bool), np.frombuffer(taps))
+
+
+def _inverse_share(present: Any, taps: Any) -> Any:
     share = present.astype(float)
     for axis in (0, 1):
         share = np.apply_along_axis(_blurred, axis, share, taps)

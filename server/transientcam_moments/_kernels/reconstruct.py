@@ -1,4 +1,4 @@
-"""The entries that a `Reconstructor` runs on, compiled for one order."""
+"""The compiled stages of `OnePass`, for one order."""
 
 from collections.abc import Callable
 from typing import Any
@@ -17,42 +17,43 @@ from transientcam_moments._kernels.entries import (
     real_arrays,
 )
 from transientcam_moments._kernels.frames import measure_entry, separate_entry, smooth_entry
-from transientcam_moments._kernels.levinson import levinson_entry
+from transientcam_moments._kernels.one_pass import Constants, OnePass, Stages
 from transientcam_moments._kernels.pisarenko import half_turns, returns_entry
-from transientcam_moments._kernels.reconstructor import Entries, Reconstructor
 
 
 def reconstruct_lane(m: int, precision: str) -> Callable[..., Any]:
-    """Compile all stages of order m; the lane makes a `Reconstructor`."""
-    entries = reconstruct_entries(m, precision)
-    return lambda *arguments: Reconstructor(entries, *arguments)
+    """Compile all stages of order m; the lane prepares the pass for pixels of one shape."""
+    stages = reconstruct_stages(m)
+
+    def lane(shape: tuple[int, ...], constants: Constants) -> OnePass:
+        return OnePass(stages, shape, constants)
+
+    return lane
 
 
-def reconstruct_entries(m: int, precision: str) -> Entries:
-    """Compile all stages of order m."""
+def reconstruct_stages(m: int) -> Stages:
+    """Compile all stages of order m in single precision."""
     order = order_type(m)
-    real, cplx = real_arrays(precision), complex_arrays(precision)
-    wide = real_arrays("d")
+    real, cplx = real_arrays("f"), complex_arrays("f")
+    wide, wide_cplx = real_arrays("d"), complex_arrays("d")
     plane, planes = real[1], real[2]
-    return Entries(
+    return Stages(
         order=(0,) * m,
-        precision=precision,
-        turns=half_turns(m, precision),
+        turns=half_turns(m, "f"),
         wide_turns=half_turns(m, "d"),
         measure=measure_entry(m),
         smooth=smooth_entry(),
-        eigenvalue=eigenvalue_entry(m, precision),
+        eigenvalue=eigenvalue_entry(m, "f"),
         judge=entry(
             back.judge,
             order, PIXELS, cplx[2], BYTES, plane, plane, plane, plane, BYTES, REAL, REAL,
             PIXELS, PIXELS,
         ),
-        levinson=levinson_entry(m, precision),
-        returns=returns_entry(m, precision),
+        returns=returns_entry(m, "f"),
         separate=separate_entry(m),
         gather=entry(
             back.gather,
-            order, cplx[2], plane, plane, REAL, complex_arrays("d")[2], PLACES, PIXELS,
+            order, cplx[2], plane, plane, REAL, wide_cplx[2], PLACES, PIXELS,
         ),
         scatter=entry(
             back.scatter,

@@ -1,0 +1,323 @@
+"""Everything between the raw images of a frame and its range, in one pass of compiled stages."""
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from transientcam_moments._kernels.careful import redo
+from transientcam_moments._kernels.margins import normalisation, row_length
+from transientcam_moments._kernels.registry import LEAST_PIXELS
+from transientcam_moments._kernels.spread import Spread, blocks
+
+_ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}
+_ROOM = 1024  # pixels that are redone in double precision at a time
+_EPS = float(np.finfo(np.float32).eps)
+_SATURATED, _REPLACED = 4, 32  # transientcam_moments.Flags
+
+
+class Stages(NamedTuple):
+    """Compiled stages of one order in single precision; the wide ones are in double precision."""
+
+    order: tuple[int, ...]
+    turns: Any
+    wide_turns: Any
+    measure: Callable[..., Any]
+    smooth: Callable[..., Any]
+    eigenvalue: Callable[..., Any]
+    judge: Callable[..., Any]
+    returns: Callable[..., Any]
+    separate: Callable[..., Any]
+    gather: Callable[..., Any]
+    scatter: Callable[..., Any]
+    wide_eigenvalue: Callable[..., Any]
+    wide_returns: Callable[..., Any]
+
+
+class Planes(NamedTuple):
+    """What a pass makes of a frame, each array with the pixels (...) last, and a new one.
+
+    Attributes
+    ----------
+    smoothed : array, shape (m + 1, ...), complex64
+        Calibrated and smoothed moments before biasing, b_0 estimated where it is not measured.
+    brightness : array, shape (...)
+        b_0 after biasing: in place of b_0 it makes the moments valid.
+    validity : array, shape (...)
+        Smallest eigenvalue over b_0 before biasing.
+    flags : array, shape (...), uint8
+        Of `transientcam_moments.Flags`.
+    phase_rad, weight, count : array, shapes (m, ...), (m, ...), (...)
+        Returns, as in `Returns`.
+    uniform, direct, indirect, range_m : array, shape (...)
+        What the returns say; range NaN where there is none.
+    redone : int
+        Pixels whose returns needed double precision.
+    """
+
+    smoothed: Any
+    brightness: Any
+    validity: Any
+    flags: Any
+    phase_rad: Any
+    weight: Any
+    count: Any
+    uniform: Any
+    direct: Any
+    indirect: Any
+    range_m: Any
+    redone: int = 0
+
+
+@dataclass(frozen=True)
+class Constants:
+    """What is the same for every frame.
+
+    Attributes
+    ----------
+    settings : Settings
+        Of the reconstruction.
+    inverse : array, shape (m + 1,) or (m + 1, ...), complex128
+        What measured moments are multiplied with, the reciprocal of a calibration; pixels where it
+        isn't finite have no moments.
+    taps : array, shape (2 R + 1,), optional
+        Weights of the smoothing along both axes of the pixels, sum 1; None for none.
+    range_per_rad_m : float
+        Range of a phase of 1 rad.
+    bad : integer array, shape (B,), optional
+        Flat places of the pixels to be flagged as replaced.
+    replaced : callable, optional
+        Takes raw images (N, P) and returns uncalibrated moments (m + 1, B) for those pixels.
+    """
+
+    settings: Any
+    inverse: Any
+    taps: Any
+    range_per_rad_m: float
+    bad: Any = None
+    replaced: Callable[[Any], Any] | None = None
+
+
+class OnePass:
+    """Reconstructs frames of one order and shape; several threads may call it at once.
+
+    Results are new arrays. What does not leave the pass lives in scratch space, which is kept for
+    later frames: one for each call that ever ran at the same time as others.
+
+    Parameters
+    ----------
+    stages : Stages
+        Of the order that the frames have.
+    shape : tuple of int
+        Of the pixels; with taps, height and width, the latter at least `LEAST_WIDTH`.
+    constants : Constants
+        What is the same for every frame.
+    """
+
+    def __init__(self, stages: Stages, shape: tuple[int, ...], constants: Constants) -> None:
+        self._stages, self._shape, self._constants = stages, shape, constants
+        self._pixels = math.prod(shape)
+        self._estimated = constants.settings.zeroth == "estimated"
+        self._prepare_calibration(np.asarray(constants.inverse))
+        self._idle: list[_Scratch] = []
+
+    def images(self, images: Any, saturated: Any, spread: Spread) -> Planes:
+        """Reconstruct raw images (N, ...), uint16, of one take.
+
+        ``saturated`` (...) replaces what the images themselves show to be saturated.
+        """
+        s, constants = self._stages, self._constants
+        raw = np.ascontiguousarray(images).reshape(len(images), self._pixels)
+        smoothed = np.empty((len(s.order) + 1, self._pixels), np.complex64)
+        with self._scratch() as scratch:
+            calibrated = smoothed if self._taps is None else scratch.calibrated
+
+            def measure(start: int, stop: int) -> None:
+                s.measure(
+                    s.order, raw, _ZEROTH[constants.settings.zeroth], self._inverse, self._stride,
+                    constants.settings.full_scale, calibrated, scratch.saturated, start, stop,
+                )  # fmt: skip
+
+            def smooth(start: int, stop: int) -> None:
+                s.smooth(
+                    calibrated.view(np.float32), self._taps, self._weight, scratch.row(start),
+                    smoothed.view(np.float32), self._shape[1], start, stop,
+                )  # fmt: skip
+
+            spread(measure, self._pixels)
+            if constants.replaced is not None:
+                moments = constants.replaced(raw)
+                inverse = self._inverse[:, constants.bad if self._stride else slice(1)]
+                calibrated[:, constants.bad] = moments * inverse
+            if constants.bad is not None:
+                scratch.saturated[constants.bad] = 0
+            if saturated is not None:
+                scratch.mark_saturated(saturated, self._shape)
+            if self._taps is not None:
+                spread(smooth, self._shape[0], 8)
+            return self._analysed(smoothed, scratch, spread)
+
+    def moments(self, smoothed: Any, saturated: Any, spread: Spread) -> Planes:
+        """Reconstruct calibrated and smoothed moments (m + 1, ...), complex64.
+
+        ``saturated`` (...) is flagged, where it is given.
+        """
+        planes = np.ascontiguousarray(smoothed).reshape(len(smoothed), self._pixels)
+        if self._estimated:
+            planes = planes.copy()
+        with self._scratch() as scratch:
+            scratch.mark_saturated(False if saturated is None else saturated, self._shape)
+            return self._analysed(planes, scratch, spread)
+
+    def _analysed(self, smoothed: Any, scratch: "_Scratch", spread: Spread) -> Planes:
+        s, constants, settings = self._stages, self._constants, self._constants.settings
+        if self._estimated:
+            smoothed[0] = 0
+        planes = self._new_planes(smoothed)
+
+        def analyse(start: int, stop: int) -> None:
+            for left, right in blocks(start, stop):
+                s.eigenvalue(
+                    s.order, smoothed, int(self._estimated), scratch.eigenvalue, left, right
+                )
+                s.judge(
+                    s.order, int(self._estimated), smoothed, scratch.saturated, scratch.eigenvalue,
+                    planes.brightness, planes.uniform, planes.validity, planes.flags,
+                    settings.epsilon, settings.minimum_brightness, left, right,
+                )  # fmt: skip
+                s.returns(
+                    s.order, s.turns, smoothed, planes.brightness, 1, planes.uniform,
+                    planes.phase_rad, planes.weight, planes.count, scratch.residual, _EPS,
+                    left, right,
+                )  # fmt: skip
+
+        def separate(start: int, stop: int) -> None:
+            s.separate(
+                s.order, planes.phase_rad, planes.weight, planes.flags, planes.direct,
+                planes.indirect, planes.range_m, settings.threshold, constants.range_per_rad_m,
+                start, stop,
+            )  # fmt: skip
+
+        spread(analyse, self._pixels)
+        redone = self._redo(planes, scratch)
+        spread(separate, self._pixels)
+        if constants.bad is not None:
+            planes.flags[constants.bad] |= _REPLACED
+        if self._estimated:
+            smoothed[0] = planes.brightness
+        shaped = (a.reshape((*a.shape[:-1], *self._shape)) for a in planes[:-1])
+        return Planes(*shaped)._replace(redone=redone)
+
+    def _new_planes(self, smoothed: Any) -> Planes:
+        """Return room for a result: an array a plane, which the allocator has at hand again."""
+        m, pixels = len(self._stages.order), self._pixels
+        plane = (np.empty(pixels, np.float32) for _ in range(6))
+        return Planes(
+            smoothed=smoothed,
+            brightness=next(plane),
+            validity=next(plane),
+            flags=np.empty(pixels, np.uint8),
+            phase_rad=np.empty((m, pixels), np.float32),
+            weight=np.empty((m, pixels), np.float32),
+            count=np.empty(pixels, np.int32),
+            uniform=next(plane),
+            direct=next(plane),
+            indirect=next(plane),
+            range_m=next(plane),
+        )
+
+    @contextmanager
+    def _scratch(self) -> Iterator["_Scratch"]:
+        try:
+            scratch = self._idle.pop()
+        except IndexError:
+            scratch = _Scratch(self._stages, self._pixels, self._shape, self._taps)
+        try:
+            yield scratch
+        finally:
+            self._idle.append(scratch)
+
+    def _prepare_calibration(self, inverse: Any) -> None:
+        """Prepare what to multiply with: a row of equal numbers, or one number a pixel.
+
+        With smoothing, absent pixels count as nothing for their neighbours, and are NaN behind it.
+        """
+        taps = self._constants.taps
+        self._taps = None if taps is None else taps.astype(np.float32)
+        self._stride = 0 if inverse.ndim == 1 else 1
+        length = self._pixels if self._stride else LEAST_PIXELS
+        planes = inverse.reshape((len(inverse), -1)).astype(np.complex64)
+        self._inverse = np.array(np.broadcast_to(planes, (len(inverse), length)), order="C")
+        if taps is None:
+            return
+        present = np.isfinite(planes).all(axis=0)
+        self._inverse[:, ~np.broadcast_to(present, length)] = 0
+        everywhere = np.broadcast_to(present, self._pixels).reshape(self._shape)
+        self._weight = normalisation(everywhere, taps)
+
+    def _redo(self, planes: Planes, scratch: "_Scratch") -> int:
+        """Redo in double precision what doesn't reproduce its moments; return how many pixels."""
+        s = self._stages
+        tolerance = 16 * (len(s.order) + 1) * _EPS
+        moments, uniform, phase, weight, count, residual = scratch.wide
+        redone = begin = 0
+        while True:
+            found = s.gather(
+                s.order, planes.smoothed, planes.brightness, scratch.residual, tolerance, moments,
+                scratch.places, begin,
+            )  # fmt: skip
+            if not found:
+                return redone
+            stop = -(-found // LEAST_PIXELS) * LEAST_PIXELS
+            s.wide_eigenvalue(s.order, moments, 0, uniform, 0, stop)
+            ill = s.wide_returns(
+                s.order, s.wide_turns, moments, uniform, 0, uniform, phase, weight, count,
+                residual, _EPS, 0, stop,
+            )  # fmt: skip
+            if ill:
+                where = np.flatnonzero(residual[:stop] > tolerance)
+                redo(moments, (phase, weight, uniform, count), where, _EPS)
+            s.scatter(
+                s.order, scratch.places, found, phase, weight, count, residual, planes.phase_rad,
+                planes.weight, planes.count, scratch.residual,
+            )  # fmt: skip
+            redone += found
+            begin = int(scratch.places[found - 1]) + 1
+
+
+class _Scratch:
+    """Room for what one call computes on the way."""
+
+    def __init__(self, stages: Stages, pixels: int, shape: tuple[int, ...], taps: Any) -> None:
+        m = len(stages.order)
+        self.saturated = np.empty(pixels, np.uint8)
+        self.eigenvalue = np.empty(pixels, np.float32)
+        self.residual = np.empty(pixels, np.float32)
+        self.places = np.empty(_ROOM, np.int64)
+        self.wide = (
+            np.empty((m + 1, _ROOM), np.complex128),
+            np.empty(_ROOM),
+            np.empty((m, _ROOM)),
+            np.empty((m, _ROOM)),
+            np.empty(_ROOM, np.int32),
+            np.empty(_ROOM),
+        )
+        if taps is not None:
+            self.calibrated = np.empty((m + 1, pixels), np.complex64)
+            self._row_length = row_length(shape[1], taps.size)
+            self._rows: dict[int, Any] = {}
+
+    def row(self, start: int) -> Any:
+        """Room for a row between two zero margins; each part of the image has its own."""
+        row = self._rows.get(start)
+        if row is None:
+            row = self._rows[start] = np.zeros(self._row_length, np.float32)
+        return row
+
+    def mark_saturated(self, saturated: Any, shape: tuple[int, ...]) -> None:
+        """Take the flags of saturated pixels from a boolean array, or from one for all."""
+        marked = np.broadcast_to(np.asarray(saturated, bool), shape).reshape(-1)
+        np.multiply(marked, np.uint8(_SATURATED), out=self.saturated)
