@@ -1,6 +1,7 @@
 """How images become moments and moments become returns."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import transientcam_moments as tm
@@ -99,6 +100,11 @@ class Recipe:
 
     def reconstruct(self, raw: RawFrame) -> tm.Reconstruction:
         """Return the reconstruction of a capture; it computes what is read of it."""
+        return self._reconstructor(raw.by_take.reshape(raw.images.shape))
+
+    @cached_property
+    def _reconstructor(self) -> tm.Reconstructor:
+        """What frames with this recipe share: prepared for the first one."""
         sequence, gains = self.applied.sequence, self.gains
         settings = self.settings.for_moments(
             base_frequency_hz=sequence.base_frequency_hz,
@@ -106,8 +112,7 @@ class Recipe:
             takes=sequence.takes,
             full_scale=self.full_scale,
         )
-        return tm.reconstruct(
-            raw.by_take.reshape(raw.images.shape),
+        return tm.Reconstructor(
             settings,
             calibration=nominal_gains(sequence) if gains is None else gains.planes,
             bad_pixels=None if gains is None else gains.bad,

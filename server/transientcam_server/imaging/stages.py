@@ -15,12 +15,13 @@ from transientcam_server.imaging.recipe import Recipe
 _log = logging.getLogger(__name__)
 
 STAGES: Final[dict[str, tuple[str, ...]]] = {
-    "moments": ("moments", "flags", "validity"),
+    "light": ("flags", "validity", "brightness"),
+    "moments": ("moments",),
     "returns": ("returns", "direct", "range_m"),
     "coefficients": ("coefficients",),
 }
 """Properties of `tm.Reconstruction` that each stage computes, in the order they build on."""
-FIRST: Final = "moments"
+FIRST: Final = "light"
 """The stage that all others build on."""
 
 

@@ -92,7 +92,7 @@ def test_nothing_is_computed_that_nobody_asks_for(
         await frame.product(pipeline.product("raw"))
         assert calls == []
         await frame.product(pipeline.product("coefficients"))
-        assert calls == ["moments", "coefficients"]
+        assert calls == ["light", "coefficients"]
 
     with_frame(camera, raw, test)
 
@@ -105,7 +105,7 @@ def test_all_who_ask_at_once_share_one_computation_and_the_same_bytes(
         asking = [frame.encoded(product, MSGPACK, channel=0) for product in wanted for _ in "abc"]
         encoded = await asyncio.gather(*asking)
 
-        assert sorted(calls) == ["coefficients", "moments", "returns"]
+        assert sorted(calls) == ["coefficients", "light", "returns"]
         assert encoded[0] is encoded[1] is encoded[6]
         assert encoded[0] is not encoded[3]
 
@@ -292,7 +292,7 @@ def test_a_bare_frame_is_the_same_with_nothing_computed(
         assert (bare.number, bare.raw, bare.recipe) == (frame.number, frame.raw, frame.recipe)
         assert bare.meta()["reconstruct_s"] is None
         np.testing.assert_array_equal(await bare.product(pipeline.product("range")), first)
-        assert calls == ["moments", "returns"] * 2
+        assert calls == ["light", "returns"] * 2
 
     with_frame(camera, raw, test)
 
