@@ -7,7 +7,6 @@ import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from enum import StrEnum
-from types import TracebackType
 
 from transientcam_driver.capabilities import IMAGE_HEADER_BYTES, AppliedSequence, Capabilities
 from transientcam_driver.clock import Clock, RealClock
@@ -23,23 +22,13 @@ from transientcam_driver.errors import (
     TransferOverflow,
     TransferStalled,
 )
-from transientcam_driver.protocol import (
-    CAPS_ROOM_BYTES,
-    LAST_ERROR_BYTES,
-    TIME_BYTES,
-    Commitment,
-    DeviceState,
-    Request,
-    SequenceWords,
-    Status,
-    unpack_capabilities,
-    unpack_last_error,
-    unpack_time,
-)
-from transientcam_driver.receiving.assembler import Counters, RawFrame
-from transientcam_driver.receiving.receiver import Incoming
+from transientcam_driver.handle import Simulation
+from transientcam_driver.protocol import Commitment, DeviceState, Request, SequenceWords, Status
+from transientcam_driver.protocol.capabilities import CAPS_ROOM_BYTES, unpack_capabilities
+from transientcam_driver.protocol.requests import LAST_ERROR_BYTES, unpack_last_error
+from transientcam_driver.protocol.status import TIME_BYTES, unpack_time
+from transientcam_driver.receiving import Counters, RawFrame, Receiver
 from transientcam_driver.sequence import Sequence
-from transientcam_driver.simulation import Simulation
 from transientcam_driver.usb import Transport
 
 READ_S = 0.1
@@ -194,11 +183,11 @@ class Camera:
             end_s = self._clock.now_s() + timeout_s
             while True:
                 self._keep_alive()
-                if (frame := self._incoming.take()) is not None:
+                if (frame := self._receiver.take()) is not None:
                     return frame
                 left_s = end_s - self._clock.now_s()
                 if left_s <= 0:
-                    self._incoming.require_images_of_the_size_announced()
+                    self._receiver.require_images_of_the_size_announced()
                     raise FrameTimeout(timeout_s)
                 if not self._read(min(left_s, READ_S)):
                     self._look_after_silence()
@@ -241,12 +230,7 @@ class Camera:
     def __enter__(self) -> "Camera":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     # --- connection ------------------------------------------------------------------------
@@ -265,7 +249,7 @@ class Camera:
                 self._ask(Request.GET_CAPS, length=CAPS_ROOM_BYTES)
             )
             self._transport.expect_transfers(IMAGE_HEADER_BYTES + self._capabilities.image_bytes)
-            self._incoming = Incoming(self._capabilities, self.counters)
+            self._receiver = Receiver(self._capabilities, self.counters)
             self._configure(self._wanted or self._capabilities.nearest(Sequence()))
         except BaseException:
             self._let_go()
@@ -326,7 +310,7 @@ class Camera:
     def _configure(self, sequence: Sequence) -> AppliedSequence:
         words = SequenceWords.of(sequence, self._capabilities)
         self._tell(Request.SET_SEQUENCE, words.pack())
-        with self._incoming.lock:
+        with self._receiver.lock:
             above = 0 if self._applied is None else self._applied.epoch
             answer = Commitment.unpack(
                 self._ask(Request.COMMIT, value=above, length=Commitment.BYTES)
@@ -340,14 +324,14 @@ class Camera:
             ):
                 raise ProtocolError(f"COMMIT answered with {answer}")
             self._applied = self._capabilities.describe(really_set, epoch=answer.epoch)
-            self._incoming.switch(self._applied, first_image=answer.first_image)
+            self._receiver.switch(self._applied, first_image=answer.first_image)
         return self._applied
 
     def _start(self) -> None:
         self._require_open()
-        with self._incoming.lock:
+        with self._receiver.lock:
             self._tell(Request.STOP)
-            self._incoming.restart(first_image=self.status().next_image)
+            self._receiver.restart(first_image=self.status().next_image)
             self._tell(Request.START)
             self._heartbeat_s = self._clock.now_s()
             self._state = CameraState.STREAMING
@@ -386,7 +370,7 @@ class Camera:
             self._clear_stall()
             return True
         except TransferOverflow:
-            self._incoming.resynchronise()
+            self._receiver.resynchronise()
             return True
         except CameraLost:
             with self._control:
@@ -396,7 +380,7 @@ class Camera:
         if not data:
             return False
         self._stalled = False
-        self._incoming.feed(data, host_time_s=self._clock.unix_s())
+        self._receiver.feed(data, host_time_s=self._clock.unix_s())
         return True
 
     def _clear_stall(self) -> None:

@@ -9,20 +9,17 @@ from urllib.parse import parse_qsl
 from transientcam_driver.camera import Camera
 from transientcam_driver.clock import Clock, RealClock
 from transientcam_driver.errors import SpecError
+from transientcam_driver.simulation import build, find_scene, measured_scene, without_noise
 from transientcam_driver.simulation.build import (
     DEFAULT_HEIGHT,
     DEFAULT_WIDTH,
     MEASURED,
     RESOLUTIONS,
-    build,
-    find_scene,
-    measured_scene,
-    without_noise,
 )
-from transientcam_driver.simulation.device.bus import SimulatedBus
+from transientcam_driver.simulation.device import SimulatedBus
 from transientcam_driver.simulation.effects import CHOICES, EFFECTS
 from transientcam_driver.simulation.imperfections import PROFILES
-from transientcam_driver.simulation.scene.scene import Background, Scene, TimeZero
+from transientcam_driver.simulation.scene import Background, Scene, TimeZero
 from transientcam_driver.usb import open_transport
 
 DEFAULT_SPEC = "sim:mirrors"

@@ -24,7 +24,8 @@ from transientcam_driver.errors import (
     TransferOverflow,
     TransferStalled,
 )
-from transientcam_driver.protocol import IMAGE_ENDPOINT, PRODUCT_ID, VENDOR_ID, Request
+from transientcam_driver.protocol import Request
+from transientcam_driver.protocol.requests import IMAGE_ENDPOINT, PRODUCT_ID, VENDOR_ID
 
 UDEV_RULE = (
     f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{VENDOR_ID:04x}", '

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from transientcam_driver import Camera, Capabilities, ImageLabel, RawFrame, Sequence
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.protocol import Request, Status, pack_capabilities
+from transientcam_driver.protocol import Request, Status
+from transientcam_driver.protocol.capabilities import pack_capabilities
 from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.simulation.device.firmware import Firmware
 from transientcam_driver.simulation.device.prototype import prototype

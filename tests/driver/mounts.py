@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 import usb.core
 
+from tests.driver.usbfs.processes import Program, emulated_camera
 from transientcam_driver import Camera, CameraLost, CameraNotFound, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.protocol import Request, Status
@@ -14,8 +15,6 @@ from transientcam_driver.simulation.build import build, find_scene, without_nois
 from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.simulation.device.faults import Fault
 from transientcam_driver.usb import open_transport
-
-from .usbfs.processes import Program, emulated_camera
 
 
 class Mount(Protocol):

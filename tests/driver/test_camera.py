@@ -24,6 +24,7 @@ from transientcam_driver import (
 )
 from transientcam_driver.clock import RealClock, VirtualClock
 from transientcam_driver.protocol import Request
+from transientcam_driver.simulation import SimulationHandle
 from transientcam_driver.simulation.build import build, find_scene
 from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.simulation.device.usb_device import EmulatedDevice
@@ -40,6 +41,7 @@ def state_of(camera: Camera) -> CameraState:
 
 
 def device_of(simulation: Simulation) -> EmulatedDevice:
+    assert isinstance(simulation, SimulationHandle)
     return simulation._device
 
 

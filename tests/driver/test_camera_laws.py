@@ -11,6 +11,7 @@ from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 from hypothesis.strategies import floats, integers, sampled_from
 
+from tests.driver.bench import Bench, number_of
 from transientcam_driver import (
     CameraFault,
     CameraLost,
@@ -23,8 +24,6 @@ from transientcam_driver import (
 )
 from transientcam_driver.receiving.assembler import FrameAssembler
 from transientcam_driver.simulation.device.faults import Fault
-
-from .bench import Bench, number_of
 
 SEQUENCES = (
     Sequence(harmonics=1, zeroth="estimated"),

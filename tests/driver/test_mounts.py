@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.driver.mounts import Mount, PyusbMount, RealMount, UsbfsMount
 from transientcam_driver import (
     Camera,
     CameraBusy,
@@ -27,8 +28,6 @@ from transientcam_driver import (
     open_camera,
 )
 from transientcam_driver.clock import VirtualClock
-
-from .mounts import Mount, PyusbMount, RealMount, UsbfsMount
 
 QUICK = Sequence(harmonics=1, zeroth="estimated", exposure_s=0.5e-3)
 READ_S = 30.0

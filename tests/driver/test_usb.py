@@ -203,7 +203,7 @@ def test_usb_is_imported_in_two_places_only() -> None:
         for line in path.read_text().splitlines()
         if line.startswith(("import usb", "from usb"))
     }
-    assert importing == {"usb.py", "simulation/backend.py"}
+    assert importing == {"usb.py", "simulation/device/bus.py"}
 
 
 def test_cameras_are_listed_without_being_claimed(bus: SimulatedBus) -> None:

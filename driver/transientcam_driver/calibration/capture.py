@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from transientcam_driver.calibration.file import CalibrationCapture
 from transientcam_driver.capabilities import AppliedSequence, Capabilities
 from transientcam_driver.errors import CameraError, FrameTimeout, SequenceError
-from transientcam_driver.receiving.assembler import RawFrame
+from transientcam_driver.receiving import RawFrame
 from transientcam_driver.sequence import Sequence
 
 DEFAULT_TAKES = 40

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from transientcam_driver.errors import UDEV_RULES_FILE, LibusbMissing
-from transientcam_driver.protocol import PRODUCT_ID, VENDOR_ID
+from transientcam_driver.protocol.requests import PRODUCT_ID, VENDOR_ID
 from transientcam_driver.usb import UDEV_RULE, UsbCamera, list_cameras, system_libusb
 
 Reported = tuple[str, str, str, str | None]

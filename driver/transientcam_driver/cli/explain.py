@@ -11,11 +11,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from transientcam_driver.errors import DriverError, SpecError
+from transientcam_driver.handle import ExplainedEffect, Explanation
 from transientcam_driver.opening import parse_spec, scene_of
 from transientcam_driver.sequence import Sequence
-from transientcam_driver.simulation.build import world_of
-from transientcam_driver.simulation.device.prototype import prototype
-from transientcam_driver.simulation.explain import ExplainedEffect, Explanation
+from transientcam_driver.simulation import world_of
+from transientcam_driver.simulation.device import prototype
 
 _BAD_USAGE = 2
 

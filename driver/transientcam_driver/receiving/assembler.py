@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.capabilities import AppliedSequence, Capabilities
-from transientcam_driver.protocol import ImageHeader, phase_word
+from transientcam_driver.protocol import ImageHeader
+from transientcam_driver.protocol.units import phase_word
 from transientcam_driver.receiving.decoder import ImagePacket
 from transientcam_driver.sequence import ImageLabel
 

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 from transientcam_driver.capabilities import IMAGE_HEADER_BYTES
-from transientcam_driver.protocol import IMAGE_MAGIC, ImageHeader, payload_checksum
+from transientcam_driver.protocol import ImageHeader
+from transientcam_driver.protocol.images import IMAGE_MAGIC, payload_checksum
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from transientcam_driver.receiving.assembler import Counters, FrameAssembler, Ra
 from transientcam_driver.receiving.decoder import PacketDecoder
 
 
-class Incoming:
+class Receiver:
     """Decoder and assembler of one connection, and the frames that are complete.
 
     The reader feeds it; whoever changes the sequence or starts a run holds ``lock`` from before

@@ -8,20 +8,30 @@ import numpy as np
 
 from transientcam_driver.clock import Clock
 from transientcam_driver.errors import EffectError, SceneError
-from transientcam_driver.simulation.device.firmware import Firmware
-from transientcam_driver.simulation.device.prototype import prototype
-from transientcam_driver.simulation.device.usb_device import EmulatedDevice
+from transientcam_driver.simulation.device import EmulatedDevice, Firmware, prototype
 from transientcam_driver.simulation.effects import CHOICES, EFFECTS, NOISE
 from transientcam_driver.simulation.effects.modulation_harmonics import measured_harmonics
 from transientcam_driver.simulation.effects.pixel_pattern import read_offsets_rad
-from transientcam_driver.simulation.handle import Simulation
+from transientcam_driver.simulation.handle import SimulationHandle
 from transientcam_driver.simulation.imperfections import DeviceProfile
-from transientcam_driver.simulation.light.measured import load_responses
-from transientcam_driver.simulation.light.transport import GivenScenery, Scenery, SurfaceScenery
+from transientcam_driver.simulation.light import (
+    GivenScenery,
+    Scenery,
+    SurfaceScenery,
+    load_responses,
+)
 from transientcam_driver.simulation.responses import SparseResponses
-from transientcam_driver.simulation.scene.file import BUILT_IN, list_scenes, load_scene
-from transientcam_driver.simulation.scene.scene import Background, Diffusor, Scene, TimeZero
-from transientcam_driver.simulation.world import Outlook, World
+from transientcam_driver.simulation.scene import (
+    BUILT_IN,
+    Background,
+    Scene,
+    TimeZero,
+    list_scenes,
+    load_scene,
+)
+from transientcam_driver.simulation.scene.scene import Diffusor
+from transientcam_driver.simulation.switchable_world import SwitchableWorld
+from transientcam_driver.simulation.world import World
 
 MEASURED = "measured"
 DEFAULT_WIDTH, DEFAULT_HEIGHT = 163, 120
@@ -113,7 +123,7 @@ def _read_device_files(device: DeviceProfile) -> None:
 
 def build(
     scene: Scene, *, width: int, height: int, seed: int | None, clock: Clock
-) -> tuple[EmulatedDevice, Simulation]:
+) -> tuple[EmulatedDevice, SimulationHandle]:
     """Put a camera in front of a scene."""
     capabilities = prototype(
         # a specimen is the same one in front of every scene
@@ -128,22 +138,22 @@ def build(
             scene, width=width, height=height, seed=seed, readout_s=capabilities.streaming_readout_s
         )
 
-    outlook = Outlook(world_before(scene))
+    world = SwitchableWorld(world_before(scene))
 
     def power_on(now_s: float) -> Firmware:
-        return Firmware(capabilities, outlook, power_on_s=now_s)
+        return Firmware(capabilities, world, power_on_s=now_s)
 
     device = EmulatedDevice(capabilities, power_on, clock=clock)
 
     quiet = {each.name: "off" for each in NOISE if scene.effects.get(each.name) == "off"}
 
-    def staged(name: str, effects: Mapping[str, str]) -> tuple[Scene, World]:
+    def prepare(name: str, effects: Mapping[str, str]) -> tuple[Scene, World]:
         found = scene if name == scene.name else find_scene(name)
         choices = found.effects | quiet | checked_effects(effects)
         found = replace(found, sensor=scene.sensor, device=scene.device, effects=choices)
         return found, world_before(found)
 
-    return device, Simulation(scene, outlook, device, staged=staged)
+    return device, SimulationHandle(scene, world, device, prepare=prepare)
 
 
 def checked_effects(effects: Mapping[str, str]) -> dict[str, str]:

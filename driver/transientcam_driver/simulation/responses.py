@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
+from transientcam_driver.handle import Response
 
 
 class Responses(Protocol):
@@ -30,7 +30,7 @@ class Responses(Protocol):
         """Delays in s, NaN where absent, and weights, 0 where absent: (K, H, W), by delay."""
         ...
 
-    def of_pixel(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def of_pixel(self, x: int, y: int) -> Response:
         """Return times in s with weights (sparse), or with the density per s (dense)."""
         ...
 
@@ -147,48 +147,3 @@ def bin_edges(delay_s: NDArray[np.float64], *, tail_s: float) -> NDArray[np.floa
     last = float(delay_s.max()) if delay_s.size else 0.0
     before, after = math.ceil(tail_s / BIN_S), math.ceil((last - first + tail_s) / BIN_S)
     return np.asarray(first + BIN_S * (np.arange(-before, after + 2) - 0.5), dtype=np.float64)
-
-
-@dataclass(frozen=True)
-class Truth:
-    """What is really there, in the units of what is measured.
-
-    Attributes
-    ----------
-    delay_s
-        (K, H, W) of each return, by delay; NaN where there is none.
-    weight
-        (K, H, W) in DN at the exposure set; 0 where there is none.
-    kind
-        "sparse": the returns are all there is. "dense": they sum up continuous responses, each
-        by its first peak and its mass.
-    """
-
-    delay_s: NDArray[np.float64]
-    weight: NDArray[np.float64]
-    kind: Literal["sparse", "dense"]
-    _responses: Responses
-    _scale_dn: float
-
-    @property
-    def range_m(self) -> NDArray[np.float64]:
-        """(H, W): half the way of the first return; NaN where no light comes back."""
-        range_m: NDArray[np.float64] = SPEED_OF_LIGHT_M_S * self.delay_s[0] / 2
-        return range_m
-
-    @property
-    def direct(self) -> NDArray[np.float64]:
-        """(H, W): weight of the first return, in DN."""
-        direct: NDArray[np.float64] = self.weight[0]
-        return direct
-
-    @property
-    def brightness(self) -> NDArray[np.float64]:
-        """(H, W): all light that comes back, in DN."""
-        total: NDArray[np.float64] = self.weight.sum(axis=0)
-        return total
-
-    def impulse_response(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return a pixel's times in s, with weights in DN (sparse) or a density in DN/s (dense)."""
-        time_s, value = self._responses.of_pixel(x, y)
-        return time_s, value * self._scale_dn

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from transientcam_driver import FirmwareTooOld, ProtocolError, Sequence, SubPhases
 from transientcam_driver.protocol import (
-    CAPS_BYTES,
     Commitment,
     DeviceState,
     ErrorCode,
@@ -18,16 +17,16 @@ from transientcam_driver.protocol import (
     Request,
     SequenceWords,
     Status,
-    StatusFlag,
-    pack_capabilities,
-    pack_last_error,
-    pack_time,
-    payload_checksum,
-    phase_word,
-    unpack_capabilities,
-    unpack_last_error,
-    unpack_time,
 )
+from transientcam_driver.protocol.capabilities import (
+    CAPS_BYTES,
+    pack_capabilities,
+    unpack_capabilities,
+)
+from transientcam_driver.protocol.images import payload_checksum
+from transientcam_driver.protocol.requests import pack_last_error, unpack_last_error
+from transientcam_driver.protocol.status import StatusFlag, pack_time, unpack_time
+from transientcam_driver.protocol.units import phase_word
 from transientcam_driver.simulation.device.prototype import prototype
 
 CAPABILITIES = prototype(serial="T-1", width=163, height=120, bits=12)

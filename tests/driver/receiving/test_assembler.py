@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from transientcam_driver import Counters, RawFrame, Sequence
-from transientcam_driver.protocol import ImageFlag, ImageHeader, phase_word
+from transientcam_driver.protocol import ImageFlag, ImageHeader
+from transientcam_driver.protocol.units import phase_word
 from transientcam_driver.receiving.assembler import FrameAssembler
 from transientcam_driver.receiving.decoder import ImagePacket
 from transientcam_driver.simulation.device.prototype import prototype

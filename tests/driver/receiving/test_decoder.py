@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from transientcam_driver.protocol import ImageFlag, ImageHeader, payload_checksum
+from transientcam_driver.protocol import ImageFlag, ImageHeader
+from transientcam_driver.protocol.images import payload_checksum
 from transientcam_driver.receiving.decoder import ImagePacket, PacketDecoder
 
 PAYLOAD_BYTES = 96

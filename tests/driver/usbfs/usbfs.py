@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
 
-from transientcam_driver.protocol import PRODUCT_ID, VENDOR_ID
+from transientcam_driver.protocol.requests import PRODUCT_ID, VENDOR_ID
 from transientcam_driver.simulation.device import descriptors
 from transientcam_driver.simulation.device.usb_device import (
     EmulatedDevice,

@@ -19,13 +19,12 @@ from transientcam_driver.protocol import (
     Request,
     SequenceWords,
     Status,
-    StatusFlag,
-    pack_capabilities,
-    pack_last_error,
-    pack_time,
-    payload_checksum,
-    phase_word,
 )
+from transientcam_driver.protocol.capabilities import pack_capabilities
+from transientcam_driver.protocol.images import payload_checksum
+from transientcam_driver.protocol.requests import pack_last_error
+from transientcam_driver.protocol.status import StatusFlag, pack_time
+from transientcam_driver.protocol.units import phase_word
 from transientcam_driver.sequence import ImageLabel, Sequence
 from transientcam_driver.simulation.device.exposures import Exposed, Exposures
 

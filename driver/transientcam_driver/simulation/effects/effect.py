@@ -15,10 +15,10 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.sensor import Sensor
 from transientcam_driver.sequence import LOW_FREQUENCY_HZ, Sequence
 from transientcam_driver.simulation.imperfections import IDEAL, PROTOTYPE, DeviceProfile
 from transientcam_driver.simulation.responses import Scatter
-from transientcam_driver.simulation.sensor import Sensor
 
 CALLED_ABOVE = 0.1
 """Effects are called for above this share of the noise floor.

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from transientcam_driver.simulation.light.paths import (
     ImageLight,
     Lit,
-    Seen,
+    RayEnds,
     first_scattering,
     image_lights,
+    light_on_ends,
     light_rays,
-    light_seen,
 )
 from transientcam_driver.simulation.light.paths import sparse as sparse_of
 from transientcam_driver.simulation.responses import SparseResponses
@@ -132,7 +132,7 @@ class MovingLight:
         for index, shape in shapes.items():  # again in double precision, or points shade themselves
             mine = np.flatnonzero(which == index)
             nearest[mine] = straight.again(shape, mine)
-        seen = self._in_front(scene, front, which[front], nearest[front])
+        ends = self._in_front(scene, front, which[front], nearest[front])
         over = np.zeros(len(self._directions), dtype=bool)
         for ways in by_mirrors:
             for shape in shapes.values():
@@ -141,9 +141,9 @@ class MovingLight:
         mirrored = np.flatnonzero(over)
         if mirrored.size:
             eye = scene.camera.position_m
-            seen = seen.with_more(first_scattering(scene, eye, self._directions[mirrored]), front)
+            ends = ends.with_more(first_scattering(scene, eye, self._directions[mirrored]), front)
             front = np.concatenate([front, mirrored])
-        lit = light_seen(scene, self._lights, seen, rays=len(front))
+        lit = light_on_ends(scene, self._lights, ends, rays=len(front))
         hidden = np.zeros(len(self._directions), dtype=bool)
         hidden[front] = True
         shadows = []
@@ -161,13 +161,13 @@ class MovingLight:
         front: NDArray[np.intp],
         surface: NDArray[np.intp],
         at: NDArray[np.float64],
-    ) -> Seen:
+    ) -> RayEnds:
         """Return what moves and is seen straight from the camera."""
         assert scene.camera is not None  # noqa: S101  (checked when made)
         distance_m = at * self._reach_m[front]
         point = scene.camera.position_m + distance_m[:, None] * self._directions[front]
         count = len(front)
-        return Seen(np.arange(count), point, surface, distance_m, np.ones(count))
+        return RayEnds(np.arange(count), point, surface, distance_m, np.ones(count))
 
     def phasors(self, frequency_hz: float) -> tuple[NDArray[np.complex64], NDArray[np.complex128]]:
         """Moments of what stands still: (K, H W) by chain of mirrors, and (H W) in all."""

@@ -23,7 +23,7 @@ _FAR_M = 1e3  # longer than any way in a scene
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class RayEnds:
     """The scattering points behind the rays that end on one, flat.
 
     ``ray`` says which ray; ``throughput`` is what mirrors on the way leave of the light.
@@ -35,9 +35,9 @@ class Seen:
     distance_m: NDArray[np.float64]
     throughput: NDArray[np.float64]
 
-    def with_more(self, more: "Seen", rays: NDArray[np.intp]) -> "Seen":
+    def with_more(self, more: "RayEnds", rays: NDArray[np.intp]) -> "RayEnds":
         """Put what other rays see behind what ``rays`` see."""
-        return Seen(
+        return RayEnds(
             np.concatenate([self.ray, more.ray + len(rays)]),
             np.concatenate([self.point, more.point]),
             np.concatenate([self.surface, more.surface]),
@@ -159,8 +159,8 @@ def light_rays(scene: Scene, directions: Points) -> Lit:
     parts = []
     for first in range(0, max(1, len(directions)), _BLOCK):
         rays = directions[first : first + _BLOCK]
-        seen = first_scattering(scene, _camera(scene).position_m, rays)
-        parts.append(light_seen(scene, lights, seen, rays=len(rays)))
+        ends = first_scattering(scene, _camera(scene).position_m, rays)
+        parts.append(light_on_ends(scene, lights, ends, rays=len(rays)))
     if len(parts) == 1:
         return parts[0]
     return joined(parts)
@@ -178,7 +178,7 @@ def joined(parts: list[Lit]) -> Lit:
     )
 
 
-def light_seen(scene: Scene, lights: tuple[ImageLight, ...], seen: Seen, *, rays: int) -> Lit:
+def light_on_ends(scene: Scene, lights: tuple[ImageLight, ...], ends: RayEnds, *, rays: int) -> Lit:
     """Follow light to what rays end on."""
     lit = Lit(
         np.full(rays, -1),
@@ -189,16 +189,16 @@ def light_seen(scene: Scene, lights: tuple[ImageLight, ...], seen: Seen, *, rays
         np.zeros((len(lights), rays)),
     )
     albedos = np.array([surface.reflectivity for surface in scene.surfaces])
-    reflectance = seen.throughput * albedos[seen.surface]
-    normal = normals_at(scene, seen.point, seen.surface)
-    lit.surface[seen.ray] = seen.surface
-    lit.point[seen.ray] = seen.point
-    lit.distance_m[seen.ray] = seen.distance_m
-    lit.reflectance[seen.ray] = reflectance
+    reflectance = ends.throughput * albedos[ends.surface]
+    normal = normals_at(scene, ends.point, ends.surface)
+    lit.surface[ends.ray] = ends.surface
+    lit.point[ends.ray] = ends.point
+    lit.distance_m[ends.ray] = ends.distance_m
+    lit.reflectance[ends.ray] = reflectance
     for k, light in enumerate(lights):
-        length_m, irradiance = light_on(scene, light, seen.point, normal)
-        lit.delay_s[k, seen.ray] = (length_m + seen.distance_m) / SPEED_OF_LIGHT_M_S
-        lit.weight[k, seen.ray] = irradiance * reflectance
+        length_m, irradiance = light_on(scene, light, ends.point, normal)
+        lit.delay_s[k, ends.ray] = (length_m + ends.distance_m) / SPEED_OF_LIGHT_M_S
+        lit.weight[k, ends.ray] = irradiance * reflectance
     return lit
 
 
@@ -207,7 +207,7 @@ def _camera(scene: Scene) -> Viewpoint:
     return scene.camera
 
 
-def first_scattering(scene: Scene, eye: Points, direction: Points) -> Seen:
+def first_scattering(scene: Scene, eye: Points, direction: Points) -> RayEnds:
     """Follow the camera's rays, over mirrors, to the scattering surface each one ends on."""
     count = len(direction)
     start = np.broadcast_to(eye, direction.shape)
@@ -239,7 +239,7 @@ def first_scattering(scene: Scene, eye: Points, direction: Points) -> Seen:
             mine, surface = which == index, scene.surfaces[index]
             direction[mine] = surface.mirror.mirrored_direction(direction[mine])
             throughput[mine] *= surface.reflectivity
-    return Seen(*(np.concatenate(parts) for parts in zip(*ended, strict=True)))
+    return RayEnds(*(np.concatenate(parts) for parts in zip(*ended, strict=True)))
 
 
 def image_lights(scene: Scene) -> Iterator[ImageLight]:

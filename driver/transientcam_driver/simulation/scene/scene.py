@@ -10,11 +10,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.sensor import Sensor
 from transientcam_driver.simulation.imperfections import IDEAL, DeviceProfile
 from transientcam_driver.simulation.responses import Scatter
 from transientcam_driver.simulation.scene.geometry import Points, Rectangle, Shape
 from transientcam_driver.simulation.scene.motion import Motion
-from transientcam_driver.simulation.sensor import Sensor
 
 Background = Literal["none", "median"]
 TimeZero = Literal["start", "peak"]

@@ -15,10 +15,10 @@ from transientcam_driver.protocol import (
     Request,
     SequenceWords,
     Status,
-    unpack_capabilities,
-    unpack_last_error,
-    unpack_time,
 )
+from transientcam_driver.protocol.capabilities import unpack_capabilities
+from transientcam_driver.protocol.requests import unpack_last_error
+from transientcam_driver.protocol.status import unpack_time
 from transientcam_driver.receiving.decoder import ImagePacket, PacketDecoder
 from transientcam_driver.simulation.device.firmware import Firmware, Refusal
 from transientcam_driver.simulation.device.prototype import prototype
