@@ -4,7 +4,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from transientcam_driver.errors import SequenceError
-from transientcam_driver.sequence import ImageLabel, Scheme, Sequence, SubPhases, TakeOrder, Zeroth
+from transientcam_driver.sequence import (
+    DERIVED_FIELDS,
+    ImageLabel,
+    Scheme,
+    Sequence,
+    SubPhases,
+    TakeOrder,
+    Zeroth,
+)
 
 IMAGE_HEADER_BYTES = 64
 BYTES_PER_PIXEL = 2
@@ -34,14 +42,8 @@ class AppliedSequence:
 
     def to_document(self) -> dict[str, Any]:
         """Return the sequence's document, what was derived from it, and ``sequence_id``."""
-        return self.sequence.to_document() | {
-            "sequence_id": self.epoch,
-            "images": self.images,
-            "capture_s": self.capture_s,
-            "frame_rate_hz": self.frame_rate_hz,
-            "unambiguous_range_m": self.unambiguous_range_m,
-            "data_rate_bytes_s": self.data_rate_bytes_s,
-        }
+        derived = {name: getattr(self, name) for name in DERIVED_FIELDS}
+        return self.sequence.to_document() | {"sequence_id": self.epoch} | derived
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,10 +9,13 @@ from transientcam_driver.protocol.images import IMAGE_MAGIC, payload_checksum
 
 @dataclass(frozen=True, slots=True)
 class ImagePacket:
-    """One image as it arrived; ``intact`` is false when its pixels fail their checksum."""
+    """One image as it arrived; ``intact`` is false when its pixels fail their checksum.
+
+    ``payload`` is read-only, and stays as it is while later bytes come.
+    """
 
     header: ImageHeader
-    payload: bytes
+    payload: bytes | memoryview
     intact: bool = True
 
 
@@ -46,7 +49,7 @@ class PacketDecoder:
         self._lost_track = False
 
     def feed(self, data: bytes | bytearray | memoryview) -> list[ImagePacket]:
-        """Take the next bytes and return the packets they complete."""
+        """Take the next bytes, which are copied, and return the packets they complete."""
         self._buffer += data
         packets: list[ImagePacket] = []
         start = 0
@@ -57,12 +60,13 @@ class PacketDecoder:
             end = start + IMAGE_HEADER_BYTES + self._payload_bytes
             if end > len(self._buffer):
                 break
-            payload = bytes(self._buffer[start + IMAGE_HEADER_BYTES : end])
+            payload = memoryview(self._buffer)[start + IMAGE_HEADER_BYTES : end].toreadonly()
             intact = payload_checksum(payload) == found.payload_crc
             packets.append(ImagePacket(found, payload, intact))
             start = end if intact else start + IMAGE_HEADER_BYTES
             self._lost_track = not intact
-        del self._buffer[:start]
+        if start:  # payloads are views of this buffer: the rest goes on in another
+            self._buffer = self._buffer[start:]
         return packets
 
     def _header_at(self, start: int) -> tuple[int, ImageHeader | None] | None:

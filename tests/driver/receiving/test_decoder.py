@@ -59,6 +59,21 @@ def test_packets_are_found_whatever_the_read_boundaries(count: int, boundaries: 
     assert decoder.resyncs == 0
 
 
+@given(boundaries=boundaries)
+def test_pixels_stay_as_they_are_while_later_bytes_come(boundaries: list[int]) -> None:
+    data = bytearray(b"".join(packet(k) for k in range(8)))
+    decoder = PacketDecoder(payload_bytes=PAYLOAD_BYTES)
+    packets = []
+    cuts = sorted({0, len(data), *(cut % (len(data) + 1) for cut in boundaries)})
+    for start, end in pairwise(cuts):
+        read = data[start:end]
+        packets += decoder.feed(memoryview(read))
+        read[:] = bytes(len(read))  # the next read overwrites it
+    decoder.reset()
+
+    assert [found.payload for found in packets] == [bytes([k] * 96) for k in range(8)]
+
+
 @given(data=st.lists(st.binary(max_size=400) | st.just(b"TCIM")), boundaries=boundaries)
 def test_arbitrary_bytes_never_raise_and_yield_nothing(
     data: list[bytes], boundaries: list[int]
