@@ -99,7 +99,7 @@ class ImageLabel:
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """The images of one transient image, as asked for: a frozen value, checked when it is made.
+    """The images of one transient image, as requested: a frozen value, checked when it is made.
 
     Attributes
     ----------

@@ -94,7 +94,7 @@ class PyusbMount:
             case "halt", ():
                 self._device.halt()
             case "expect", (fault, images):
-                self._device.expect(Fault(fault), images)
+                self._device.inject(Fault(fault), images)
             case "stall", (requests,):
                 self._device.stall_next(requests)
             case "interlock", (closed,):

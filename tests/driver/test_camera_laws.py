@@ -167,15 +167,15 @@ class Cable(RuleBasedStateMachine):
 
     @rule(images=integers(1, 5))
     def short(self, images: int) -> None:
-        self.device.expect(Fault.SHORTEN, images)
+        self.device.inject(Fault.SHORTEN, images)
 
     @rule(images=integers(1, 5), fault=sampled_from([Fault.CORRUPT_PIXELS, Fault.CORRUPT_HEADER]))
     def corrupt(self, images: int, fault: Fault) -> None:
-        self.device.expect(fault, images)
+        self.device.inject(fault, images)
 
     @rule(images=integers(1, 5), fault=sampled_from(list(Fault)))
     def disturb(self, images: int, fault: Fault) -> None:
-        self.device.expect(fault, images)
+        self.device.inject(fault, images)
 
     @rule(duration_s=floats(0.0, 4.0))
     def delay(self, duration_s: float) -> None:

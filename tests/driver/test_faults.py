@@ -76,7 +76,7 @@ def test_without_a_fault_every_image_is_delivered(camera: Camera, read: Read) ->
 
 def test_missing_packets_are_counted(bench: Bench, camera: Camera, read: Read) -> None:
     read()
-    bench.device.expect(Fault.DROP, 3)
+    bench.device.inject(Fault.DROP, 3)
 
     frame = read()
 
@@ -86,7 +86,7 @@ def test_missing_packets_are_counted(bench: Bench, camera: Camera, read: Read) -
 
 def test_a_corrupt_header_loses_its_image_alone(bench: Bench, camera: Camera, read: Read) -> None:
     read()
-    bench.device.expect(Fault.CORRUPT_HEADER)
+    bench.device.inject(Fault.CORRUPT_HEADER)
 
     frame = read()
 
@@ -96,7 +96,7 @@ def test_a_corrupt_header_loses_its_image_alone(bench: Bench, camera: Camera, re
 
 def test_a_corrupt_payload_loses_its_image_alone(bench: Bench, camera: Camera, read: Read) -> None:
     read()
-    bench.device.expect(Fault.CORRUPT_PIXELS)
+    bench.device.inject(Fault.CORRUPT_PIXELS)
 
     frame = read()
 
@@ -106,7 +106,7 @@ def test_a_corrupt_payload_loses_its_image_alone(bench: Bench, camera: Camera, r
 
 def test_a_short_packet_loses_its_image_alone(bench: Bench, camera: Camera, read: Read) -> None:
     read()
-    bench.device.expect(Fault.SHORTEN)
+    bench.device.inject(Fault.SHORTEN)
 
     frame = read()
 
@@ -115,7 +115,7 @@ def test_a_short_packet_loses_its_image_alone(bench: Bench, camera: Camera, read
 
 
 def test_duplicated_packets_are_passed_over(bench: Bench, camera: Camera, read: Read) -> None:
-    bench.device.expect(Fault.DUPLICATE, COUNT)
+    bench.device.inject(Fault.DUPLICATE, COUNT)
 
     frames = [read(), read()]
 
@@ -126,7 +126,7 @@ def test_duplicated_packets_are_passed_over(bench: Bench, camera: Camera, read: 
 
 def test_reordered_packets_never_mix_images(bench: Bench, camera: Camera, read: Read) -> None:
     read()
-    bench.device.expect(Fault.SWAP)
+    bench.device.inject(Fault.SWAP)
 
     frame = read()
 
@@ -136,7 +136,7 @@ def test_reordered_packets_never_mix_images(bench: Bench, camera: Camera, read: 
 
 def test_babble_loses_its_image_alone(bench: Bench, camera: Camera, read: Read) -> None:
     read()
-    bench.device.expect(Fault.BABBLE)
+    bench.device.inject(Fault.BABBLE)
 
     frame = read()
 

@@ -90,11 +90,11 @@ class SimulationHandle:
 
     def corrupt_next(self, images: int = 1) -> None:
         """Damage the pixels of the next images on the wire."""
-        self._device.expect(Fault.CORRUPT_PIXELS, _count(images))
+        self._device.inject(Fault.CORRUPT_PIXELS, _count(images))
 
     def drop_next(self, images: int = 1) -> None:
         """Lose the next images on the wire."""
-        self._device.expect(Fault.DROP, _count(images))
+        self._device.inject(Fault.DROP, _count(images))
 
     def set_interlock(self, *, closed: bool) -> None:
         """Open or close the safety interlock of the light."""

@@ -50,7 +50,7 @@ class _Quadratures:
 
 @dataclass(slots=True)
 class _Plan:
-    """What does not change between the images of a sequence.
+    """Everything that is the same for all images of a sequence.
 
     ``view`` is that of the last image, ``mean`` its brightness, and ``quadratures`` its planes by
     harmonic.
@@ -76,17 +76,17 @@ class World:
     Parameters
     ----------
     scenery
-        What is in front of the camera.
+        The light in front of the camera.
     sensor
-        What turns electrons into numbers.
+        Turns electrons into numbers.
     electrons_per_s
         Electrons a second that a relative brightness of 1 gives a pixel.
     effects
         "auto", "on" or "off" by the effect's name.
     seed
-        Of all randomness: an image's noise depends on the seed and its sequence number only.
+        Of all randomness: the noise of an image depends on the seed and its sequence number only.
     device
-        What is imperfect about the camera.
+        Imperfections of the camera.
     ambient_electrons_per_s
         Electrons a second that other light gives a pixel that sees a white surface.
     readout_s
@@ -122,11 +122,11 @@ class World:
         return self._sensor
 
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
-        """Decide what the sequence calls for, and build that."""
+        """Build the effects that the sequence calls for."""
         if self._plan is not None and self._plan.sequence == sequence:
             return
         conditions = self.conditions(sequence)
-        built = [effect for effect in EFFECTS if self._wanted(effect, conditions)]
+        built = [effect for effect in EFFECTS if self._is_built(effect, conditions)]
         of_light = frozenset(each.name for each in built if issubclass(each, LightEffect))
         made = [effect(self._forced(effect, conditions)) for effect in built]
         self._plan = _Plan(
@@ -157,13 +157,13 @@ class World:
         return exposure.signal.astype(np.uint16)
 
     def temperature_c(self, device_time_s: float) -> float:
-        """Return that of the sensor, which warms up if it drifts."""
+        """Temperature of the sensor, which rises where thermal drift is built."""
         effects = self._plan.on_shot if self._plan is not None else ()
         rises_c = [each.rise_c(device_time_s) for each in effects if isinstance(each, ThermalDrift)]
         return _AMBIENT_C + sum(rises_c)
 
     def conditions(self, sequence: Sequence) -> Conditions:
-        """Return what effects are judged by."""
+        """Conditions by which effects are judged."""
         scale_e = self._electrons_per_s * sequence.exposure_s
         lit = self._brightness[self._brightness > 0]
         white_e = self._ambient_electrons_per_s * sequence.exposure_s
@@ -182,14 +182,14 @@ class World:
         )
 
     def calls(self, sequence: Sequence) -> dict[str, Call]:
-        """Ask each effect what it says of this scene and a sequence."""
+        """Judge each effect for this scene and a sequence."""
         conditions = self.conditions(sequence)
         return {
             effect.name: effect.called_for(self._forced(effect, conditions)) for effect in EFFECTS
         }
 
     def explain(self, scene: str, sequence: Sequence | None = None) -> Explanation:
-        """Say what a sequence calls for, by default the one that is set."""
+        """Explain what a sequence calls for, by default the one that is set."""
         if sequence is None:
             sequence = self._configured().sequence
         floor_dn = self.conditions(sequence).floor_dn
@@ -243,12 +243,12 @@ class World:
                 phasor *= np.conj(shot.factor)
             electrons += in_phase * np.float32(phasor.real)
             electrons += quadrature * np.float32(phasor.imag)
-        # |b_j| <= b_0 holds but for rounding
+        # |b_j| <= b_0, except for rounding
         np.maximum(electrons, np.float32(0), out=electrons)
         return electrons
 
     def _quadratures(self, plan: _Plan, harmonic: int, time_s: float) -> _Quadratures:
-        """Compute what images of a harmonic are made of; anew only where the scene moves."""
+        """Planes of the images of a harmonic; computed again only where the scene moves."""
         view = plan.view_at(time_s)
         if plan.view is not view:
             plan.view = view
@@ -282,25 +282,25 @@ class World:
             effect.on_light(planes)
         return planes
 
-    def _wanted(self, effect: type[Effect], conditions: Conditions) -> bool:
+    def _is_built(self, effect: type[Effect], conditions: Conditions) -> bool:
         choice = self.choice(effect)
         if choice == "auto":
             return effect.called_for(conditions).called
         return choice == "on"
 
     def _forced(self, effect: type[Effect], conditions: Conditions) -> Conditions:
-        """Give an effect that is forced on a device that has it."""
+        """Conditions of a device that has the imperfection of an effect that is forced on."""
         if self.choice(effect) != "on":
             return conditions
         return effect.forced_on(conditions)
 
     def _configured(self) -> _Plan:
-        assert self._plan is not None, "no sequence committed"  # noqa: S101  (the firmware's order)
+        assert self._plan is not None, "no sequence committed"  # noqa: S101  (the firmware configures first)
         return self._plan
 
 
 def _stages(effects: list[ImageEffect]) -> tuple[Stage, ...]:
-    """Put one draw behind all that add to its variance."""
+    """Insert one draw of noise behind the stages that add to its variance."""
     stages: list[Stage] = []
     for effect in effects:
         if stages and stages[-1].adds_variance and not effect.adds_variance:

@@ -30,7 +30,7 @@ def main() -> None:
             case "halt":
                 device.halt()
             case "expect":
-                device.expect(Fault(arguments[0]), arguments[1])
+                device.inject(Fault(arguments[0]), arguments[1])
             case "stall":
                 device.stall_next(arguments[0])
             case "interlock":

@@ -1,4 +1,4 @@
-"""The make of the simulated camera."""
+"""Capabilities of the simulated camera."""
 
 from transientcam_driver.capabilities import IMAGE_HEADER_BYTES, Capabilities
 from transientcam_driver.protocol.requests import VERSION

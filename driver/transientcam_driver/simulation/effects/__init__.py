@@ -1,7 +1,7 @@
-"""What happens to light on its way to a number, one file an effect.
+"""Effects on light on its way to a number, one file each.
 
-Each effect says for a scene and a sequence whether it is called for, why, how large it is and
-what it costs. One that is not called for is not built: it is never called and draws no random
+Each effect judges for a scene and a sequence whether it is called for, why, how large it is and
+what it costs. One that is not called for is not built: it costs nothing and draws no random
 number. A new effect is a file here and an entry in ``EFFECTS``.
 """
 
@@ -34,7 +34,7 @@ from transientcam_driver.simulation.effects.thermal_drift import ThermalDrift
 CHOICES = ("auto", "on", "off")
 
 NOISE = (ShotNoise, ReadNoise)
-"""What ``noise=off`` switches off."""
+"""Switched off by ``noise=off``."""
 
 EFFECTS: tuple[type[Effect], ...] = (
     MirrorPaths,

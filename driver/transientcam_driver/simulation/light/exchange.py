@@ -43,7 +43,7 @@ class Exchange:
 
     @classmethod
     def of(cls, scene: Scene, per_side: int) -> "Exchange":
-        """Work out who sees whom, and how much light the lamp gives to whom."""
+        """Compute form factors and distances between patches, and the direct light on each."""
         patches = Patches.of(scene, per_side)
         factors = form_factors(scene, patches, patches.centre, patches.normal)
         squared = np.maximum(

@@ -23,7 +23,7 @@ class WithMixedPixels:
     at
         Rows and columns of those to replace.
     lit, scatter
-        What the rays see: for each place in a pixel, all of these pixels.
+        Light of the rays: for each place in a pixel, all of these pixels.
     """
 
     def __init__(
@@ -40,11 +40,11 @@ class WithMixedPixels:
 
     @property
     def kind(self) -> Literal["sparse", "dense"]:
-        """As that of the base."""
+        """Kind of the base."""
         return self._base.kind
 
     def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
-        """Those of the base, but for the pixels replaced."""
+        """Moments of the base, except of the pixels replaced."""
         moments = self._base.moments(frequency_hz)
         of_rays = self._lit.moments(frequency_hz, self._scatter).reshape(-1, len(self._at[0]))
         moments[self._at] = of_rays.mean(axis=0)
@@ -81,7 +81,7 @@ class WithMixedPixels:
         return all_s, all_weight
 
     def of_pixel(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return that of the base, or of the rays in a pixel that is replaced."""
+        """Response of the base, or of the rays in a pixel that is replaced."""
         mine = np.flatnonzero((self._at[0] == y) & (self._at[1] == x))
         return self._mixed.of_pixel(int(mine[0]), 0) if mine.size else self._base.of_pixel(x, y)
 
@@ -109,7 +109,7 @@ def with_mixed_pixels(
 
 
 def edges(distance_m: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Pixels (H, W) at a jump of range, and the steps in m; 0 m means that a pixel sees nothing."""
+    """Pixels (H, W) at a jump of range, and the steps in m; 0 m stands for a ray without an end."""
     edge = np.zeros(distance_m.shape, dtype=bool)
     steps: list[NDArray[np.float64]] = []
     for axis in (0, 1):

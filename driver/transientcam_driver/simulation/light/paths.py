@@ -19,14 +19,14 @@ from transientcam_driver.simulation.scene.geometry import Points, Rectangle, blo
 from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Viewpoint
 
 _BLOCK = 8192  # rays at a time, so that what is computed for them stays in the cache
-_FAR_M = 1e3  # longer than any way in a scene
+_FAR_M = 1e3  # longer than any path in a scene
 
 
 @dataclass(frozen=True, slots=True)
 class RayEnds:
-    """The scattering points behind the rays that end on one, flat.
+    """The scattering points on which rays of the camera end, flat.
 
-    ``ray`` says which ray; ``throughput`` is what mirrors on the way leave of the light.
+    ``ray`` is the index of the ray, ``throughput`` the share of light left by mirrors on the way.
     """
 
     ray: NDArray[np.intp]
@@ -36,7 +36,7 @@ class RayEnds:
     throughput: NDArray[np.float64]
 
     def with_more(self, more: "RayEnds", rays: NDArray[np.intp]) -> "RayEnds":
-        """Put what other rays see behind what ``rays`` see."""
+        """Append the ends of further rays behind those of ``rays``."""
         return RayEnds(
             np.concatenate([self.ray, more.ray + len(rays)]),
             np.concatenate([self.point, more.point]),
@@ -57,7 +57,7 @@ class ImageLight:
 
 @dataclass(frozen=True, slots=True)
 class Lit:
-    """What rays of the camera see: one row a ray, all flat.
+    """The light that rays of the camera see, one entry a ray, flat.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class Lit:
         return moments
 
     def scatter(self, scene: Scene) -> Scatter | None:
-        """Return how the surfaces' depths spread the light of each ray, if any does."""
+        """Spread of each ray's light inside the surface it ends on; None if no surface has any."""
         return scatter_of(scene, self.surface)
 
 
@@ -113,7 +113,7 @@ def trace(scene: Scene, *, width: int, height: int) -> SparseResponses:
 
 
 def sparse(scene: Scene, lit: Lit, *, width: int, height: int) -> SparseResponses:
-    """Arrange what the pixels' rays see as an image."""
+    """Arrange the light of the pixels' rays as an image."""
     reaching = np.any(lit.weight > 0, axis=1)
     reaching[0] |= not reaching.any()  # a dark scene has one return, of weight 0
     shape = (-1, height, width)
@@ -154,7 +154,7 @@ def rays_through(
 
 
 def light_rays(scene: Scene, directions: Points) -> Lit:
-    """Follow rays from the camera to what they see, and light to there."""
+    """Follow rays from the camera to their ends, and light to there."""
     lights = tuple(image_lights(scene))
     parts = []
     for first in range(0, max(1, len(directions)), _BLOCK):
@@ -167,7 +167,7 @@ def light_rays(scene: Scene, directions: Points) -> Lit:
 
 
 def joined(parts: list[Lit]) -> Lit:
-    """Put rays behind others."""
+    """Concatenate along the rays."""
     return Lit(
         np.concatenate([part.surface for part in parts]),
         np.concatenate([part.point for part in parts]),
@@ -179,7 +179,7 @@ def joined(parts: list[Lit]) -> Lit:
 
 
 def light_on_ends(scene: Scene, lights: tuple[ImageLight, ...], ends: RayEnds, *, rays: int) -> Lit:
-    """Follow light to what rays end on."""
+    """Follow light to the ends of rays."""
     lit = Lit(
         np.full(rays, -1),
         np.zeros((rays, 3)),
@@ -266,13 +266,13 @@ def image_lights(scene: Scene) -> Iterator[ImageLight]:
 def light_on(
     scene: Scene, light: ImageLight, point: Points, normal: Points
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Length of the way in m, and irradiance, by one chain of mirrors at points on surfaces.
+    """Length of the path in m, and irradiance, by one chain of mirrors at points on surfaces.
 
-    The length is 0 where the light is not seen in the mirrors.
+    The length is 0 where the mirrors do not show the light.
     """
     length_m, irradiance = np.zeros(len(point)), np.zeros(len(point))
     near = np.arange(len(point))
-    if light.mirrors:  # few points see the light in the mirror
+    if light.mirrors:  # only few points are lit by the last mirror
         image_m = np.broadcast_to(light.positions_m[0], point.shape)
         near = np.flatnonzero(light.mirrors[0].shape.hit(point, image_m) < 1)
         point, normal = point[near], normal[near]
@@ -310,10 +310,10 @@ def _beam(light: Light, cosine: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _unobstructed(scene: Scene, light: ImageLight, point: Points) -> NDArray[np.intp]:
-    """Walk back from points over the chain of mirrors to the light; tell which ones arrive."""
+    """Return the points, by index, whose path over the chain of mirrors to the light is free."""
     left = np.arange(len(point))
     stops = [point]
-    # first whether all mirrors are met, which few points' ways do; then what stands in between
+    # first whether all mirrors are hit, which few paths do; then what is in between
     for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
         start = stops[-1]
         fraction = mirror.shape.hit(start, np.broadcast_to(image_m, start.shape))
@@ -332,7 +332,7 @@ def _unobstructed(scene: Scene, light: ImageLight, point: Points) -> NDArray[np.
 
 
 def blocked(scene: Scene, start: Points, end: Points) -> NDArray[np.bool_]:
-    """Whether anything stands between two points; what they lie on themselves does not count."""
+    """Whether anything is between two points; the surfaces they lie on do not count."""
     blocked = np.zeros(len(start), dtype=bool)
     if not len(start):
         return blocked
@@ -351,7 +351,7 @@ def blocked(scene: Scene, start: Points, end: Points) -> NDArray[np.bool_]:
 
 def _box(start: Points, end: Points) -> tuple[Points, Points]:
     """Lowest and highest coordinates of segments, all of which may end at one point."""
-    ends = end[:1] if end.strides[0] == 0 else end  # as broadcasting makes it
+    ends = end[:1] if end.strides[0] == 0 else end  # a broadcast point
     axes = range(3)
     low = [min(start[:, axis].min(), ends[:, axis].min()) for axis in axes]
     high = [max(start[:, axis].max(), ends[:, axis].max()) for axis in axes]

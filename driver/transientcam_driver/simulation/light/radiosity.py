@@ -2,8 +2,8 @@
 
 Radiosity with times of flight. Surfaces are cut into patches; at each frequency a patch's
 irradiance is a complex moment, and light on its way from patch to patch turns it by its time of
-flight. Moments are therefore sums over all paths between patches, at exactly the frequencies that
-are asked for; nothing is binned.
+flight. Moments are therefore sums over all paths between patches, at exactly the frequencies
+requested; nothing is binned.
 """
 
 from dataclasses import replace
@@ -25,12 +25,12 @@ _HISTOGRAM_PATCHES = 12  # a side, for the impulse response of a pixel
 
 
 class Interreflection:
-    """The light that pixels get over more than one scattering surface.
+    """The light that reaches pixels over more than one scattering surface.
 
     Parameters
     ----------
     scene, lit
-        What the camera's rays see of a scene.
+        A scene, and the light that the camera's rays see of it.
     """
 
     def __init__(self, scene: Scene, lit: Lit, *, width: int, height: int) -> None:
@@ -42,7 +42,7 @@ class Interreflection:
 
     @property
     def patches(self) -> int:
-        """Into how many patches the scene is cut."""
+        """Number of patches of the scene."""
         return len(self._exchange.patches)
 
     def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
@@ -96,7 +96,7 @@ class Interreflection:
         return result
 
     def _between(self, patches: Patches) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Find the patches around what each pixel sees, and the weights to interpolate with."""
+        """Patches around the end of each pixel's ray, and weights of the interpolation."""
         count = len(self._lit.surface)
         index, weights = np.zeros((count, 4), dtype=np.intp), np.zeros((count, 4))
         for surface, cells in patches.cells.items():
@@ -119,7 +119,7 @@ class Interreflection:
 
 
 class WithInterreflection:
-    """Returns by direct light and mirrors, and what surfaces give each other."""
+    """Returns by direct light and mirrors, and the light that surfaces give each other."""
 
     kind: Literal["sparse", "dense"] = "dense"
 
@@ -132,7 +132,7 @@ class WithInterreflection:
         return self._direct.moments(frequency_hz) + self._further.moments(frequency_hz)
 
     def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the direct returns, and one for all the rest at its mean delay."""
+        """Direct returns, and one for all the rest at its mean delay."""
         delay_s, weight = self._direct.returns()
         mean_s, rest = self._further.returns
         mean_s = np.where(rest > 0, mean_s, np.nan)
