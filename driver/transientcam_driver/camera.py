@@ -84,7 +84,7 @@ class Camera:
         self.counters = Counters()
         self._control = threading.RLock()  # requests and the state
         self._reading = threading.Lock()  # held by the reader
-        self._wanted = sequence
+        self._requested = sequence
         self._resume = False
         self._closed = False
         self._heartbeat_s = -math.inf
@@ -136,7 +136,7 @@ class Camera:
         self._capabilities.validate(sequence)
         with self._control:
             applied = self._configure(sequence)
-            self._wanted = sequence
+            self._requested = sequence
             return applied
 
     def start(self) -> None:
@@ -251,7 +251,7 @@ class Camera:
             )
             self._transport.expect_transfers(IMAGE_HEADER_BYTES + self._capabilities.image_bytes)
             self._receiver = Receiver(self._capabilities, self.counters)
-            self._configure(self._wanted or self._capabilities.nearest(Sequence()))
+            self._configure(self._requested or self._capabilities.nearest(Sequence()))
         except BaseException:
             self._close_transport()
             self._state = CameraState.DISCONNECTED

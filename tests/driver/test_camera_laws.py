@@ -79,7 +79,7 @@ class Cable(RuleBasedStateMachine):
         assert not self.device.plugged or not self.lit()
 
     def lit(self) -> bool:
-        """Ask the device itself, whatever it does to requests."""
+        """Read it from the device itself, also where requests are stalled."""
         now_s = self.bench.clock.now_s()
         self.device._firmware._advance(now_s)
         return self.device._firmware._status(now_s).light_on
@@ -179,7 +179,7 @@ class Cable(RuleBasedStateMachine):
 
     @rule(duration_s=floats(0.0, 4.0))
     def delay(self, duration_s: float) -> None:
-        """Nobody reads for a while."""
+        """No frame is read for some time."""
         self.bench.clock.sleep(duration_s)
 
     @rule(duration_s=floats(0.0, 0.5))
@@ -193,7 +193,7 @@ class Cable(RuleBasedStateMachine):
     # --- what holds whatever happens ------------------------------------------------------
 
     @invariant()
-    def the_light_is_on_only_while_somebody_reads(self) -> None:
+    def the_light_is_on_only_while_frames_are_read(self) -> None:
         if self.device.plugged and self.lit():
             assert self.camera.state is CameraState.STREAMING
             silent_s = self.bench.clock.now_s() - self.camera._heartbeat_s

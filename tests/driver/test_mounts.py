@@ -61,7 +61,7 @@ def mount(mounted: Mount) -> Iterator[Mount]:
 @pytest.fixture
 def emulated(mount: Mount) -> Mount:
     if not mount.emulated:
-        pytest.skip("nobody does this to a real camera")
+        pytest.skip("not possible with a real camera")
     return mount
 
 
@@ -81,7 +81,7 @@ def read_on(camera: Camera) -> None:
 
 
 def state_of(camera: Camera) -> CameraState:
-    """Ask anew: a type checker takes a property for a value that stays."""
+    """Read it again: a type checker takes a property for a constant."""
     return camera.state
 
 
@@ -234,7 +234,7 @@ def test_the_device_time_passes(camera: Camera) -> None:
     assert camera.device_time_s() > before_s
 
 
-def test_unplugging_is_told_and_replugging_resumes(emulated: Mount) -> None:
+def test_unplugging_is_reported_and_replugging_resumes(emulated: Mount) -> None:
     camera = emulated.open(sequence=QUICK)
     camera.start()
     before = read(camera)
@@ -270,7 +270,7 @@ def test_a_bad_image_loses_its_frame_alone(emulated: Mount, fault: str) -> None:
     camera = emulated.open(sequence=QUICK)
     camera.start()
     read(camera)
-    emulated.do("expect", fault, 1)
+    emulated.do("inject", fault, 1)
 
     frames = [read(camera)]
     while not frames[-1].lost_images:  # what had arrived already is delivered
@@ -283,7 +283,7 @@ def test_a_bad_image_loses_its_frame_alone(emulated: Mount, fault: str) -> None:
 
 def test_a_duplicated_image_is_passed_over(emulated: Mount) -> None:
     camera = emulated.open(sequence=QUICK)
-    emulated.do("expect", "duplicate", 4)
+    emulated.do("inject", "duplicate", 4)
     camera.start()
 
     frames = [read(camera), read(camera)]

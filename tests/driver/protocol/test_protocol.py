@@ -243,7 +243,7 @@ def test_a_sequence_on_the_grid_survives_the_wire(
     n: int,
     take_order: str,
 ) -> None:
-    asked = Sequence.from_document(
+    requested = Sequence.from_document(
         {
             "base_frequency_hz": round(base_frequency_hz * 4) / 4,
             "harmonics": harmonics,
@@ -255,9 +255,9 @@ def test_a_sequence_on_the_grid_survives_the_wire(
         }
     )
 
-    words = SequenceWords.unpack(SequenceWords.of(asked, CAPABILITIES).pack())
+    words = SequenceWords.unpack(SequenceWords.of(requested, CAPABILITIES).pack())
 
-    assert words.sequence(CAPABILITIES) == asked
+    assert words.sequence(CAPABILITIES) == requested
     assert [words.word(j) for j in range(1, harmonics + 1)] == [
         j * words.base_word for j in range(1, harmonics + 1)
     ]
@@ -343,7 +343,7 @@ def test_a_last_error_names_request_code_and_reason() -> None:
     assert unpack_last_error(packed) == ("SET_SEQUENCE", "BAD_VALUE", "takes = 0")
 
 
-def test_a_last_error_of_a_later_firmware_is_still_told() -> None:
+def test_a_last_error_of_a_later_firmware_is_still_read() -> None:
     assert unpack_last_error(b"\x63\x00\x7fwhat") == ("request 0x7f", "error 99", "what")
 
 

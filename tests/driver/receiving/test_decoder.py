@@ -122,7 +122,7 @@ def test_a_damaged_header_costs_that_packet_only(bit: int) -> None:
 
 
 @given(bit=st.integers(64 * 8, (64 + PAYLOAD_BYTES) * 8 - 1))
-def test_a_damaged_payload_is_told_and_costs_that_image_only(bit: int) -> None:
+def test_a_damaged_payload_is_reported_and_costs_that_image_only(bit: int) -> None:
     damaged = bytearray(packet(0))
     damaged[bit // 8] ^= 1 << bit % 8
 

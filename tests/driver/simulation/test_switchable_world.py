@@ -111,17 +111,17 @@ def test_a_camera_unplugged_comes_back_before_the_scene_it_was_changed_to(
 
 
 @pytest.mark.parametrize(
-    ("wanted", "field", "value"),
+    ("change", "field", "value"),
     [
         ({"effects": {"rain": "on"}}, "effects", "rain"),
         ({"effects": {"ambient": "maybe"}}, "effects.ambient", "maybe"),
     ],
 )
 def test_what_there_is_not_is_refused_by_name_and_nothing_changes(
-    simulation: Simulation, wanted: dict[str, Any], field: str, value: str
+    simulation: Simulation, change: dict[str, Any], field: str, value: str
 ) -> None:
     with pytest.raises(EffectError) as refused:
-        simulation.change(**wanted)
+        simulation.change(**change)
 
     assert (refused.value.field, refused.value.value) == (field, value)
     assert simulation.effects == {}

@@ -29,7 +29,7 @@ def main() -> None:
                 mount.replug()
             case "halt":
                 device.halt()
-            case "expect":
+            case "inject":
                 device.inject(Fault(arguments[0]), arguments[1])
             case "stall":
                 device.stall_next(arguments[0])

@@ -253,7 +253,7 @@ def test_harmonics_of_a_measured_correlation_are_those_of_its_spectrum(data_dir:
 
 
 @pytest.mark.parametrize("content", [b"", b"not numpy"])
-def test_a_waveform_that_cannot_be_read_is_told(tmp_path: Path, content: bytes) -> None:
+def test_a_waveform_that_cannot_be_read_is_reported(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "wave.npy"
     path.write_bytes(content)
 
@@ -261,7 +261,7 @@ def test_a_waveform_that_cannot_be_read_is_told(tmp_path: Path, content: bytes) 
         measured_harmonics(path)
 
 
-def test_a_waveform_of_another_kind_is_told(tmp_path: Path) -> None:
+def test_a_waveform_of_another_kind_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "wave.npy"
     np.save(path, np.ones((2, 3, 4)))
     with pytest.raises(SceneError, match="samples or more"):
@@ -300,7 +300,7 @@ def test_a_measured_pattern_is_read_and_placed_on_the_pixels(data_dir: Path) -> 
 
 
 @pytest.mark.parametrize("content", [b"", b"\x02\x00\x02\x00\x00\x00"])
-def test_a_pattern_that_cannot_be_used_is_told(tmp_path: Path, content: bytes) -> None:
+def test_a_pattern_that_cannot_be_used_is_reported(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "offsets.bin"
     path.write_bytes(content)
 

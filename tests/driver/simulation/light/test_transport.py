@@ -267,7 +267,9 @@ motion = "swing"
         load_scene(write(tmp_path, COMPOSED + mirror))
 
 
-def test_a_device_file_that_is_missing_is_told_when_the_camera_is_opened(tmp_path: Path) -> None:
+def test_a_device_file_that_is_missing_is_reported_when_the_camera_is_opened(
+    tmp_path: Path,
+) -> None:
     device = "[device]\nwaveform_file = 'absent.npy'\n"
 
     with pytest.raises(SceneError, match=r"absent.npy"):
