@@ -9,8 +9,11 @@
 (12, 120, 163)
 """
 
-from transientcam_driver.calibration.capture import capture_calibration
-from transientcam_driver.calibration.file import CalibrationCapture, CalibrationSubject
+from transientcam_driver.calibration import (
+    CalibrationCapture,
+    CalibrationSubject,
+    capture_calibration,
+)
 from transientcam_driver.camera import Camera, CameraState
 from transientcam_driver.capabilities import AppliedSequence, Capabilities
 from transientcam_driver.errors import (
@@ -36,11 +39,12 @@ from transientcam_driver.errors import (
     SequenceError,
     SpecError,
 )
+from transientcam_driver.handle import Simulation, Truth
 from transientcam_driver.opening import open_camera
 from transientcam_driver.protocol import Status
-from transientcam_driver.receiving.assembler import Counters, RawFrame
+from transientcam_driver.receiving import Counters, RawFrame
 from transientcam_driver.sequence import ImageLabel, Sequence, SubPhases
-from transientcam_driver.simulation import SceneInfo, Simulation, Truth, list_scenes
+from transientcam_driver.simulation import SceneInfo, list_scenes
 
 __all__ = [
     "AppliedSequence",

@@ -7,7 +7,6 @@ import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from enum import StrEnum
-from types import TracebackType
 
 from transientcam_driver.capabilities import IMAGE_HEADER_BYTES, AppliedSequence, Capabilities
 from transientcam_driver.clock import Clock, RealClock
@@ -23,23 +22,13 @@ from transientcam_driver.errors import (
     TransferOverflow,
     TransferStalled,
 )
-from transientcam_driver.protocol import (
-    CAPS_ROOM_BYTES,
-    LAST_ERROR_BYTES,
-    TIME_BYTES,
-    Commitment,
-    DeviceState,
-    Request,
-    SequenceWords,
-    Status,
-    unpack_capabilities,
-    unpack_last_error,
-    unpack_time,
-)
-from transientcam_driver.receiving.assembler import Counters, RawFrame
-from transientcam_driver.receiving.receiver import Incoming
+from transientcam_driver.handle import Simulation
+from transientcam_driver.protocol import Commitment, DeviceState, Request, SequenceWords, Status
+from transientcam_driver.protocol.capabilities import CAPS_ROOM_BYTES, unpack_capabilities
+from transientcam_driver.protocol.requests import LAST_ERROR_BYTES, unpack_last_error
+from transientcam_driver.protocol.status import TIME_BYTES, unpack_time
+from transientcam_driver.receiving import Counters, RawFrame, Receiver
 from transientcam_driver.sequence import Sequence
-from transientcam_driver.simulation import Simulation
 from transientcam_driver.usb import Transport
 
 READ_S = 0.1
@@ -62,9 +51,9 @@ class Camera:
     """An AMCW lidar, real or simulated, owned by this process.
 
     Methods may be called from any thread, ``read_frame`` from one at a time. Images are read on
-    the thread that calls ``read_frame``, which also keeps the heartbeat: the light burns only
-    while somebody takes the frames. When nobody does for longer than the device's heartbeat, the
-    device switches itself off, and the next ``read_frame`` starts it anew.
+    the thread that calls ``read_frame``, which also sends the heartbeat: the light is on only
+    while frames are read. When none is read for longer than the device's heartbeat, the device
+    switches itself off, and the next ``read_frame`` starts it again.
 
     The light goes off with ``stop``, ``safe_off`` and ``close``, when the object is collected or
     the interpreter ends, and by the device's own watchdog when the process dies.
@@ -74,11 +63,11 @@ class Camera:
     connect
         Finds and claims the device with a serial number, or any when it is None.
     clock
-        Time; the world's by default.
+        Real time by default.
     simulation
-        Handle on the simulated world, when there is one behind the cable.
+        The handle on a simulated camera; None for a real one.
     sequence
-        What to configure first; the default, as near as the camera comes to it, without one.
+        What to configure first; by default the nearest that the camera can do to ``Sequence()``.
     """
 
     def __init__(
@@ -95,7 +84,7 @@ class Camera:
         self.counters = Counters()
         self._control = threading.RLock()  # requests and the state
         self._reading = threading.Lock()  # held by the reader
-        self._wanted = sequence
+        self._requested = sequence
         self._resume = False
         self._closed = False
         self._heartbeat_s = -math.inf
@@ -104,11 +93,11 @@ class Camera:
         self._applied: AppliedSequence | None = None
         self._open(None)
 
-    # --- what it is and what it does -------------------------------------------------------
+    # --- state and methods -------------------------------------------------------------------
 
     @property
     def capabilities(self) -> Capabilities:
-        """The camera's own account of itself."""
+        """What the camera can do, by its own answer."""
         return self._capabilities
 
     @property
@@ -123,7 +112,7 @@ class Camera:
         return self._applied
 
     def validate(self, sequence: Sequence) -> AppliedSequence:
-        """Say what would be set, without asking the device; the epoch is 0.
+        """Return what would be set, without a request to the device; the epoch is 0.
 
         Raises
         ------
@@ -147,7 +136,7 @@ class Camera:
         self._capabilities.validate(sequence)
         with self._control:
             applied = self._configure(sequence)
-            self._wanted = sequence
+            self._requested = sequence
             return applied
 
     def start(self) -> None:
@@ -165,14 +154,14 @@ class Camera:
         self._off(Request.SAFE_OFF)
 
     def status(self) -> Status:
-        """Ask the device how it is."""
+        """Read the device's status."""
         with self._control:
-            return Status.unpack(self._ask(Request.GET_STATUS, length=Status.BYTES))
+            return Status.unpack(self._request_in(Request.GET_STATUS, length=Status.BYTES))
 
     def device_time_s(self) -> float:
-        """Ask the device for its clock: seconds since power-up."""
+        """Read the device's clock: seconds since power-up."""
         with self._control:
-            return unpack_time(self._ask(Request.GET_TIME, length=TIME_BYTES))
+            return unpack_time(self._request_in(Request.GET_TIME, length=TIME_BYTES))
 
     def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
         """Wait for the next complete frame.
@@ -180,9 +169,9 @@ class Camera:
         Raises
         ------
         FrameTimeout
-            None was complete in time; the camera goes on.
+            None was complete in time; the camera goes on capturing.
         ProtocolError
-            None was complete in time, because images have another size than the camera says.
+            None was complete in time, because images have another size than the capabilities say.
         NotStreaming
             The camera was not started, or was stopped meanwhile.
         CameraLost
@@ -194,14 +183,14 @@ class Camera:
             end_s = self._clock.now_s() + timeout_s
             while True:
                 self._keep_alive()
-                if (frame := self._incoming.take()) is not None:
+                if (frame := self._receiver.take()) is not None:
                     return frame
                 left_s = end_s - self._clock.now_s()
                 if left_s <= 0:
-                    self._incoming.require_images_of_the_size_announced()
+                    self._receiver.require_images_of_the_size_announced()
                     raise FrameTimeout(timeout_s)
                 if not self._read(min(left_s, READ_S)):
-                    self._look_after_silence()
+                    self._check_silence()
 
     def reconnect(self) -> None:
         """After CameraLost: find the same device again, restore the sequence, resume streaming.
@@ -213,14 +202,14 @@ class Camera:
         CameraNotFound
             It is still absent; try again later.
         CameraError
-            It is there but cannot be had: not yet (a node without its permissions, a second
-            unplugging), or because another program was faster.
+            It is there but cannot be opened: not yet (a node without its permissions, a second
+            unplugging), or because another program has claimed it.
         """
         with self._reading, self._control:
             self._require_open()
             if self._state is not CameraState.DISCONNECTED:
                 return
-            self._let_go()
+            self._close_transport()
             self._open(self._capabilities.serial)
             if self._resume:
                 self._start()
@@ -235,18 +224,13 @@ class Camera:
             with suppress(CameraError):  # the light of a lost camera is the watchdog's
                 self._transport.control_out(Request.SAFE_OFF)
             self._state = CameraState.DISCONNECTED
-        with self._reading:  # the device may not vanish under a reader
-            self._let_go()
+        with self._reading:  # the device must not be closed while a thread reads
+            self._close_transport()
 
     def __enter__(self) -> "Camera":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     # --- connection ------------------------------------------------------------------------
@@ -260,26 +244,27 @@ class Camera:
             raise
         self._release = weakref.finalize(self, _release, self._transport)
         try:
-            self._transport.control_out(Request.SAFE_OFF)  # whatever its last owner left
+            # usb-protocol 9: also where the last owner left the light on
+            self._transport.control_out(Request.SAFE_OFF)
             self._capabilities = unpack_capabilities(
-                self._ask(Request.GET_CAPS, length=CAPS_ROOM_BYTES)
+                self._request_in(Request.GET_CAPS, length=CAPS_ROOM_BYTES)
             )
             self._transport.expect_transfers(IMAGE_HEADER_BYTES + self._capabilities.image_bytes)
-            self._incoming = Incoming(self._capabilities, self.counters)
-            self._configure(self._wanted or self._capabilities.nearest(Sequence()))
+            self._receiver = Receiver(self._capabilities, self.counters)
+            self._configure(self._requested or self._capabilities.nearest(Sequence()))
         except BaseException:
-            self._let_go()
+            self._close_transport()
             self._state = CameraState.DISCONNECTED
             raise
         self._stalled = False
         self._state = CameraState.IDLE
 
     def _lose(self) -> None:
-        """Take note that the device is gone; a reader may still hold its handle."""
+        """Mark the device as gone; a reading thread may still use its transport."""
         self._state = CameraState.DISCONNECTED
 
-    def _let_go(self) -> None:
-        """Give the device back; nobody reads."""
+    def _close_transport(self) -> None:
+        """Give the device back; no thread may be reading."""
         self._release.detach()
         self._transport.close()
 
@@ -289,16 +274,16 @@ class Camera:
 
     # --- requests (under _control) ---------------------------------------------------------
 
-    def _ask(self, request: Request, *, value: int = 0, length: int) -> bytes:
-        with self._answering(request):
+    def _request_in(self, request: Request, *, value: int = 0, length: int) -> bytes:
+        with self._translated(request):
             return self._transport.control_in(request, value=value, length=length)
 
-    def _tell(self, request: Request, data: bytes = b"") -> None:
-        with self._answering(request):
+    def _request_out(self, request: Request, data: bytes = b"") -> None:
+        with self._translated(request):
             self._transport.control_out(request, data)
 
     @contextmanager
-    def _answering(self, request: Request) -> Iterator[None]:
+    def _translated(self, request: Request) -> Iterator[None]:
         """Around a request: a stall becomes DeviceRefused, a loss disconnects the camera."""
         self._require_open()
         if self._state is CameraState.DISCONNECTED:
@@ -313,25 +298,27 @@ class Camera:
             raise
 
     def _refusal(self, request: Request) -> DeviceRefused:
-        """Ask the device why it stalled a request."""
+        """Read why the device stalled a request (usb-protocol 7, 10.5)."""
         try:
             answer = self._transport.control_in(Request.GET_LAST_ERROR, length=LAST_ERROR_BYTES)
-        except TransferStalled:
+        except TransferStalled:  # usb-protocol 10.5
             return DeviceRefused(request.name, "NONE", "it does not say why")
         refused, code, detail = unpack_last_error(answer)
-        if refused != request.name:
+        if refused != request.name:  # usb-protocol 10.5: the reason of an earlier request
             return DeviceRefused(request.name, "NONE", "it does not say why")
         return DeviceRefused(refused, code, detail)
 
     def _configure(self, sequence: Sequence) -> AppliedSequence:
         words = SequenceWords.of(sequence, self._capabilities)
-        self._tell(Request.SET_SEQUENCE, words.pack())
-        with self._incoming.lock:
+        self._request_out(Request.SET_SEQUENCE, words.pack())  # usb-protocol 5.1: staged
+        with self._receiver.lock:
+            # usb-protocol 3.1: the new epoch is above this one, also after a power cycle
             above = 0 if self._applied is None else self._applied.epoch
             answer = Commitment.unpack(
-                self._ask(Request.COMMIT, value=above, length=Commitment.BYTES)
+                self._request_in(Request.COMMIT, value=above, length=Commitment.BYTES)
             )
             really_set = answer.words.sequence(self._capabilities)
+            # usb-protocol 8.4, 10.12
             period_s = really_set.exposure_s + self._capabilities.streaming_readout_s
             if (
                 answer.images != really_set.images
@@ -340,15 +327,15 @@ class Camera:
             ):
                 raise ProtocolError(f"COMMIT answered with {answer}")
             self._applied = self._capabilities.describe(really_set, epoch=answer.epoch)
-            self._incoming.switch(self._applied, first_image=answer.first_image)
+            self._receiver.switch(self._applied, first_image=answer.first_image)
         return self._applied
 
     def _start(self) -> None:
         self._require_open()
-        with self._incoming.lock:
-            self._tell(Request.STOP)
-            self._incoming.restart(first_image=self.status().next_image)
-            self._tell(Request.START)
+        with self._receiver.lock:
+            self._request_out(Request.STOP)  # usb-protocol 3: no image is exposed until START
+            self._receiver.restart(first_image=self.status().next_image)
+            self._request_out(Request.START)
             self._heartbeat_s = self._clock.now_s()
             self._state = CameraState.STREAMING
 
@@ -356,15 +343,15 @@ class Camera:
         with self._control:
             self._resume = False
             try:
-                self._tell(request)
+                self._request_out(request)
             except DeviceRefused:
-                self._tell(Request.SAFE_OFF)  # which is never refused
+                self._request_out(Request.SAFE_OFF)  # usb-protocol 9, 10.6: never refused
             self._state = CameraState.IDLE
 
     # --- images (under _reading) -----------------------------------------------------------
 
     def _keep_alive(self) -> None:
-        """Send the heartbeat when it is due; start anew when it was missed."""
+        """Send the heartbeat when it is due; start again when it was missed (usb-protocol 3.2)."""
         with self._control:
             self._require_open()
             if self._state is not CameraState.STREAMING:
@@ -373,9 +360,9 @@ class Camera:
                 raise NotStreaming(self._state)
             silent_s = self._clock.now_s() - self._heartbeat_s
             if silent_s >= self._capabilities.heartbeat_s:
-                self._start()  # the device is off by now, and its images are stale
+                self._start()  # the light is off by now, and images in the FIFO are old
             elif silent_s >= self._capabilities.heartbeat_s / _BEATS_PER_TIMEOUT:
-                self._tell(Request.HEARTBEAT)
+                self._request_out(Request.HEARTBEAT)
                 self._heartbeat_s = self._clock.now_s()
 
     def _read(self, timeout_s: float) -> bool:
@@ -385,22 +372,22 @@ class Camera:
         except TransferStalled:
             self._clear_stall()
             return True
-        except TransferOverflow:
-            self._incoming.resynchronise()
+        except TransferOverflow:  # usb-protocol 10.3
+            self._receiver.resynchronise()
             return True
         except CameraLost:
             with self._control:
-                self._require_open()  # closed under the reader: no loss
+                self._require_open()  # closed by another thread: no loss
                 self._lose()
             raise
         if not data:
             return False
         self._stalled = False
-        self._incoming.feed(data, host_time_s=self._clock.unix_s())
+        self._receiver.feed(data, host_time_s=self._clock.unix_s())
         return True
 
     def _clear_stall(self) -> None:
-        """Clear the halt once; a second one in a row resets the device."""
+        """Clear the halt once; a second one in a row resets the device (usb-protocol 10.2)."""
         with self._control:
             try:
                 if not self._stalled:
@@ -414,11 +401,11 @@ class Camera:
             self._lose()
             raise CameraLost("the image endpoint stalled twice; the device was reset")
 
-    def _look_after_silence(self) -> None:
-        """No image for a whole read: ask why."""
+    def _check_silence(self) -> None:
+        """Read the status after a read without an image (usb-protocol 10.1)."""
         with self._control:
             if self._state is not CameraState.STREAMING:
-                return  # stopped meanwhile; _keep_alive says so
+                return  # stopped meanwhile: _keep_alive raises
             status = self.status()
             if status.state is DeviceState.STREAMING:
                 return

@@ -1,10 +1,18 @@
-"""What a camera can do, and what it made of a sequence that was asked for."""
+"""What a camera can do, and a sequence as it applies it."""
 
 from dataclasses import dataclass, replace
 from typing import Any
 
 from transientcam_driver.errors import SequenceError
-from transientcam_driver.sequence import ImageLabel, Scheme, Sequence, SubPhases, TakeOrder, Zeroth
+from transientcam_driver.sequence import (
+    DERIVED_FIELDS,
+    ImageLabel,
+    Scheme,
+    Sequence,
+    SubPhases,
+    TakeOrder,
+    Zeroth,
+)
 
 IMAGE_HEADER_BYTES = 64
 BYTES_PER_PIXEL = 2
@@ -33,20 +41,14 @@ class AppliedSequence:
         return self.sequence.labels_at(self.low_frequency_hz)
 
     def to_document(self) -> dict[str, Any]:
-        """Return the sequence's document, what was derived from it, and ``sequence_id``."""
-        return self.sequence.to_document() | {
-            "sequence_id": self.epoch,
-            "images": self.images,
-            "capture_s": self.capture_s,
-            "frame_rate_hz": self.frame_rate_hz,
-            "unambiguous_range_m": self.unambiguous_range_m,
-            "data_rate_bytes_s": self.data_rate_bytes_s,
-        }
+        """Return the sequence's document, its derived fields, and ``sequence_id``."""
+        derived = {name: getattr(self, name) for name in DERIVED_FIELDS}
+        return self.sequence.to_document() | {"sequence_id": self.epoch} | derived
 
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """A camera's own account of itself (GET_CAPS).
+    """What a camera can do, by its answer to GET_CAPS.
 
     Frequencies are multiples of ``tuning_step_hz``, exposures of 1 ns. A single capture reads an
     image out in ``readout_s``; back-to-back frames take ``streaming_readout_s`` an image.
@@ -83,7 +85,7 @@ class Capabilities:
         return self.width * self.height * BYTES_PER_PIXEL
 
     def validate(self, sequence: Sequence) -> None:
-        """Hold a sequence against what this camera can do.
+        """Check a sequence against what this camera can do.
 
         Raises
         ------
@@ -122,7 +124,7 @@ class Capabilities:
             raise SequenceError("takes", sequence.takes, limit)
 
     def nearest(self, sequence: Sequence) -> Sequence:
-        """Return a sequence that this camera can do, as near to the one asked for as it comes."""
+        """Return the nearest sequence to the one given that this camera can do."""
         harmonics = min(sequence.harmonics, self.max_harmonics)
         highest_hz = self.frequency_hz(self.tuning_word(self.max_frequency_hz) // harmonics)
         sub_phases, schemes, zeroths = sequence.sub_phases, self.schemes, self.zeroths
@@ -143,7 +145,7 @@ class Capabilities:
         return replace(nearest, takes=min(sequence.takes, most_takes))
 
     def apply(self, sequence: Sequence, *, epoch: int = 0) -> AppliedSequence:
-        """Say what this camera makes of a sequence, without asking it."""
+        """Return a sequence as this camera would apply it, without a request to it."""
         self.validate(sequence)
         return self.describe(
             replace(
@@ -155,7 +157,7 @@ class Capabilities:
         )
 
     def describe(self, sequence: Sequence, *, epoch: int) -> AppliedSequence:
-        """Add to a sequence that is set already what follows from it."""
+        """Return a sequence that is set already, with its derived fields."""
         streaming_s = sequence.capture_s(self.streaming_readout_s)
         frame_bytes = sequence.images * (IMAGE_HEADER_BYTES + self.image_bytes)
         return AppliedSequence(

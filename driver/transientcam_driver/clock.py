@@ -1,4 +1,4 @@
-"""The time a camera lives in: real, or as fast as its images can be computed."""
+"""The clock of a camera: real time, or a virtual one as fast as images can be computed."""
 
 import threading
 import time
@@ -22,7 +22,7 @@ class Clock(Protocol):
 
 
 class RealClock:
-    """The time of the world."""
+    """Real time."""
 
     def now_s(self) -> float:
         """Monotonic time."""
@@ -38,9 +38,9 @@ class RealClock:
 
 
 class VirtualClock:
-    """Time that passes only where somebody waits for it: a simulation as fast as it computes.
+    """Time that passes only in waits: a simulation runs as fast as it computes.
 
-    One thread at a time may wait; what another does meanwhile happens at that moment.
+    One thread at a time may wait; what other threads do meanwhile takes no time.
     """
 
     def __init__(self, *, start_s: float = 0.0, unix_s: float = 0.0) -> None:
@@ -56,9 +56,9 @@ class VirtualClock:
         return self._now_s + self._offset_s
 
     def wait(self, condition: threading.Condition, timeout_s: float) -> None:
-        """Let the time pass at once."""
+        """Advance the time at once."""
         self._now_s += max(0.0, timeout_s)
 
     def sleep(self, duration_s: float) -> None:
-        """Let time pass outside of any wait."""
+        """Advance the time outside of any wait."""
         self._now_s += duration_s

@@ -9,20 +9,17 @@ from urllib.parse import parse_qsl
 from transientcam_driver.camera import Camera
 from transientcam_driver.clock import Clock, RealClock
 from transientcam_driver.errors import SpecError
+from transientcam_driver.simulation import build, find_scene, measured_scene, without_noise
 from transientcam_driver.simulation.build import (
     DEFAULT_HEIGHT,
     DEFAULT_WIDTH,
     MEASURED,
     RESOLUTIONS,
-    build,
-    find_scene,
-    measured_scene,
-    without_noise,
 )
-from transientcam_driver.simulation.device.bus import SimulatedBus
+from transientcam_driver.simulation.device import SimulatedBus
 from transientcam_driver.simulation.effects import CHOICES, EFFECTS
 from transientcam_driver.simulation.imperfections import PROFILES
-from transientcam_driver.simulation.scene.scene import Background, Scene, TimeZero
+from transientcam_driver.simulation.scene import Background, Scene, TimeZero
 from transientcam_driver.usb import open_transport
 
 DEFAULT_SPEC = "sim:mirrors"
@@ -34,7 +31,7 @@ _EFFECTS = tuple(effect.name for effect in EFFECTS if effect.optional)
 
 @dataclass(frozen=True, slots=True)
 class CameraSpec:
-    """A camera's name, taken apart.
+    """A camera's name, parsed.
 
     ``scene`` is None for a real camera, ``serial`` for a simulated one or any real one.
     """
@@ -64,26 +61,26 @@ def open_camera(spec: str = DEFAULT_SPEC, *, clock: Clock | None = None) -> Came
         ``mixed-pixels=off``; a measured one also ``background=median`` and
         ``time_zero=peak``.
     clock
-        The time a simulated camera lives in; the world's by default.
+        The clock of a simulated camera; real time by default.
 
     Raises
     ------
     SpecError
-        The name cannot be read.
+        The name is not valid.
     SceneError
-        The scene says something that cannot be.
+        The scene is not valid.
     CameraError
         The camera is absent, busy, or may not be opened.
     """
-    wanted = parse_spec(spec)
-    if wanted.scene is None:
-        return Camera(lambda serial: open_transport(serial or wanted.serial), clock=clock)
+    parsed = parse_spec(spec)
+    if parsed.scene is None:
+        return Camera(lambda serial: open_transport(serial or parsed.serial), clock=clock)
     clock = clock or RealClock()
     device, simulation = build(
-        scene_of(wanted),
-        width=wanted.width,
-        height=wanted.height,
-        seed=wanted.seed,
+        scene_of(parsed),
+        width=parsed.width,
+        height=parsed.height,
+        seed=parsed.seed,
         clock=clock,
     )
     connect = partial(open_transport, backend=SimulatedBus([device]))
@@ -91,12 +88,12 @@ def open_camera(spec: str = DEFAULT_SPEC, *, clock: Clock | None = None) -> Came
 
 
 def parse_spec(spec: str) -> CameraSpec:
-    """Take a camera's name apart.
+    """Parse a camera's name.
 
     Raises
     ------
     SpecError
-        Saying what cannot be read.
+        Naming the part that is not valid.
     """
     kind, _, rest = spec.partition(":")
     if kind == "usb":
@@ -127,28 +124,28 @@ def parse_spec(spec: str) -> CameraSpec:
     )
 
 
-def scene_of(wanted: CameraSpec) -> Scene:
-    """Load the scene of a simulated camera, changed as its name asks for.
+def scene_of(parsed: CameraSpec) -> Scene:
+    """Load the scene of a simulated camera, with the changes its name has.
 
     Raises
     ------
     SceneError
-        The scene says something that cannot be.
+        The scene is not valid.
     """
-    scene = _scene(wanted)
-    if wanted.device is not None:
-        scene = replace(scene, device=PROFILES[wanted.device])
-    if not wanted.noise:
+    scene = _scene(parsed)
+    if parsed.device is not None:
+        scene = replace(scene, device=PROFILES[parsed.device])
+    if not parsed.noise:
         scene = without_noise(scene)
-    return replace(scene, effects=scene.effects | wanted.effects)
+    return replace(scene, effects=scene.effects | parsed.effects)
 
 
-def _scene(wanted: CameraSpec) -> Scene:
-    assert wanted.scene is not None  # noqa: S101  (the caller has looked)
-    if not wanted.scene.startswith(_OF_FILE):
-        return find_scene(wanted.scene)
-    path = Path(wanted.scene.removeprefix(_OF_FILE))
-    return measured_scene(path, background=wanted.background, time_zero=wanted.time_zero)
+def _scene(parsed: CameraSpec) -> Scene:
+    assert parsed.scene is not None  # noqa: S101  (the caller has checked)
+    if not parsed.scene.startswith(_OF_FILE):
+        return find_scene(parsed.scene)
+    path = Path(parsed.scene.removeprefix(_OF_FILE))
+    return measured_scene(path, background=parsed.background, time_zero=parsed.time_zero)
 
 
 def _resolution(spec: str, options: dict[str, str]) -> tuple[int, int]:

@@ -19,17 +19,16 @@ Zeroth = Literal["low-frequency", "on-off", "estimated"]
 Scheme = Literal["arccos", "harmonic-cancellation", "none"]
 TakeOrder = Literal["sequential", "interleaved"]
 
-# What an applied sequence adds to its document; a client may send it back unchanged.
-DERIVED_FIELDS = frozenset(
-    {
-        "sequence_id",
-        "images",
-        "capture_s",
-        "frame_rate_hz",
-        "unambiguous_range_m",
-        "data_rate_bytes_s",
-    }
+DERIVED_FIELDS = (
+    "images",
+    "capture_s",
+    "frame_rate_hz",
+    "unambiguous_range_m",
+    "data_rate_bytes_s",
 )
+"""What follows from a sequence on one camera: fields of an applied one and of its document."""
+READ_ONLY_FIELDS = frozenset({"sequence_id", *DERIVED_FIELDS})
+"""What a client may send back unchanged with a sequence's document; it is ignored."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +99,7 @@ class ImageLabel:
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """The images of one transient image, as asked for: a frozen value, checked when it is made.
+    """The images of one transient image, as requested: a frozen value, checked when it is made.
 
     Attributes
     ----------
@@ -219,8 +218,8 @@ class Sequence:
     def from_document(cls, document: Mapping[str, Any]) -> "Sequence":
         """Build from a JSON document; what is absent keeps its default.
 
-        What only an applied sequence can say (``images``, ``capture_s``...) is ignored, so that
-        a document that was read can be changed and sent back.
+        What only an applied sequence has (``READ_ONLY_FIELDS``) is ignored, so that a document
+        that was read can be changed and sent back.
 
         Raises
         ------
@@ -228,7 +227,7 @@ class Sequence:
             Naming the field, its value and the limit.
         """
         known = {each.name for each in fields(cls)}
-        _known_keys("", document, known | DERIVED_FIELDS)
+        _known_keys("", document, known | READ_ONLY_FIELDS)
         given = {name: value for name, value in document.items() if name in known}
         if "sub_phases" in given:
             given["sub_phases"] = SubPhases.from_document(given["sub_phases"])

@@ -1,4 +1,4 @@
-"""The USB cable: find a camera, send it requests, read its images. The only ``import usb``.
+"""The USB transport: find a camera, send it requests, read its images.
 
 Errors of pyusb are translated in ``_translated`` and nowhere else.
 """
@@ -24,7 +24,8 @@ from transientcam_driver.errors import (
     TransferOverflow,
     TransferStalled,
 )
-from transientcam_driver.protocol import IMAGE_ENDPOINT, PRODUCT_ID, VENDOR_ID, Request
+from transientcam_driver.protocol import Request
+from transientcam_driver.protocol.requests import IMAGE_ENDPOINT, PRODUCT_ID, VENDOR_ID
 
 UDEV_RULE = (
     f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{VENDOR_ID:04x}", '
@@ -38,12 +39,12 @@ _CONTROL_TIMEOUT_MS = 1000
 _PACKET_BYTES = 1024  # of the fastest bulk endpoint; reads are multiples of it, so none overflows
 _SMALLEST_READ_BYTES = 16 * 1024
 
-# How a vanished device shows itself depends on the host controller, the kernel and the moment.
+# usb-protocol 10.7; which one depends on the host controller, the kernel and the moment
 _GONE = {errno.ENODEV, errno.EIO, errno.EPROTO, errno.ESHUTDOWN, errno.ENOENT, None}
 
 
 class Transport(Protocol):
-    """What a camera needs of its cable."""
+    """What a camera requires of its transport."""
 
     @property
     def serial(self) -> str:
@@ -51,11 +52,11 @@ class Transport(Protocol):
         ...
 
     def control_in(self, request: Request, *, value: int = 0, length: int) -> bytes:
-        """Ask the device."""
+        """Send a request and return the answer."""
         ...
 
     def control_out(self, request: Request, data: bytes = b"") -> None:
-        """Tell the device."""
+        """Send a request."""
         ...
 
     def expect_transfers(self, transfer_bytes: int) -> None:
@@ -91,7 +92,7 @@ class UsbTransport:
             usb.util.claim_interface(device, _INTERFACE)
 
     def control_in(self, request: Request, *, value: int = 0, length: int) -> bytes:
-        """Ask the device; ``value`` takes 32 bits (wValue, wIndex)."""
+        """Send a request and return the answer; ``value`` has 32 bits (wValue, wIndex)."""
         with self._translated(request.name):
             return bytes(
                 self._device.ctrl_transfer(
@@ -100,7 +101,7 @@ class UsbTransport:
             )
 
     def control_out(self, request: Request, data: bytes = b"") -> None:
-        """Tell the device."""
+        """Send a request."""
         with self._translated(request.name):
             self._device.ctrl_transfer(_VENDOR_OUT, request, 0, 0, data, _CONTROL_TIMEOUT_MS)
 
@@ -112,7 +113,7 @@ class UsbTransport:
     def read(self, *, timeout_s: float) -> memoryview:
         """Wait for the next transfer; the view is empty when the time ran out.
 
-        It shows a buffer that the next call overwrites.
+        It is a view of a buffer that the next call overwrites.
         """
         timeout_ms = max(1, round(timeout_s * 1e3))
         with self._translated("reading images"):
@@ -124,7 +125,7 @@ class UsbTransport:
                 half = len(self._buffer) // 2 // _PACKET_BYTES * _PACKET_BYTES
                 if error.errno != errno.ENOMEM or half < _SMALLEST_READ_BYTES:
                     raise
-                # usbfs_memory_mb is exhausted: ask for less at a time from now on
+                # usb-protocol 10.4: usbfs_memory_mb is exhausted; smaller reads from now on
                 self._buffer = array.array("B", bytes(half))
                 count = 0
         return memoryview(self._buffer)[:count]
@@ -140,7 +141,7 @@ class UsbTransport:
             self._device.reset()
 
     def close(self) -> None:
-        """Give the device back; a device that is gone already is no error."""
+        """Give the device back; no error if it is gone already."""
         with suppress(usb.core.USBError, NotImplementedError):
             usb.util.release_interface(self._device, _INTERFACE)
         with suppress(usb.core.USBError, NotImplementedError):
@@ -153,12 +154,12 @@ class UsbTransport:
 
 
 def open_transport(serial: str | None = None, *, backend: Any = None) -> UsbTransport:
-    """Find and claim a camera, by serial number or the first that can be had.
+    """Find and claim a camera, by serial number or the first that can be opened.
 
     Parameters
     ----------
     serial
-        Serial number of the wanted camera.
+        Serial number of the camera to open.
     backend
         A pyusb backend; the system's libusb without one.
 
@@ -174,7 +175,7 @@ def open_transport(serial: str | None = None, *, backend: Any = None) -> UsbTran
             if serial is None or found == serial:
                 return UsbTransport(device, found or "")
         except CameraLost:
-            pass  # it left while it was looked at
+            pass  # it was unplugged meanwhile
         except CameraError as error:
             trouble = error
         usb.util.dispose_resources(device)
@@ -185,7 +186,7 @@ def open_transport(serial: str | None = None, *, backend: Any = None) -> UsbTran
 class UsbCamera:
     """A camera that is plugged in.
 
-    ``serial`` and ``product`` are None, and ``problem`` says why, where it cannot be asked.
+    ``serial`` and ``product`` are None, and ``problem`` says why, where they cannot be read.
     """
 
     node: str
@@ -195,7 +196,7 @@ class UsbCamera:
 
     @property
     def spec(self) -> str:
-        """The name that opens it."""
+        """The name by which `open_camera` opens it."""
         return "usb" if self.serial is None else f"usb:{self.serial}"
 
 
@@ -205,7 +206,7 @@ def system_libusb() -> Any:
 
 
 def list_cameras(*, backend: Any = None) -> tuple[UsbCamera, ...]:
-    """Say which cameras are plugged in; none is claimed, so that none is disturbed.
+    """List the cameras that are plugged in; none is claimed, so that none is disturbed.
 
     Raises
     ------
@@ -245,7 +246,7 @@ def _node(device: Any) -> str:
 
 @contextmanager
 def _translated(action: str, node: str) -> Iterator[None]:
-    """Turn every error of pyusb into one of ours."""
+    """Translate every error of pyusb into one of `transientcam_driver.errors`."""
     try:
         yield
     except NotImplementedError as error:  # what pyusb makes of LIBUSB_ERROR_NOT_SUPPORTED

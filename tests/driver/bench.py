@@ -1,4 +1,4 @@
-"""A small camera whose images tell their own numbers, so that any mix-up shows in the pixels."""
+"""A small camera whose images hold their own numbers, so that any mix-up shows in the pixels."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from transientcam_driver import Camera, Capabilities, ImageLabel, RawFrame, Sequence
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.protocol import Request, Status, pack_capabilities
+from transientcam_driver.protocol import Request, Status
+from transientcam_driver.protocol.capabilities import pack_capabilities
 from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.simulation.device.firmware import Firmware
 from transientcam_driver.simulation.device.prototype import prototype
@@ -50,15 +51,15 @@ def number_of(image: NDArray[np.uint16]) -> int:
 
 
 class _Firmware(Firmware):
-    """A firmware that may say something else of itself than what it does."""
+    """A firmware that may announce other capabilities than it has."""
 
-    def __init__(self, *arguments: Any, told: Capabilities, **named: Any) -> None:
+    def __init__(self, *arguments: Any, announced: Capabilities, **named: Any) -> None:
         super().__init__(*arguments, **named)
-        self._told = told
+        self._announced = announced
 
     def control_in(self, request: int, value: int, index: int, *, now_s: float) -> bytes:
         if request == Request.GET_CAPS:
-            return pack_capabilities(self._told)
+            return pack_capabilities(self._announced)
         return super().control_in(request, value, index, now_s=now_s)
 
 
@@ -66,14 +67,16 @@ class Bench:
     """A small camera, its cable and its clock."""
 
     def __init__(
-        self, capabilities: Capabilities = CAPABILITIES, *, told: Capabilities | None = None
+        self, capabilities: Capabilities = CAPABILITIES, *, announced: Capabilities | None = None
     ) -> None:
-        """``told`` is what the device says of itself, if that is not the truth."""
+        """``announced`` are those in the device's answer, where they are wrong on purpose."""
         self.clock = VirtualClock(start_s=1000.0, unix_s=1.7e9)
         self.images = NumberedImages()
 
         def power_on(now_s: float) -> Firmware:
-            return _Firmware(capabilities, self.images, power_on_s=now_s, told=told or capabilities)
+            return _Firmware(
+                capabilities, self.images, power_on_s=now_s, announced=announced or capabilities
+            )
 
         self.device = EmulatedDevice(capabilities, power_on, clock=self.clock)
         self.bus = SimulatedBus([self.device])
@@ -87,7 +90,7 @@ class Bench:
 
     @property
     def lit(self) -> bool:
-        """Whether the light is on, asked behind the camera's back."""
+        """Whether the light is on, read from the device, not by the camera."""
         return self.device._firmware._status(self.clock.now_s()).light_on
 
     def status(self) -> Status:

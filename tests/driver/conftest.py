@@ -1,4 +1,4 @@
-"""Cameras on a simulated bus, in a time that passes only where somebody waits for it."""
+"""Cameras on a simulated bus, in a time that passes only in waits."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 import usb.core
 
+from tests.driver.usbfs.processes import Program, emulated_camera
 from transientcam_driver import Camera, CameraLost, CameraNotFound, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.protocol import Request, Status
@@ -14,8 +15,6 @@ from transientcam_driver.simulation.build import build, find_scene, without_nois
 from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.simulation.device.faults import Fault
 from transientcam_driver.usb import open_transport
-
-from .usbfs.processes import Program, emulated_camera
 
 
 class Mount(Protocol):
@@ -67,9 +66,9 @@ class PyusbMount:
         self._opened = ExitStack()
 
     def open(self, spec: str = "usb", sequence: Sequence | None = None) -> Camera:
-        wanted = spec.partition(":")[2] or None
+        of_spec = spec.partition(":")[2] or None
         camera = Camera(
-            lambda serial: open_transport(serial or wanted, backend=self._bus),
+            lambda serial: open_transport(serial or of_spec, backend=self._bus),
             clock=self._clock,
             sequence=sequence,
         )
@@ -94,8 +93,8 @@ class PyusbMount:
                 self._device.replug()
             case "halt", ():
                 self._device.halt()
-            case "expect", (fault, images):
-                self._device.expect(Fault(fault), images)
+            case "inject", (fault, images):
+                self._device.inject(Fault(fault), images)
             case "stall", (requests,):
                 self._device.stall_next(requests)
             case "interlock", (closed,):
@@ -156,7 +155,7 @@ class UsbfsMount:
         self._camera.do("memory", None)
         self._camera.do("unplug")
         self._camera.do("replug")
-        for _ in range(500):  # the news of the plug travels through udev's monitor
+        for _ in range(500):  # libusb is notified of the plug by udev's monitor
             try:
                 self._program.open().close()
             except (CameraNotFound, CameraLost):
@@ -170,7 +169,7 @@ class UsbfsMount:
 
 
 class RealMount:
-    """A camera that is plugged in; nobody pulls its cable."""
+    """A camera that is plugged in; its cable stays in."""
 
     emulated = False
 

@@ -24,6 +24,7 @@ from transientcam_driver import (
 )
 from transientcam_driver.clock import RealClock, VirtualClock
 from transientcam_driver.protocol import Request
+from transientcam_driver.simulation import SimulationHandle
 from transientcam_driver.simulation.build import build, find_scene
 from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.simulation.device.usb_device import EmulatedDevice
@@ -35,11 +36,12 @@ VIDEO = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.5e-3)
 
 
 def state_of(camera: Camera) -> CameraState:
-    """Ask anew: a type checker takes a property for a value that stays."""
+    """Read it again: a type checker takes a property for a constant."""
     return camera.state
 
 
 def device_of(simulation: Simulation) -> EmulatedDevice:
+    assert isinstance(simulation, SimulationHandle)
     return simulation._device
 
 
@@ -147,7 +149,7 @@ def test_safe_off_switches_the_light_off(camera: Camera) -> None:
 
 
 def light_of(simulation: Simulation) -> bool:
-    """Whether the light is on, asked behind the camera's back."""
+    """Whether the light is on, read from the device, not by the camera."""
     device = device_of(simulation)
     status = device.control(0xC0, Request.GET_STATUS, 0, 0, 64, b"")
     return bool(status[2] & 1)
@@ -175,9 +177,9 @@ def test_an_exception_switches_the_light_off(clock: VirtualClock) -> None:
             assert camera.simulation is not None
             lit.append(camera.simulation)
             camera.start()
-            raise RuntimeError("somebody else's")
+            raise RuntimeError("of the caller")
 
-    with pytest.raises(RuntimeError, match="somebody else's"):
+    with pytest.raises(RuntimeError, match="of the caller"):
         fail()
 
     assert not light_of(lit[0])
@@ -224,7 +226,7 @@ def test_the_heartbeat_keeps_the_light_on_as_long_as_frames_are_read(
     assert not status.watchdog_tripped
 
 
-def test_the_light_goes_off_when_nobody_reads_and_on_again_with_the_next_frame(
+def test_the_light_goes_off_when_frames_are_not_read_and_on_again_with_the_next_frame(
     camera: Camera, clock: VirtualClock
 ) -> None:
     camera.start()
@@ -239,7 +241,7 @@ def test_the_light_goes_off_when_nobody_reads_and_on_again_with_the_next_frame(
     assert frame.lost_images == 0
 
 
-def test_a_host_that_reads_too_late_loses_images_and_is_told(
+def test_a_host_that_reads_too_late_loses_images_and_is_reported(
     camera: Camera, clock: VirtualClock
 ) -> None:
     camera.configure(VIDEO)
@@ -403,10 +405,10 @@ def test_an_answer_that_cannot_be_is_a_protocol_error(
     camera: Camera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     transport: Any = camera._transport
-    ask = transport.control_in
+    control_in = transport.control_in
 
     def lie(request: Request, *, value: int = 0, length: int) -> bytes:
-        answer = bytes(ask(request, value=value, length=length))
+        answer = bytes(control_in(request, value=value, length=length))
         return b"\1\0\0\0" + answer[4:] if request is Request.COMMIT else answer
 
     monkeypatch.setattr(transport, "control_in", lie)
@@ -415,7 +417,7 @@ def test_an_answer_that_cannot_be_is_a_protocol_error(
         camera.configure(VIDEO)
 
 
-def test_the_device_tells_its_time(camera: Camera, clock: VirtualClock) -> None:
+def test_the_device_gives_its_time(camera: Camera, clock: VirtualClock) -> None:
     before_s = camera.device_time_s()
     clock.sleep(2.5)
 

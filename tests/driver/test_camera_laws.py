@@ -11,6 +11,7 @@ from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 from hypothesis.strategies import floats, integers, sampled_from
 
+from tests.driver.bench import Bench, number_of
 from transientcam_driver import (
     CameraFault,
     CameraLost,
@@ -23,8 +24,6 @@ from transientcam_driver import (
 )
 from transientcam_driver.receiving.assembler import FrameAssembler
 from transientcam_driver.simulation.device.faults import Fault
-
-from .bench import Bench, number_of
 
 SEQUENCES = (
     Sequence(harmonics=1, zeroth="estimated"),
@@ -80,7 +79,7 @@ class Cable(RuleBasedStateMachine):
         assert not self.device.plugged or not self.lit()
 
     def lit(self) -> bool:
-        """Ask the device itself, whatever it does to requests."""
+        """Read it from the device itself, also where requests are stalled."""
         now_s = self.bench.clock.now_s()
         self.device._firmware._advance(now_s)
         return self.device._firmware._status(now_s).light_on
@@ -168,19 +167,19 @@ class Cable(RuleBasedStateMachine):
 
     @rule(images=integers(1, 5))
     def short(self, images: int) -> None:
-        self.device.expect(Fault.SHORTEN, images)
+        self.device.inject(Fault.SHORTEN, images)
 
     @rule(images=integers(1, 5), fault=sampled_from([Fault.CORRUPT_PIXELS, Fault.CORRUPT_HEADER]))
     def corrupt(self, images: int, fault: Fault) -> None:
-        self.device.expect(fault, images)
+        self.device.inject(fault, images)
 
     @rule(images=integers(1, 5), fault=sampled_from(list(Fault)))
     def disturb(self, images: int, fault: Fault) -> None:
-        self.device.expect(fault, images)
+        self.device.inject(fault, images)
 
     @rule(duration_s=floats(0.0, 4.0))
     def delay(self, duration_s: float) -> None:
-        """Nobody reads for a while."""
+        """No frame is read for some time."""
         self.bench.clock.sleep(duration_s)
 
     @rule(duration_s=floats(0.0, 0.5))
@@ -194,7 +193,7 @@ class Cable(RuleBasedStateMachine):
     # --- what holds whatever happens ------------------------------------------------------
 
     @invariant()
-    def the_light_is_on_only_while_somebody_reads(self) -> None:
+    def the_light_is_on_only_while_frames_are_read(self) -> None:
         if self.device.plugged and self.lit():
             assert self.camera.state is CameraState.STREAMING
             silent_s = self.bench.clock.now_s() - self.camera._heartbeat_s

@@ -56,12 +56,12 @@ def test_a_lesser_camera_refuses_more(
     exposure_s=st.floats(20e-6, 50e-3),
     harmonics=st.integers(1, 32),
 )
-def test_what_is_applied_lies_on_the_grid_and_near_what_was_asked(
+def test_what_is_applied_lies_on_the_grid_and_near_what_was_requested(
     base_frequency_hz: float, exposure_s: float, harmonics: int
 ) -> None:
-    asked = Sequence(base_frequency_hz, harmonics, exposure_s=exposure_s)
+    requested = Sequence(base_frequency_hz, harmonics, exposure_s=exposure_s)
 
-    applied = CAPABILITIES.apply(asked).sequence
+    applied = CAPABILITIES.apply(requested).sequence
 
     assert (applied.base_frequency_hz / 0.25).is_integer()
     assert abs(applied.base_frequency_hz - base_frequency_hz) <= 0.125
@@ -125,9 +125,9 @@ lesser_cameras = st.builds(
 def test_the_nearest_sequence_is_one_that_the_camera_can_do(
     camera: Capabilities, base_frequency_hz: float, harmonics: int, takes: int, take_order: Any
 ) -> None:
-    asked = Sequence(base_frequency_hz, harmonics, takes=takes, take_order=take_order)
+    requested = Sequence(base_frequency_hz, harmonics, takes=takes, take_order=take_order)
 
-    nearest = camera.nearest(asked)
+    nearest = camera.nearest(requested)
 
     camera.validate(nearest)
     assert camera.nearest(nearest) == nearest

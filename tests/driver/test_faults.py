@@ -76,7 +76,7 @@ def test_without_a_fault_every_image_is_delivered(camera: Camera, read: Read) ->
 
 def test_missing_packets_are_counted(bench: Bench, camera: Camera, read: Read) -> None:
     read()
-    bench.device.expect(Fault.DROP, 3)
+    bench.device.inject(Fault.DROP, 3)
 
     frame = read()
 
@@ -86,7 +86,7 @@ def test_missing_packets_are_counted(bench: Bench, camera: Camera, read: Read) -
 
 def test_a_corrupt_header_loses_its_image_alone(bench: Bench, camera: Camera, read: Read) -> None:
     read()
-    bench.device.expect(Fault.CORRUPT_HEADER)
+    bench.device.inject(Fault.CORRUPT_HEADER)
 
     frame = read()
 
@@ -96,7 +96,7 @@ def test_a_corrupt_header_loses_its_image_alone(bench: Bench, camera: Camera, re
 
 def test_a_corrupt_payload_loses_its_image_alone(bench: Bench, camera: Camera, read: Read) -> None:
     read()
-    bench.device.expect(Fault.CORRUPT_PIXELS)
+    bench.device.inject(Fault.CORRUPT_PIXELS)
 
     frame = read()
 
@@ -106,7 +106,7 @@ def test_a_corrupt_payload_loses_its_image_alone(bench: Bench, camera: Camera, r
 
 def test_a_short_packet_loses_its_image_alone(bench: Bench, camera: Camera, read: Read) -> None:
     read()
-    bench.device.expect(Fault.SHORTEN)
+    bench.device.inject(Fault.SHORTEN)
 
     frame = read()
 
@@ -115,7 +115,7 @@ def test_a_short_packet_loses_its_image_alone(bench: Bench, camera: Camera, read
 
 
 def test_duplicated_packets_are_passed_over(bench: Bench, camera: Camera, read: Read) -> None:
-    bench.device.expect(Fault.DUPLICATE, COUNT)
+    bench.device.inject(Fault.DUPLICATE, COUNT)
 
     frames = [read(), read()]
 
@@ -126,7 +126,7 @@ def test_duplicated_packets_are_passed_over(bench: Bench, camera: Camera, read: 
 
 def test_reordered_packets_never_mix_images(bench: Bench, camera: Camera, read: Read) -> None:
     read()
-    bench.device.expect(Fault.SWAP)
+    bench.device.inject(Fault.SWAP)
 
     frame = read()
 
@@ -136,7 +136,7 @@ def test_reordered_packets_never_mix_images(bench: Bench, camera: Camera, read: 
 
 def test_babble_loses_its_image_alone(bench: Bench, camera: Camera, read: Read) -> None:
     read()
-    bench.device.expect(Fault.BABBLE)
+    bench.device.inject(Fault.BABBLE)
 
     frame = read()
 
@@ -219,7 +219,7 @@ def test_a_device_silent_for_too_long_is_a_timeout(bench: Bench, camera: Camera)
     assert camera.state == "streaming"
 
 
-def test_an_opened_interlock_is_told(bench: Bench, camera: Camera, read: Read) -> None:
+def test_an_opened_interlock_is_reported(bench: Bench, camera: Camera, read: Read) -> None:
     read()
     bench.device.set_interlock(closed=False)
 
@@ -269,7 +269,7 @@ def test_no_memory_at_all_is_an_error_of_the_camera(
 
 
 def test_firmware_of_another_protocol_is_refused_and_left_dark() -> None:
-    bench = Bench(told=replace(CAPABILITIES, protocol_version=0))
+    bench = Bench(announced=replace(CAPABILITIES, protocol_version=0))
 
     with pytest.raises(FirmwareTooOld, match="version 0 found, version 1 needed"):
         bench.open()
@@ -280,7 +280,7 @@ def test_firmware_of_another_protocol_is_refused_and_left_dark() -> None:
 
 
 def test_a_device_that_says_another_resolution_than_it_has_is_caught() -> None:
-    bench = Bench(told=replace(CAPABILITIES, width=16))
+    bench = Bench(announced=replace(CAPABILITIES, width=16))
 
     with bench.open(SEQUENCE) as camera:
         camera.start()
@@ -289,14 +289,14 @@ def test_a_device_that_says_another_resolution_than_it_has_is_caught() -> None:
 
 
 def test_a_device_that_says_another_read_out_than_it_has_is_caught() -> None:
-    bench = Bench(told=replace(CAPABILITIES, streaming_readout_s=1e-3))
+    bench = Bench(announced=replace(CAPABILITIES, streaming_readout_s=1e-3))
 
     with pytest.raises(ProtocolError, match="COMMIT answered"):
         bench.open(SEQUENCE)
 
 
 def test_a_device_that_refuses_what_it_said_it_could_is_named() -> None:
-    bench = Bench(told=replace(CAPABILITIES, max_frequency_hz=1e9))
+    bench = Bench(announced=replace(CAPABILITIES, max_frequency_hz=1e9))
 
     with bench.open(SEQUENCE) as camera:
         with pytest.raises(DeviceRefused) as caught:
@@ -319,7 +319,7 @@ def test_a_device_that_refuses_what_it_said_it_could_is_named() -> None:
 )
 def test_capabilities_that_cannot_be_are_refused(lie: dict[str, Any], name: str) -> None:
     with pytest.raises(ProtocolError, match=name):
-        Bench(told=replace(CAPABILITIES, **lie)).open()
+        Bench(announced=replace(CAPABILITIES, **lie)).open()
 
 
 def test_a_camera_that_can_do_less_than_the_default_is_opened_with_what_it_can() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.driver.mounts import Mount, PyusbMount, RealMount, UsbfsMount
 from transientcam_driver import (
     Camera,
     CameraBusy,
@@ -27,8 +28,6 @@ from transientcam_driver import (
     open_camera,
 )
 from transientcam_driver.clock import VirtualClock
-
-from .mounts import Mount, PyusbMount, RealMount, UsbfsMount
 
 QUICK = Sequence(harmonics=1, zeroth="estimated", exposure_s=0.5e-3)
 READ_S = 30.0
@@ -62,7 +61,7 @@ def mount(mounted: Mount) -> Iterator[Mount]:
 @pytest.fixture
 def emulated(mount: Mount) -> Mount:
     if not mount.emulated:
-        pytest.skip("nobody does this to a real camera")
+        pytest.skip("not possible with a real camera")
     return mount
 
 
@@ -82,7 +81,7 @@ def read_on(camera: Camera) -> None:
 
 
 def state_of(camera: Camera) -> CameraState:
-    """Ask anew: a type checker takes a property for a value that stays."""
+    """Read it again: a type checker takes a property for a constant."""
     return camera.state
 
 
@@ -235,7 +234,7 @@ def test_the_device_time_passes(camera: Camera) -> None:
     assert camera.device_time_s() > before_s
 
 
-def test_unplugging_is_told_and_replugging_resumes(emulated: Mount) -> None:
+def test_unplugging_is_reported_and_replugging_resumes(emulated: Mount) -> None:
     camera = emulated.open(sequence=QUICK)
     camera.start()
     before = read(camera)
@@ -271,7 +270,7 @@ def test_a_bad_image_loses_its_frame_alone(emulated: Mount, fault: str) -> None:
     camera = emulated.open(sequence=QUICK)
     camera.start()
     read(camera)
-    emulated.do("expect", fault, 1)
+    emulated.do("inject", fault, 1)
 
     frames = [read(camera)]
     while not frames[-1].lost_images:  # what had arrived already is delivered
@@ -284,7 +283,7 @@ def test_a_bad_image_loses_its_frame_alone(emulated: Mount, fault: str) -> None:
 
 def test_a_duplicated_image_is_passed_over(emulated: Mount) -> None:
     camera = emulated.open(sequence=QUICK)
-    emulated.do("expect", "duplicate", 4)
+    emulated.do("inject", "duplicate", 4)
     camera.start()
 
     frames = [read(camera), read(camera)]

@@ -3,12 +3,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.driver.conftest import OpenCamera
 from transientcam_driver import CameraNotFound, SceneError, SpecError
 from transientcam_driver.opening import CameraSpec, open_camera, parse_spec
 from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.usb import open_transport
-
-from .conftest import OpenCamera
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,7 @@ def fail(monkeypatch: pytest.MonkeyPatch, method: str, error: Exception) -> None
     monkeypatch.setattr(SimulatedBus, method, raising)
 
 
-def test_without_permission_the_udev_rule_is_told(
+def test_without_permission_the_udev_rule_is_reported(
     bus: SimulatedBus, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fail(monkeypatch, "open_device", usb.core.USBError("Access denied", -3, errno.EACCES))
@@ -203,7 +203,7 @@ def test_usb_is_imported_in_two_places_only() -> None:
         for line in path.read_text().splitlines()
         if line.startswith(("import usb", "from usb"))
     }
-    assert importing == {"usb.py", "simulation/backend.py"}
+    assert importing == {"usb.py", "simulation/device/bus.py"}
 
 
 def test_cameras_are_listed_without_being_claimed(bus: SimulatedBus) -> None:
@@ -233,7 +233,7 @@ def test_an_empty_bus_lists_no_camera() -> None:
     assert list_cameras(backend=SimulatedBus([])) == ()
 
 
-def test_the_file_for_udev_holds_the_rule_that_the_error_tells() -> None:
+def test_the_file_for_udev_holds_the_rule_that_the_error_names() -> None:
     file = Path(__file__).parents[2] / "packaging" / Path(UDEV_RULES_FILE).name
     (rule,) = [line for line in file.read_text().splitlines() if not line.startswith("#")]
 

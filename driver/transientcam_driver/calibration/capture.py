@@ -1,4 +1,4 @@
-"""Capturing a calibration measurement with a camera.
+"""Capture of a calibration measurement with a camera.
 
 The images are taken while the light shines at the sensor through a filter and a diffusor, so that
 every pixel should measure the same at every frequency (Peters et al. 2015, Sec. 4.2).
@@ -17,25 +17,25 @@ from numpy.typing import NDArray
 from transientcam_driver.calibration.file import CalibrationCapture
 from transientcam_driver.capabilities import AppliedSequence, Capabilities
 from transientcam_driver.errors import CameraError, FrameTimeout, SequenceError
-from transientcam_driver.receiving.assembler import RawFrame
+from transientcam_driver.receiving import RawFrame
 from transientcam_driver.sequence import Sequence
 
 DEFAULT_TAKES = 40
 """Of the paper's calibration measurements."""
-_FRAME_PATIENCE = 5.0  # times as long as a frame takes, and at least:
-_LEAST_PATIENCE_S = 10.0
+_TIMEOUT_FRAMES = 5.0  # of a read, in times of a frame, and at least:
+_LEAST_TIMEOUT_S = 10.0
 _POLL_S = 0.25
 
 Averaging = Callable[[NDArray[np.uint16]], tuple[NDArray[Any], NDArray[np.bool_]]]
 """From takes of one image (takes, 1, H, W) to their mean (1, H, W), and which were kept
 (takes, 1)."""
 Progress = Callable[[int, int], None]
-"""Told how many frames are captured, of how many; several times a second, so that one who wants
-to end the measurement can raise something."""
+"""Called with the number of frames captured, and of all, several times a second; an exception that
+it raises ends the measurement."""
 
 
 class CalibratedCamera(Protocol):
-    """What a measurement needs of a camera; `Camera` has it."""
+    """What a measurement requires of a camera; `Camera` has it."""
 
     @property
     def capabilities(self) -> Capabilities:
@@ -79,23 +79,23 @@ def capture_calibration(
     """Measure with the camera's present sequence while its light shines at the sensor (Sec. 4.2).
 
     Dark images come first, with the same exposure. The sequence is then restored, and the light
-    is off, also where the measurement fails or is broken off.
+    is off, also where the measurement fails or is interrupted.
 
     Parameters
     ----------
     camera
-        Idle; nobody else reads from it meanwhile.
+        Idle; no other thread may read from it meanwhile.
     takes
-        How often each image is captured, from 2.
+        How often each image is captured, at least 2.
     average
-        How takes become one image; their mean without a better idea.
+        From the takes of an image to one; their mean by default.
     progress
-        Told after each frame, and while it waits for one.
+        Called after each frame, and while waiting for one.
 
     Raises
     ------
     SequenceError
-        For less than two takes.
+        For fewer than two takes.
     CameraError
         The camera was lost, or gives no frames.
     """
@@ -107,20 +107,20 @@ def capture_calibration(
     with_dark = "on-off" in camera.capabilities.zeroths
     total = takes * (1 + with_dark)
 
-    def tell(done: int) -> None:
+    def report(done: int) -> None:
         if progress is not None:
             progress(done, total)
 
     try:
-        dark = _dark(_frames(camera, in_the_dark, takes, tell)) if with_dark else None
-        frames = _frames(camera, single, takes, lambda done: tell(total - takes + done))
+        dark = _dark(_frames(camera, in_the_dark, takes, report)) if with_dark else None
+        frames = _frames(camera, single, takes, lambda done: report(total - takes + done))
         applied = camera.applied
     finally:
-        with suppress(CameraError):  # a lost camera's light is its own watchdog's
+        with suppress(CameraError):  # a lost camera switches its light off by its watchdog
             camera.stop()
-        with suppress(CameraError):  # and so is what it captures when it is back
+        with suppress(CameraError):  # a lost camera is configured by its reconnect
             camera.configure(before)
-    # image by image, so that the takes of a large sensor never stand in memory twice
+    # image by image, so that the takes of a large sensor are not in memory twice
     averaged = [
         average(np.stack([frame.images[k : k + 1] for frame in frames]))
         for k in range(applied.images)
@@ -141,15 +141,15 @@ def capture_calibration(
 
 
 def _frames(
-    camera: CalibratedCamera, sequence: Sequence, takes: int, tell: Callable[[int], None]
+    camera: CalibratedCamera, sequence: Sequence, takes: int, report: Callable[[int], None]
 ) -> list[RawFrame]:
     applied = camera.configure(sequence)
-    timeout_s = max(_LEAST_PATIENCE_S, _FRAME_PATIENCE / applied.frame_rate_hz)
+    timeout_s = max(_LEAST_TIMEOUT_S, _TIMEOUT_FRAMES / applied.frame_rate_hz)
     frames = []
     camera.start()
     for taken in range(takes):
-        frames.append(_frame(camera, timeout_s, partial(tell, taken)))
-        tell(taken + 1)
+        frames.append(_frame(camera, timeout_s, partial(report, taken)))
+        report(taken + 1)
     camera.stop()
     return frames
 

@@ -1,6 +1,6 @@
-"""Calibration measurements: kept in a file, good for one camera and sequence.
+"""Calibration measurements in a file, each valid for one camera and sequence.
 
-What follows from them is arithmetic, and left to others.
+The calibration itself is computed from them by others; nothing here does arithmetic.
 """
 
 import hashlib
@@ -28,7 +28,7 @@ from transientcam_driver.errors import (
 from transientcam_driver.sequence import Sequence
 
 DEVICE_FIELDS = ("serial", "width", "height")
-"""Fields of a mismatch that no other sequence makes good."""
+"""Fields of a mismatch that another sequence cannot resolve."""
 FORMAT = 1
 MAX_BYTES = 1024**3
 """Of the content of a file, unpacked."""
@@ -40,7 +40,7 @@ MAX_TEXT = 200
 
 @dataclass(frozen=True, slots=True)
 class CalibrationSubject:
-    """What a calibration measurement is good for: a camera, and what it captures."""
+    """What a calibration measurement is valid for: a camera, and a sequence."""
 
     serial: str
     width: int
@@ -51,21 +51,21 @@ class CalibrationSubject:
     def misfit(
         self, applied: AppliedSequence, capabilities: Capabilities
     ) -> CalibrationMismatch | None:
-        """Say why the measurement is not good for what a camera captures; None where it is.
+        """Return why the measurement is not valid for what a camera captures; None where it is.
 
         The number and order of takes do not matter: each image is the same in all of them.
         """
-        sequence, mine = applied.sequence, self.sequence
+        sequence, measured = applied.sequence, self.sequence
         compared: list[tuple[str, object, object]] = [
             ("serial", capabilities.serial, self.serial),
             ("width", capabilities.width, self.width),
             ("height", capabilities.height, self.height),
-            ("base_frequency_hz", sequence.base_frequency_hz, mine.base_frequency_hz),
-            ("harmonics", sequence.harmonics, mine.harmonics),
-            ("zeroth", sequence.zeroth, mine.zeroth),
-            ("exposure_s", sequence.exposure_s, mine.exposure_s),
-            ("sub_phases.scheme", sequence.sub_phases.scheme, mine.sub_phases.scheme),
-            ("sub_phases.n", sequence.sub_phases.n, mine.sub_phases.n),
+            ("base_frequency_hz", sequence.base_frequency_hz, measured.base_frequency_hz),
+            ("harmonics", sequence.harmonics, measured.harmonics),
+            ("zeroth", sequence.zeroth, measured.zeroth),
+            ("exposure_s", sequence.exposure_s, measured.exposure_s),
+            ("sub_phases.scheme", sequence.sub_phases.scheme, measured.sub_phases.scheme),
+            ("sub_phases.n", sequence.sub_phases.n, measured.sub_phases.n),
         ]
         if sequence.zeroth == "low-frequency":
             compared.append(("low_frequency_hz", applied.low_frequency_hz, self.low_frequency_hz))
@@ -77,7 +77,7 @@ class CalibrationSubject:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CalibrationCapture:
-    """The images of a calibration measurement, and what they are good for.
+    """The images of a calibration measurement, and what they are valid for.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class CalibrationCapture:
         float32 (H, W) in DN: mean and standard deviation of images without light at the same
         exposure; None where the camera cannot take any.
     notes
-        What others keep with it, as JSON has it; its id does not depend on them.
+        Further entries of the file, as JSON; its id does not depend on them.
     """
 
     images: NDArray[np.float32]
@@ -121,29 +121,29 @@ class CalibrationCapture:
         digest = hashlib.sha256(json.dumps(self._document(), sort_keys=True).encode())
         for array in self._arrays().values():
             digest.update(np.ascontiguousarray(array).tobytes())
-        # it stands in addresses and names files
+        # it is used in URLs and file names
         serial = re.sub(r"[^A-Za-z0-9-]+", "-", self.serial).strip("-")
         return f"{serial or 'camera'}-{digest.hexdigest()[:12]}"
 
     @property
     def rejected_images(self) -> int:
-        """How many images were left out of the averages."""
+        """Number of images left out of the averages."""
         return int(np.count_nonzero(~self.kept))
 
     @property
     def subject(self) -> CalibrationSubject:
-        """What this measurement is good for."""
+        """What this measurement is valid for."""
         height, width = self.images.shape[1:]
         return CalibrationSubject(self.serial, width, height, self.sequence, self.low_frequency_hz)
 
     def misfit(
         self, applied: AppliedSequence, capabilities: Capabilities
     ) -> CalibrationMismatch | None:
-        """Say why it is not good for what a camera captures; see `CalibrationSubject.misfit`."""
+        """Return why it is not valid for a camera's sequence; see `CalibrationSubject.misfit`."""
         return self.subject.misfit(applied, capabilities)
 
     def require_fit(self, applied: AppliedSequence, capabilities: Capabilities) -> None:
-        """Refuse what this measurement is not good for.
+        """Refuse a camera or sequence that this measurement is not valid for.
 
         Raises
         ------
@@ -167,13 +167,13 @@ class CalibrationCapture:
         Raises
         ------
         CalibrationFileError
-            Naming the file, what in it is wrong, and what it should be.
+            Naming the file, the entry that is not valid, and the expected one.
         """
         try:
-            # numpy leaves a file open that it cannot make sense of
+            # numpy does not close a file that it cannot read
             with path.open("rb") as file, zipfile.ZipFile(file) as archive:
                 size = sum(member.file_size for member in archive.infolist())
-                if size > max_bytes:  # said before any of it is unpacked
+                if size > max_bytes:  # before any of it is unpacked
                     raise CalibrationFileError(
                         path, "the file", f"{size} bytes unpacked", f"at most {max_bytes}"
                     )
@@ -208,11 +208,11 @@ _UNREADABLE = (
     *(NotImplementedError, RuntimeError),  # ways to pack or encrypt that nothing here uses
     *(SyntaxError, tokenize.TokenError),  # an array's header is Python
 )
-"""What files raise that hold something else."""
+"""Exceptions of reading a file with other content."""
 
 
 def _unpacked(data: bytes) -> NDArray[Any]:
-    """Return the array in an .npy, whose header is not believed."""
+    """Return the array in an .npy; its header is checked before memory is allocated."""
     stream = io.BytesIO(data)
     read_header = {
         (1, 0): np.lib.format.read_array_header_1_0,
@@ -292,17 +292,17 @@ def _array(
     dtype: Any,
     shape: tuple[int | None, ...],
 ) -> NDArray[Any]:
-    wanted = f"{np.dtype(dtype)} of shape {tuple('any' if n is None else n for n in shape)}"
+    expected = f"{np.dtype(dtype)} of shape {tuple('any' if n is None else n for n in shape)}"
     if name not in content:
-        raise CalibrationFileError(path, name, "absent", wanted)
+        raise CalibrationFileError(path, name, "absent", expected)
     array = content[name]
     fits = array.ndim == len(shape) and all(
         length == needed or needed is None
         for length, needed in zip(array.shape, shape, strict=False)
     )
     if array.dtype != dtype or not fits or not array.size:
-        raise CalibrationFileError(path, name, f"{array.dtype} of shape {array.shape}", wanted)
-    # means and deviations of what a converter gives; a comparison with NaN is false
+        raise CalibrationFileError(path, name, f"{array.dtype} of shape {array.shape}", expected)
+    # means and deviations of a converter's codes; a comparison with NaN is false
     if not (array.min() >= 0 and array.max() <= MAX_DN):
         found = f"from {array.min()} to {array.max()}"
         raise CalibrationFileError(path, name, found, f"from 0 to {MAX_DN}")

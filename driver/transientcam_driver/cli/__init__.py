@@ -1,1 +1,1 @@
-"""Parts."""
+"""What the driver adds to the ``transientcam`` command; each module is an entry point."""

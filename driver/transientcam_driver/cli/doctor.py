@@ -1,6 +1,6 @@
-"""What ``transientcam doctor`` asks the driver: whether cameras on USB can be reached from here.
+"""Checks for ``transientcam doctor``: whether cameras on USB can be reached from this machine.
 
-Findings are tuples ``(level, check, message, remedy)``, as that verb's entry points give them.
+Findings are tuples ``(level, check, message, remedy)``, as that verb's entry points yield them.
 """
 
 import os
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from transientcam_driver.errors import UDEV_RULES_FILE, LibusbMissing
-from transientcam_driver.protocol import PRODUCT_ID, VENDOR_ID
+from transientcam_driver.protocol.requests import PRODUCT_ID, VENDOR_ID
 from transientcam_driver.usb import UDEV_RULE, UsbCamera, list_cameras, system_libusb
 
 Reported = tuple[str, str, str, str | None]
@@ -24,7 +24,7 @@ _RULE_DIRECTORIES: Final = (
     "lib/udev/rules.d",
 )
 _SEATS: Final = "73-seat-late.rules"
-"""What gives access to tagged devices; a rule that tags must come before it."""
+"""The rules that give access to tagged devices; a rule that tags must come before them."""
 _VENDOR = re.compile(rf'ATTRS?{{idVendor}}=="{VENDOR_ID:04x}"', re.IGNORECASE)
 _PRODUCT = re.compile(rf'ATTRS?{{idProduct}}=="{PRODUCT_ID:04x}"', re.IGNORECASE)
 _IN_A_CONTAINER = "in a container: -v /dev/bus/usb:/dev/bus/usb --device-cgroup-rule 'c 189:* rmw'"
@@ -33,14 +33,14 @@ _IN_A_CONTAINER = "in a container: -v /dev/bus/usb:/dev/bus/usb --device-cgroup-
 def checks(
     config: Path | None = None, *, root: Path = Path("/"), backend: Any = None
 ) -> Iterator[Reported]:
-    """Look at libusb, the device nodes, the udev rule and the cameras themselves.
+    """Check libusb, the device nodes, the udev rule and the cameras.
 
     Parameters
     ----------
     config
-        The file of settings; nothing here depends on it.
+        The file of settings; no check here depends on it.
     root
-        Where the file system begins.
+        Root of the file system.
     backend
         A pyusb backend; the system's libusb without one.
     """

@@ -1,4 +1,4 @@
-"""The verb ``explain``: what a scene and a sequence call for."""
+"""The verb ``explain``: the effects that a scene and a sequence call for."""
 
 import json
 from dataclasses import replace
@@ -10,12 +10,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from transientcam_driver.cli.options import JsonOption
 from transientcam_driver.errors import DriverError, SpecError
+from transientcam_driver.handle import ExplainedEffect, Explanation
 from transientcam_driver.opening import parse_spec, scene_of
 from transientcam_driver.sequence import Sequence
-from transientcam_driver.simulation.build import world_of
-from transientcam_driver.simulation.device.prototype import prototype
-from transientcam_driver.simulation.explain import ExplainedEffect, Explanation
+from transientcam_driver.simulation import world_of
+from transientcam_driver.simulation.device import prototype
 
 _BAD_USAGE = 2
 
@@ -42,7 +43,7 @@ def explain(
         float | None, typer.Option("--exposure-s", help="Of one image, in s.")
     ] = None,
     takes: Annotated[int | None, typer.Option("--takes", help="Takes to average.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Say which effects a scene calls for, why, how large each is, and what it costs."""
     options = {
@@ -78,18 +79,18 @@ def _document(path: Path) -> Any:
 
 
 def _explained(name: str, sequence: Sequence) -> Explanation:
-    wanted = parse_spec(name if name.startswith(("sim:", "usb")) else f"sim:{name}")
-    if wanted.scene is None:
+    parsed = parse_spec(name if name.startswith(("sim:", "usb")) else f"sim:{name}")
+    if parsed.scene is None:
         raise SpecError(name, "a real camera has no scene to explain")
-    scene = scene_of(wanted)
+    scene = scene_of(parsed)
     capabilities = prototype(
-        serial="", width=wanted.width, height=wanted.height, bits=scene.sensor.bits
+        serial="", width=parsed.width, height=parsed.height, bits=scene.sensor.bits
     )
     capabilities.validate(sequence)
     world = world_of(
         scene,
-        width=wanted.width,
-        height=wanted.height,
+        width=parsed.width,
+        height=parsed.height,
         readout_s=capabilities.streaming_readout_s,
     )
     return world.explain(scene.name, sequence)

@@ -1,23 +1,22 @@
-"""What the driver brings along for the ``transientcam`` command."""
+"""The verb ``scenes``, and the cameras that ``transientcam devices`` lists."""
 
 import json
 from dataclasses import asdict
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from transientcam_driver.cli.options import JsonOption
 from transientcam_driver.errors import LibusbMissing
 from transientcam_driver.simulation import list_scenes
 from transientcam_driver.usb import list_cameras
 
-_Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 
-
-def scenes(as_json: _Json = False) -> None:
-    """List the scenes that the simulated camera knows."""
+def scenes(as_json: JsonOption = False) -> None:
+    """List the scenes of the simulated camera."""
     infos = list_scenes()
     if as_json:
         fields = [
@@ -33,10 +32,10 @@ def scenes(as_json: _Json = False) -> None:
 
 
 def plugged_in() -> dict[str, Any]:
-    """Return what `transientcam devices` tells of this machine.
+    """Return what `transientcam devices` lists of this machine.
 
     ``cameras``: those on USB, each with the ``spec`` that opens it; ``problem``: why USB cannot be
-    asked, or None; ``simulated``: the specs of the built-in scenes.
+    used, or None; ``simulated``: the specs of the built-in scenes.
     """
     problem: str | None = None
     try:

@@ -1,4 +1,4 @@
-"""What the device can do: GET_CAPS."""
+"""Capabilities of the device: GET_CAPS (usb-protocol 4)."""
 
 import math
 import struct
@@ -17,7 +17,7 @@ _CAPS_MAGIC = b"TCCP"
 _CAPS = struct.Struct("<4sHH32s32s16sHHBBBBBBHHxxIIIIIIIIIII")
 CAPS_BYTES = _CAPS.size + 4
 CAPS_ROOM_BYTES = 512
-"""What a host asks for, so that later fields fit."""
+"""Length that a host requests, so that later fields fit (usb-protocol 3)."""
 
 
 def pack_capabilities(capabilities: Capabilities) -> bytes:
@@ -61,20 +61,20 @@ def unpack_capabilities(data: bytes) -> Capabilities:
     Raises
     ------
     FirmwareTooOld
-        The device speaks another version.
+        The device has another version of the protocol.
     ProtocolError
-        The block is damaged, or what it says cannot be.
+        The block is damaged, or a field is out of range.
     """
     if len(data) < 8 or data[:4] != _CAPS_MAGIC:
         raise ProtocolError(f"{len(data)} bytes without the mark of capabilities")
     version, length = struct.unpack_from("<HH", data, 4)
-    if version != VERSION:
+    if version != VERSION:  # usb-protocol 4: another version is another protocol
         raise FirmwareTooOld(version, VERSION)
     if length < CAPS_BYTES or len(data) < length:
         raise ProtocolError(f"capabilities of {len(data)} bytes, {max(length, CAPS_BYTES)} needed")
     if crc32c(data[: length - 4]) != struct.unpack_from("<I", data, length - 4)[0]:
         raise ProtocolError("capabilities with a wrong checksum")
-    # Later minor revisions append fields before the checksum; the known ones stay in front.
+    # usb-protocol 4: later revisions append fields before the CRC; the known ones stay in front
     (
         *_,
         model,
@@ -134,7 +134,7 @@ def unpack_capabilities(data: bytes) -> Capabilities:
 
 
 def _check_capabilities(c: Capabilities) -> None:
-    """Refuse what would divide by zero, overflow or never end further up."""
+    """Refuse values by which callers would divide by zero, overflow or loop without end."""
     ranges = (
         ("width", c.width, 1, 4096),
         ("height", c.height, 1, 4096),

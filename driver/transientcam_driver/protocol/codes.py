@@ -1,4 +1,4 @@
-"""Words of a sequence as the codes of the wire."""
+"""Choices of a sequence, in the order of their codes on the wire (usb-protocol 5.1)."""
 
 from transientcam_driver.sequence import Scheme, TakeOrder, Zeroth
 

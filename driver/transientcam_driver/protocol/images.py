@@ -1,4 +1,4 @@
-"""Image packets: the header in front of the pixels, and their checksum."""
+"""Image packets: the header in front of the pixels, and their checksums (usb-protocol 8.1)."""
 
 import struct
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class ImageFlag(IntFlag):
     FIRST_OF_FRAME = 2
     LAST_OF_FRAME = 4
     OVERFLOW = 8
-    """The device's FIFO was full just before: images are missing."""
+    """Images in front of this one were dropped, because the FIFO was full (usb-protocol 8.3)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ class ImageHeader:
 
     @classmethod
     def unpack(cls, data: bytes) -> "ImageHeader | None":
-        """Read 64 bytes; None unless they are a header, of this version and undamaged."""
+        """Read 64 bytes; None unless they are an undamaged header of this version."""
         if data[:4] != IMAGE_MAGIC or data[4] != VERSION or data[5] != IMAGE_HEADER_BYTES:
             return None
         if crc32c(data[: _HEADER.size]) != _CRC.unpack_from(data, _HEADER.size)[0]:

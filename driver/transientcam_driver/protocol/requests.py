@@ -1,4 +1,4 @@
-"""The device on the bus, its requests, and why it refuses them."""
+"""The device on the bus, its requests (usb-protocol 1, 3), and why it refused one (7)."""
 
 import struct
 from enum import IntEnum
@@ -14,7 +14,7 @@ VERSION = 1
 
 
 class Request(IntEnum):
-    """bRequest of the vendor requests to the device."""
+    """bRequest of the vendor requests to the device (usb-protocol 3)."""
 
     GET_CAPS = 0x01
     SET_SEQUENCE = 0x02
@@ -30,7 +30,7 @@ class Request(IntEnum):
 
 
 class ErrorCode(IntEnum):
-    """Why the device stalled a request."""
+    """Why the device stalled a request (usb-protocol 7)."""
 
     NONE = 0
     UNKNOWN_REQUEST = 1

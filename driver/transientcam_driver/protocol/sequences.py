@@ -1,4 +1,4 @@
-"""What the device is to capture: SET_SEQUENCE and COMMIT."""
+"""Sequences on the wire: SET_SEQUENCE and COMMIT (usb-protocol 5.1, 5.2)."""
 
 import struct
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from transientcam_driver.sequence import Sequence, SubPhases
 class SequenceWords:
     """A sequence in the integers of the hardware: payload of SET_SEQUENCE, part of COMMIT's answer.
 
-    Frequency j is ``j * base_word`` steps of the synthesiser, so ratios are exact.
+    Frequency j is ``j * base_word`` steps of the synthesiser, so that ratios are exact.
     """
 
     harmonics: int
@@ -48,12 +48,12 @@ class SequenceWords:
         )
 
     def sequence(self, capabilities: Capabilities) -> Sequence:
-        """Give the integers their meaning back.
+        """Return the sequence that these integers stand for.
 
         Raises
         ------
         ProtocolError
-            A code without a meaning.
+            An unknown code.
         SequenceError
             A field out of every range.
         """
@@ -76,7 +76,7 @@ class SequenceWords:
         )
 
     def word(self, harmonic: int) -> int:
-        """Tuning word of a harmonic; 0 asks for the one of the zeroth moment."""
+        """Tuning word of a harmonic; harmonic 0 is the zeroth moment (usb-protocol 8.1)."""
         return self.base_word * harmonic if harmonic else self.low_word
 
     def pack(self) -> bytes:

@@ -1,4 +1,4 @@
-"""How the device is: GET_STATUS and GET_TIME."""
+"""Status and clock of the device: GET_STATUS (usb-protocol 6) and GET_TIME (3)."""
 
 import struct
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from transientcam_driver.protocol.units import centidegrees, nanoseconds
 
 
 class DeviceState(IntEnum):
-    """State of the device, in GET_STATUS."""
+    """State of the device (usb-protocol 2)."""
 
     IDLE = 0
     STREAMING = 1
@@ -30,7 +30,7 @@ class StatusFlag(IntFlag):
 class Status:
     """Answer to GET_STATUS.
 
-    ``next_image`` is the sequence number of the image to come, ``dropped_images`` how many the
+    ``next_image`` is the sequence number of the next image, ``dropped_images`` the number that the
     device's FIFO had no room for since power-up.
     """
 
@@ -59,7 +59,7 @@ class Status:
 
     @property
     def watchdog_tripped(self) -> bool:
-        """Whether the light went off because no heartbeat came."""
+        """Whether the light went off because no heartbeat came (usb-protocol 3.2)."""
         return StatusFlag.WATCHDOG_TRIPPED in self.flags
 
     def pack(self) -> bytes:

@@ -9,7 +9,7 @@ def nanoseconds(time_s: float) -> int:
 
 
 def centidegrees(temperature_c: float) -> int:
-    """Temperature in 1/100 degree Celsius, as far as 16 bits reach."""
+    """Temperature in 1/100 degree Celsius, limited to int16."""
     return max(-32768, min(32767, round(temperature_c * 100)))
 
 

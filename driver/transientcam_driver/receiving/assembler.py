@@ -1,4 +1,4 @@
-"""Put the images of one transient image together, and say what is missing."""
+"""Assemble the images of one transient image, and count what is missing."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.capabilities import AppliedSequence, Capabilities
-from transientcam_driver.protocol import ImageHeader, phase_word
+from transientcam_driver.protocol import ImageHeader
+from transientcam_driver.protocol.units import phase_word
 from transientcam_driver.receiving.decoder import ImagePacket
 from transientcam_driver.sequence import ImageLabel
 
@@ -58,7 +59,7 @@ class RawFrame:
 
 @dataclass(slots=True)
 class Counters:
-    """What a camera has seen since it was opened."""
+    """Images and frames received since the camera was opened."""
 
     images: int = 0
     lost: int = 0
@@ -72,9 +73,9 @@ class Counters:
 class FrameAssembler:
     """Collect image packets of one epoch into frames.
 
-    A frame with a missing or corrupt image is dropped as a whole; the next one that is complete
-    says how many images were lost. Packets of another epoch belong to a sequence that was
-    replaced, and are left out.
+    A frame with a missing or corrupt image is dropped as a whole; the next complete one has the
+    number of images lost. Packets of another epoch belong to a sequence that was replaced, and
+    are left out.
     """
 
     def __init__(
@@ -95,18 +96,18 @@ class FrameAssembler:
         self._next_number = first_image
         self._images: NDArray[np.uint16] | None = None
         self._frame = -1
-        self._seen = 0
+        self._received = 0
         self._first_time_s = 0.0
 
     def push(self, packet: ImagePacket, *, host_time_s: float) -> RawFrame | None:
         """Take an image; return the frame it completes, if any."""
         header = packet.header
-        if header.epoch != self.epoch:
+        if header.epoch != self.epoch:  # usb-protocol 10.10
             return None
-        if not self._in_order(header):
+        if not self._in_order(header):  # usb-protocol 10.9
             self._counters.duplicates += 1
             return None
-        if not packet.intact or not self._as_labelled(header):
+        if not packet.intact or not self._as_labelled(header):  # usb-protocol 10.8, 10.10
             self._counters.corrupt += 1
             self._lost_since_delivery += 1
             self._abandon()
@@ -114,17 +115,21 @@ class FrameAssembler:
         self._counters.images += 1
         if header.index == 0:
             self._begin(header)
-        elif self._images is None or header.frame != self._frame or header.index != self._seen:
+        # usb-protocol 8.3, 10.8: an image of this frame is missing
+        elif self._images is None or header.frame != self._frame or header.index != self._received:
             self._abandon()
             return None
         assert self._images is not None  # noqa: S101  (begun above, or checked)
         pixels = np.frombuffer(packet.payload, dtype="<u2").reshape(self._shape[1:])
         self._images[header.index] = pixels
-        self._seen += 1
-        return self._finish(header, host_time_s) if self._seen == len(self._labels) else None
+        self._received += 1
+        return self._finish(header, host_time_s) if self._received == len(self._labels) else None
 
     def _in_order(self, header: ImageHeader) -> bool:
-        """Follow the sequence numbers; false for one that came before."""
+        """Count the images missing before this one; false for a number that came before.
+
+        A gap in the sequence numbers is the number of images lost (usb-protocol 8.3).
+        """
         gap = header.number - self._next_number
         if gap < 0:
             return False
@@ -134,7 +139,7 @@ class FrameAssembler:
         return True
 
     def _as_labelled(self, header: ImageHeader) -> bool:
-        """Hold what the device says it measured against what was asked of it."""
+        """Whether the header is that of the sequence's image at its index (usb-protocol 5.3)."""
         k = header.index
         return (
             header.count == len(self._labels)
@@ -154,7 +159,7 @@ class FrameAssembler:
         if self._images is not None:
             self._counters.incomplete_frames += 1
         self._images = None
-        self._seen = 0
+        self._received = 0
 
     def _finish(self, header: ImageHeader, host_time_s: float) -> RawFrame:
         assert self._images is not None  # noqa: S101  (the caller has just filled it)
@@ -170,7 +175,7 @@ class FrameAssembler:
             lost_images=self._lost_since_delivery,
         )
         self._images = None
-        self._seen = 0
+        self._received = 0
         self._lost_since_delivery = 0
         self._counters.frames += 1
         return frame

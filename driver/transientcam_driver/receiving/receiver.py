@@ -1,4 +1,4 @@
-"""What comes in over the cable: bytes to packets to frames."""
+"""From transfers to frames: bytes to packets to frames."""
 
 import threading
 from collections import deque
@@ -9,12 +9,12 @@ from transientcam_driver.receiving.assembler import Counters, FrameAssembler, Ra
 from transientcam_driver.receiving.decoder import PacketDecoder
 
 
-class Incoming:
+class Receiver:
     """Decoder and assembler of one connection, and the frames that are complete.
 
-    The reader feeds it; whoever changes the sequence or starts a run holds ``lock`` from before
-    the device knows until ``switch`` or ``restart`` has been called, so that no image is looked at
-    before its labels are known. It is never held while waiting for an image.
+    The reading thread feeds it. A thread that changes the sequence or starts a run holds ``lock``
+    from before its request until ``switch`` or ``restart`` has returned, so that no image is
+    assembled before its labels are set. The lock is never held while waiting for an image.
     """
 
     def __init__(self, capabilities: Capabilities, counters: Counters) -> None:
@@ -26,7 +26,7 @@ class Incoming:
         self._frames: deque[RawFrame] = deque()
 
     def switch(self, applied: AppliedSequence, *, first_image: int) -> None:
-        """Go on with a new sequence; frames of the one before are not delivered any more."""
+        """Go on with a new sequence; frames of the one before are not delivered after this."""
         with self.lock:
             self._assembler = FrameAssembler(applied, self._capabilities, self._counters)
             self.restart(first_image=first_image)
@@ -40,7 +40,7 @@ class Incoming:
                 self._assembler.restart(first_image)
 
     def resynchronise(self) -> None:
-        """Forget a transfer that went wrong."""
+        """Drop what was received of a failed transfer (usb-protocol 10.3)."""
         with self.lock:
             self._decoder.reset()
             self._counters.resyncs += 1
@@ -58,12 +58,12 @@ class Incoming:
             self._counters.resyncs += self._decoder.resyncs - resyncs
 
     def require_images_of_the_size_announced(self) -> None:
-        """Hold intact headers against the capabilities.
+        """Compare the length in intact headers with the capabilities (usb-protocol 10.11).
 
         Raises
         ------
         ProtocolError
-            Images of another size came in this run; they are taken for noise one by one.
+            Images of another length came in this run; one by one they are taken for noise.
         """
         odd_bytes = self._decoder.odd_payload_bytes
         if odd_bytes is not None:

@@ -8,20 +8,30 @@ import numpy as np
 
 from transientcam_driver.clock import Clock
 from transientcam_driver.errors import EffectError, SceneError
-from transientcam_driver.simulation.device.firmware import Firmware
-from transientcam_driver.simulation.device.prototype import prototype
-from transientcam_driver.simulation.device.usb_device import EmulatedDevice
+from transientcam_driver.simulation.device import EmulatedDevice, Firmware, prototype
 from transientcam_driver.simulation.effects import CHOICES, EFFECTS, NOISE
 from transientcam_driver.simulation.effects.modulation_harmonics import measured_harmonics
 from transientcam_driver.simulation.effects.pixel_pattern import read_offsets_rad
-from transientcam_driver.simulation.handle import Simulation
+from transientcam_driver.simulation.handle import SimulationHandle
 from transientcam_driver.simulation.imperfections import DeviceProfile
-from transientcam_driver.simulation.light.measured import load_responses
-from transientcam_driver.simulation.light.transport import GivenScenery, Scenery, SurfaceScenery
+from transientcam_driver.simulation.light import (
+    GivenScenery,
+    Scenery,
+    SurfaceScenery,
+    load_responses,
+)
 from transientcam_driver.simulation.responses import SparseResponses
-from transientcam_driver.simulation.scene.file import BUILT_IN, list_scenes, load_scene
-from transientcam_driver.simulation.scene.scene import Background, Diffusor, Scene, TimeZero
-from transientcam_driver.simulation.world import Outlook, World
+from transientcam_driver.simulation.scene import (
+    BUILT_IN,
+    Background,
+    Scene,
+    TimeZero,
+    list_scenes,
+    load_scene,
+)
+from transientcam_driver.simulation.scene.scene import Diffusor
+from transientcam_driver.simulation.switchable_world import SwitchableWorld
+from transientcam_driver.simulation.world import World
 
 MEASURED = "measured"
 DEFAULT_WIDTH, DEFAULT_HEIGHT = 163, 120
@@ -34,7 +44,7 @@ def find_scene(name: str) -> Scene:
     Raises
     ------
     SceneError
-        There is no such scene, or it says something that cannot be.
+        There is no such scene, or its file is not valid.
     """
     if name.endswith(".toml"):
         return load_scene(Path(name))
@@ -49,7 +59,7 @@ def find_scene(name: str) -> Scene:
 
 
 def measured_scene(path: Path, *, background: Background, time_zero: TimeZero) -> Scene:
-    """Put the built-in scene ``measured`` around one file of impulse responses."""
+    """Return the built-in scene ``measured`` with one file of impulse responses."""
     template = load_scene(BUILT_IN / f"{MEASURED}.toml")
     (response,) = template.responses
     response = replace(response, path=path, background=background, time_zero=time_zero)
@@ -57,13 +67,13 @@ def measured_scene(path: Path, *, background: Background, time_zero: TimeZero) -
 
 
 def without_noise(scene: Scene) -> Scene:
-    """Return the same scene before a sensor whose only error is the rounding to 16 bits."""
+    """Return the same scene with a sensor whose only error is the rounding to 16 bits."""
     quiet = {effect.name: "off" for effect in NOISE}
     return replace(scene, sensor=scene.sensor.ideal(), effects=scene.effects | quiet)
 
 
 def scenery_of(scene: Scene, *, width: int, height: int) -> Scenery:
-    """Prepare to compute the light of a scene, or read its impulse responses."""
+    """Prepare the light of a scene, or read its impulse responses."""
     if scene.responses:
         return GivenScenery(load_responses(scene, width=width, height=height))
     if scene.diffusor is not None:
@@ -83,12 +93,12 @@ def through_diffusor(diffusor: Diffusor, *, width: int, height: int) -> SparseRe
 def world_of(
     scene: Scene, *, width: int, height: int, seed: int | None = None, readout_s: float
 ) -> World:
-    """Put a sensor in front of a scene.
+    """Build the renderer of a scene and its sensor.
 
     Raises
     ------
     SceneError
-        A file that the scene names cannot be read, or holds something else.
+        A file that the scene names cannot be read, or has other content.
     """
     _read_device_files(scene.device)
     return World(
@@ -104,7 +114,7 @@ def world_of(
 
 
 def _read_device_files(device: DeviceProfile) -> None:
-    """Find out now what is wrong with them, rather than when a sequence is set."""
+    """Check them now, and not when a sequence is set."""
     if device.waveform is not None and device.waveform.file is not None:
         measured_harmonics(device.waveform.file)
     if device.pattern is not None and device.pattern.file is not None:
@@ -113,41 +123,41 @@ def _read_device_files(device: DeviceProfile) -> None:
 
 def build(
     scene: Scene, *, width: int, height: int, seed: int | None, clock: Clock
-) -> tuple[EmulatedDevice, Simulation]:
-    """Put a camera in front of a scene."""
+) -> tuple[EmulatedDevice, SimulationHandle]:
+    """Build a simulated camera in front of a scene: the device, and the handle on both."""
     capabilities = prototype(
-        # a specimen is the same one in front of every scene
+        # the same specimen in front of every scene
         serial=f"SIM-{scene.device.name}-{scene.device.seed}"[:32],
         width=width,
         height=height,
         bits=scene.sensor.bits,
     )
 
-    def world_before(scene: Scene) -> World:
+    def world_of_scene(scene: Scene) -> World:
         return world_of(
             scene, width=width, height=height, seed=seed, readout_s=capabilities.streaming_readout_s
         )
 
-    outlook = Outlook(world_before(scene))
+    world = SwitchableWorld(world_of_scene(scene))
 
     def power_on(now_s: float) -> Firmware:
-        return Firmware(capabilities, outlook, power_on_s=now_s)
+        return Firmware(capabilities, world, power_on_s=now_s)
 
     device = EmulatedDevice(capabilities, power_on, clock=clock)
 
     quiet = {each.name: "off" for each in NOISE if scene.effects.get(each.name) == "off"}
 
-    def staged(name: str, effects: Mapping[str, str]) -> tuple[Scene, World]:
+    def prepare(name: str, effects: Mapping[str, str]) -> tuple[Scene, World]:
         found = scene if name == scene.name else find_scene(name)
         choices = found.effects | quiet | checked_effects(effects)
         found = replace(found, sensor=scene.sensor, device=scene.device, effects=choices)
-        return found, world_before(found)
+        return found, world_of_scene(found)
 
-    return device, Simulation(scene, outlook, device, staged=staged)
+    return device, SimulationHandle(scene, world, device, prepare=prepare)
 
 
 def checked_effects(effects: Mapping[str, str]) -> dict[str, str]:
-    """Return choices of effects by name, if there are such effects and choices.
+    """Return choices of effects by name, after checking that they exist.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""What is imperfect about a make of camera, and about one specimen of it.
+"""Imperfections of a make of camera, and of one specimen of it.
 
 The figures of ``PROTOTYPE`` are those of the CamBoard nano family, on which the paper's camera is
-built, as far as they are known; the rest is chosen and says so.
+built, as far as they are known; the rest is chosen, and marked so.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from pathlib import Path
 class RollOff:
     """Amplitude of the modulation relative to that of an ideal one, over frequency.
 
-    Between the frequencies given it is interpolated, beyond them it stays what it is.
+    Interpolated between the frequencies given, constant beyond them.
     """
 
     frequency_hz: tuple[float, ...]
@@ -34,7 +34,7 @@ class Waveform:
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """What each pixel does in its own way: a delay of its clock, and a gain.
+    """Differences between pixels: a delay of the clock, and a gain.
 
     ``file`` holds phase offsets of a real board at ``file_frequency_hz``; without one the delays
     are drawn from the device's seed. ``delay_s`` and ``gain`` are standard deviations.
@@ -50,7 +50,7 @@ class Pattern:
 class Drift:
     """The device warms up after it is switched on, by ``rise_c`` in the end.
 
-    The light comes later by ``delay_s_per_c`` for each degree above the start.
+    The light is delayed by ``delay_s_per_c`` for each degree above the start.
     """
 
     rise_c: float
@@ -67,7 +67,7 @@ class Outliers:
 
 @dataclass(frozen=True, slots=True)
 class LensScatter:
-    """A share of the light goes astray in the lens, over a Gaussian of this width.
+    """A share of the light is scattered in the lens, over a Gaussian of this width.
 
     ``width`` is a standard deviation, as a share of the image's width.
     """
@@ -108,7 +108,7 @@ PROTOTYPE = DeviceProfile(
     ),
     # 10 degrees at 23 MHz, as on a real board of the same kind; the gain is chosen
     pattern=Pattern(delay_s=1.2e-9, gain=0.01),
-    # chosen: what a small camera without a fan does
+    # chosen: of a small camera without a fan
     drift=Drift(rise_c=12.0, time_constant_s=300.0, delay_s_per_c=4e-12),
     outliers=Outliers(share=0.07),  # "5-10 % of all captured images" (Sec. 6)
     lens_scatter=LensScatter(share=0.02, width=0.15),  # chosen

@@ -1,4 +1,4 @@
-"""Impulse responses of all pixels: what a scene is for the camera.
+"""Impulse responses of all pixels: the light of a scene at the camera.
 
 Brightness is relative to a white surface that faces the light at 1 m; the sensor's exposure
 turns it into digital numbers.
@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
+from transientcam_driver.handle import Response
 
 
 class Responses(Protocol):
@@ -30,14 +30,14 @@ class Responses(Protocol):
         """Delays in s, NaN where absent, and weights, 0 where absent: (K, H, W), by delay."""
         ...
 
-    def of_pixel(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def of_pixel(self, x: int, y: int) -> Response:
         """Return times in s with weights (sparse), or with the density per s (dense)."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """An exponentially modified Gaussian: what the depth of a material makes of a sharp return.
+    """An exponentially modified Gaussian: the return of light that enters a material.
 
     The convolution of a normal density of standard deviation ``width_s`` with an exponential one
     of mean ``decay_s`` (after Heide et al. 2014, as the paper's Fig. 11). Numbers, or arrays with
@@ -48,7 +48,7 @@ class Scatter:
     decay_s: Any
 
     def transfer(self, frequency_hz: float) -> Any:
-        """``int g(t) exp(2 pi i f t) dt``: what it multiplies moments by."""
+        """``int g(t) exp(2 pi i f t) dt``, the factor of moments."""
         omega = 2 * np.pi * frequency_hz
         return np.exp(-0.5 * (omega * self.width_s) ** 2) / (1 - 1j * omega * self.decay_s)
 
@@ -67,7 +67,7 @@ class Scatter:
         v = self.width_s / self.decay_s
         u = time_s / self.width_s
         decayed = np.exp(np.minimum(0.5 * v * v - v * u, 700)) * _normal_share(u - v)
-        # beyond some widths before the return the product above is 0 times infinity
+        # far before the return the product above is 0 times infinity
         return np.where(u < -8, 0.0, np.clip(_normal_share(u) - decayed, 0, 1))
 
 
@@ -79,14 +79,14 @@ def _normal_share(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class SparseResponses:
-    """A few returns a pixel: sharp ones, or as wide as the material they come from makes them.
+    """A few returns a pixel: sharp ones, or widened by the material they come from.
 
     Parameters
     ----------
     delay_s, weight
         (K, H, W) in any order; a weight of 0 means absent.
     scatter
-        What widens the returns: (H, W) all of a pixel, or (K, H, W) each by its own.
+        Width of the returns: (H, W) of all of a pixel, or (K, H, W) of each.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class SparseResponses:
 
     @property
     def kind(self) -> Literal["sparse", "dense"]:
-        """Whether the returns are all there is."""
+        """Sparse, unless a material widens returns."""
         return "sparse" if self._scatter is None else "dense"
 
     def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
@@ -123,7 +123,7 @@ class SparseResponses:
         return self._delay_s, self._weight
 
     def of_pixel(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Delays and weights of the returns that are there, or their density over equal bins."""
+        """Delays and weights of the pixel's returns, or their density over equal bins."""
         there = self._weight[:, y, x] > 0
         delay_s, weight = self._delay_s[there, y, x], self._weight[there, y, x]
         if self._scatter is None:
@@ -138,7 +138,7 @@ class SparseResponses:
 
 
 BIN_S = 5e-11
-"""Width of the bins of densities that are computed, not read."""
+"""Width of the bins of computed densities; those from files have their own."""
 
 
 def bin_edges(delay_s: NDArray[np.float64], *, tail_s: float) -> NDArray[np.float64]:
@@ -147,48 +147,3 @@ def bin_edges(delay_s: NDArray[np.float64], *, tail_s: float) -> NDArray[np.floa
     last = float(delay_s.max()) if delay_s.size else 0.0
     before, after = math.ceil(tail_s / BIN_S), math.ceil((last - first + tail_s) / BIN_S)
     return np.asarray(first + BIN_S * (np.arange(-before, after + 2) - 0.5), dtype=np.float64)
-
-
-@dataclass(frozen=True)
-class Truth:
-    """What is really there, in the units of what is measured.
-
-    Attributes
-    ----------
-    delay_s
-        (K, H, W) of each return, by delay; NaN where there is none.
-    weight
-        (K, H, W) in DN at the exposure set; 0 where there is none.
-    kind
-        "sparse": the returns are all there is. "dense": they sum up continuous responses, each
-        by its first peak and its mass.
-    """
-
-    delay_s: NDArray[np.float64]
-    weight: NDArray[np.float64]
-    kind: Literal["sparse", "dense"]
-    _responses: Responses
-    _scale_dn: float
-
-    @property
-    def range_m(self) -> NDArray[np.float64]:
-        """(H, W): half the way of the first return; NaN where no light comes back."""
-        range_m: NDArray[np.float64] = SPEED_OF_LIGHT_M_S * self.delay_s[0] / 2
-        return range_m
-
-    @property
-    def direct(self) -> NDArray[np.float64]:
-        """(H, W): weight of the first return, in DN."""
-        direct: NDArray[np.float64] = self.weight[0]
-        return direct
-
-    @property
-    def brightness(self) -> NDArray[np.float64]:
-        """(H, W): all light that comes back, in DN."""
-        total: NDArray[np.float64] = self.weight.sum(axis=0)
-        return total
-
-    def impulse_response(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return a pixel's times in s, with weights in DN (sparse) or a density in DN/s (dense)."""
-        time_s, value = self._responses.of_pixel(x, y)
-        return time_s, value * self._scale_dn

@@ -1,36 +1,31 @@
 """A scene in front of the simulated sensor: from impulse responses to images."""
 
-import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.handle import ExplainedEffect, Explanation, Truth
+from transientcam_driver.sensor import Sensor
 from transientcam_driver.sequence import ImageLabel, Sequence
-from transientcam_driver.simulation.effects import (
-    EFFECTS,
-    Call,
-    Conditions,
-    Effect,
+from transientcam_driver.simulation.effects import CALLED_ABOVE, EFFECTS, Call, Conditions, Effect
+from transientcam_driver.simulation.effects.effect import (
     Exposure,
     ImageEffect,
     LightEffect,
     LightPlanes,
-    ModulationHarmonics,
-    MotionDuringSequence,
     NormalDraw,
     PlaneEffect,
     Shot,
     ShotEffect,
     Stage,
-    ThermalDrift,
 )
-from transientcam_driver.simulation.explain import ExplainedEffect, Explanation
+from transientcam_driver.simulation.effects.modulation_harmonics import ModulationHarmonics
+from transientcam_driver.simulation.effects.motion import MotionDuringSequence
+from transientcam_driver.simulation.effects.thermal_drift import ThermalDrift
 from transientcam_driver.simulation.imperfections import IDEAL, DeviceProfile
-from transientcam_driver.simulation.light.transport import Scenery, Seen, View
-from transientcam_driver.simulation.responses import Truth
-from transientcam_driver.simulation.sensor import Sensor
+from transientcam_driver.simulation.light import Scenery, View, ViewAt
 
 _AMBIENT_C = 25.0
 
@@ -55,22 +50,22 @@ class _Quadratures:
 
 @dataclass(slots=True)
 class _Plan:
-    """What does not change between the images of a sequence.
+    """Everything that is the same for all images of a sequence.
 
-    ``looked_at`` is what was seen last, ``mean`` its brightness, and ``quadratures`` what it gives
-    at each harmonic.
+    ``view`` is that of the last image, ``mean`` its brightness, and ``quadratures`` its planes by
+    harmonic.
     """
 
     sequence: Sequence
     frequencies_hz: dict[int, float]
     conditions: Conditions
-    view: View
+    view_at: ViewAt
     per_image: bool
     waveform: ModulationHarmonics | None
     on_light: tuple[PlaneEffect, ...]
     on_shot: tuple[ShotEffect, ...]
     stages: tuple[Stage, ...]
-    looked_at: Seen | None = None
+    view: View | None = None
     mean: NDArray[np.float64] | None = None
     quadratures: dict[int, _Quadratures] = field(default_factory=dict)
 
@@ -81,17 +76,17 @@ class World:
     Parameters
     ----------
     scenery
-        What is in front of the camera.
+        The light in front of the camera.
     sensor
-        What turns electrons into numbers.
+        Turns electrons into numbers.
     electrons_per_s
         Electrons a second that a relative brightness of 1 gives a pixel.
     effects
         "auto", "on" or "off" by the effect's name.
     seed
-        Of all randomness: an image's noise depends on the seed and its sequence number only.
+        Of all randomness: the noise of an image depends on the seed and its sequence number only.
     device
-        What is imperfect about the camera.
+        Imperfections of the camera.
     ambient_electrons_per_s
         Electrons a second that other light gives a pixel that sees a white surface.
     readout_s
@@ -118,7 +113,7 @@ class World:
         self._device = device
         self._ambient_electrons_per_s = ambient_electrons_per_s
         self._readout_s = readout_s
-        self._brightness = scenery.glimpse.responses.moments(0.0).real
+        self._brightness = scenery.preview.responses.moments(0.0).real
         self._plan: _Plan | None = None
 
     @property
@@ -127,11 +122,11 @@ class World:
         return self._sensor
 
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
-        """Decide what the sequence calls for, and build that."""
+        """Build the effects that the sequence calls for."""
         if self._plan is not None and self._plan.sequence == sequence:
             return
         conditions = self.conditions(sequence)
-        built = [effect for effect in EFFECTS if self._wanted(effect, conditions)]
+        built = [effect for effect in EFFECTS if self._is_built(effect, conditions)]
         of_light = frozenset(each.name for each in built if issubclass(each, LightEffect))
         made = [effect(self._forced(effect, conditions)) for effect in built]
         self._plan = _Plan(
@@ -162,13 +157,13 @@ class World:
         return exposure.signal.astype(np.uint16)
 
     def temperature_c(self, device_time_s: float) -> float:
-        """Return that of the sensor, which warms up if it drifts."""
+        """Temperature of the sensor, which rises where thermal drift is built."""
         effects = self._plan.on_shot if self._plan is not None else ()
         rises_c = [each.rise_c(device_time_s) for each in effects if isinstance(each, ThermalDrift)]
         return _AMBIENT_C + sum(rises_c)
 
     def conditions(self, sequence: Sequence) -> Conditions:
-        """Return what effects are judged by."""
+        """Conditions by which effects are judged."""
         scale_e = self._electrons_per_s * sequence.exposure_s
         lit = self._brightness[self._brightness > 0]
         white_e = self._ambient_electrons_per_s * sequence.exposure_s
@@ -179,7 +174,7 @@ class World:
             pixels=self._brightness.size,
             brightest_e=float(self._brightness.max(initial=0.0)) * scale_e,
             ambient_white_e=white_e,
-            ambient_e=white_e * float(np.mean(self._scenery.glimpse.reflectance)),
+            ambient_e=white_e * float(np.mean(self._scenery.preview.reflectance)),
             image_period_s=sequence.exposure_s + self._readout_s,
             device=self._device,
             facts=self._scenery.facts,
@@ -187,14 +182,14 @@ class World:
         )
 
     def calls(self, sequence: Sequence) -> dict[str, Call]:
-        """Ask each effect what it says of this scene and a sequence."""
+        """Judge each effect for this scene and a sequence."""
         conditions = self.conditions(sequence)
         return {
             effect.name: effect.called_for(self._forced(effect, conditions)) for effect in EFFECTS
         }
 
     def explain(self, scene: str, sequence: Sequence | None = None) -> Explanation:
-        """Say what a sequence calls for, by default the one that is set."""
+        """Explain what a sequence calls for, by default the one that is set."""
         if sequence is None:
             sequence = self._configured().sequence
         floor_dn = self.conditions(sequence).floor_dn
@@ -212,7 +207,9 @@ class World:
                 cost_s=call.cost_s * sequence.images,
             )
             effects.append(explained)
-        return Explanation(scene, self._device.name, sequence, floor_dn, tuple(effects))
+        return Explanation(
+            scene, self._device.name, sequence, floor_dn, tuple(effects), CALLED_ABOVE
+        )
 
     def choice(self, effect: type[Effect]) -> str:
         """Return "auto", "on" or "off"."""
@@ -221,14 +218,14 @@ class World:
     def truth(self, *, device_time_s: float | None = None) -> Truth:
         """Ground truth, in DN at the exposure set; of the image that was made last."""
         plan = self._configured()
-        if device_time_s is not None or plan.looked_at is None:
-            seen = plan.view(device_time_s or 0.0)
+        if device_time_s is not None or plan.view is None:
+            view = plan.view_at(device_time_s or 0.0)
         else:
-            seen = plan.looked_at
-        responses = seen.responses
+            view = plan.view
+        responses = view.responses
         scale_dn = self._electrons_per_s * plan.sequence.exposure_s / self._sensor.gain_e_per_dn
         delay_s, weight = responses.returns()
-        return Truth(delay_s, weight * scale_dn, responses.kind, responses, scale_dn)
+        return Truth(delay_s, weight * scale_dn, responses.kind, responses.of_pixel, scale_dn)
 
     def _mean_e(self, plan: _Plan, label: ImageLabel, shot: Shot) -> NDArray[np.float32]:
         time_s = shot.device_time_s
@@ -246,110 +243,67 @@ class World:
                 phasor *= np.conj(shot.factor)
             electrons += in_phase * np.float32(phasor.real)
             electrons += quadrature * np.float32(phasor.imag)
-        # |b_j| <= b_0 holds but for rounding
+        # |b_j| <= b_0, except for rounding
         np.maximum(electrons, np.float32(0), out=electrons)
         return electrons
 
     def _quadratures(self, plan: _Plan, harmonic: int, time_s: float) -> _Quadratures:
-        """Compute what images of a harmonic are made of; anew only where the scene moves."""
-        seen = plan.view(time_s)
-        if plan.looked_at is not seen:
-            plan.looked_at = seen
-            plan.mean = seen.responses.moments(0.0).real
+        """Planes of the images of a harmonic; computed again only where the scene moves."""
+        view = plan.view_at(time_s)
+        if plan.view is not view:
+            plan.view = view
+            plan.mean = view.responses.moments(0.0).real
             plan.quadratures.clear()
-        assert plan.mean is not None  # noqa: S101  (set with looked_at)
+        assert plan.mean is not None  # noqa: S101  (set with view)
         if harmonic not in plan.quadratures:
             frequency_hz = plan.frequencies_hz[harmonic]
             plan.quadratures[harmonic] = _Quadratures.of(
-                self._planes(plan, frequency_hz, seen, plan.mean)
+                self._planes(plan, frequency_hz, view, plan.mean)
             )
         return plan.quadratures[harmonic]
 
     def _planes(
-        self, plan: _Plan, frequency_hz: float, seen: Seen, mean: NDArray[np.float64]
+        self, plan: _Plan, frequency_hz: float, view: View, mean: NDArray[np.float64]
     ) -> LightPlanes:
         scale_e = 0.5 * self._electrons_per_s * plan.sequence.exposure_s
         planes = LightPlanes(
             frequency_hz,
             np.float32(0),
-            seen.reflectance,
+            view.reflectance,
             (scale_e * mean).astype(np.float32),
         )
         if frequency_hz:
             contents = plan.waveform.harmonics(frequency_hz) if plan.waveform else {1: 1.0}
             for k, content in contents.items():
                 factor = scale_e * content * plan.conditions.sub_phase_gain(k)
-                moments = seen.responses.moments(k * frequency_hz)
+                moments = view.responses.moments(k * frequency_hz)
                 planes.terms[k] = (factor * moments).astype(np.complex64)
         for effect in plan.on_light:
             effect.on_light(planes)
         return planes
 
-    def _wanted(self, effect: type[Effect], conditions: Conditions) -> bool:
+    def _is_built(self, effect: type[Effect], conditions: Conditions) -> bool:
         choice = self.choice(effect)
         if choice == "auto":
             return effect.called_for(conditions).called
         return choice == "on"
 
     def _forced(self, effect: type[Effect], conditions: Conditions) -> Conditions:
-        """Give an effect that is forced on a device that has it."""
+        """Conditions of a device that has the imperfection of an effect that is forced on."""
         if self.choice(effect) != "on":
             return conditions
         return effect.forced_on(conditions)
 
     def _configured(self) -> _Plan:
-        assert self._plan is not None, "no sequence committed"  # noqa: S101  (the firmware's order)
+        assert self._plan is not None, "no sequence committed"  # noqa: S101  (the firmware configures first)
         return self._plan
 
 
 def _stages(effects: list[ImageEffect]) -> tuple[Stage, ...]:
-    """Put one draw behind all that add to its variance."""
+    """Insert one draw of noise behind the stages that add to its variance."""
     stages: list[Stage] = []
     for effect in effects:
         if stages and stages[-1].adds_variance and not effect.adds_variance:
             stages.append(NormalDraw())
         stages.append(effect)
     return tuple(stages)
-
-
-class Outlook:
-    """A renderer in front of whose sensor one world can take the place of another.
-
-    Attributes
-    ----------
-    world
-        The one that images are taken of.
-    """
-
-    def __init__(self, world: World) -> None:
-        self.world = world
-        self._asked: tuple[Sequence, tuple[ImageLabel, ...]] | None = None
-        self._changing = threading.Lock()
-
-    def change(self, world: World) -> None:
-        """Let images from now on be of ``world``; returns once it is prepared.
-
-        Images of the old one are taken until then. One frame may hold images of both.
-        """
-        while True:
-            asked = self._asked
-            if asked is not None:
-                world.configure(*asked)  # may take seconds
-            with self._changing:
-                if asked == self._asked:  # else it was prepared for a sequence of the past
-                    self.world = world
-                    return
-
-    def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
-        """Prepare for the images of a sequence."""
-        with self._changing:
-            self._asked = sequence, labels
-            self.world.configure(sequence, labels)
-
-    def image(self, label: ImageLabel, *, number: int, device_time_s: float) -> NDArray[np.uint16]:
-        """Expose and read one image."""
-        return self.world.image(label, number=number, device_time_s=device_time_s)
-
-    def temperature_c(self, device_time_s: float) -> float:
-        """Return that of the sensor."""
-        return self.world.temperature_c(device_time_s)

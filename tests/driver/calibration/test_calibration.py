@@ -105,20 +105,20 @@ def test_the_light_is_off_also_when_it_is_broken_off(bench: Bench, camera: Camer
     assert camera.applied.sequence == SEQUENCE
 
 
-def test_a_lost_camera_is_told(bench: Bench, camera: Camera) -> None:
+def test_a_lost_camera_is_reported(bench: Bench, camera: Camera) -> None:
     with pytest.raises(CameraLost):
         capture_calibration(camera, takes=TAKES, progress=lambda *_: bench.device.unplug())
 
 
 def test_progress_counts_every_frame(camera: Camera) -> None:
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
 
-    capture_calibration(camera, takes=TAKES, progress=lambda *each: told.append(each))
+    capture_calibration(camera, takes=TAKES, progress=lambda *each: reported.append(each))
 
-    assert told == [(done, 2 * TAKES) for done in range(1, 2 * TAKES + 1)]
+    assert reported == [(done, 2 * TAKES) for done in range(1, 2 * TAKES + 1)]
 
 
-def test_outliers_are_left_to_whoever_averages(camera: Camera) -> None:
+def test_outliers_are_left_to_the_average(camera: Camera) -> None:
     def without_the_first(takes: Any) -> Any:
         kept = np.ones(takes.shape[:2], dtype=bool)
         kept[0] = number_of(takes[0, 0]) % 2
@@ -305,20 +305,20 @@ def test_one_who_ends_it_is_heard_while_no_frame_comes(
     class Enough(Exception):  # noqa: N818 - nothing has failed
         pass
 
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
 
     def silent(camera: Camera, *, timeout_s: float) -> RawFrame:
         raise FrameTimeout(timeout_s)
 
     def lose_patience(*each: int) -> None:
-        told.append((each[0], each[1]))
-        if len(told) == 3:
+        reported.append((each[0], each[1]))
+        if len(reported) == 3:
             raise Enough
 
     monkeypatch.setattr(Camera, "read_frame", silent)
     with pytest.raises(Enough):
         capture_calibration(camera, takes=TAKES, progress=lose_patience)
-    assert told == [(0, 2 * TAKES)] * 3
+    assert reported == [(0, 2 * TAKES)] * 3
     assert camera.applied.sequence == SEQUENCE
 
 

@@ -1,4 +1,4 @@
-"""What the driver tells `transientcam doctor`, on file systems and buses made for it."""
+"""The driver's findings for `transientcam doctor`, on file systems and buses made for it."""
 
 import errno
 import os
@@ -28,7 +28,7 @@ def rule(root: Path, text: str, name: str = "60-camera.rules") -> None:
 
 @pytest.fixture
 def user(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Be somebody who needs a rule."""
+    """Run as a user that needs a rule."""
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
 
 
@@ -46,7 +46,7 @@ def test_a_machine_that_is_set_up_is_in_order(tmp_path: Path) -> None:
     assert seen["camera"][2].startswith("usb:SIM-ideal-0: ")
 
 
-def test_without_device_nodes_a_container_is_told_what_it_needs(tmp_path: Path) -> None:
+def test_without_device_nodes_a_container_is_advised(tmp_path: Path) -> None:
     level, _, message, remedy = found(tmp_path)["USB"]
 
     assert (level, message) == ("warning", "there is no /dev/bus/usb")
@@ -76,7 +76,7 @@ def test_a_rule_over_several_lines_and_in_capitals_is_a_rule(tmp_path: Path) -> 
     assert found(tmp_path)["udev rule"][0] == "ok"
 
 
-def test_a_rule_that_tags_too_late_is_told(tmp_path: Path) -> None:
+def test_a_rule_that_tags_too_late_is_reported(tmp_path: Path) -> None:
     rule(tmp_path, UDEV_RULE, "99-camera.rules")
 
     level, _, message, remedy = found(tmp_path)["udev rule"]
@@ -107,7 +107,7 @@ def test_a_camera_that_may_not_be_opened_is_a_fault_with_its_remedy(
     assert UDEV_RULE in str(remedy)
 
 
-def test_a_missing_libusb_is_told_and_looked_no_further(
+def test_a_missing_libusb_is_reported_and_looked_no_further(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(usb.backend.libusb1, "get_backend", lambda: None)

@@ -81,7 +81,7 @@ def test_a_choice_in_the_name_is_obeyed() -> None:
         (["sim:wall?ambient=maybe"], "auto, on, off"),
     ],
 )
-def test_bad_input_is_told_in_one_line(arguments: list[str], message: str) -> None:
+def test_bad_input_is_reported_in_one_line(arguments: list[str], message: str) -> None:
     result = run(*arguments)
 
     assert result.exit_code == 2

@@ -32,7 +32,7 @@ def test_scenes_are_printed_as_json() -> None:
     assert all(entry["description"] and entry["path"].endswith(".toml") for entry in listed)
 
 
-def test_what_is_plugged_in_is_told_with_the_name_that_opens_it(
+def test_what_is_plugged_in_is_listed_with_the_name_that_opens_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(scenes, "list_cameras", lambda: (UsbCamera("/dev/x", "A-17", "lidar"),))
@@ -52,7 +52,7 @@ def test_what_is_plugged_in_is_told_with_the_name_that_opens_it(
     }
 
 
-def test_a_missing_libusb_is_told_beside_the_simulated_cameras(
+def test_a_missing_libusb_is_listed_beside_the_simulated_cameras(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def missing() -> None:
@@ -60,7 +60,7 @@ def test_a_missing_libusb_is_told_beside_the_simulated_cameras(
 
     monkeypatch.setattr(scenes, "list_cameras", missing)
 
-    told = scenes.plugged_in()
+    listed = scenes.plugged_in()
 
-    assert (told["cameras"], told["simulated"][0]) == ([], f"sim:{list_scenes()[0].name}")
-    assert "apt install" in told["problem"]
+    assert (listed["cameras"], listed["simulated"][0]) == ([], f"sim:{list_scenes()[0].name}")
+    assert "apt install" in listed["problem"]

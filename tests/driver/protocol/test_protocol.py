@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from transientcam_driver import FirmwareTooOld, ProtocolError, Sequence, SubPhases
 from transientcam_driver.protocol import (
-    CAPS_BYTES,
     Commitment,
     DeviceState,
     ErrorCode,
@@ -18,16 +17,16 @@ from transientcam_driver.protocol import (
     Request,
     SequenceWords,
     Status,
-    StatusFlag,
-    pack_capabilities,
-    pack_last_error,
-    pack_time,
-    payload_checksum,
-    phase_word,
-    unpack_capabilities,
-    unpack_last_error,
-    unpack_time,
 )
+from transientcam_driver.protocol.capabilities import (
+    CAPS_BYTES,
+    pack_capabilities,
+    unpack_capabilities,
+)
+from transientcam_driver.protocol.images import payload_checksum
+from transientcam_driver.protocol.requests import pack_last_error, unpack_last_error
+from transientcam_driver.protocol.status import StatusFlag, pack_time, unpack_time
+from transientcam_driver.protocol.units import phase_word
 from transientcam_driver.simulation.device.prototype import prototype
 
 CAPABILITIES = prototype(serial="T-1", width=163, height=120, bits=12)
@@ -244,7 +243,7 @@ def test_a_sequence_on_the_grid_survives_the_wire(
     n: int,
     take_order: str,
 ) -> None:
-    asked = Sequence.from_document(
+    requested = Sequence.from_document(
         {
             "base_frequency_hz": round(base_frequency_hz * 4) / 4,
             "harmonics": harmonics,
@@ -256,9 +255,9 @@ def test_a_sequence_on_the_grid_survives_the_wire(
         }
     )
 
-    words = SequenceWords.unpack(SequenceWords.of(asked, CAPABILITIES).pack())
+    words = SequenceWords.unpack(SequenceWords.of(requested, CAPABILITIES).pack())
 
-    assert words.sequence(CAPABILITIES) == asked
+    assert words.sequence(CAPABILITIES) == requested
     assert [words.word(j) for j in range(1, harmonics + 1)] == [
         j * words.base_word for j in range(1, harmonics + 1)
     ]
@@ -344,7 +343,7 @@ def test_a_last_error_names_request_code_and_reason() -> None:
     assert unpack_last_error(packed) == ("SET_SEQUENCE", "BAD_VALUE", "takes = 0")
 
 
-def test_a_last_error_of_a_later_firmware_is_still_told() -> None:
+def test_a_last_error_of_a_later_firmware_is_still_read() -> None:
     assert unpack_last_error(b"\x63\x00\x7fwhat") == ("request 0x7f", "error 99", "what")
 
 

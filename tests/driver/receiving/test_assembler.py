@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from transientcam_driver import Counters, RawFrame, Sequence
-from transientcam_driver.protocol import ImageFlag, ImageHeader, phase_word
+from transientcam_driver.protocol import ImageFlag, ImageHeader
+from transientcam_driver.protocol.units import phase_word
 from transientcam_driver.receiving.assembler import FrameAssembler
 from transientcam_driver.receiving.decoder import ImagePacket
 from transientcam_driver.simulation.device.prototype import prototype
@@ -88,7 +89,7 @@ def test_times_are_the_devices_own() -> None:
 
 
 @pytest.mark.parametrize("missing", range(COUNT))
-def test_a_missing_image_drops_its_frame_and_the_next_frame_tells(missing: int) -> None:
+def test_a_missing_image_drops_its_frame_and_the_next_frame_counts_it(missing: int) -> None:
     assembly = Assembly()
 
     frames = assembly.push(*(image(k) for k in range(3 * COUNT) if k != COUNT + missing))
@@ -99,7 +100,7 @@ def test_a_missing_image_drops_its_frame_and_the_next_frame_tells(missing: int) 
 
 
 @pytest.mark.parametrize("damaged", range(COUNT))
-def test_a_corrupt_image_drops_its_frame_and_the_next_frame_tells(damaged: int) -> None:
+def test_a_corrupt_image_drops_its_frame_and_the_next_frame_counts_it(damaged: int) -> None:
     assembly = Assembly()
 
     frames = assembly.push(

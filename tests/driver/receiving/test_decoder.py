@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from transientcam_driver.protocol import ImageFlag, ImageHeader, payload_checksum
+from transientcam_driver.protocol import ImageFlag, ImageHeader
+from transientcam_driver.protocol.images import payload_checksum
 from transientcam_driver.receiving.decoder import ImagePacket, PacketDecoder
 
 PAYLOAD_BYTES = 96
@@ -58,6 +59,21 @@ def test_packets_are_found_whatever_the_read_boundaries(count: int, boundaries: 
     assert decoder.resyncs == 0
 
 
+@given(boundaries=boundaries)
+def test_pixels_stay_as_they_are_while_later_bytes_come(boundaries: list[int]) -> None:
+    data = bytearray(b"".join(packet(k) for k in range(8)))
+    decoder = PacketDecoder(payload_bytes=PAYLOAD_BYTES)
+    packets = []
+    cuts = sorted({0, len(data), *(cut % (len(data) + 1) for cut in boundaries)})
+    for start, end in pairwise(cuts):
+        read = data[start:end]
+        packets += decoder.feed(memoryview(read))
+        read[:] = bytes(len(read))  # the next read overwrites it
+    decoder.reset()
+
+    assert [found.payload for found in packets] == [bytes([k] * 96) for k in range(8)]
+
+
 @given(data=st.lists(st.binary(max_size=400) | st.just(b"TCIM")), boundaries=boundaries)
 def test_arbitrary_bytes_never_raise_and_yield_nothing(
     data: list[bytes], boundaries: list[int]
@@ -106,7 +122,7 @@ def test_a_damaged_header_costs_that_packet_only(bit: int) -> None:
 
 
 @given(bit=st.integers(64 * 8, (64 + PAYLOAD_BYTES) * 8 - 1))
-def test_a_damaged_payload_is_told_and_costs_that_image_only(bit: int) -> None:
+def test_a_damaged_payload_is_reported_and_costs_that_image_only(bit: int) -> None:
     damaged = bytearray(packet(0))
     damaged[bit // 8] ^= 1 << bit % 8
 

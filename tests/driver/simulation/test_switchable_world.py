@@ -9,7 +9,8 @@ import pytest
 from tests.driver.conftest import OpenCamera
 from transientcam_driver import Camera, CameraLost, EffectError, SceneError, Sequence, Simulation
 from transientcam_driver.sequence import ImageLabel
-from transientcam_driver.simulation.world import Outlook, World
+from transientcam_driver.simulation.switchable_world import SwitchableWorld
+from transientcam_driver.simulation.world import World
 
 
 def _simulation(camera: Camera) -> Simulation:
@@ -110,17 +111,17 @@ def test_a_camera_unplugged_comes_back_before_the_scene_it_was_changed_to(
 
 
 @pytest.mark.parametrize(
-    ("wanted", "field", "value"),
+    ("change", "field", "value"),
     [
         ({"effects": {"rain": "on"}}, "effects", "rain"),
         ({"effects": {"ambient": "maybe"}}, "effects.ambient", "maybe"),
     ],
 )
 def test_what_there_is_not_is_refused_by_name_and_nothing_changes(
-    simulation: Simulation, wanted: dict[str, Any], field: str, value: str
+    simulation: Simulation, change: dict[str, Any], field: str, value: str
 ) -> None:
     with pytest.raises(EffectError) as refused:
-        simulation.change(**wanted)
+        simulation.change(**change)
 
     assert (refused.value.field, refused.value.value) == (field, value)
     assert simulation.effects == {}
@@ -149,17 +150,17 @@ class _SlowWorld:
 def test_a_sequence_set_while_a_world_is_prepared_is_prepared_for_as_well() -> None:
     present, coming = _SlowWorld(), _SlowWorld()
     present.go_on.set()
-    outlook = Outlook(cast(World, present))
+    switchable = SwitchableWorld(cast(World, present))
     first, second = Sequence(harmonics=2), Sequence(harmonics=5)
-    outlook.configure(first, ())
-    changing = threading.Thread(target=outlook.change, args=(coming,))
+    switchable.configure(first, ())
+    changing = threading.Thread(target=switchable.change, args=(coming,))
     changing.start()
     assert coming.preparing.wait(10)
 
-    outlook.configure(second, ())
-    assert outlook.world is cast(World, present)
+    switchable.configure(second, ())
+    assert switchable.world is cast(World, present)
     coming.go_on.set()
     changing.join()
 
-    assert outlook.world is cast(World, coming)
+    assert switchable.world is cast(World, coming)
     assert coming.prepared_for == [first, second]

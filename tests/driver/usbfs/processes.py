@@ -98,9 +98,9 @@ class Program:
 
     def open(self, spec: str = "usb", sequence: Sequence | None = None) -> Camera:
         """Open a camera there, and return one that stands for it here."""
-        return cast("Camera", _RemoteCamera(self, self.ask("open", spec, sequence)))
+        return cast("Camera", _RemoteCamera(self, self.request("open", spec, sequence)))
 
-    def ask(self, *request: Any) -> Any:
+    def request(self, *request: Any) -> Any:
         """Return the answer, or raise the error that came instead of it."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
@@ -122,7 +122,7 @@ class Program:
 
 
 class _RemoteCamera:
-    """A camera in another process: methods are called and properties asked for there."""
+    """A camera in another process: methods are called and properties read there."""
 
     def __init__(self, program: Program, number: int) -> None:
         self._program = program
@@ -130,10 +130,10 @@ class _RemoteCamera:
 
     def __getattr__(self, name: str) -> Any:
         if name not in _METHODS:
-            return self._program.ask("get", self._number, name)
+            return self._program.request("get", self._number, name)
 
         def call(*positional: Any, **named: Any) -> Any:
-            return self._program.ask("call", self._number, name, positional, named)
+            return self._program.request("call", self._number, name, positional, named)
 
         return call
 

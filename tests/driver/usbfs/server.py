@@ -29,8 +29,8 @@ def main() -> None:
                 mount.replug()
             case "halt":
                 device.halt()
-            case "expect":
-                device.expect(Fault(arguments[0]), arguments[1])
+            case "inject":
+                device.inject(Fault(arguments[0]), arguments[1])
             case "stall":
                 device.stall_next(arguments[0])
             case "interlock":

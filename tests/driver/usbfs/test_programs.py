@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 
 import transientcam
-
-from .processes import EmulatedCamera, Program, emulated_camera, skip_or_fail
+from tests.driver.usbfs.processes import EmulatedCamera, Program, emulated_camera, skip_or_fail
 
 QUICK = {"harmonics": 1, "zeroth": "estimated", "exposure_s": 0.0005}
 

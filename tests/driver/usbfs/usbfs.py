@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
 
-from transientcam_driver.protocol import PRODUCT_ID, VENDOR_ID
+from transientcam_driver.protocol.requests import PRODUCT_ID, VENDOR_ID
 from transientcam_driver.simulation.device import descriptors
 from transientcam_driver.simulation.device.usb_device import (
     EmulatedDevice,
@@ -104,7 +104,7 @@ class UsbfsMount:
         self._pump.start()
 
     def unplug(self) -> None:
-        """Pull the cable: what is in flight fails, and udev tells."""
+        """Pull the cable: what is in flight fails, and udev sends an event."""
         with self.device.changed:
             self.device.unplug()
             for client in self.clients:
@@ -194,7 +194,7 @@ class UsbfsMount:
             path.symlink_to(target)
 
     def show_reapable(self, reapable: bool) -> None:
-        """Make the node writable, or not, for whoever polls it."""
+        """Make the node writable, or not, for programs that poll it."""
         if reapable and self._full:
             os.read(self._pipe, self._pipe_bytes)
         elif not reapable and not self._full:

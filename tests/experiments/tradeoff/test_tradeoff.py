@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Camera, Sequence, SequenceError, Truth, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.simulation.responses import Responses, SparseResponses
+from transientcam_driver.simulation.responses import SparseResponses
 from transientcam_experiments import commands, tradeoff
 from transientcam_experiments.tradeoff import capture, computing, estimating, transport
 from transientcam_experiments.tradeoff.records import key_of
@@ -118,7 +118,7 @@ def truth_of(delay_s: Array, weight: Array) -> Truth:
     shape = (len(delay_s), 1, 1)
     responses = SparseResponses(delay_s.reshape(shape), weight.reshape(shape))
     delays, weights = responses.returns()
-    return Truth(delays, weights, "sparse", cast(Responses, responses), 1.0)
+    return Truth(delays, weights, "sparse", responses.of_pixel, 1.0)
 
 
 def test_true_cumulative_light_steps_up_at_each_return() -> None:

@@ -1,11 +1,11 @@
-"""Mount the simulated camera as a pyusb backend.
+"""The simulated camera as a pyusb backend.
 
 ``usb.core.find(backend=...)`` finds it, and everything above pyusb is the code that drives a
-real camera. Errors carry the numbers that pyusb's libusb backend gives them.
+real camera. Errors carry the numbers of pyusb's libusb backend.
 """
 
 # pyright: reportIncompatibleMethodOverride=false
-# (pyusb's base class has no annotations; its empty methods look as if they returned None)
+# (pyusb's base class has no annotations, so that its empty methods are inferred to return None)
 
 import array
 import errno
@@ -85,7 +85,7 @@ class SimulatedBus(usb.backend.IBackend):  # type: ignore[misc]  # pyusb has no 
         """Return None: there is no hub."""
 
     def get_device_descriptor(self, dev: EmulatedDevice) -> SimpleNamespace:
-        """Device descriptor, with the place on the bus that pyusb expects beside it."""
+        """Device descriptor, with the place on the bus, which pyusb expects beside it."""
         found = _named(_DEVICE_FIELDS, "<BBHBBBBHHHBBBB", descriptors.DEVICE_DESCRIPTOR)
         found.bus, found.address = dev.bus, dev.address
         found.port_number, found.port_numbers, found.speed = 1, (1,), _HIGH_SPEED
@@ -115,28 +115,28 @@ class SimulatedBus(usb.backend.IBackend):  # type: ignore[misc]  # pyusb has no 
     # --- opening --------------------------------------------------------------------------
 
     def open_device(self, dev: EmulatedDevice) -> _Handle:
-        """Open; several programs may."""
+        """Open; several handles may be open."""
         if not dev.plugged:
             raise _no_device()
         return _Handle(dev)
 
     def close_device(self, dev_handle: _Handle) -> None:
-        """Close, and give back what was claimed."""
+        """Close, and release what was claimed."""
         for interface in tuple(dev_handle.claimed):
-            self._give_back(dev_handle, interface)
+            self._release(dev_handle, interface)
 
     def claim_interface(self, dev_handle: _Handle, intf: int) -> None:
         """Claim for one handle; EBUSY for a second."""
-        self._live(dev_handle)
+        self._require_live(dev_handle)
         key = (id(dev_handle.device), intf)
         if self._claims.setdefault(key, dev_handle) is not dev_handle:
             raise _error("Resource busy", -6, errno.EBUSY)
         dev_handle.claimed.add(intf)
 
     def release_interface(self, dev_handle: _Handle, intf: int) -> None:
-        """Give the interface back."""
-        self._give_back(dev_handle, intf)
-        self._live(dev_handle)
+        """Release the interface."""
+        self._release(dev_handle, intf)
+        self._require_live(dev_handle)
 
     def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:
         """SET_CONFIGURATION."""
@@ -152,12 +152,12 @@ class SimulatedBus(usb.backend.IBackend):  # type: ignore[misc]  # pyusb has no 
 
     def clear_halt(self, dev_handle: _Handle, ep: int) -> None:
         """Let a halted endpoint run again."""
-        self._live(dev_handle)
+        self._require_live(dev_handle)
         dev_handle.device.clear_halt()
 
     def reset_device(self, dev_handle: _Handle) -> None:
         """Reset the port."""
-        self._carry(dev_handle, dev_handle.device.reset)
+        self._translated(dev_handle, dev_handle.device.reset)
 
     def is_kernel_driver_active(self, dev_handle: _Handle, intf: int) -> bool:
         """Return false: a vendor class has no kernel driver."""
@@ -178,7 +178,7 @@ class SimulatedBus(usb.backend.IBackend):  # type: ignore[misc]  # pyusb has no 
         """Control transfer; data to the host is written into ``data``."""
         to_host = bool(bmRequestType & 0x80)
         sent = b"" if to_host else data.tobytes()
-        answer = self._carry(
+        answer = self._translated(
             dev_handle,
             lambda: dev_handle.device.control(
                 bmRequestType, bRequest, wValue, wIndex, len(data), sent
@@ -197,22 +197,22 @@ class SimulatedBus(usb.backend.IBackend):  # type: ignore[misc]  # pyusb has no 
             raise _error("Entity not found", -5, errno.ENOENT)
         view = memoryview(buff).cast("B")
         timeout_s = timeout / 1e3 if timeout else None
-        count = self._carry(
+        count = self._translated(
             dev_handle, lambda: dev_handle.device.bulk_in(view, timeout_s=timeout_s)
         )
         if count == 0:
             raise USBTimeoutError("Operation timed out", -7, errno.ETIMEDOUT)
         return count
 
-    # --- inside ---------------------------------------------------------------------------
+    # --- private --------------------------------------------------------------------------
 
     def _control(self, handle: _Handle, request_type: int, request: int, value: int) -> bytes:
-        return self._carry(
+        return self._translated(
             handle, lambda: handle.device.control(request_type, request, value, 0, 64, b"")
         )
 
-    def _carry(self, handle: _Handle, action: Callable[[], Result]) -> Result:
-        self._live(handle)
+    def _translated(self, handle: _Handle, action: Callable[[], Result]) -> Result:
+        self._require_live(handle)
         try:
             return action()
         except Stall:
@@ -222,12 +222,12 @@ class SimulatedBus(usb.backend.IBackend):  # type: ignore[misc]  # pyusb has no 
         except Unplugged:
             raise _no_device() from None
 
-    def _live(self, handle: _Handle) -> None:
-        # a handle dies with its cable, also when the camera is plugged in again
+    def _require_live(self, handle: _Handle) -> None:
+        # a handle is invalid once the cable was out, also when the camera is plugged in again
         if not handle.device.plugged or handle.address != handle.device.address:
             raise _no_device()
 
-    def _give_back(self, handle: _Handle, interface: int) -> None:
+    def _release(self, handle: _Handle, interface: int) -> None:
         handle.claimed.discard(interface)
         key = (id(handle.device), interface)
         if self._claims.get(key) is handle:
@@ -240,6 +240,6 @@ def _named(names: list[str], layout: str, data: bytes) -> SimpleNamespace:
 
 
 def _only(*indices: int) -> None:
-    """Refuse every index but 0, as pyusb wants it when it counts."""
+    """Refuse every index but 0: pyusb counts until IndexError."""
     if any(indices):
         raise IndexError(indices)

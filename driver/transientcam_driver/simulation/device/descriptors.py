@@ -5,7 +5,12 @@ The Microsoft descriptors make Windows load WinUSB without a driver file.
 
 import struct
 
-from transientcam_driver.protocol import IMAGE_ENDPOINT, PRODUCT_ID, VENDOR_CLASS, VENDOR_ID
+from transientcam_driver.protocol.requests import (
+    IMAGE_ENDPOINT,
+    PRODUCT_ID,
+    VENDOR_CLASS,
+    VENDOR_ID,
+)
 
 MAX_PACKET_BYTES = 512  # bulk endpoint at high speed
 MS_OS_20_REQUEST = 0x20

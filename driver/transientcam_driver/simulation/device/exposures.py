@@ -1,4 +1,4 @@
-"""When images are exposed, and which of them find room in the FIFO: a function of time alone."""
+"""Exposures and the FIFO behind them, as a function of time alone (usb-protocol 8.3, 8.4)."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Exposed:
-    """An image by its place in time; its pixels exist when somebody asks for them.
+    """An image by its place in time; its pixels are rendered when it is read.
 
-    ``due_s`` is when its read-out is over; ``after_overflow`` tells that images in front of it
+    ``due_s`` is when its read-out is over; ``after_overflow`` is true where images in front of it
     were dropped.
     """
 
@@ -47,8 +47,9 @@ class Exposures:
     """The shutter and the FIFO behind it.
 
     Image k of a run is exposed from ``start + k T`` and stands in the FIFO from
-    ``start + (k + 1) T``. An image that finds no room is lost with the rest of its frame; storing
-    goes on with a frame that has room, so that a host that is always too slow gets whole frames.
+    ``start + (k + 1) T`` (usb-protocol 8.4). An image without room is lost with the rest of its
+    frame; storing goes on with a frame that has room (8.3), so that a host that is always too
+    slow gets whole frames.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ class Exposures:
     def end(self) -> None:
         """Stop; what is exposed already stays in the FIFO."""
         if self._run is not None and self._run.exposed % self._run.count:
-            self.next_frame += 1  # the frame that was broken off keeps its number
+            self.next_frame += 1  # the frame that was abandoned keeps its number
         self._run = None
 
     def flush(self) -> None:
@@ -91,7 +92,7 @@ class Exposures:
         self._overflowed = False
 
     def advance(self, now_s: float) -> None:
-        """Let happen what the time up to now brings."""
+        """Advance to now: store the images exposed since the last call."""
         run = self._run
         if run is None:
             return
@@ -112,7 +113,7 @@ class Exposures:
         if run is None:
             return None
         k = run.exposed
-        if self._overflowed:  # storing goes on with the first image of a frame
+        if self._overflowed:  # usb-protocol 8.3: storing goes on with the first image of a frame
             k = -(-k // run.count) * run.count
         return run.image(k, after_overflow=self._overflowed)
 
@@ -121,6 +122,7 @@ class Exposures:
         return self._fifo.popleft() if self._fifo else None
 
     def _store(self, run: _Run, k: int) -> None:
+        # usb-protocol 8.3: room for a frame, or half the FIFO where frames are larger
         free = self._room - len(self._fifo)
         resumes = k % run.count == 0 and free >= min(run.count, self._room // 2)
         if free == 0 or (self._overflowed and not resumes):

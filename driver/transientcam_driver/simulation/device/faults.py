@@ -1,4 +1,4 @@
-"""What can happen to images and requests on their way over the cable."""
+"""Faults of image packets on the cable."""
 
 from collections import deque
 from enum import StrEnum
@@ -7,7 +7,7 @@ from transientcam_driver.capabilities import IMAGE_HEADER_BYTES
 
 
 class Fault(StrEnum):
-    """What happens to an image packet."""
+    """A fault of an image packet."""
 
     DROP = "drop"
     """It is lost."""
@@ -26,9 +26,9 @@ class Fault(StrEnum):
 
 
 class FaultyCable:
-    """Carries image packets as transfers, and lets happen to the next ones what was asked for.
+    """Carries image packets as transfers, with the faults injected into the next ones.
 
-    Faults take their turns in the order in which they were asked for.
+    Faults happen in the order in which they were injected.
     """
 
     def __init__(self) -> None:
@@ -40,12 +40,12 @@ class FaultyCable:
         """Whether a transfer waits to be read."""
         return bool(self._transfers)
 
-    def expect(self, fault: Fault, images: int) -> None:
-        """Let a fault happen to the next images that have none yet."""
+    def inject(self, fault: Fault, images: int) -> None:
+        """Inject a fault into the next images that have none yet."""
         self._pending.extend([fault] * images)
 
-    def cut(self) -> None:
-        """Forget what is on its way; faults that have not happened yet still will."""
+    def clear(self) -> None:
+        """Drop the packets on their way; faults that have not happened yet remain."""
         self._held = None
         self._transfers.clear()
 
@@ -54,7 +54,7 @@ class FaultyCable:
         return self._transfers.popleft()
 
     def carry(self, packet: bytes) -> None:
-        """Put an image packet on its way."""
+        """Send an image packet, with its fault if it has one."""
         behind, self._held = self._held, None
         match self._pending.popleft() if self._pending else None:
             case None:

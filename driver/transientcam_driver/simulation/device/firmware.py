@@ -1,6 +1,6 @@
 """The device's side of the protocol: vendor requests in, answers and image packets out.
 
-Pure: time is passed in, images come from a renderer, and nothing here knows how the bytes travel.
+Pure: time is passed in, images come from a renderer, and nothing here depends on a transport.
 """
 
 from typing import Protocol
@@ -19,19 +19,18 @@ from transientcam_driver.protocol import (
     Request,
     SequenceWords,
     Status,
-    StatusFlag,
-    pack_capabilities,
-    pack_last_error,
-    pack_time,
-    payload_checksum,
-    phase_word,
 )
+from transientcam_driver.protocol.capabilities import pack_capabilities
+from transientcam_driver.protocol.images import payload_checksum
+from transientcam_driver.protocol.requests import pack_last_error
+from transientcam_driver.protocol.status import StatusFlag, pack_time
+from transientcam_driver.protocol.units import phase_word
 from transientcam_driver.sequence import ImageLabel, Sequence
 from transientcam_driver.simulation.device.exposures import Exposed, Exposures
 
 
-class Refusal(Exception):  # noqa: N818  (a refusal is an answer of the device, not a failure)
-    """The device stalls the request; GET_LAST_ERROR tells why."""
+class Refusal(Exception):  # noqa: N818  (an answer of the device, not a failure)
+    """The device stalls the request; GET_LAST_ERROR has the reason (usb-protocol 7)."""
 
     def __init__(self, code: ErrorCode, detail: str) -> None:
         super().__init__(code, detail)
@@ -40,7 +39,7 @@ class Refusal(Exception):  # noqa: N818  (a refusal is an answer of the device, 
 
 
 class Renderer(Protocol):
-    """What the sensor sees."""
+    """What renders the images of the sensor."""
 
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
         """Prepare for the images of a sequence."""
@@ -82,7 +81,7 @@ class Firmware:
         self._ready: tuple[Exposed, bytes] | None = None  # an image rendered ahead
 
     def set_interlock(self, now_s: float, *, closed: bool) -> None:
-        """Open or close the safety interlock; opening it switches the light off."""
+        """Open or close the safety interlock; opening switches the light off (usb-protocol 9)."""
         self._advance(now_s)
         self._interlock_closed = closed
         if not closed and self._exposures.running:
@@ -112,7 +111,7 @@ class Firmware:
             raise
 
     def control_out(self, request: int, data: bytes, *, now_s: float) -> None:
-        """Obey a vendor request from host to device; raise Refusal for a stall."""
+        """Execute a vendor request from host to device; raise Refusal for a stall."""
         self._advance(now_s)
         try:
             match request:
@@ -120,11 +119,11 @@ class Firmware:
                     self._stage(data)
                 case Request.START:
                     self._start(now_s)
-                case Request.STOP | Request.SAFE_OFF:
+                case Request.STOP | Request.SAFE_OFF:  # usb-protocol 3, 9: in every state
                     self._exposures.end()
                 case Request.FLUSH:
                     self._flush()
-                case Request.HEARTBEAT:
+                case Request.HEARTBEAT:  # usb-protocol 3.2
                     self._heartbeat_s = now_s
                 case _:
                     raise Refusal(ErrorCode.UNKNOWN_REQUEST, f"no request {request:#04x} to write")
@@ -143,12 +142,12 @@ class Firmware:
             raise Refusal(ErrorCode.BAD_VALUE, error.detail) from error
         except DriverError as error:
             raise Refusal(ErrorCode.BAD_VALUE, str(error)) from error
-        self._staged = words
+        self._staged = words  # usb-protocol 3: nothing changes until COMMIT
 
     def _commit(self, epoch_above: int, now_s: float) -> Commitment:
         if self._staged is None and self._words is None:
             raise Refusal(ErrorCode.NOT_CONFIGURED, "no sequence staged")
-        if self._staged is not None:
+        if self._staged is not None:  # usb-protocol 3.1: else a repeated COMMIT changes nothing
             streaming = self._exposures.running
             self._exposures.end()
             self._flush()
@@ -156,7 +155,7 @@ class Firmware:
             sequence = self._words.sequence(self.capabilities)
             self._labels = sequence.labels_at(self.capabilities.low_frequency_hz)
             self._renderer.configure(sequence, self._labels)
-            self._epoch = max(self._epoch, epoch_above) + 1
+            self._epoch = max(self._epoch, epoch_above) + 1  # usb-protocol 3.1
             if streaming:
                 self._begin(now_s)
         assert self._words is not None  # noqa: S101  (refused above otherwise)
@@ -174,8 +173,8 @@ class Firmware:
         if not self._interlock_closed:
             raise Refusal(ErrorCode.INTERLOCK_OPEN, "the interlock is open")
         self._exposures.end()
-        self._flush()
-        self._faulted = False
+        self._flush()  # usb-protocol 3: START empties the FIFO
+        self._faulted = False  # usb-protocol 2
         self._watchdog_tripped = False
         self._heartbeat_s = now_s
         self._begin(now_s)
@@ -183,7 +182,7 @@ class Firmware:
     def _status(self, now_s: float) -> Status:
         flags = StatusFlag(0)
         state = DeviceState.FAULTED if self._faulted else DeviceState.IDLE
-        if self._exposures.running:
+        if self._exposures.running:  # usb-protocol 2: light in STREAMING and in no other state
             state = DeviceState.STREAMING
             flags |= StatusFlag.LIGHT_ON
         if self._interlock_closed:
@@ -208,7 +207,7 @@ class Firmware:
     # --- images ---------------------------------------------------------------------------
 
     def due_s(self) -> float | None:
-        """When there is an image to read: in the past if there is one already, None if never."""
+        """When the next image can be read: in the past if it can be now, None if never."""
         image = self._exposures.upcoming()
         return None if image is None else image.due_s
 
@@ -237,15 +236,16 @@ class Firmware:
 
     def _period_s(self) -> float:
         assert self._words is not None  # noqa: S101  (callers have a sequence)
+        # usb-protocol 8.4
         return self._words.exposure_ns / 1e9 + self.capabilities.streaming_readout_s
 
     def _advance(self, now_s: float) -> None:
-        """Let happen what the time up to now brings: exposures, and the watchdog."""
+        """Advance exposures and the watchdog up to now."""
         if not self._exposures.running:
             return
         trip_s = self._heartbeat_s + self.capabilities.heartbeat_s
         self._exposures.advance(min(now_s, trip_s))
-        if now_s > trip_s:
+        if now_s > trip_s:  # usb-protocol 3.2
             self._watchdog_tripped = True
             self._exposures.end()
 
@@ -255,7 +255,7 @@ class Firmware:
         label = self._labels[image.index]
         device_time_s = image.begin_s - self._power_on_s
         pixels = self._renderer.image(label, number=image.number, device_time_s=device_time_s)
-        payload = pixels.astype("<u2", copy=False).tobytes()
+        payload = pixels.astype("<u2", copy=False).tobytes()  # usb-protocol 8.1
         assert self._words is not None  # noqa: S101  (what is exposed has a sequence)
         header = ImageHeader(
             flags=self._image_flags(image, label),
@@ -278,13 +278,13 @@ class Firmware:
         return packet
 
     def _image_flags(self, image: Exposed, label: ImageLabel) -> ImageFlag:
-        said = {
+        holds = {
             ImageFlag.ILLUMINATION: label.illumination,
             ImageFlag.FIRST_OF_FRAME: image.index == 0,
             ImageFlag.LAST_OF_FRAME: image.index == len(self._labels) - 1,
             ImageFlag.OVERFLOW: image.after_overflow,
         }
         flags = ImageFlag(0)
-        for flag, holds in said.items():
-            flags |= flag if holds else ImageFlag(0)
+        for flag, is_set in holds.items():
+            flags |= flag if is_set else ImageFlag(0)
         return flags

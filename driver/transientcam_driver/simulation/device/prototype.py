@@ -1,7 +1,7 @@
-"""The make of the simulated camera."""
+"""Capabilities of the simulated camera."""
 
 from transientcam_driver.capabilities import IMAGE_HEADER_BYTES, Capabilities
-from transientcam_driver.protocol import VERSION
+from transientcam_driver.protocol.requests import VERSION
 
 
 def prototype(*, serial: str, width: int, height: int, bits: int) -> Capabilities:

@@ -1,6 +1,6 @@
 """The simulated camera as a USB device: standard requests, one bulk endpoint, faults, a cable.
 
-What mounts it (a pyusb backend, a usbfs server) only carries requests and transfers here.
+A mount (a pyusb backend, a usbfs server) only passes requests and transfers on to it.
 """
 
 import math
@@ -18,8 +18,8 @@ from transientcam_driver.simulation.device.firmware import Firmware, Refusal
 
 _STANDARD, _VENDOR, _TYPE_MASK, _DEVICE_TO_HOST = 0x00, 0x40, 0x60, 0x80
 _TO_ENDPOINT = 0x02
-_FOREVER_S = 3600.0  # one wait of a read without a time limit; it then waits again
-_CUTS_THE_STREAM = {Request.START, Request.COMMIT, Request.FLUSH}
+_FOREVER_S = 3600.0  # one wait of a read without a time limit, which then waits again
+_INTERRUPTS_THE_STREAM = {Request.START, Request.COMMIT, Request.FLUSH}
 
 
 class _Standard(IntEnum):
@@ -34,16 +34,16 @@ class _Standard(IntEnum):
     SET_INTERFACE = 11
 
 
-class Stall(Exception):  # noqa: N818  (what the bus calls it)
+class Stall(Exception):  # noqa: N818  (the bus's own term)
     """The endpoint answers with a stall."""
 
 
-class Overflow(Exception):  # noqa: N818  (what the bus calls it)
+class Overflow(Exception):  # noqa: N818  (the bus's own term)
     """A packet does not fit into what is left of the host's buffer."""
 
 
-class Unplugged(Exception):  # noqa: N818  (what happened)
-    """There is no device any more."""
+class Unplugged(Exception):  # noqa: N818  (a state, not an error)
+    """The device is not plugged in any more."""
 
 
 class EmulatedDevice:
@@ -80,7 +80,7 @@ class EmulatedDevice:
     def control(
         self, request_type: int, request: int, value: int, index: int, length: int, data: bytes
     ) -> bytes:
-        """Carry out a control transfer; return at most ``length`` bytes, empty for writes."""
+        """Execute a control transfer; return at most ``length`` bytes, empty for writes."""
         with self.changed:
             if not self.plugged:
                 raise Unplugged
@@ -99,7 +99,7 @@ class EmulatedDevice:
             and index == descriptors.MS_OS_20_DESCRIPTOR_INDEX
         ):
             return descriptors.MS_OS_20_DESCRIPTOR
-        if self._requests_to_stall and request != Request.SAFE_OFF:  # that one is never refused
+        if self._requests_to_stall and request != Request.SAFE_OFF:  # usb-protocol 9: never refused
             self._requests_to_stall -= 1
             raise Stall
         try:
@@ -109,8 +109,8 @@ class EmulatedDevice:
         except Refusal as refusal:
             raise Stall from refusal
         finally:
-            if request in _CUTS_THE_STREAM:
-                self._cut()
+            if request in _INTERRUPTS_THE_STREAM:
+                self._clear_transfers()
             self.changed.notify_all()  # a read in progress may have another image to wait for
         return b""
 
@@ -206,28 +206,28 @@ class EmulatedDevice:
         return None if due_s is None else max(due_s, self._silent_until_s)
 
     def clear_halt(self) -> None:
-        """Let the bulk endpoint run again."""
+        """Clear the halt of the bulk endpoint."""
         with self.changed:
             self._halted = False
             self.changed.notify_all()
 
     def reset(self) -> None:
-        """Port reset: the device starts anew, at the same address."""
+        """Port reset: the device starts again, at the same address."""
         with self.changed:
             if not self.plugged:
                 raise Unplugged
             self._restart()
 
-    # --- what a hand or a fault does ------------------------------------------------------
+    # --- cable and faults -----------------------------------------------------------------
 
     def unplug(self) -> None:
-        """Pull the cable; it also carries the power."""
+        """Pull the cable, and with it the power."""
         with self.changed:
             self.plugged = False
             self.changed.notify_all()
 
     def replug(self) -> None:
-        """Plug the cable in again: power-up, and a new address. Nothing happens to one plugged."""
+        """Plug the cable in again: power-up, and a new address. No effect on a plugged device."""
         with self.changed:
             if not self.plugged:
                 self.plugged = True
@@ -235,18 +235,18 @@ class EmulatedDevice:
                 self._restart()
 
     def halt(self) -> None:
-        """Halt the bulk endpoint, as a device does that cannot go on."""
+        """Halt the bulk endpoint, as a device does that cannot continue."""
         with self.changed:
             self._halted = True
             self.changed.notify_all()
 
-    def expect(self, fault: Fault, images: int = 1) -> None:
-        """Let a fault happen to the next images on their way."""
+    def inject(self, fault: Fault, images: int = 1) -> None:
+        """Inject a fault into the next images."""
         with self.changed:
-            self._cable.expect(fault, images)
+            self._cable.inject(fault, images)
 
     def stall_next(self, requests: int = 1) -> None:
-        """Stall the next vendor requests, whatever they are, but never SAFE_OFF."""
+        """Stall the next vendor requests of any kind but SAFE_OFF."""
         with self.changed:
             self._requests_to_stall += requests
 
@@ -262,13 +262,13 @@ class EmulatedDevice:
             self._firmware.set_interlock(self.clock.now_s(), closed=closed)
             self.changed.notify_all()
 
-    def _cut(self) -> None:
-        self._cable.cut()
+    def _clear_transfers(self) -> None:
+        self._cable.clear()
         self._left_over = memoryview(b"")
 
     def _restart(self) -> None:
         self._halted = False
-        self._cut()
+        self._clear_transfers()
         self._cable = FaultyCable()
         self._requests_to_stall = 0
         self._silent_until_s = -math.inf

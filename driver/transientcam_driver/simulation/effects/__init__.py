@@ -1,8 +1,8 @@
-"""What happens to light on its way to a number, one file an effect.
+"""Effects on light on its way to a number, one file each.
 
-Each effect says for a scene and a sequence whether it is called for, why, how large it is and
-what it costs. One that is not called for is not built: it is never called and draws no random
-number.
+Each effect judges for a scene and a sequence whether it is called for, why, how large it is and
+what it costs. One that is not called for is not built: it costs nothing and draws no random
+number. A new effect is a file here and an entry in ``EFFECTS``.
 """
 
 from transientcam_driver.simulation.effects.ambient_light import AmbientLight
@@ -11,16 +11,7 @@ from transientcam_driver.simulation.effects.effect import (
     Call,
     Conditions,
     Effect,
-    Exposure,
     Facts,
-    ImageEffect,
-    LightEffect,
-    LightPlanes,
-    NormalDraw,
-    PlaneEffect,
-    Shot,
-    ShotEffect,
-    Stage,
 )
 from transientcam_driver.simulation.effects.interreflection import DiffuseInterreflection
 from transientcam_driver.simulation.effects.lens_scatter import LensScatter
@@ -43,7 +34,7 @@ from transientcam_driver.simulation.effects.thermal_drift import ThermalDrift
 CHOICES = ("auto", "on", "off")
 
 NOISE = (ShotNoise, ReadNoise)
-"""What ``noise=off`` switches off."""
+"""Switched off by ``noise=off``."""
 
 EFFECTS: tuple[type[Effect], ...] = (
     MirrorPaths,
@@ -69,33 +60,8 @@ __all__ = [
     "CHOICES",
     "EFFECTS",
     "NOISE",
-    "AmbientLight",
-    "AmplitudeRollOff",
     "Call",
     "Conditions",
-    "DiffuseInterreflection",
     "Effect",
-    "Exposure",
     "Facts",
-    "ImageEffect",
-    "LensScatter",
-    "LightEffect",
-    "LightPlanes",
-    "MirrorPaths",
-    "MixedPixels",
-    "ModulationHarmonics",
-    "MotionDuringSequence",
-    "NormalDraw",
-    "PixelPattern",
-    "PlaneEffect",
-    "Quantisation",
-    "ReadNoise",
-    "Saturation",
-    "Scattering",
-    "Shot",
-    "ShotEffect",
-    "ShotNoise",
-    "Stage",
-    "SynchronisationOutliers",
-    "ThermalDrift",
 ]

@@ -14,7 +14,7 @@ from transientcam_driver.simulation.effects.effect import (
 
 
 class AmbientLight(PlaneEffect):
-    """Adds electrons, and with them shot noise, and takes of the full well.
+    """Adds electrons, and with them shot noise, and fills the full well.
 
     It falls evenly on all surfaces: a pixel gets its share by the reflectance of what it sees.
     """
@@ -44,5 +44,5 @@ class AmbientLight(PlaneEffect):
         return replace(conditions, ambient_white_e=ambient_e, ambient_e=ambient_e)
 
     def on_light(self, planes: LightPlanes) -> None:
-        """Add it to what is there without the camera's light."""
+        """Add it to the part without the camera's light."""
         planes.constant = planes.constant + self._electrons * planes.reflectance

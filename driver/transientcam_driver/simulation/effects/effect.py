@@ -1,10 +1,10 @@
-"""What an effect is.
+"""The base of effects, and the values they work on.
 
 Effects come in four kinds, by where they happen:
 
-- ``LightEffect``: light on its way. The scenery computes it; the effect only decides.
-- ``PlaneEffect``: what the camera makes of the light, the same for all images of a frequency.
-- ``ShotEffect``: what is different from one image to the next.
+- ``LightEffect``: light on its way. The scenery computes it; the effect only judges.
+- ``PlaneEffect``: from light to electrons, the same for all images of a frequency.
+- ``ShotEffect``: differences from one image to the next.
 - ``ImageEffect``: from electrons to numbers, image by image.
 """
 
@@ -15,10 +15,10 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.sensor import Sensor
 from transientcam_driver.sequence import LOW_FREQUENCY_HZ, Sequence
 from transientcam_driver.simulation.imperfections import IDEAL, PROTOTYPE, DeviceProfile
 from transientcam_driver.simulation.responses import Scatter
-from transientcam_driver.simulation.sensor import Sensor
 
 CALLED_ABOVE = 0.1
 """Effects are called for above this share of the noise floor.
@@ -31,7 +31,7 @@ _NONE = np.float32(0)
 
 
 class Facts(Protocol):
-    """What effects want to know of a scene's light; shares are of a typical pixel's light."""
+    """Figures of a scene's light; shares are of a typical pixel's light."""
 
     @property
     def mirror_share(self) -> float:
@@ -45,7 +45,7 @@ class Facts(Protocol):
 
     @property
     def scatter(self) -> Scatter | None:
-        """The widest spread of light inside a surface, and which share of the pixels sees one."""
+        """The widest spread of light inside a surface; None where there is none."""
         ...
 
     @property
@@ -71,12 +71,12 @@ class Facts(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """What an effect judges by: the sensor, the sequence, and how bright the scene is.
+    """The conditions an effect is judged by: sensor, sequence, device and brightness of the scene.
 
     ``brightness_e`` is the mean zeroth moment over the pixels that light reaches, in electrons
     at the sequence's exposure; 0 in the dark. ``brightest_e`` is the highest one.
-    ``ambient_white_e`` is what other light adds to each image of a white surface, ``ambient_e``
-    to that of a typical pixel.
+    ``ambient_white_e`` are electrons of other light in each image of a white surface,
+    ``ambient_e`` in that of a typical pixel.
     """
 
     sensor: Sensor
@@ -131,7 +131,7 @@ class Conditions:
         return 3 * self.image_period_s * between
 
     def sub_phase_gain(self, harmonic: int) -> complex:
-        """G_k: what the division of the exposure leaves of a harmonic (Sec. 4.1)."""
+        """G_k: gain of a harmonic by the division of the exposure (Sec. 4.1)."""
         sub_phases = self.sequence.sub_phases
         phases = np.array(sub_phases.phases_rad)
         return complex(np.sum(sub_phases.weights * np.exp(-1j * harmonic * phases)))
@@ -152,7 +152,7 @@ class Call:
 
 
 def weigh(conditions: Conditions, size_dn: float, reason: str, cost_s: float) -> Call:
-    """Call for an effect where it stands out of the noise."""
+    """Call for an effect whose size is above a share of the noise floor."""
     floor_dn = conditions.floor_dn
     called = size_dn > CALLED_ABOVE * floor_dn
     return Call(called, reason, size_dn, cost_s)
@@ -175,7 +175,7 @@ class LightPlanes:
 
 @dataclass(slots=True)
 class Shot:
-    """What is particular about one image.
+    """The differences of one image from the others of its frequency.
 
     ``delay_s`` is added to all times of flight; the modulated part is multiplied by ``factor``.
     """
@@ -193,7 +193,7 @@ class Exposure:
 
     ``signal`` (H, W) is in electrons until it is quantised. Normal noise is not added by each
     effect: their variances add up in ``variance_e2``, of which ``NormalDraw`` draws once. The sum
-    of independent normal variables is normal, and drawing is what noise costs.
+    of independent normal variables is normal, and the draw is the cost of noise.
     """
 
     signal: Plane
@@ -202,7 +202,7 @@ class Exposure:
 
 
 class Stage(ABC):
-    """Something that happens to every image."""
+    """A step from electrons to numbers, for every image."""
 
     adds_variance: ClassVar[bool] = False
 
@@ -223,9 +223,9 @@ class NormalDraw(Stage):
 
 
 class Effect(ABC):
-    """Something that says whether a scene calls for it.
+    """An effect, and whether a scene calls for it.
 
-    ``figures`` names the field of the device's profile that it is about, if there is one. An
+    ``figures`` names the field of the device's profile that it depends on, if there is one. An
     effect that is forced on where the device has no such figures takes the prototype's.
     """
 
@@ -239,11 +239,11 @@ class Effect(ABC):
     @classmethod
     @abstractmethod
     def called_for(cls, conditions: Conditions) -> Call:
-        """Say whether these conditions call for the effect."""
+        """Judge whether these conditions call for the effect."""
 
     @classmethod
     def forced_on(cls, conditions: Conditions) -> Conditions:
-        """Return conditions that have what this effect is about."""
+        """Return conditions under which the effect exists."""
         device = conditions.device
         if not cls.figures or getattr(device, cls.figures) is not None:
             return conditions
@@ -256,7 +256,7 @@ class LightEffect(Effect):
 
 
 class PlaneEffect(Effect):
-    """What the camera makes of light, the same for all images of a frequency."""
+    """From light to electrons, the same for all images of a frequency."""
 
     @abstractmethod
     def on_light(self, planes: LightPlanes) -> None:
@@ -264,7 +264,7 @@ class PlaneEffect(Effect):
 
 
 class ShotEffect(Effect):
-    """What is different from one image to the next."""
+    """Differences from one image to the next."""
 
     @abstractmethod
     def on_shot(self, shot: Shot) -> None:

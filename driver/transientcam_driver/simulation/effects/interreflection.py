@@ -10,7 +10,7 @@ class DiffuseInterreflection(LightEffect):
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
-        """Where surfaces that scatter see each other, and enough light goes that way."""
+        """Where surfaces that scatter light each other, and enough light goes that way."""
         share = conditions.facts.indirect_share if conditions.facts else 0.0
         if not share:
             return Call(

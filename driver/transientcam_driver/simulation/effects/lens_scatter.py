@@ -15,7 +15,7 @@ _COST_S_PER_PIXEL = 2e-7  # only where the scene moves; else it is done once
 
 
 class LensScatter(PlaneEffect):
-    """A share of the light is spread by a wide Gaussian; what leaves the image is lost."""
+    """A share of the light is spread by a wide Gaussian; light that leaves the image is lost."""
 
     name = "lens-scatter"
     figures = "lens_scatter"
@@ -54,7 +54,7 @@ class LensScatter(PlaneEffect):
 
 
 def _spread(count: int, sigma: float) -> NDArray[np.float32]:
-    """Matrix (count, count) whose columns spread a pixel's light; what falls outside is lost."""
+    """Matrix (count, count) whose columns spread a pixel's light; some falls beyond the edges."""
     pixels = np.arange(count)
     reach = np.arange(-4 * count, 5 * count)
     density = np.exp(-0.5 * ((pixels[:, None] - pixels[None, :]) / sigma) ** 2)

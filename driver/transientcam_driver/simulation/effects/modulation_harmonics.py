@@ -19,7 +19,7 @@ class ModulationHarmonics(Effect):
     """Images at frequency f also contain moments at its multiples.
 
     Sub-phases and the four-bucket differences remove most of them; what is left is an error of
-    the moments. The world asks ``harmonics`` for the content at a frequency.
+    the moments. The world reads the content at a frequency from ``harmonics``.
     """
 
     name = "modulation-harmonics"
@@ -72,7 +72,7 @@ def measured_harmonics(path: Path) -> dict[int, complex]:
     Raises
     ------
     SceneError
-        The file cannot be read, or holds something else.
+        The file cannot be read, or has other content.
     """
     rows = _read(path)
     wave = rows[0] - rows[1] if len(rows) % 2 == 0 else rows[0]

@@ -21,7 +21,7 @@ class MotionDuringSequence(LightEffect):
         """Where something moves far enough during the images of one moment.
 
         Its error is that of a pixel that the silhouette leaves, over the share of such pixels, and
-        the phase that the way makes.
+        the phase of the distance moved.
         """
         facts = conditions.facts
         cost_s = conditions.pixels * _COST_S_PER_PIXEL

@@ -1,4 +1,4 @@
-"""Pixel pattern: each pixel's clock comes a little later, and each pixel has a gain of its own."""
+"""Pixel pattern: each pixel has its own delay and gain."""
 
 from pathlib import Path
 
@@ -19,9 +19,9 @@ _CODES = 4096  # of a turn, in files of phase offsets
 
 
 class PixelPattern(PlaneEffect):
-    """Delays and gains that stay with the device, whatever it looks at.
+    """Delays and gains of the device, the same for every scene.
 
-    Drawn from the seed of the device, not of the scene: what a calibration finds holds for every
+    Drawn from the seed of the device, not of the scene, so that a calibration is good for every
     scene.
     """
 
@@ -84,7 +84,7 @@ def read_offsets_rad(path: Path) -> NDArray[np.float64]:
     Raises
     ------
     SceneError
-        The file cannot be read, or holds something else.
+        The file cannot be read, or has other content.
     """
     try:
         words = np.frombuffer(path.read_bytes(), dtype="<i2")

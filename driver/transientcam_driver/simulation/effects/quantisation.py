@@ -23,7 +23,7 @@ class Quantisation(ImageEffect):
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
-        """Say always; its error is that of rounding four images, 1 / sqrt(12) each."""
+        """Call for it always; its error is that of rounding four images, 1 / sqrt(12) each."""
         reason = f"{conditions.sensor.bits} bits of {conditions.sensor.gain_e_per_dn:g} electrons"
         size_dn = 2 / math.sqrt(12 * conditions.sequence.takes)
         return Call(True, reason, size_dn, conditions.pixels * _COST_S_PER_PIXEL)

@@ -34,7 +34,7 @@ class AmplitudeRollOff(PlaneEffect):
         return weigh(conditions, size_dn, f"down to {least:.0%} of the amplitude", 0.0)
 
     def on_light(self, planes: LightPlanes) -> None:
-        """Weaken what is modulated."""
+        """Weaken the modulated part."""
         if planes.frequency_hz:
             factor = np.float32(amplitude(self._roll_off, planes.frequency_hz))
             for term in planes.terms.values():

@@ -27,5 +27,5 @@ class Saturation(ImageEffect):
         return Call(over_e > 0, reason, size_dn, cost_s)
 
     def apply(self, exposure: Exposure) -> None:
-        """Cut off what is too much."""
+        """Clip at the full well."""
         np.minimum(exposure.signal, np.float32(self._sensor.full_well_e), out=exposure.signal)

@@ -1,4 +1,4 @@
-"""Synchronisation outliers: now and then light and sensor lose each other during an exposure."""
+"""Synchronisation outliers: light and sensor lose synchronisation during some exposures."""
 
 import math
 
@@ -40,7 +40,7 @@ class SynchronisationOutliers(ShotEffect):
         return weigh(conditions, size_dn, f"{outliers.share:.0%} of the images", 1e-5)
 
     def on_shot(self, shot: Shot) -> None:
-        """Lose it, sometimes."""
+        """Give a share of the images a random phase."""
         random = np.random.Generator(
             np.random.SFC64(np.random.SeedSequence((shot.seed, shot.number, 0x0071)))
         )

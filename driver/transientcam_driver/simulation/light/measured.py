@@ -17,7 +17,7 @@ from transientcam_driver.errors import SceneError
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_driver.simulation.scene.scene import ResponseFile, Scene
 
-_CUBE_PERCENTILE = 99.0  # pixels of which share stay at or below brightness 1; lamps exceed it
+_CUBE_PERCENTILE = 99.0  # this share of the pixels stays at or below brightness 1; lamps exceed it
 _FIRST_PEAK = 0.1  # of the highest bin
 
 
@@ -95,7 +95,7 @@ class DenseResponses:
 def _summarised(
     values: NDArray[np.float32],
 ) -> list[tuple[NDArray[np.intp], NDArray[np.float64]]]:
-    """Bin and mass of the returns that stand for continuous responses."""
+    """Bin and mass of the returns that represent continuous responses."""
     highest = values.argmax(axis=-1)
     total = values.sum(axis=-1, dtype=np.float64)
     if values.shape[:2] == (1, 1):
@@ -139,7 +139,7 @@ def _part(response: ResponseFile) -> _Part:
     part = _read(response.path, response.bin_s)
     values = part.values
     if response.background == "median":
-        # what is left of the noise below the median is no light
+        # noise below the median is no light
         values = np.maximum(values - np.median(values, axis=-1, keepdims=True), 0)
     # time zero first: it is the peak's place on the file's own axis
     start_s = part.start_s - _time_zero_s(response, values, part) + response.delay_s
@@ -171,7 +171,7 @@ def _brightness(path: Path, values: NDArray[np.float32]) -> float:
 
 
 def _read(path: Path, bin_s: float | None) -> _Part:
-    """Read one .npz; time zero is its first bin, or what its optical path lengths say."""
+    """Read one .npz; time zero is its first bin, or that of its optical path lengths."""
     content = _content(path)
     if "h" in content:
         start_s = _scalar(path, content, "start_opl_m") / SPEED_OF_LIGHT_M_S
@@ -188,7 +188,7 @@ def _read(path: Path, bin_s: float | None) -> _Part:
 
 def _content(path: Path) -> dict[str, Any]:
     try:
-        # opened here, because np.load leaves the files open that it cannot read
+        # opened here, because np.load does not close a file that it cannot read
         with path.open("rb") as file:
             archive = np.load(file, allow_pickle=False)
             if isinstance(archive, np.ndarray):

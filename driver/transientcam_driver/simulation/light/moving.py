@@ -1,7 +1,7 @@
 """Light in a scene some of whose surfaces move.
 
-What stands still is traced once. At each time only what the moving surfaces change is looked at:
-the rays of the camera that end on one of them, and the ways of light that they stand in.
+What stands still is traced once. At each time only what the moving surfaces change is computed:
+the rays of the camera that end on one of them, and the paths of light that they block.
 """
 
 from dataclasses import replace
@@ -13,27 +13,27 @@ from numpy.typing import NDArray
 from transientcam_driver.simulation.light.paths import (
     ImageLight,
     Lit,
-    Seen,
+    RayEnds,
     first_scattering,
     image_lights,
+    light_on_ends,
     light_rays,
-    light_seen,
 )
 from transientcam_driver.simulation.light.paths import sparse as sparse_of
 from transientcam_driver.simulation.responses import SparseResponses
 from transientcam_driver.simulation.scene.geometry import Ellipsoid, Points, Shape
 from transientcam_driver.simulation.scene.scene import Scene
 
-_FAR_M = 1e3  # longer than any way in a scene
+_FAR_M = 1e3  # longer than any path in a scene
 _END = 1 - 1e-5  # of a segment, in single precision
 _START = 1e-5
-_PIXELS = 1.0  # that the fastest surface may move before it is looked at again
+_PIXELS = 1.0  # that the fastest surface may move before the scene is computed again
 
 
-class _Ways:
-    """Segments that stay, asked again and again what an ellipsoid of given radii hits.
+class _Segments:
+    """Fixed segments, intersected with a shape at many places.
 
-    All that does not depend on where it is is computed once.
+    What does not depend on the place of an ellipsoid is computed once.
     """
 
     def __init__(self, index: NDArray[np.intp], start: Points, end: Points) -> None:
@@ -42,20 +42,20 @@ class _Ways:
         self._of_radii: dict[tuple[float, ...], tuple[NDArray[np.float32], ...]] = {}
 
     def hit(self, shape: Shape) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Which of them the shape stands in, and at which fraction of their way."""
+        """Return the segments that the shape blocks by index, and the fraction of their length."""
         if not isinstance(shape, Ellipsoid):
             at = shape.hit(self._start, self._end)
             near = np.flatnonzero(at < _END)
             return near, at[near]
         key = tuple(shape.radii.tolist())
         if key not in self._of_radii:
-            whence, whither = self._start / shape.radii, (self._end - self._start) / shape.radii
+            origin, direction = self._start / shape.radii, (self._end - self._start) / shape.radii
             parts = (
-                whence,
-                whither,
-                np.einsum("nc,nc->n", whither, whither),
-                np.einsum("nc,nc->n", whence, whither),
-                np.einsum("nc,nc->n", whence, whence) - 1,
+                origin,
+                direction,
+                np.einsum("nc,nc->n", direction, direction),
+                np.einsum("nc,nc->n", origin, direction),
+                np.einsum("nc,nc->n", origin, origin) - 1,
             )
             self._of_radii[key] = tuple(part.astype(np.float32) for part in parts)
         start, way, a, along, beyond = self._of_radii[key]
@@ -71,8 +71,8 @@ class _Ways:
         between = (first > _START) & (first < _END)
         return near[between], first[between].astype(np.float64)
 
-    def again(self, shape: Shape, chosen: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Return the fraction for some of them in double precision."""
+    def exact(self, shape: Shape, chosen: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Fraction of some segments in double precision."""
         at = shape.hit(self._start[chosen], self._end[chosen])
         return np.where(at < 1, at, 1.0)  # grazing rays may differ between precisions
 
@@ -93,7 +93,7 @@ class MovingLight:
         self.scene = scene
         self._directions = directions
         self._width, self._height = width, height
-        # surfaces keep their places in the list; what moves is far below while the rest is traced
+        # surfaces keep their indices; what moves is put far below while the rest is traced
         self._movers = tuple(k for k, each in enumerate(scene.surfaces) if each.motions)
         self._still_scene = replace(
             scene,
@@ -106,7 +106,9 @@ class MovingLight:
         )
         self.still = light_rays(self._still_scene, directions)
         self._lights = tuple(image_lights(scene))
-        self._chains = tuple(tuple(self._ways(k, light)) for k, light in enumerate(self._lights))
+        self._chains = tuple(
+            tuple(self._light_segments(k, light)) for k, light in enumerate(self._lights)
+        )
         self._reach_m = np.zeros(len(directions))
         self._sight = self._lines_of_sight()
         self._phasors: dict[float, tuple[NDArray[np.complex64], NDArray[np.complex128]]] = {}
@@ -117,7 +119,7 @@ class MovingLight:
         return float(np.floor(time_s / self.step_s + 1e-9) * self.step_s)
 
     def at(self, time_s: float) -> "MovingResponses":
-        """Look at the scene at a time."""
+        """Impulse responses at a time."""
         scene = self.scene.at(time_s)
         assert scene.camera is not None  # noqa: S101  (checked when made)
         shapes = {index: scene.surfaces[index].shape for index in self._movers}
@@ -129,29 +131,29 @@ class MovingLight:
             closer = at < nearest[rays]
             nearest[rays[closer]], which[rays[closer]] = at[closer], index
         front = np.flatnonzero(which >= 0)
-        for index, shape in shapes.items():  # again in double precision, or points shade themselves
+        for index, shape in shapes.items():  # in double precision, or points shade themselves
             mine = np.flatnonzero(which == index)
-            nearest[mine] = straight.again(shape, mine)
-        seen = self._in_front(scene, front, which[front], nearest[front])
+            nearest[mine] = straight.exact(shape, mine)
+        ends = self._in_front(scene, front, which[front], nearest[front])
         over = np.zeros(len(self._directions), dtype=bool)
-        for ways in by_mirrors:
+        for segments in by_mirrors:
             for shape in shapes.values():
-                over[ways.index[ways.hit(shape)[0]]] = True
+                over[segments.index[segments.hit(shape)[0]]] = True
         over[front] = False
         mirrored = np.flatnonzero(over)
         if mirrored.size:
             eye = scene.camera.position_m
-            seen = seen.with_more(first_scattering(scene, eye, self._directions[mirrored]), front)
+            ends = ends.with_more(first_scattering(scene, eye, self._directions[mirrored]), front)
             front = np.concatenate([front, mirrored])
-        lit = light_seen(scene, self._lights, seen, rays=len(front))
+        lit = light_on_ends(scene, self._lights, ends, rays=len(front))
         hidden = np.zeros(len(self._directions), dtype=bool)
         hidden[front] = True
         shadows = []
         for chain in self._chains:
             dark = np.zeros(len(self._directions), dtype=bool)
-            for ways in chain:
+            for segments in chain:
                 for shape in shapes.values():
-                    dark[ways.index[ways.hit(shape)[0]]] = True
+                    dark[segments.index[segments.hit(shape)[0]]] = True
             shadows.append(np.flatnonzero(dark & ~hidden))
         return MovingResponses(self, scene, front, lit, tuple(shadows))
 
@@ -161,13 +163,13 @@ class MovingLight:
         front: NDArray[np.intp],
         surface: NDArray[np.intp],
         at: NDArray[np.float64],
-    ) -> Seen:
-        """Return what moves and is seen straight from the camera."""
+    ) -> RayEnds:
+        """Return the ends of rays on moving surfaces that the camera sees without a mirror."""
         assert scene.camera is not None  # noqa: S101  (checked when made)
         distance_m = at * self._reach_m[front]
         point = scene.camera.position_m + distance_m[:, None] * self._directions[front]
         count = len(front)
-        return Seen(np.arange(count), point, surface, distance_m, np.ones(count))
+        return RayEnds(np.arange(count), point, surface, distance_m, np.ones(count))
 
     def phasors(self, frequency_hz: float) -> tuple[NDArray[np.complex64], NDArray[np.complex128]]:
         """Moments of what stands still: (K, H W) by chain of mirrors, and (H W) in all."""
@@ -180,24 +182,24 @@ class MovingLight:
             self._phasors[frequency_hz] = each.astype(np.complex64), each.sum(axis=0)
         return self._phasors[frequency_hz]
 
-    def _ways(self, chain: int, light: ImageLight) -> list[_Ways]:
-        """Return the segments of light's ways to what stands still, where it arrives."""
+    def _light_segments(self, chain: int, light: ImageLight) -> list[_Segments]:
+        """Segments of the paths of light to what stands still, where it arrives."""
         index = np.flatnonzero(self.still.weight[chain])
         if not index.size:
             return []
-        ways, start = [], self.still.point[index]
+        segments, start = [], self.still.point[index]
         for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
             fraction = mirror.shape.hit(start, np.broadcast_to(image_m, start.shape))
             end = start + fraction[:, None] * (image_m - start)
-            ways.append(_Ways(index, start, end))
+            segments.append(_Segments(index, start, end))
             start = end
         lamp = np.broadcast_to(light.positions_m[-1], start.shape)
-        return [*ways, _Ways(index, start, lamp)]
+        return [*segments, _Segments(index, start, lamp)]
 
-    def _lines_of_sight(self) -> list[_Ways]:
-        """Return the segments of the camera's rays: straight ones, and those over mirrors."""
+    def _lines_of_sight(self) -> list[_Segments]:
+        """Segments of the camera's rays: the first ones, and those behind mirrors."""
         assert self.scene.camera is not None  # noqa: S101  (checked when made)
-        lines: list[_Ways] = []
+        lines: list[_Segments] = []
         start = np.broadcast_to(self.scene.camera.position_m, self._directions.shape)
         index, direction = np.arange(len(self._directions)), self._directions
         surfaces = self._still_scene.surfaces
@@ -206,12 +208,12 @@ class MovingLight:
             hits = np.stack([each.shape.hit(start, far) for each in surfaces])
             for k, each in enumerate(surfaces):
                 if each.kind == "stencil":
-                    hits[k] = np.inf  # its open cells let rays pass; what it hides stays hidden
+                    hits[k] = np.inf  # rays pass its open cells; what it hides stays hidden
             nearest = hits.min(axis=0)
             end = start + np.minimum(nearest, 1.0)[:, None] * _FAR_M * direction
             if not lines:
                 self._reach_m = np.minimum(nearest, 1.0) * _FAR_M
-            lines.append(_Ways(index, start, end))
+            lines.append(_Segments(index, start, end))
             which = np.where(np.isfinite(nearest), hits.argmin(axis=0), -1)
             on = np.array([each.kind == "mirror" for each in surfaces] + [False])[which]
             if not on.any():
@@ -223,7 +225,7 @@ class MovingLight:
         return lines
 
     def _step_s(self, directions: Points, width: int) -> float:
-        """Return how long nothing moves by more than a part of a pixel."""
+        """Longest time in which nothing moves by more than ``_PIXELS``."""
         assert self.scene.camera is not None  # noqa: S101  (checked when made)
         eye = self.scene.camera.position_m
         pixel_rad = float(
@@ -240,7 +242,7 @@ class MovingLight:
 
 
 class MovingResponses:
-    """Impulse responses at one time: what stands still and is not hidden, and what is in front."""
+    """Impulse responses at one time: of what stands still and is visible, and of what moves."""
 
     def __init__(
         self,
@@ -260,11 +262,11 @@ class MovingResponses:
 
     @property
     def kind(self) -> Literal["sparse", "dense"]:
-        """As that of the surfaces."""
+        """Dense where a surface spreads light."""
         return self._whole.kind
 
     def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
-        """Sum of the phasors that are left."""
+        """Sum of the phasors that are not in shadow."""
         each, total = self._of.phasors(frequency_hz)
         moments = total.copy()
         for chain, dark in zip(each, self._shadows, strict=True):
@@ -278,7 +280,7 @@ class MovingResponses:
         return self._whole.returns()
 
     def of_pixel(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return those of one pixel."""
+        """Response of one pixel."""
         return self._whole.of_pixel(x, y)
 
     @property
@@ -288,7 +290,7 @@ class MovingResponses:
 
     @property
     def lit(self) -> Lit:
-        """What the camera's rays see at this time."""
+        """Light of the camera's rays at this time."""
         still, front = self._of.still, self._front
         surface, distance_m = still.surface.copy(), still.distance_m.copy()
         point, reflectance = still.point.copy(), still.reflectance.copy()

@@ -86,7 +86,7 @@ def form_factors(scene: Scene, patches: Patches, at: Points, normal: Points) -> 
 def _blocked(
     scene: Scene, patches: Patches, at: Points, patch: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """Whether anything hides a patch's centre from a point; looks only where something could."""
+    """Whether anything hides a patch's centre from a point."""
     if len(patches.cells) == 2 and len(scene.surfaces) == 2 and _convex(scene):
         return np.zeros(len(at), dtype=bool)
     return blocked(scene, at, patches.centre[patch])
@@ -107,7 +107,7 @@ def _contour(corners: Points, normal: Points) -> NDArray[np.float64]:
     angle = np.arctan2(sine, cosine)
     with np.errstate(divide="ignore", invalid="ignore"):
         edge = np.where(sine > 0, angle / sine, 0.0)
-    # counter-clockwise from the patch's front is clockwise around the normal of who looks at it
+    # counter-clockwise from the patch's front is clockwise around the normal at the point
     total = -np.einsum("pk,pkc,pc->p", edge, cross, normal) / (2 * np.pi)
     clipped: NDArray[np.float64] = np.clip(total, 0.0, 1.0)
     return clipped

@@ -19,14 +19,14 @@ from transientcam_driver.simulation.scene.geometry import Points, Rectangle, blo
 from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Viewpoint
 
 _BLOCK = 8192  # rays at a time, so that what is computed for them stays in the cache
-_FAR_M = 1e3  # longer than any way in a scene
+_FAR_M = 1e3  # longer than any path in a scene
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """The scattering points behind the rays that end on one, flat.
+class RayEnds:
+    """The scattering points on which rays of the camera end, flat.
 
-    ``ray`` says which ray; ``throughput`` is what mirrors on the way leave of the light.
+    ``ray`` is the index of the ray, ``throughput`` the share of light left by mirrors on the way.
     """
 
     ray: NDArray[np.intp]
@@ -35,9 +35,9 @@ class Seen:
     distance_m: NDArray[np.float64]
     throughput: NDArray[np.float64]
 
-    def with_more(self, more: "Seen", rays: NDArray[np.intp]) -> "Seen":
-        """Put what other rays see behind what ``rays`` see."""
-        return Seen(
+    def with_more(self, more: "RayEnds", rays: NDArray[np.intp]) -> "RayEnds":
+        """Append the ends of further rays behind those of ``rays``."""
+        return RayEnds(
             np.concatenate([self.ray, more.ray + len(rays)]),
             np.concatenate([self.point, more.point]),
             np.concatenate([self.surface, more.surface]),
@@ -57,7 +57,7 @@ class ImageLight:
 
 @dataclass(frozen=True, slots=True)
 class Lit:
-    """What rays of the camera see: one row a ray, all flat.
+    """The light that rays of the camera see, one entry a ray, flat.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class Lit:
         return moments
 
     def scatter(self, scene: Scene) -> Scatter | None:
-        """Return how the surfaces' depths spread the light of each ray, if any does."""
+        """Spread of each ray's light inside the surface it ends on; None if no surface has any."""
         return scatter_of(scene, self.surface)
 
 
@@ -113,7 +113,7 @@ def trace(scene: Scene, *, width: int, height: int) -> SparseResponses:
 
 
 def sparse(scene: Scene, lit: Lit, *, width: int, height: int) -> SparseResponses:
-    """Arrange what the pixels' rays see as an image."""
+    """Arrange the light of the pixels' rays as an image."""
     reaching = np.any(lit.weight > 0, axis=1)
     reaching[0] |= not reaching.any()  # a dark scene has one return, of weight 0
     shape = (-1, height, width)
@@ -154,20 +154,20 @@ def rays_through(
 
 
 def light_rays(scene: Scene, directions: Points) -> Lit:
-    """Follow rays from the camera to what they see, and light to there."""
+    """Follow rays from the camera to their ends, and light to there."""
     lights = tuple(image_lights(scene))
     parts = []
     for first in range(0, max(1, len(directions)), _BLOCK):
         rays = directions[first : first + _BLOCK]
-        seen = first_scattering(scene, _camera(scene).position_m, rays)
-        parts.append(light_seen(scene, lights, seen, rays=len(rays)))
+        ends = first_scattering(scene, _camera(scene).position_m, rays)
+        parts.append(light_on_ends(scene, lights, ends, rays=len(rays)))
     if len(parts) == 1:
         return parts[0]
     return joined(parts)
 
 
 def joined(parts: list[Lit]) -> Lit:
-    """Put rays behind others."""
+    """Concatenate along the rays."""
     return Lit(
         np.concatenate([part.surface for part in parts]),
         np.concatenate([part.point for part in parts]),
@@ -178,8 +178,8 @@ def joined(parts: list[Lit]) -> Lit:
     )
 
 
-def light_seen(scene: Scene, lights: tuple[ImageLight, ...], seen: Seen, *, rays: int) -> Lit:
-    """Follow light to what rays end on."""
+def light_on_ends(scene: Scene, lights: tuple[ImageLight, ...], ends: RayEnds, *, rays: int) -> Lit:
+    """Follow light to the ends of rays."""
     lit = Lit(
         np.full(rays, -1),
         np.zeros((rays, 3)),
@@ -189,16 +189,16 @@ def light_seen(scene: Scene, lights: tuple[ImageLight, ...], seen: Seen, *, rays
         np.zeros((len(lights), rays)),
     )
     albedos = np.array([surface.reflectivity for surface in scene.surfaces])
-    reflectance = seen.throughput * albedos[seen.surface]
-    normal = normals_at(scene, seen.point, seen.surface)
-    lit.surface[seen.ray] = seen.surface
-    lit.point[seen.ray] = seen.point
-    lit.distance_m[seen.ray] = seen.distance_m
-    lit.reflectance[seen.ray] = reflectance
+    reflectance = ends.throughput * albedos[ends.surface]
+    normal = normals_at(scene, ends.point, ends.surface)
+    lit.surface[ends.ray] = ends.surface
+    lit.point[ends.ray] = ends.point
+    lit.distance_m[ends.ray] = ends.distance_m
+    lit.reflectance[ends.ray] = reflectance
     for k, light in enumerate(lights):
-        length_m, irradiance = light_on(scene, light, seen.point, normal)
-        lit.delay_s[k, seen.ray] = (length_m + seen.distance_m) / SPEED_OF_LIGHT_M_S
-        lit.weight[k, seen.ray] = irradiance * reflectance
+        length_m, irradiance = light_on(scene, light, ends.point, normal)
+        lit.delay_s[k, ends.ray] = (length_m + ends.distance_m) / SPEED_OF_LIGHT_M_S
+        lit.weight[k, ends.ray] = irradiance * reflectance
     return lit
 
 
@@ -207,7 +207,7 @@ def _camera(scene: Scene) -> Viewpoint:
     return scene.camera
 
 
-def first_scattering(scene: Scene, eye: Points, direction: Points) -> Seen:
+def first_scattering(scene: Scene, eye: Points, direction: Points) -> RayEnds:
     """Follow the camera's rays, over mirrors, to the scattering surface each one ends on."""
     count = len(direction)
     start = np.broadcast_to(eye, direction.shape)
@@ -239,7 +239,7 @@ def first_scattering(scene: Scene, eye: Points, direction: Points) -> Seen:
             mine, surface = which == index, scene.surfaces[index]
             direction[mine] = surface.mirror.mirrored_direction(direction[mine])
             throughput[mine] *= surface.reflectivity
-    return Seen(*(np.concatenate(parts) for parts in zip(*ended, strict=True)))
+    return RayEnds(*(np.concatenate(parts) for parts in zip(*ended, strict=True)))
 
 
 def image_lights(scene: Scene) -> Iterator[ImageLight]:
@@ -266,13 +266,13 @@ def image_lights(scene: Scene) -> Iterator[ImageLight]:
 def light_on(
     scene: Scene, light: ImageLight, point: Points, normal: Points
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Length of the way in m, and irradiance, by one chain of mirrors at points on surfaces.
+    """Length of the path in m, and irradiance, by one chain of mirrors at points on surfaces.
 
-    The length is 0 where the light is not seen in the mirrors.
+    The length is 0 where the mirrors do not show the light.
     """
     length_m, irradiance = np.zeros(len(point)), np.zeros(len(point))
     near = np.arange(len(point))
-    if light.mirrors:  # few points see the light in the mirror
+    if light.mirrors:  # only few points are lit by the last mirror
         image_m = np.broadcast_to(light.positions_m[0], point.shape)
         near = np.flatnonzero(light.mirrors[0].shape.hit(point, image_m) < 1)
         point, normal = point[near], normal[near]
@@ -310,10 +310,10 @@ def _beam(light: Light, cosine: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _unobstructed(scene: Scene, light: ImageLight, point: Points) -> NDArray[np.intp]:
-    """Walk back from points over the chain of mirrors to the light; tell which ones arrive."""
+    """Return the points, by index, whose path over the chain of mirrors to the light is free."""
     left = np.arange(len(point))
     stops = [point]
-    # first whether all mirrors are met, which few points' ways do; then what stands in between
+    # first whether all mirrors are hit, which few paths do; then what is in between
     for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
         start = stops[-1]
         fraction = mirror.shape.hit(start, np.broadcast_to(image_m, start.shape))
@@ -332,7 +332,7 @@ def _unobstructed(scene: Scene, light: ImageLight, point: Points) -> NDArray[np.
 
 
 def blocked(scene: Scene, start: Points, end: Points) -> NDArray[np.bool_]:
-    """Whether anything stands between two points; what they lie on themselves does not count."""
+    """Whether anything is between two points; the surfaces they lie on do not count."""
     blocked = np.zeros(len(start), dtype=bool)
     if not len(start):
         return blocked
@@ -351,7 +351,7 @@ def blocked(scene: Scene, start: Points, end: Points) -> NDArray[np.bool_]:
 
 def _box(start: Points, end: Points) -> tuple[Points, Points]:
     """Lowest and highest coordinates of segments, all of which may end at one point."""
-    ends = end[:1] if end.strides[0] == 0 else end  # as broadcasting makes it
+    ends = end[:1] if end.strides[0] == 0 else end  # a broadcast point
     axes = range(3)
     low = [min(start[:, axis].min(), ends[:, axis].min()) for axis in axes]
     high = [max(start[:, axis].max(), ends[:, axis].max()) for axis in axes]

@@ -2,197 +2,47 @@
 
 Radiosity with times of flight. Surfaces are cut into patches; at each frequency a patch's
 irradiance is a complex moment, and light on its way from patch to patch turns it by its time of
-flight. Moments are therefore sums over all paths between patches, at exactly the frequencies that
-are asked for; nothing is binned.
+flight. Moments are therefore sums over all paths between patches, at exactly the frequencies
+requested; nothing is binned.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
-from transientcam_driver.simulation.light.patches import Patches, form_factors
-from transientcam_driver.simulation.light.paths import (
-    Lit,
-    image_lights,
-    light_on,
-    normals_at,
-    scatter_of,
-)
-from transientcam_driver.simulation.responses import BIN_S, Scatter
-from transientcam_driver.simulation.scene.geometry import Points
+from transientcam_driver.simulation.light.exchange import Exchange
+from transientcam_driver.simulation.light.patches import Patches
+from transientcam_driver.simulation.light.paths import Lit
+from transientcam_driver.simulation.responses import BIN_S, Responses
 from transientcam_driver.simulation.scene.scene import Scene
 
-_SAMPLES = 3  # a side, of the direct light on a patch: its edge may cross the patch
 _CENTROID_HZ = 1e5  # low enough that a phase is proportional to the mean delay
 _HISTOGRAM_PATCHES = 12  # a side, for the impulse response of a pixel
 
 
-@dataclass(frozen=True)
-class _Exchange:
-    """Light between the patches of a scene.
-
-    Attributes
-    ----------
-    factors, distance_m
-        (N, N) form factors, receivers first, and distances.
-    delay_s, radiosity
-        (K, N, S) direct light on S samples of each patch by each chain of mirrors, and what it
-        gives on.
-    """
-
-    scene: Scene
-    patches: Patches
-    factors: NDArray[np.float32]
-    distance_m: NDArray[np.float32]
-    delay_s: NDArray[np.float64]
-    radiosity: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, scene: Scene, per_side: int) -> "_Exchange":
-        """Work out who sees whom, and how much light the lamp gives to whom."""
-        patches = Patches.of(scene, per_side)
-        factors = form_factors(scene, patches, patches.centre, patches.normal)
-        squared = np.maximum(
-            np.sum(patches.centre**2, 1)[:, None]
-            + np.sum(patches.centre**2, 1)
-            - 2 * patches.centre @ patches.centre.T,
-            0,
-        )
-        delay_s, radiosity = _direct(scene, patches)
-        return cls(
-            scene,
-            patches,
-            factors.astype(np.float32),
-            np.sqrt(squared).astype(np.float32),
-            delay_s,
-            radiosity,
-        )
-
-    def irradiance(self, frequency_hz: float) -> NDArray[np.complex128]:
-        """Moments (N) of the light that patches get from each other, over all bounces."""
-        omega = 2 * np.pi * frequency_hz
-        scatter = scatter_of(self.scene, self.patches.surface)
-        transfer = 1.0 if scatter is None else scatter.transfer(frequency_hz)
-        light = np.einsum("kns,kns->n", self.radiosity, np.exp(1j * omega * self.delay_s))
-        phase = np.float32(omega / SPEED_OF_LIGHT_M_S) * self.distance_m
-        in_phase, quadrature = self.factors * np.cos(phase), self.factors * np.sin(phase)
-        total = np.zeros(len(self.patches), dtype=np.complex128)
-        for _bounce in range(self.scene.transport.diffuse_bounces):
-            given = (light * transfer).astype(np.complex64)
-            of_real, of_imag = given.real.copy(), given.imag.copy()
-            got = (in_phase @ of_real - quadrature @ of_imag) + 1j * (
-                in_phase @ of_imag + quadrature @ of_real
-            )
-            total += got
-            light = self.patches.albedo * got
-        return total
-
-    @cached_property
-    def history(self) -> tuple[float, NDArray[np.float64]]:
-        """Irradiance (N, T) over time in bins of ``BIN_S``, and the time of the first bin's start.
-
-        Light is moved by whole bins, so that each bounce is off by half a bin at most.
-        """
-        shift = np.rint(self.distance_m / (SPEED_OF_LIGHT_M_S * BIN_S)).astype(np.intp)
-        scatter = scatter_of(self.scene, self.patches.surface)
-        first_s = float(self.delay_s[self.radiosity > 0].min(initial=1.0))
-        placed = np.rint((self.delay_s - first_s) / BIN_S).astype(np.intp)
-        placed[self.radiosity <= 0] = 0
-        bounces = self.scene.transport.diffuse_bounces
-        tail = 0
-        if scatter is not None:
-            tail = int((8 * scatter.width_s.max() + 12 * scatter.decay_s.max()) / BIN_S) + 1
-        count = int(placed.max()) + bounces * (int(shift.max()) + tail) + 1
-        patches = len(self.patches)
-        light = np.zeros((patches, count))
-        index = np.broadcast_to(np.arange(patches)[None, :, None], placed.shape)
-        np.add.at(light, (index.ravel(), placed.ravel()), self.radiosity.ravel())
-        total = np.zeros_like(light)
-        for _bounce in range(bounces):
-            got = np.zeros_like(light)
-            last = np.flatnonzero(light.any(axis=0)).max(initial=0) + 1
-            for q in range(patches):
-                given = light[q, :last]
-                if not given.any():
-                    continue
-                if scatter is not None:
-                    given = _spread(given, scatter.width_s[q], scatter.decay_s[q], tail)
-                for p in np.flatnonzero(self.factors[:, q]):
-                    at = shift[p, q]
-                    got[p, at : at + len(given)] += (self.factors[p, q] * given)[: count - at]
-            total += got
-            light = self.patches.albedo[:, None] * got
-        return first_s - BIN_S / 2, total
-
-
-def _spread(
-    given: NDArray[np.float64], width_s: float, decay_s: float, tail: int
-) -> NDArray[np.float64]:
-    if not width_s and not decay_s:
-        return given
-    edges_s = BIN_S * (np.arange(tail + 1) - 0.5)
-    return np.convolve(given, np.diff(Scatter(width_s, decay_s).cumulated(edges_s)))
-
-
-def _direct(scene: Scene, patches: Patches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Direct light on samples of each patch, as the share of the patch's radiosity it makes."""
-    middles = (2 * np.arange(_SAMPLES) + 1) / (2 * _SAMPLES)
-    u, w = (grid.ravel() for grid in np.meshgrid(middles, middles))
-    c = patches.corners
-    points = (
-        np.einsum("s,nc->nsc", (1 - u) * (1 - w), c[:, 0])
-        + np.einsum("s,nc->nsc", u * (1 - w), c[:, 1])
-        + np.einsum("s,nc->nsc", u * w, c[:, 2])
-        + np.einsum("s,nc->nsc", (1 - u) * w, c[:, 3])
-    ).reshape(-1, 3)
-    surface = np.repeat(patches.surface, _SAMPLES**2)
-    points = _onto(scene, points, surface)
-    normal = normals_at(scene, points, surface)
-    lights = tuple(image_lights(scene))
-    shape = (len(lights), len(patches), _SAMPLES**2)
-    delay_s, radiosity = np.zeros(shape), np.zeros(shape)
-    for k, light in enumerate(lights):
-        length_m, irradiance = light_on(scene, light, points, normal)
-        delay_s[k] = length_m.reshape(shape[1:]) / SPEED_OF_LIGHT_M_S
-        radiosity[k] = irradiance.reshape(shape[1:]) * patches.albedo[:, None] / _SAMPLES**2
-    return delay_s, radiosity
-
-
-def _onto(scene: Scene, points: Points, surface: NDArray[np.intp]) -> Points:
-    """Move points of flat patches out to the curved surface they stand for."""
-    points = points.copy()
-    for index in np.unique(surface):
-        shape = scene.surfaces[index].shape
-        if hasattr(shape, "radii"):
-            mine = surface == index
-            on_unit = (points[mine] - shape.centre) / shape.radii
-            on_unit /= np.linalg.norm(on_unit, axis=-1, keepdims=True)
-            points[mine] = shape.centre + on_unit * shape.radii
-    return points
-
-
 class Interreflection:
-    """The light that pixels get over more than one scattering surface.
+    """The light that reaches pixels over more than one scattering surface.
 
     Parameters
     ----------
     scene, lit
-        What the camera's rays see of a scene.
+        A scene, and the light that the camera's rays see of it.
     """
 
     def __init__(self, scene: Scene, lit: Lit, *, width: int, height: int) -> None:
         self._scene = scene
         self._lit = lit
         self._shape = (height, width)
-        self._exchange = _Exchange.of(scene, scene.transport.patches)
+        self._exchange = Exchange.of(scene, scene.transport.patches)
         self._cells, self._weights = self._between(self._exchange.patches)
 
     @property
     def patches(self) -> int:
-        """Into how many patches the scene is cut."""
+        """Number of patches of the scene."""
         return len(self._exchange.patches)
 
     def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
@@ -246,7 +96,7 @@ class Interreflection:
         return result
 
     def _between(self, patches: Patches) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Find the patches around what each pixel sees, and the weights to interpolate with."""
+        """Patches around the end of each pixel's ray, and weights of the interpolation."""
         count = len(self._lit.surface)
         index, weights = np.zeros((count, 4), dtype=np.intp), np.zeros((count, 4))
         for surface, cells in patches.cells.items():
@@ -259,10 +109,55 @@ class Interreflection:
         return index, weights
 
     @cached_property
-    def _histogram(self) -> _Exchange:
+    def _histogram(self) -> Exchange:
         few = min(_HISTOGRAM_PATCHES, self._scene.transport.patches)
-        return _Exchange.of(self._scene, few)
+        return Exchange.of(self._scene, few)
 
     @cached_property
     def _between_few(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         return self._between(self._histogram.patches)
+
+
+class WithInterreflection:
+    """Returns by direct light and mirrors, and the light that surfaces give each other."""
+
+    kind: Literal["sparse", "dense"] = "dense"
+
+    def __init__(self, direct: Responses, further: Interreflection) -> None:
+        self._direct = direct
+        self._further = further
+
+    def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
+        """Sum of both."""
+        return self._direct.moments(frequency_hz) + self._further.moments(frequency_hz)
+
+    def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Direct returns, and one for all the rest at its mean delay."""
+        delay_s, weight = self._direct.returns()
+        mean_s, rest = self._further.returns
+        mean_s = np.where(rest > 0, mean_s, np.nan)
+        delay_s, weight = (
+            np.concatenate([delay_s, mean_s[None]]),
+            np.concatenate([weight, rest[None]]),
+        )
+        order = np.argsort(delay_s, axis=0)  # NaN goes last
+        return np.take_along_axis(delay_s, order, 0), np.take_along_axis(weight, order, 0)
+
+    def of_pixel(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Density per s over equal bins; a sharp return fills one bin."""
+        _, rest = self._further.returns
+        start_s, mass = self._further.of_pixel(x, y, weight=float(rest[y, x]))
+        time_s, value = self._direct.of_pixel(x, y)
+        if self._direct.kind == "dense":
+            value = value * BIN_S
+        if not time_s.size and not mass.any():
+            return start_s + BIN_S * np.array([0.5]), np.zeros(1)
+        first_s = min([start_s] if mass.any() else [], default=np.inf)
+        first_s = min(first_s, float(time_s.min()) - BIN_S / 2 if time_s.size else np.inf)
+        into = np.rint((time_s - first_s) / BIN_S - 0.5).astype(int)
+        shift = round((start_s - first_s) / BIN_S) if mass.any() else 0
+        bins = np.zeros(max(int(into.max(initial=0)) + 1, shift + len(mass)))
+        bins[shift : shift + len(mass)] += mass
+        np.add.at(bins, into, value)
+        time_s = np.float64(first_s) + BIN_S * (np.arange(len(bins), dtype=np.float64) + 0.5)
+        return np.asarray(time_s, dtype=np.float64), bins / BIN_S

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.errors import SceneError
+from transientcam_driver.sensor import Sensor
 from transientcam_driver.simulation.effects import CHOICES, EFFECTS
 from transientcam_driver.simulation.imperfections import (
     PROFILES,
@@ -35,7 +36,6 @@ from transientcam_driver.simulation.scene.scene import (
     Viewpoint,
 )
 from transientcam_driver.simulation.scene.table import Table
-from transientcam_driver.simulation.sensor import Sensor
 
 BUILT_IN = Path(__file__).parents[1] / "scenes"
 MOST_BOUNCES = 8

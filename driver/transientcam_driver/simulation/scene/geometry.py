@@ -1,4 +1,4 @@
-"""Shapes in space: what rays hit, what mirrors reflect, what casts shadows.
+"""Shapes in space: hits of rays, reflection in mirrors, shadows.
 
 Lengths in m; x points right, y away from the camera, z up.
 """
@@ -74,7 +74,7 @@ class Rectangle:
         return corners.min(axis=0), corners.max(axis=0)
 
     def moved(self, by: Points) -> "Rectangle":
-        """Return it elsewhere."""
+        """Return it moved."""
         return replace(self, centre=self.centre + by)
 
     def normals(self, points: Points) -> Points:
@@ -172,7 +172,7 @@ class Ellipsoid:
         return self.centre - self.radii, self.centre + self.radii
 
     def moved(self, by: Points) -> "Ellipsoid":
-        """Return it elsewhere."""
+        """Return it moved."""
         return replace(self, centre=self.centre + by)
 
     def normals(self, points: Points) -> Points:

@@ -1,4 +1,4 @@
-"""How surfaces move: along a path of straight lines, as a function of the device's time alone."""
+"""Motion of surfaces along straight lines, as a function of the device's time alone."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -17,9 +17,9 @@ class Motion:
     Attributes
     ----------
     path_m
-        (N, 3) offsets from where the surface stands.
+        (N, 3) offsets from the surface's place.
     period_s
-        Time until all begins again.
+        Time until it repeats.
     repeat
         How the path's end joins its start: "restart" jumps, "back" goes the way back, "loop"
         goes on straight to the start.

@@ -1,6 +1,6 @@
 """What is in front of the simulated camera, and the camera itself.
 
-The schema is described in docs/scenes.md; ``scene_file`` reads it.
+The schema is described in docs/scenes.md; ``file`` reads it.
 """
 
 from dataclasses import dataclass, field, replace
@@ -10,11 +10,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.sensor import Sensor
 from transientcam_driver.simulation.imperfections import IDEAL, DeviceProfile
 from transientcam_driver.simulation.responses import Scatter
 from transientcam_driver.simulation.scene.geometry import Points, Rectangle, Shape
 from transientcam_driver.simulation.scene.motion import Motion
-from transientcam_driver.simulation.sensor import Sensor
 
 Background = Literal["none", "median"]
 TimeZero = Literal["start", "peak"]
@@ -47,7 +47,7 @@ class Light:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """Something that scatters or reflects light, or stands in its way.
+    """Something that scatters, reflects or blocks light.
 
     ``reflectivity`` is the albedo of a diffuse or translucent surface. ``opaque`` is the mask of
     a stencil, rows from top to bottom as seen from its front; the other kinds have none.
@@ -73,7 +73,7 @@ class Surface:
         return self.kind in ("diffuse", "translucent")
 
     def at(self, time_s: float) -> "Surface":
-        """Return it where it is at a time."""
+        """Return it at its place at a time."""
         if not self.motions:
             return self
         by = sum((motion.offset_m(time_s) for motion in self.motions), np.zeros(3))
@@ -87,7 +87,7 @@ class Transport:
     Attributes
     ----------
     mirror_bounces
-        Mirrors that light may pass on its way to a surface, and the camera may look over.
+        Most mirrors on the way of light to a surface, and on a ray of the camera.
     diffuse_bounces
         How often light goes from surface to surface before the camera sees it.
     patches
@@ -118,8 +118,8 @@ class ResponseFile:
 class Diffusor:
     """The light shines at the sensor through a filter and a diffusor (Fig. 4).
 
-    Every pixel gets one return of the same brightness and delay; ``fall_off`` is how much of the
-    brightness the corners of the image lack.
+    Every pixel gets one return of the same brightness and delay; ``fall_off`` is the share of the
+    brightness that is missing in the corners of the image.
     """
 
     brightness: float = 1.0

@@ -12,7 +12,7 @@ from transientcam_driver.errors import SceneError
 
 
 class Table:
-    """A table of a scene file. ``done`` refuses the keys that nobody asked for."""
+    """A table of a scene file; ``done`` refuses the keys that were not read."""
 
     def __init__(self, file: str | Path, prefix: str, content: object) -> None:
         self.file = file
@@ -47,7 +47,7 @@ class Table:
         return value
 
     def choice(self, key: str, allowed: tuple[str, ...], default: str | None = None) -> Any:
-        """Read one of a few words; the caller knows their type."""
+        """Read one of a few words; the caller gives the result its type."""
         value = self._take(key, default)
         if value not in allowed:
             raise self.error(key, value, f"one of {', '.join(allowed)}")
@@ -135,7 +135,7 @@ class Table:
         ]
 
     def done(self) -> None:
-        """Refuse what was not asked for: most likely a misspelt key."""
+        """Refuse keys that were not read: most likely a misspelt one."""
         for key, value in self._left.items():
             raise self.error(key, value, f"absent; known here are {', '.join(self._known)}")
 

@@ -22,10 +22,10 @@ from transientcam_server.service import Service
 router = APIRouter(tags=["simulation"])
 
 _FAULTS: Final[dict[str, Callable[[Simulation], None]]] = {
-    "unplug": Simulation.unplug,
-    "replug": Simulation.replug,
-    "corrupt-image": Simulation.corrupt_next,
-    "drop-image": Simulation.drop_next,
+    "unplug": lambda simulation: simulation.unplug(),
+    "replug": lambda simulation: simulation.replug(),
+    "corrupt-image": lambda simulation: simulation.corrupt_next(),
+    "drop-image": lambda simulation: simulation.drop_next(),
 }
 
 

@@ -11,7 +11,7 @@ def transfers(*faults: Fault, images: int = 1) -> list[bytes | None]:
     """What arrives of four packets."""
     cable, arrived = FaultyCable(), []
     for fault in faults:
-        cable.expect(fault, images)
+        cable.inject(fault, images)
     for packet in PACKETS:
         cable.carry(packet)
         while cable:
@@ -58,9 +58,9 @@ def test_faults_take_their_turns() -> None:
 
 def test_what_is_held_back_is_forgotten_with_the_stream() -> None:
     cable = FaultyCable()
-    cable.expect(Fault.SWAP, 1)
+    cable.inject(Fault.SWAP, 1)
     cable.carry(PACKETS[0])
-    cable.cut()
+    cable.clear()
     cable.carry(PACKETS[1])
 
     assert cable.take() == PACKETS[1]

@@ -15,10 +15,10 @@ from transientcam_driver.protocol import (
     Request,
     SequenceWords,
     Status,
-    unpack_capabilities,
-    unpack_last_error,
-    unpack_time,
 )
+from transientcam_driver.protocol.capabilities import unpack_capabilities
+from transientcam_driver.protocol.requests import unpack_last_error
+from transientcam_driver.protocol.status import unpack_time
 from transientcam_driver.receiving.decoder import ImagePacket, PacketDecoder
 from transientcam_driver.simulation.device.firmware import Firmware, Refusal
 from transientcam_driver.simulation.device.prototype import prototype
@@ -31,7 +31,7 @@ POWER_ON_S = 100.0
 
 
 class Renderer:
-    """Pixels that tell the image's number; remembers what it was asked for."""
+    """Pixels that hold the image's number; remembers which images were rendered."""
 
     def __init__(self) -> None:
         self.rendered: list[int] = []
@@ -58,18 +58,18 @@ class Device:
         if configured:
             self.configure(SEQUENCE)
 
-    def ask(self, request: int, value: int = 0) -> bytes:
+    def read_answer(self, request: int, value: int = 0) -> bytes:
         return self.firmware.control_in(request, value & 0xFFFF, value >> 16, now_s=self.now_s)
 
-    def tell(self, request: int, data: bytes = b"") -> None:
+    def write(self, request: int, data: bytes = b"") -> None:
         self.firmware.control_out(request, data, now_s=self.now_s)
 
     def configure(self, sequence: Sequence, epoch_above: int = 0) -> Commitment:
-        self.tell(Request.SET_SEQUENCE, SequenceWords.of(sequence, CAPABILITIES).pack())
-        return Commitment.unpack(self.ask(Request.COMMIT, epoch_above))
+        self.write(Request.SET_SEQUENCE, SequenceWords.of(sequence, CAPABILITIES).pack())
+        return Commitment.unpack(self.read_answer(Request.COMMIT, epoch_above))
 
     def status(self) -> Status:
-        return Status.unpack(self.ask(Request.GET_STATUS))
+        return Status.unpack(self.read_answer(Request.GET_STATUS))
 
     def read(self) -> list[ImagePacket]:
         """Read all that is there."""
@@ -82,7 +82,7 @@ class Device:
         return [packet.header.number for packet in self.read()]
 
     def refusal(self) -> tuple[str, str, str]:
-        return unpack_last_error(self.ask(Request.GET_LAST_ERROR))
+        return unpack_last_error(self.read_answer(Request.GET_LAST_ERROR))
 
 
 @pytest.fixture
@@ -93,8 +93,8 @@ def device() -> Device:
 def test_it_gives_its_capabilities_and_its_time(device: Device) -> None:
     device.now_s += 1.25
 
-    assert unpack_capabilities(device.ask(Request.GET_CAPS)) == CAPABILITIES
-    assert unpack_time(device.ask(Request.GET_TIME)) == 1.25
+    assert unpack_capabilities(device.read_answer(Request.GET_CAPS)) == CAPABILITIES
+    assert unpack_time(device.read_answer(Request.GET_TIME)) == 1.25
 
 
 def test_after_power_up_it_is_idle_dark_and_has_no_sequence() -> None:
@@ -104,11 +104,11 @@ def test_after_power_up_it_is_idle_dark_and_has_no_sequence() -> None:
 
     assert (status.state, status.light_on, status.epoch) == (DeviceState.IDLE, False, 0)
     with pytest.raises(Refusal) as caught:
-        device.tell(Request.START)
+        device.write(Request.START)
     assert caught.value.code is ErrorCode.NOT_CONFIGURED
     assert device.refusal() == ("START", "NOT_CONFIGURED", "no sequence committed")
     with pytest.raises(Refusal):
-        device.ask(Request.COMMIT)
+        device.read_answer(Request.COMMIT)
 
 
 def test_commit_answers_with_what_was_really_set() -> None:
@@ -124,19 +124,19 @@ def test_commit_answers_with_what_was_really_set() -> None:
 
 
 def test_a_staged_sequence_changes_nothing_before_commit(device: Device) -> None:
-    device.tell(Request.SET_SEQUENCE, SequenceWords.of(Sequence(), CAPABILITIES).pack())
+    device.write(Request.SET_SEQUENCE, SequenceWords.of(Sequence(), CAPABILITIES).pack())
 
     assert device.status().epoch == 1
-    device.tell(Request.START)
+    device.write(Request.START)
     device.now_s += PERIOD_S
     (packet,) = device.read()
     assert packet.header.count == COUNT
 
 
 def test_commit_may_be_repeated(device: Device) -> None:
-    first = Commitment.unpack(device.ask(Request.COMMIT))
+    first = Commitment.unpack(device.read_answer(Request.COMMIT))
 
-    assert Commitment.unpack(device.ask(Request.COMMIT)) == first
+    assert Commitment.unpack(device.read_answer(Request.COMMIT)) == first
 
 
 def test_epochs_stay_above_the_one_the_host_knows(device: Device) -> None:
@@ -160,7 +160,7 @@ def test_an_impossible_sequence_is_stalled_and_explained(
     words = replace(SequenceWords.of(SEQUENCE, CAPABILITIES), **change)
 
     with pytest.raises(Refusal):
-        device.tell(Request.SET_SEQUENCE, words.pack())
+        device.write(Request.SET_SEQUENCE, words.pack())
 
     request, code, detail = device.refusal()
     assert (request, code) == ("SET_SEQUENCE", "BAD_VALUE")
@@ -170,20 +170,20 @@ def test_an_impossible_sequence_is_stalled_and_explained(
 
 def test_a_sequence_of_the_wrong_length_is_stalled(device: Device) -> None:
     with pytest.raises(Refusal):
-        device.tell(Request.SET_SEQUENCE, b"short")
+        device.write(Request.SET_SEQUENCE, b"short")
 
     assert device.refusal() == ("SET_SEQUENCE", "BAD_LENGTH", "5 bytes, 20 needed")
 
 
 def test_unknown_requests_are_stalled_in_both_directions(device: Device) -> None:
-    for call in (device.ask, device.tell):
+    for call in (device.read_answer, device.write):
         with pytest.raises(Refusal):
             call(0x77)
         assert device.refusal()[1] == "UNKNOWN_REQUEST"
 
 
 def test_image_k_stands_in_the_fifo_at_start_plus_k_plus_1_periods(device: Device) -> None:
-    device.tell(Request.START)
+    device.write(Request.START)
 
     for k in range(20):
         assert device.firmware.due_s() == pytest.approx(POWER_ON_S + (k + 1) * PERIOD_S)
@@ -196,7 +196,7 @@ def test_image_k_stands_in_the_fifo_at_start_plus_k_plus_1_periods(device: Devic
 
 
 def test_headers_label_images_as_the_sequence_does(device: Device) -> None:
-    device.tell(Request.START)
+    device.write(Request.START)
     device.now_s += COUNT * PERIOD_S + 1e-6
 
     headers = [packet.header for packet in device.read()]
@@ -213,7 +213,7 @@ def test_headers_label_images_as_the_sequence_does(device: Device) -> None:
 
 
 def test_a_host_that_reads_too_late_loses_the_rest_of_the_frame(device: Device) -> None:
-    device.tell(Request.START)  # the FIFO has room for 8 images, a frame has 6
+    device.write(Request.START)  # the FIFO has room for 8 images, a frame has 6
     device.now_s += 11 * PERIOD_S + 1e-6
 
     assert device.numbers() == list(range(8))
@@ -227,11 +227,11 @@ def test_a_host_that_reads_too_late_loses_the_rest_of_the_frame(device: Device) 
 
 
 def test_a_host_that_is_always_too_slow_still_gets_whole_frames(device: Device) -> None:
-    device.tell(Request.START)
+    device.write(Request.START)
     whole, seen = 0, []
     for _ in range(600):  # reads one image in the time of two
         device.now_s += 2 * PERIOD_S
-        device.tell(Request.HEARTBEAT)
+        device.write(Request.HEARTBEAT)
         data = device.firmware.read(now_s=device.now_s)
         if data is not None:
             (packet,) = device.decoder.feed(data)
@@ -242,8 +242,8 @@ def test_a_host_that_is_always_too_slow_still_gets_whole_frames(device: Device) 
     assert whole > 40  # of at most 100: the host takes 600 images
 
 
-def test_images_that_nobody_reads_are_not_rendered(device: Device) -> None:
-    device.tell(Request.START)
+def test_images_that_are_not_read_are_not_rendered(device: Device) -> None:
+    device.write(Request.START)
     device.now_s += 1.9
 
     assert device.status().dropped_images > 300
@@ -251,7 +251,7 @@ def test_images_that_nobody_reads_are_not_rendered(device: Device) -> None:
 
 
 def test_an_image_rendered_ahead_is_not_rendered_again(device: Device) -> None:
-    device.tell(Request.START)
+    device.write(Request.START)
 
     device.firmware.prepare()
     device.firmware.prepare()
@@ -262,7 +262,7 @@ def test_an_image_rendered_ahead_is_not_rendered_again(device: Device) -> None:
 
 
 def test_preparing_after_an_overflow_renders_what_will_be_read(device: Device) -> None:
-    device.tell(Request.START)
+    device.write(Request.START)
     device.now_s += 9 * PERIOD_S + 1e-6
     device.numbers()
 
@@ -277,10 +277,10 @@ def test_preparing_after_an_overflow_renders_what_will_be_read(device: Device) -
 
 
 def test_numbers_and_frames_go_on_after_stop_and_start(device: Device) -> None:
-    device.tell(Request.START)
+    device.write(Request.START)
     device.now_s += 4 * PERIOD_S + 1e-6
-    device.tell(Request.STOP)
-    device.tell(Request.START)
+    device.write(Request.STOP)
+    device.write(Request.START)
     device.now_s += PERIOD_S + 1e-6
 
     (packet,) = device.read()
@@ -289,9 +289,9 @@ def test_numbers_and_frames_go_on_after_stop_and_start(device: Device) -> None:
 
 
 def test_images_exposed_before_stop_stay_readable(device: Device) -> None:
-    device.tell(Request.START)
+    device.write(Request.START)
     device.now_s += 3 * PERIOD_S + 1e-6
-    device.tell(Request.STOP)
+    device.write(Request.STOP)
     device.now_s += 1.0
 
     assert not device.status().light_on
@@ -300,16 +300,16 @@ def test_images_exposed_before_stop_stay_readable(device: Device) -> None:
 
 
 def test_flush_empties_the_fifo(device: Device) -> None:
-    device.tell(Request.START)
+    device.write(Request.START)
     device.now_s += 3 * PERIOD_S + 1e-6
-    device.tell(Request.FLUSH)
+    device.write(Request.FLUSH)
     device.now_s += PERIOD_S
 
     assert device.numbers() == [3]
 
 
 def test_commit_while_streaming_switches_at_once_and_says_the_first_number(device: Device) -> None:
-    device.tell(Request.START)
+    device.write(Request.START)
     device.now_s += 4 * PERIOD_S + 1e-6
 
     answer = device.configure(Sequence(harmonics=1, zeroth="estimated", exposure_s=1.02e-3))
@@ -323,9 +323,9 @@ def test_commit_while_streaming_switches_at_once_and_says_the_first_number(devic
 
 
 def test_the_light_goes_off_when_the_heartbeat_stops(device: Device) -> None:
-    device.tell(Request.START)
+    device.write(Request.START)
     device.now_s += 1.5
-    device.tell(Request.HEARTBEAT)
+    device.write(Request.HEARTBEAT)
     device.now_s += 1.9
     assert device.status().light_on
 
@@ -337,37 +337,37 @@ def test_the_light_goes_off_when_the_heartbeat_stops(device: Device) -> None:
         False,
         True,
     )
-    device.tell(Request.START)
+    device.write(Request.START)
     assert not device.status().watchdog_tripped
 
 
 def test_no_image_is_exposed_after_the_watchdog(device: Device) -> None:
-    device.tell(Request.START)
+    device.write(Request.START)
     device.now_s += 60.0
 
     assert device.status().next_image == 400  # 2 s of images of 5 ms
 
 
-def test_an_open_interlock_switches_off_and_is_told(device: Device) -> None:
-    device.tell(Request.START)
+def test_an_open_interlock_switches_off_and_is_reported(device: Device) -> None:
+    device.write(Request.START)
     device.firmware.set_interlock(device.now_s, closed=False)
 
     status = device.status()
     assert (status.state, status.light_on) == (DeviceState.FAULTED, False)
     with pytest.raises(Refusal) as caught:
-        device.tell(Request.START)
+        device.write(Request.START)
     assert caught.value.code is ErrorCode.INTERLOCK_OPEN
 
     device.firmware.set_interlock(device.now_s, closed=True)
-    device.tell(Request.START)
+    device.write(Request.START)
     assert device.status().light_on
 
 
 def test_safe_off_is_obeyed_in_every_state(device: Device) -> None:
-    Device(configured=False).tell(Request.SAFE_OFF)
-    device.tell(Request.SAFE_OFF)
-    device.tell(Request.START)
-    device.tell(Request.SAFE_OFF)
+    Device(configured=False).write(Request.SAFE_OFF)
+    device.write(Request.SAFE_OFF)
+    device.write(Request.START)
+    device.write(Request.SAFE_OFF)
     assert not device.status().light_on
     device.firmware.set_interlock(device.now_s, closed=False)
-    device.tell(Request.SAFE_OFF)
+    device.write(Request.SAFE_OFF)

@@ -12,7 +12,8 @@ import usb.core
 import usb.util
 
 from transientcam_driver.clock import Clock, RealClock, VirtualClock
-from transientcam_driver.protocol import PRODUCT_ID, VENDOR_ID, Request
+from transientcam_driver.protocol import Request
+from transientcam_driver.protocol.requests import PRODUCT_ID, VENDOR_ID
 from transientcam_driver.simulation.build import build, find_scene
 from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.simulation.device.usb_device import EmulatedDevice
@@ -136,7 +137,7 @@ def test_a_halted_endpoint_stalls_until_it_is_cleared(found: Any, device: Emulat
     assert len(found.read(0x81, 65536, timeout=100)) == 39184
 
 
-def test_a_second_owner_is_told_it_is_busy(found: Any, bus: SimulatedBus) -> None:
+def test_a_second_owner_is_reported_it_is_busy(found: Any, bus: SimulatedBus) -> None:
     usb.util.claim_interface(found, 0)
     other = find(bus)
 

@@ -204,7 +204,7 @@ def test_a_file_that_cannot_be_used_says_what_is_wrong(
     assert allowed in caught.value.allowed
 
 
-def test_an_array_without_a_name_is_told(tmp_path: Path) -> None:
+def test_an_array_without_a_name_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "array.npy"
     np.save(path, np.ones(3))
 
@@ -213,7 +213,7 @@ def test_an_array_without_a_name_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [None, b"", b"PK\x03\x04 no zip", b"plain text"])
-def test_a_file_that_is_no_npz_is_told(tmp_path: Path, content: bytes | None) -> None:
+def test_a_file_that_is_no_npz_is_reported(tmp_path: Path, content: bytes | None) -> None:
     path = tmp_path / "bad.npz"
     if content is not None:
         path.write_bytes(content)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from transientcam_driver.sensor import Sensor
 from transientcam_driver.simulation.build import find_scene
 from transientcam_driver.simulation.light.paths import trace
 from transientcam_driver.simulation.scene.geometry import Rectangle
 from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Transport, Viewpoint
-from transientcam_driver.simulation.sensor import Sensor
 
 C = 299_792_458.0
 WIDTH, HEIGHT = 33, 25

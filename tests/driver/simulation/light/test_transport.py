@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from transientcam_driver import SceneError, Sequence, list_scenes, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.simulation.build import find_scene, scenery_of, world_of
-from transientcam_driver.simulation.light.transport import SurfaceScenery, edges
+from transientcam_driver.simulation.light.mixed_pixels import edges
+from transientcam_driver.simulation.light.transport import SurfaceScenery
 from transientcam_driver.simulation.responses import Scatter, SparseResponses
 from transientcam_driver.simulation.scene.file import load_scene
 from transientcam_driver.simulation.world import World
@@ -266,7 +267,9 @@ motion = "swing"
         load_scene(write(tmp_path, COMPOSED + mirror))
 
 
-def test_a_device_file_that_is_missing_is_told_when_the_camera_is_opened(tmp_path: Path) -> None:
+def test_a_device_file_that_is_missing_is_reported_when_the_camera_is_opened(
+    tmp_path: Path,
+) -> None:
     device = "[device]\nwaveform_file = 'absent.npy'\n"
 
     with pytest.raises(SceneError, match=r"absent.npy"):

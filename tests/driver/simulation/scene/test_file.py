@@ -117,7 +117,7 @@ def test_an_empty_scene_is_refused(tmp_path: Path) -> None:
         load_scene(write(tmp_path, "name = 'nothing'"))
 
 
-def test_a_missing_file_is_told(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="No such file"):
         load_scene(tmp_path / "absent.toml")
 
