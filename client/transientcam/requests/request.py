@@ -234,7 +234,7 @@ def problem_error(fields: Mapping[str, Any], *, status: int = 0) -> ProblemError
         field=text("field", "") or None,
         value=fields.get("value"),
         limit=fields.get("limit"),
-        document=fields,
+        document=dict(fields),
     )
 
 
