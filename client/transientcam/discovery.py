@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, cast
 
 from transientcam.errors import ParameterError
-from transientcam.transport.errors import translated
+from transientcam.transport import translated
 
 if TYPE_CHECKING:
     from zeroconf import ServiceInfo, ServiceListener, Zeroconf

@@ -4,14 +4,14 @@ import asyncio
 import inspect
 import json
 from collections.abc import Awaitable, Callable
-from typing import Any
+from typing import Any, assert_type
 
 import httpx
 import pytest
 
 import transientcam
 from tests.client.conftest import Recording
-from transientcam import AsyncCamera, AsyncStream, Camera, Stream
+from transientcam import AsyncCamera, AsyncStream, Camera, Frame, Stream
 from transientcam.errors import ParameterError, ProblemError, ServerUnreachable
 
 _URL = "http://lidar.example:8000"
@@ -69,7 +69,7 @@ _CALLS: dict[
     "configure": (
         lambda c: c.configure(takes=2),
         lambda c: c.configure(takes=2),
-        ("PUT", "sequence", "", {"harmonics": 3, "takes": 2}),
+        ("PUT", "sequence", "", {**_SEQUENCE, "takes": 2}),
     ),
     "validate": (
         lambda c: c.validate({"takes": 2}),
@@ -249,6 +249,27 @@ def test_the_twins_take_the_same_arguments(name: str) -> None:
     one, other = getattr(Camera, name), getattr(AsyncCamera, name)
     if inspect.isfunction(one) and inspect.isfunction(other):
         assert inspect.signature(one).parameters == inspect.signature(other).parameters
+
+
+def test_type_checkers_see_what_either_returns(daemon: _Daemon) -> None:
+    async def asynchronous() -> None:
+        async with AsyncCamera(_URL, transport=httpx.MockTransport(daemon)) as camera:
+            assert_type(await camera.frame("range"), Frame)
+            assert_type(await camera.picture("range"), bytes)
+            assert_type(await camera.start(), dict[str, Any])
+            assert_type(await camera.jobs.cancel("5a0c"), dict[str, Any])
+
+    with Camera(_URL, transport=httpx.MockTransport(daemon)) as camera:
+        assert_type(camera.frame("range"), Frame)
+        assert_type(camera.picture("range"), bytes)
+        assert_type(camera.start(), dict[str, Any])
+        assert_type(camera.jobs.cancel("5a0c"), dict[str, Any])
+    asyncio.run(asynchronous())
+
+
+def test_a_request_that_cannot_be_built_is_refused_when_its_method_is_called() -> None:
+    with pytest.raises(ParameterError, match="number is 0"):
+        _ = AsyncCamera(_URL).frame("range", number=0)
 
 
 def test_a_refusal_reaches_the_caller_of_either() -> None:

@@ -44,7 +44,7 @@ def conformance(
     console = Console(stderr=to_standard_output, highlight=False)
     width = max(len(each.name) for each in CHECKS)
 
-    with Device(url, token=token, patience_s=timeout_s) as device, console.status("") as status:
+    with Device(url, token=token, timeout_s=timeout_s) as device, console.status("") as status:
 
         def begin(check: Check) -> None:
             status.update(f"{check.group}: {check.promise}")

@@ -14,9 +14,7 @@ import httpx
 from transientcam.camera import Camera
 from transientcam.cli.findings import Finding
 from transientcam.errors import FrameTimeout, ProblemError, TransientcamError
-from transientcam.transport.address import parse_address
-from transientcam.transport.errors import translated
-from transientcam.transport.options import http_options
+from transientcam.transport import http_options, parse_address, translated
 
 CLOCKS_WITHIN_S: Final = 1.5
 """The daemon's ``Date`` has whole seconds, so that nothing finer can be said."""

@@ -12,8 +12,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from transientcam.conformance.expecting import expect
 from transientcam.errors import PromiseBroken, ProtocolError
-from transientcam.transport.errors import translated
-from transientcam.transport.options import threaded_stream_options
+from transientcam.transport import stream_options, translated
 from transientcam.wire import (
     Ack,
     Channel,
@@ -38,10 +37,10 @@ _SMALL_BUFFER_BYTES = 4096
 class Conversation:
     """A connection that was subscribed; what it receives is kept in the order it came."""
 
-    def __init__(self, connection: ClientConnection, url: str, *, patience_s: float) -> None:
+    def __init__(self, connection: ClientConnection, url: str, *, timeout_s: float) -> None:
         self._connection = connection
         self._url = url
-        self._patience_s = patience_s
+        self._timeout_s = timeout_s
         self.hello: Hello | None = None
         self.channels: tuple[Channel, ...] = ()
         self.notices: list[Notice] = []
@@ -87,7 +86,7 @@ class Conversation:
 
     def receive(self) -> ServerMessage:
         """Return the next message."""
-        message = self._receive(self._patience_s)
+        message = self._receive(self._timeout_s)
         match message:
             case Hello():
                 self.hello, self.channels = message, message.channels
@@ -99,10 +98,10 @@ class Conversation:
 
     def close_code(self) -> int:
         """Receive until the other end closes, and return the code it gives."""
-        end_s = time.monotonic() + self._patience_s
+        end_s = time.monotonic() + self._timeout_s
         while time.monotonic() < end_s:
             try:
-                self._connection.recv(timeout=self._patience_s)
+                self._connection.recv(timeout=self._timeout_s)
             except ConnectionClosed as error:
                 return CloseCode.ABNORMAL if error.rcvd is None else error.rcvd.code
             except TimeoutError:
@@ -115,7 +114,7 @@ class Conversation:
         return sum(int(each["count"]) for each in told if each.get("channel") == channel)
 
     def _next(self, kind: type[_M], wanted: Callable[[_M], bool], missing: str) -> _M:
-        end_s = time.monotonic() + self._patience_s
+        end_s = time.monotonic() + self._timeout_s
         while time.monotonic() < end_s:
             message = self.receive()
             if isinstance(message, kind) and wanted(message):
@@ -123,7 +122,7 @@ class Conversation:
             if isinstance(message, ErrorMessage):
                 detail = message.problem.get("detail")
                 raise PromiseBroken(f"the stream tells of a problem: {detail}")
-        raise PromiseBroken(f"{missing} within {self._patience_s:g} s")
+        raise PromiseBroken(f"{missing} within {self._timeout_s:g} s")
 
     def _receive(self, timeout_s: float) -> ServerMessage:
         try:
@@ -143,7 +142,7 @@ def connected(
     url: str,
     *products: str,
     token: str | None = None,
-    patience_s: float,
+    timeout_s: float,
     credit: int | None = None,
     start: int | None = None,
     silent: bool = False,
@@ -154,11 +153,11 @@ def connected(
     ``silent`` sends no subscription, ``unread`` keeps the buffers of this end so small that what
     is not read stays with the camera.
     """
-    options = threaded_stream_options(url, timeout_s=patience_s)
+    options = stream_options(url, timeout_s=timeout_s, threaded=True)
     if unread:
-        options |= {"max_queue": 1, "sock": _small_socket(url, patience_s)}
+        options |= {"max_queue": 1, "sock": _small_socket(url, timeout_s)}
     with translated(url), connect(url, **options) as connection:
-        conversation = Conversation(connection, url, patience_s=patience_s)
+        conversation = Conversation(connection, url, timeout_s=timeout_s)
         if not silent:
             wanted = tuple(Subscription(each) for each in products)
             message = Subscribe(wanted, token=token, credits=credit, start=start)

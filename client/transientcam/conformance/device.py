@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
-from types import TracebackType
 from typing import Any, Final
 
 import httpx
@@ -13,16 +12,16 @@ import httpx
 from transientcam.conformance.conversation import Conversation, connected
 from transientcam.conformance.expecting import equal, expect, skip_unless
 from transientcam.errors import PromiseBroken, ProtocolError
-from transientcam.requests import request as rest
-from transientcam.transport.address import parse_address
-from transientcam.transport.errors import media_type, translated
-from transientcam.transport.options import answer, http_options
+from transientcam.requests import problem
+from transientcam.transport import answer_of, http_options, parse_address, translated
+from transientcam.transport.errors import media_type
+from transientcam.transport.options import set_lease
 from transientcam.wire import LEASE_HEADER, MEDIA_TYPE, PROBLEM_MEDIA_TYPE, Frame, parse_frame
 
 API: Final = "/api/v1"
 HOLDER: Final = "transientcam conformance"
 _STATE: Final = ("sequence", "reconstruction")
-_OF_THE_CAMERA: Final = rest.APPLIED_FIELDS | {"reconstruction_id"}
+_CHANGE_COUNTERS: Final = frozenset(("sequence_id", "reconstruction_id"))
 _LEASE_S: Final = 600.0
 _SHOWN = 120
 
@@ -34,16 +33,16 @@ class Device:
     ----------
     url, token
         As of `Camera`.
-    patience_s
+    timeout_s
         How long what should happen by itself may take.
     """
 
-    def __init__(self, url: str, *, token: str | None = None, patience_s: float = 30.0) -> None:
+    def __init__(self, url: str, *, token: str | None = None, timeout_s: float = 30.0) -> None:
         self.address = parse_address(url)
         self.token = token
-        self.patience_s = patience_s
+        self.timeout_s = timeout_s
         self._http = httpx.Client(
-            base_url=self.address.url, **http_options(token=token, timeout_s=patience_s)
+            base_url=self.address.url, **http_options(token=token, timeout_s=timeout_s)
         )
         self._lease_id: str | None = None
         self.answers: list[tuple[dict[str, Any], httpx.Response]] = []
@@ -78,7 +77,7 @@ class Device:
         """Return the JSON document that a request is answered with."""
         what = _named(response)
         if response.status_code != status:
-            said = rest.problem(answer(response))
+            said = problem(answer_of(response))
             raise PromiseBroken(f"{what} is answered with {response.status_code}: {said}")
         equal(_media_type(response), "application/json", f"the media type of {what}")
         return _object(response)
@@ -108,7 +107,7 @@ class Device:
         """Return the product of a frame at a path, as msgpack."""
         response = self.send("GET", path, headers={"accept": MEDIA_TYPE}, **options)
         if response.status_code != httpx.codes.OK:
-            said = rest.problem(answer(response))
+            said = problem(answer_of(response))
             raise PromiseBroken(f"{_named(response)} is refused: {said}")
         equal(_media_type(response), MEDIA_TYPE, f"the media type of {_named(response)}")
         try:
@@ -119,7 +118,7 @@ class Device:
     @contextmanager
     def stream(self, *products: str, **options: Any) -> Iterator[Conversation]:
         """Subscribe for the length of a block; options as of `connected`."""
-        chosen = {"token": self.token, "patience_s": self.patience_s} | options
+        chosen = {"token": self.token, "timeout_s": self.timeout_s} | options
         with connected(self.address.stream, *products, **chosen) as conversation:
             yield conversation
 
@@ -152,10 +151,10 @@ class Device:
 
     def wait_until(self, happened: Callable[[], bool], what: str) -> None:
         """Wait for something; it is a broken promise if it does not come in time."""
-        end_s = time.monotonic() + self.patience_s
+        end_s = time.monotonic() + self.timeout_s
         while not happened():
             if time.monotonic() >= end_s:
-                raise PromiseBroken(f"{what} within {self.patience_s:g} s")
+                raise PromiseBroken(f"{what} within {self.timeout_s:g} s")
             time.sleep(0.05)
 
     # -- changing it ---------------------------------------------------------------------------
@@ -175,7 +174,7 @@ class Device:
         terms = {"holder": HOLDER, "duration_s": _LEASE_S, "on_lapse": "keep"}
         response = self.send("POST", f"{API}/lease", json=terms)
         if response.status_code in (401, 403, 409):
-            skip_unless(False, f"nothing may be changed: {rest.problem(answer(response))}")
+            skip_unless(False, f"nothing may be changed: {problem(answer_of(response))}")
         granted = self.document(response, status=201)
         before = self.state()
         self.hold(granted["lease_id"])
@@ -207,10 +206,7 @@ class Device:
     def hold(self, lease_id: str | None) -> None:
         """Show this lease with every change from now on."""
         self._lease_id = lease_id
-        if lease_id is None:
-            self._http.headers.pop(LEASE_HEADER, None)
-        else:
-            self._http.headers[LEASE_HEADER] = lease_id
+        set_lease(self._http.headers, lease_id)
 
     @contextmanager
     def capturing(self) -> Iterator[None]:
@@ -226,7 +222,7 @@ class Device:
         """Return a sequence that can be set; skip the check where the camera does not take it."""
         response = self.send("POST", f"{API}/sequence/validate", json=dict(sequence))
         if not response.is_success:
-            skip_unless(False, f"this camera does not take it: {rest.problem(answer(response))}")
+            skip_unless(False, f"this camera does not take it: {problem(answer_of(response))}")
         return dict(sequence)
 
     def state(self) -> dict[str, Any]:
@@ -235,7 +231,7 @@ class Device:
             name: {
                 key: value
                 for key, value in self.read(f"{API}/{name}").items()
-                if key not in _OF_THE_CAMERA
+                if key not in _CHANGE_COUNTERS
             }
             for name in _STATE
             if self.offers("PUT", f"/{name}")
@@ -260,12 +256,7 @@ class Device:
     def __enter__(self) -> "Device":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

@@ -6,8 +6,8 @@ from typing import Any, Final
 from transientcam.conformance.check import checks
 from transientcam.conformance.device import API, Device
 from transientcam.conformance.expecting import equal, expect
-from transientcam.requests.request import problem
-from transientcam.transport.options import answer
+from transientcam.requests import problem
+from transientcam.transport import answer_of
 
 _SEQUENCE: Final = f"{API}/sequence"
 _CHANGEABLE: Final = "read-write"
@@ -90,7 +90,7 @@ def the_limits_of_a_sequence_are_taken(device: Device) -> None:
             body = _with(device.sequence, each["pointer"], value)
             response = device.send("POST", f"{_SEQUENCE}/validate", json=body)
             refused = f"{each['name']} = {value}, its limit, is refused"
-            expect(response.is_success, f"{refused}: {problem(answer(response))}")
+            expect(response.is_success, f"{refused}: {problem(answer_of(response))}")
 
 
 def a_checked_sequence_is_not_set(device: Device) -> None:

@@ -77,7 +77,7 @@ def a_replay_is_those_frames_again(device: Device) -> None:
         wanted = [each.array for each in streamed[-_FRAMES:]]
         with (
             replayed(file) as address,
-            Device(address, patience_s=device.patience_s) as replay,
+            Device(address, timeout_s=device.timeout_s) as replay,
             replay.stream("raw") as stream,
         ):
             found = [stream.frame().array for _ in range(_FRAMES + 1)]

@@ -47,7 +47,7 @@ def spoilt_images_are_counted(device: Device) -> None:
     """Images that are lost or corrupt cost their frame; the next one and a notice say how many."""
     for fault in ("corrupt-image", "drop-image"):
         with _simulated(device) as stream:
-            _cause(device, fault)
+            _inject_fault(device, fault)
             told = stream.notice("lost-images")
             expect(told.details.get("count", 0) >= 1, f"{fault}: no lost image is told")
             stream.frame()
@@ -65,15 +65,15 @@ def _simulated(device: Device) -> Iterator[Conversation]:
 
 @contextmanager
 def _unplugged(device: Device) -> Iterator[None]:
-    _cause(device, "unplug")
+    _inject_fault(device, "unplug")
     try:
         yield
     finally:
-        _cause(device, "replug")
+        _inject_fault(device, "replug")
         device.wait_until(lambda: device.camera["state"] != "lost", "the camera is not found again")
 
 
-def _cause(device: Device, fault: str) -> None:
+def _inject_fault(device: Device, fault: str) -> None:
     device.document(device.send("POST", f"{API}/simulation/faults", json={"fault": fault}))
 
 

@@ -1,6 +1,6 @@
 """The one place where errors of the network libraries become errors of this package.
 
-(msgpack's become `ProtocolError` where msgpack is used, in `wire.codec`.)
+Those of msgpack become `ProtocolError` where msgpack is used, in `wire.codec`.
 """
 
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from transientcam.errors import (
     StreamClosed,
     TransientcamError,
 )
-from transientcam.requests.request import Answer, problem
+from transientcam.requests import Answer, problem
 from transientcam.wire import CloseCode
 
 FOREIGN = (
