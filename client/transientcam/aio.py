@@ -19,9 +19,9 @@ from transientcam.requests import Request, document, problem
 from transientcam.requests.changes import set_reconstruction, set_sequence
 from transientcam.requests.jobs import PROGRESS_EVERY_S, WAIT_S, OnProgress, ended
 from transientcam.requests.recordings import recording_file
+from transientcam.stream import BaseStream
 from transientcam.stream_state import (
     DEFAULT_CREDITS,
-    BaseStream,
     NoticeHandler,
     Reconnect,
     StreamState,

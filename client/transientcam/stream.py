@@ -1,18 +1,52 @@
 """A stream of frames as they are captured, read by a thread."""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Data
 
 from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamError
 from transientcam.frame import Frame
-from transientcam.stream_state import DEFAULT_CREDITS, BaseStream, StreamState, subscribe_message
+from transientcam.stream_state import DEFAULT_CREDITS, StreamState, subscribe_message
 from transientcam.transport import stream_options, translated
 from transientcam.transport.deadline import Deadline
-from transientcam.wire import CloseCode, Subscription
+from transientcam.wire import Channel, CloseCode, Hello, Notice, Subscription
+
+
+class BaseStream:
+    """What `Stream` and `AsyncStream` report of their state."""
+
+    def __init__(self, url: str, state: StreamState, *, timeout_s: float) -> None:
+        self._url = url
+        self._state = state
+        self._timeout_s = timeout_s
+
+    @property
+    def hello(self) -> Hello | None:
+        """The server's greeting; None before the first connection."""
+        return self._state.hello
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Unit, axes, dtype and shape of the frames of each subscription at present."""
+        return self._state.channels
+
+    @property
+    def sequence(self) -> Mapping[str, Any]:
+        """The sequence that is captured at present; empty before the first connection."""
+        return self._state.sequence
+
+    @property
+    def notices(self) -> Sequence[Notice]:
+        """The newest 256 notices, oldest first.
+
+        Beside those of docs/stream.md the client adds ``product-failed`` (with the problem),
+        ``connection-lost`` (``reason``) and ``reconnected`` (``attempts``).
+        """
+        return self._state.notices
 
 
 class Stream(BaseStream):

@@ -6,7 +6,7 @@ when the connection is lost.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -249,36 +249,3 @@ def _may_pass(error: TransientcamError) -> bool:
             return error.status in _RESTARTING
         case _:
             return isinstance(error, ServerUnreachable)
-
-
-class BaseStream:
-    """What `Stream` and `AsyncStream` report of their state."""
-
-    def __init__(self, url: str, state: StreamState, *, timeout_s: float) -> None:
-        self._url = url
-        self._state = state
-        self._timeout_s = timeout_s
-
-    @property
-    def hello(self) -> Hello | None:
-        """The server's greeting; None before the first connection."""
-        return self._state.hello
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """Unit, axes, dtype and shape of the frames of each subscription at present."""
-        return self._state.channels
-
-    @property
-    def sequence(self) -> Mapping[str, Any]:
-        """The sequence that is captured at present; empty before the first connection."""
-        return self._state.sequence
-
-    @property
-    def notices(self) -> Sequence[Notice]:
-        """The newest 256 notices, oldest first.
-
-        Beside those of docs/stream.md the client adds ``product-failed`` (with the problem),
-        ``connection-lost`` (``reason``) and ``reconnected`` (``attempts``).
-        """
-        return self._state.notices

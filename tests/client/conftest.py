@@ -6,10 +6,12 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from websockets.sync.server import Server, ServerConnection, serve
+
+from transientcam.frame import FrameMeta
 
 SPECIFICATION = Path(__file__).resolve().parents[2] / "docs" / "stream.md"
 _BLOCK = re.compile(r"```(hex|json) (\w+)\n(.*?)```", re.DOTALL)
@@ -33,6 +35,11 @@ def recorded() -> dict[str, Recording]:
         name: Recording(bytes.fromhex(block["hex"]), json.loads(block["json"]))
         for name, block in blocks.items()
     }
+
+
+def frame_meta(**known: object) -> FrameMeta:
+    """Return the metadata of a frame, as far as a test needs it."""
+    return cast("FrameMeta", known)
 
 
 Handler = Callable[[ServerConnection], None]

@@ -9,6 +9,7 @@ from scipy.integrate import trapezoid
 from scipy.linalg import toeplitz
 
 import transientcam
+from tests.client.conftest import frame_meta
 from transientcam.density import step_down, step_up
 from transientcam.errors import ParameterError
 
@@ -143,7 +144,7 @@ def test_a_transient_repeats_after_the_unambiguous_time_however_often() -> None:
 
 def test_a_frame_is_taken_for_its_array() -> None:
     frame = transientcam.Frame(
-        "coefficients", "DN,1", ("coefficient", "y", "x"), {"frame": 1}, np.ones((3, 1, 1))
+        "coefficients", "DN,1", ("coefficient", "y", "x"), frame_meta(frame=1), np.ones((3, 1, 1))
     )
 
     np.testing.assert_array_equal(

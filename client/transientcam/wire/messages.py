@@ -2,73 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypedDict
+from typing import Any
 
 from numpy.typing import NDArray
 
 from transientcam.frame import Frame
 from transientcam.wire.codec import pack, pack_with_array
 from transientcam.wire.contract import F32, VERSION
-
-
-class PixelCounts(TypedDict):
-    """How many pixels of a frame carry each flag; one pixel may carry several."""
-
-    total: int
-    valid: int
-    biased: int
-    no_signal: int
-    saturated: int
-    non_finite: int
-    degenerate: int
-    replaced: int
-
-
-class PredictedStd(TypedDict):
-    """Standard deviation that the sensor's noise gives a frame's range, in m."""
-
-    median: float
-    p90: float
-    """90 % of the pixels are better."""
-    first_order_share: float
-    """Share of the pixels where the noise model holds; that of the others is a rough figure."""
-
-
-class FrameMeta(TypedDict):
-    """What is known of a frame, whatever product of it is sent."""
-
-    frame: int
-    """Counted by the server from 1; never resets while it runs."""
-    sequence_id: int
-    calibration_id: str
-    reconstruction_id: int
-    """Counts the settings of the reconstruction that the server has had."""
-    device_time_s: float
-    """Start of the first exposure, by the camera's clock."""
-    host_time_s: float
-    """Arrival of the last image, Unix time."""
-    capture_s: float
-    reconstruct_s: float | None
-    """None until something of this frame was computed."""
-    base_frequency_hz: float
-    harmonics: int
-    zeroth: str
-    exposure_s: float
-    takes: int
-    width: int
-    height: int
-    temperature_c: float
-    lost_images: int
-    """Images lost or corrupt between the frame before and this one."""
-    rejected_images: int | None
-    """Images left out of the average over takes as outliers; None until it was computed."""
-    pixels: PixelCounts | None
-    predicted_range_std_m: PredictedStd | None
-    """None until the range of this frame was computed."""
-    region: list[int]
-    """Which pixels of the frame this is about: column and row of the first, width, height."""
-    decimation: int
-    """Only every so many of them are here, both ways."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,10 +1,10 @@
 """Messages from untrusted bytes: every failure is one `ProtocolError` that names its place."""
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from transientcam.errors import ProtocolError
-from transientcam.frame import Frame
+from transientcam.frame import Frame, FrameMeta
 from transientcam.wire import fields
 from transientcam.wire.arrays import DTYPES, MAX_DIMENSIONS, MAX_LENGTH, parse_array
 from transientcam.wire.codec import unpack
@@ -224,7 +224,7 @@ def _frame(document: Mapping[str, Any]) -> Frame:
         product=fields.text(document, "product"),
         unit=fields.text(document, "unit"),
         axes=axes,
-        meta=meta,
+        meta=cast("FrameMeta", meta),  # of its keys only ``frame`` is checked
         array=array,
         encode_s=fields.number(document, "encode_s"),
         channel=_optional_integer(document, "channel", minimum=0, maximum=MAX_INTEGER),

@@ -7,7 +7,7 @@ import io
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,7 @@ def _npz(
     product: Product, array: _Array, meta: Mapping[str, Any], extra: Mapping[str, Any], *_: Any
 ) -> bytes:
     description = product.description
+    meta = cast("wire.FrameMeta", meta)
     array = np.asarray(array, dtype=description.dtype)
     return npz_bytes(
         Frame(product.name, description.unit, description.axes, meta, array, extra=extra)

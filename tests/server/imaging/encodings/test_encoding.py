@@ -41,7 +41,7 @@ def test_msgpack_holds_the_array_and_the_meta() -> None:
 
     np.testing.assert_array_equal(message.array, array)
     assert (message.product, message.unit, message.axes) == ("range", "m", ("y", "x"))
-    assert message.meta == META
+    assert dict(message.meta) == META
     assert message.channel is None
     assert message.encode_s >= 0.0
 
