@@ -74,11 +74,11 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
         self._streams: list[AsyncStream] = []
 
     async def info(self) -> dict[str, Any]:
-        """Return what the daemon is: names and versions."""
+        """Return names and versions of the daemon."""
         return await self._ask(document("info"))
 
     async def camera(self) -> dict[str, Any]:
-        """Return what the camera is, can do and does: capabilities and state."""
+        """Return capabilities and state of the camera."""
         return await self._ask(document("camera"))
 
     async def sequence(self) -> dict[str, Any]:
@@ -102,7 +102,7 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
         return await self._ask(set_reconstruction(settings))
 
     async def parameters(self) -> dict[str, Any]:
-        """Return everything that can be set, with its value, unit and limits."""
+        """Return all parameters, with their values, units and limits."""
         return await self._ask(document("parameters"))
 
     async def wait_for(
@@ -149,7 +149,7 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
         return await self._ask(document("frames"))
 
     async def simulation(self) -> dict[str, Any]:
-        """Return the simulated world; a problem where the camera is real."""
+        """Return the simulated scene and effects; a `ProblemError` if the camera is real."""
         return await self._ask(document("simulation"))
 
     async def download_recording(

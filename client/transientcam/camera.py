@@ -47,13 +47,13 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
             for frame in camera.stream("range", "coefficients"):
                 ...
 
-    Every method may raise `ServerUnreachable`, `ProblemError` (the daemon refused, and says why)
+    Every method may raise `ServerUnreachable`, `ProblemError` (the daemon refused, with a reason)
     and `ProtocolError`. `AsyncCamera` is its twin for asyncio.
 
     Parameters
     ----------
     url
-        Address of the daemon; http unless it says https.
+        Address of the daemon; http if it has no scheme.
     token
         Bearer token, where the daemon requires one.
     timeout_s
@@ -78,12 +78,12 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
 
     @property
     def info(self) -> dict[str, Any]:
-        """What the daemon is: names and versions."""
+        """Names and versions of the daemon."""
         return self._ask(document("info"))
 
     @property
     def camera(self) -> dict[str, Any]:
-        """What the camera is, can do and does: capabilities and state."""
+        """Capabilities and state of the camera."""
         return self._ask(document("camera"))
 
     @property
@@ -118,7 +118,7 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """Everything that can be set, in ``parameters``, with its value, unit and limits."""
+        """All parameters, in ``parameters``, with their values, units and limits."""
         return self._ask(document("parameters"))
 
     def wait_for(self, job_id: str, *, on_progress: OnProgress | None = None) -> dict[str, Any]:
@@ -186,7 +186,7 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
 
     @property
     def simulation(self) -> dict[str, Any]:
-        """The simulated world; a problem where the camera is real."""
+        """The simulated scene and effects; a `ProblemError` if the camera is real."""
         return self._ask(document("simulation"))
 
     def download_recording(

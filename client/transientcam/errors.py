@@ -72,7 +72,7 @@ class ServerUnreachable(_DataError):  # noqa: N818 - a state has no "Error" in i
 
 @dataclass(eq=False, repr=False, kw_only=True)
 class ProblemError(_DataError):
-    """The server refused a request and said why.
+    """The server refused a request, with a reason.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class ProblemError(_DataError):
         One sentence for the kind, one for this occurrence.
     field, value, limit
         Which part of the request was refused, what it was and what it may be; None where the
-        server does not say.
+        server sends none.
     document
         The whole problem as the server sent it.
     """
@@ -145,7 +145,7 @@ class ProtocolError(_WrongValueError):
 
 
 class ParameterError(_WrongValueError, ValueError):
-    """An argument cannot be used: ``field`` names it, ``limit`` says what would do."""
+    """An argument cannot be used: ``field`` names it, ``limit`` is what it may be."""
 
 
 @dataclass(eq=False, repr=False)
@@ -163,13 +163,13 @@ class CommandUnavailable(_DataError):  # noqa: N818 - the same
 
 @dataclass(eq=False, repr=False)
 class PromiseBroken(_DataError):  # noqa: N818 - the same
-    """A camera does not do what is documented; ``what`` says what it does instead."""
+    """A camera does not do what is documented; ``what`` is what it does instead."""
 
     what: str
 
 
 @dataclass(eq=False, repr=False)
 class CheckSkipped(_DataError):  # noqa: N818 - the same
-    """A promise cannot be tried on this camera; ``why`` says why not."""
+    """A promise cannot be tried on this camera; ``why`` is the reason."""
 
     why: str

@@ -1,4 +1,4 @@
-"""One product of one frame, as a numpy array that knows its unit."""
+"""One product of one frame: a numpy array with its unit, axes and metadata."""
 
 import io
 import json
@@ -13,7 +13,7 @@ from transientcam.errors import ParameterError
 
 
 class PixelCounts(TypedDict):
-    """How many pixels of a frame carry each flag; one pixel may carry several."""
+    """Number of pixels of a frame that carry each flag; one pixel may carry several."""
 
     total: int
     valid: int
@@ -36,7 +36,7 @@ class PredictedStd(TypedDict):
 
 
 class FrameMeta(TypedDict):
-    """What is known of a frame, whatever product of it is sent."""
+    """Metadata of a frame, the same for all its products."""
 
     frame: int
     """Counted by the server from 1; never resets while it runs."""
@@ -50,7 +50,7 @@ class FrameMeta(TypedDict):
     """Arrival of the last image, Unix time."""
     capture_s: float
     reconstruct_s: float | None
-    """None until something of this frame was computed."""
+    """None until a product of this frame was computed."""
     base_frequency_hz: float
     harmonics: int
     zeroth: str
@@ -67,9 +67,9 @@ class FrameMeta(TypedDict):
     predicted_range_std_m: PredictedStd | None
     """None until the range of this frame was computed."""
     region: list[int]
-    """Which pixels of the frame this is about: column and row of the first, width, height."""
+    """The pixels of the frame that the array holds: column and row of the first, width, height."""
     decimation: int
-    """Only every so many of them are here, both ways."""
+    """Every so many of them are in the array, both ways."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -92,9 +92,9 @@ class Frame:
     encode_s
         How long the server took to make this product and its bytes.
     channel
-        Which subscription of a stream it answers; None outside a stream.
+        The subscription of a stream that it belongs to; None outside a stream.
     extra
-        What only some products have: ``labels`` of raw, ``time_s`` of those over time, ``y`` of
+        Parts of some products: ``labels`` of raw, ``time_s`` of those over time, ``y`` of
         streak, ``radius`` of bounds, ``intrinsics`` of pointcloud.
     """
 
@@ -120,7 +120,7 @@ class Frame:
 
     @property
     def labels(self) -> Sequence[Mapping[str, Any]]:
-        """What each image of ``raw`` was taken with, in the order of its first axis; else empty."""
+        """Label of each image of ``raw``, in the order of its first axis; empty otherwise."""
         return tuple(self.extra.get("labels", ()))
 
     @property
@@ -157,10 +157,10 @@ class Frame:
 
 
 def npz_bytes(frame: Frame) -> bytes:
-    """Return a frame with everything that belongs to it, as `numpy.load` reads it.
+    """Return a frame and its metadata as an .npz file, which `numpy.load` reads.
 
-    ``array`` is there with ``product``, ``unit`` and ``axes``, ``meta`` (JSON), and what only some
-    products have: numbers and lists of numbers as arrays (``time_s``), all else as JSON
+    It holds ``array``, ``product``, ``unit``, ``axes``, ``meta`` (JSON) and the parts that only
+    some products have: numbers and lists of numbers as arrays (``time_s``), all else as JSON
     (``labels``).
     """
     parts: dict[str, Any] = {

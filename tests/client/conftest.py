@@ -47,7 +47,7 @@ Replay = Callable[[Handler], "ReplayServer"]
 
 
 class ReplayServer:
-    """A WebSocket server that lets ``handler`` talk to whoever connects."""
+    """A WebSocket server that runs ``handler`` for each client."""
 
     def __init__(self, handler: Handler, *, port: int = 0, **options: Any) -> None:
         self.connections = 0

@@ -88,7 +88,7 @@ def test_a_lease_that_was_taken_over_is_lost_and_changes_nothing_more(
     camera.configure(harmonics=3)
 
 
-def test_the_light_goes_off_whoever_holds_the_lease(camera: Camera, other: Camera) -> None:
+def test_the_light_goes_off_whichever_client_holds_the_lease(camera: Camera, other: Camera) -> None:
     with camera.lease("anna"):
         assert other.safe_off()["running"] is False
         assert camera.start()["running"] is True

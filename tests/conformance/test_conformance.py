@@ -40,7 +40,7 @@ def test_the_daemon_keeps_every_promise(daemon: Breakable) -> None:
     assert not report.failed, said(report)
     assert len(report.results) == len(CHECKS) + 1
     assert {each.reason for each in report.results if each.outcome == "skipped"} <= {
-        "the service asks nobody for a token",
+        "the service requires no token",
     }
     assert after == before
     assert not recordings
@@ -130,7 +130,7 @@ def test_a_broken_promise_about_tokens_fails_its_check(
     assert word in str(result.reason)
 
 
-def test_who_may_only_look_changes_nothing_and_is_told_why(guarded: Guarded) -> None:
+def test_a_viewer_changes_nothing_and_gets_the_reason(guarded: Guarded) -> None:
     daemon, tokens = guarded
     with Device(daemon.served.url, token=tokens[Role.VIEWER], timeout_s=LONG_S) as device:
         report = run(device, chosen(["tags", "lease", "recording"]))
@@ -141,7 +141,7 @@ def test_who_may_only_look_changes_nothing_and_is_told_why(guarded: Guarded) -> 
     assert "may not delete" in str(reasons["a-file-can-be-fetched-in-parts"])
 
 
-def test_a_camera_that_somebody_controls_is_left_alone(daemon: Breakable) -> None:
+def test_a_camera_that_another_client_controls_is_left_alone(daemon: Breakable) -> None:
     with Device(daemon.served.url, timeout_s=LONG_S) as device, httpx.Client() as other:
         address = f"{daemon.served.url}{API}/lease"
         lease = other.post(address, json={"holder": "bench 2"}).json()

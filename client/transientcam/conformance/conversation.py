@@ -35,7 +35,7 @@ _SMALL_BUFFER_BYTES = 4096
 
 
 class Conversation:
-    """A connection that was subscribed; what it receives is kept in the order it came."""
+    """One connection, and the messages of it in the order they arrived."""
 
     def __init__(self, connection: ClientConnection, url: str, *, timeout_s: float) -> None:
         self._connection = connection
@@ -45,18 +45,18 @@ class Conversation:
         self.channels: tuple[Channel, ...] = ()
         self.notices: list[Notice] = []
 
-    def say(self, document: dict[str, Any]) -> None:
+    def send(self, document: dict[str, Any]) -> None:
         """Send any map."""
         with translated(self._url):
             self._connection.send(pack(document))
 
-    def say_text(self, text: str) -> None:
+    def send_text(self, text: str) -> None:
         """Send a text message, which the protocol does not have."""
         with translated(self._url):
             self._connection.send(text)
 
     def acknowledge(self, frame: int) -> None:
-        """Say that a frame and all before it are done with."""
+        """Acknowledge a frame and all before it."""
         with translated(self._url):
             self._connection.send(encode(Ack(frame)))
 
@@ -67,20 +67,20 @@ class Conversation:
         return self.greeting()
 
     def greeting(self) -> Hello:
-        """Return the next hello; what comes before is passed over."""
+        """Return the next hello; messages before it are skipped."""
         return self._next(Hello, lambda hello: True, "no hello")
 
-    def frame(self, wanted: Callable[[Frame], bool] = lambda frame: True) -> Frame:
-        """Return the next frame, or the next that is wanted; what comes before is passed over."""
-        return self._next(Frame, wanted, "no such frame")
+    def frame(self, matches: Callable[[Frame], bool] = lambda frame: True) -> Frame:
+        """Return the next frame that ``matches``; messages before it are skipped."""
+        return self._next(Frame, matches, "no such frame")
 
     def notice(self, *kinds: str) -> Notice:
-        """Return the next notice of these kinds; what comes before is passed over."""
+        """Return the next notice of these kinds; messages before it are skipped."""
         what = f"no notice {' or '.join(kinds)}"
         return self._next(Notice, lambda notice: notice.kind in kinds, what)
 
     def problem(self) -> dict[str, Any]:
-        """Return the next problem; what comes before is passed over."""
+        """Return the next problem; messages before it are skipped."""
         what = "no problem that answers a message which cannot be used"
         return dict(self._next(ErrorMessage, lambda error: True, what).problem)
 
@@ -109,19 +109,19 @@ class Conversation:
         raise PromiseBroken("the stream is not closed")
 
     def dropped(self, channel: int) -> int:
-        """Return how many frames of a channel the notices so far say were dropped."""
-        told = [each.details for each in self.notices if each.kind == "dropped"]
-        return sum(int(each["count"]) for each in told if each.get("channel") == channel)
+        """Return how many frames of a channel were dropped, by the notices so far."""
+        drops = [each.details for each in self.notices if each.kind == "dropped"]
+        return sum(int(each["count"]) for each in drops if each.get("channel") == channel)
 
-    def _next(self, kind: type[_M], wanted: Callable[[_M], bool], missing: str) -> _M:
+    def _next(self, kind: type[_M], matches: Callable[[_M], bool], missing: str) -> _M:
         end_s = time.monotonic() + self._timeout_s
         while time.monotonic() < end_s:
             message = self.receive()
-            if isinstance(message, kind) and wanted(message):
+            if isinstance(message, kind) and matches(message):
                 return message
             if isinstance(message, ErrorMessage):
                 detail = message.problem.get("detail")
-                raise PromiseBroken(f"the stream tells of a problem: {detail}")
+                raise PromiseBroken(f"the stream reports a problem: {detail}")
         raise PromiseBroken(f"{missing} within {self._timeout_s:g} s")
 
     def _receive(self, timeout_s: float) -> ServerMessage:
@@ -130,7 +130,7 @@ class Conversation:
                 try:
                     data = self._connection.recv(timeout=timeout_s)
                 except TimeoutError:
-                    what = f"nothing is said on the stream within {timeout_s:g} s"
+                    what = f"no message on the stream within {timeout_s:g} s"
                     raise PromiseBroken(what) from None
             return parse_server_message(data)
         except ProtocolError as error:
@@ -150,8 +150,8 @@ def connected(
 ) -> Iterator[Conversation]:
     """Connect to a stream, and subscribe to ``products`` unless there are none.
 
-    ``silent`` sends no subscription, ``unread`` keeps the buffers of this end so small that what
-    is not read stays with the camera.
+    ``silent`` sends no subscription; ``unread`` keeps the buffers of this end so small that unread
+    messages stay with the camera.
     """
     options = stream_options(url, timeout_s=timeout_s, threaded=True)
     if unread:
@@ -159,8 +159,8 @@ def connected(
     with translated(url), connect(url, **options) as connection:
         conversation = Conversation(connection, url, timeout_s=timeout_s)
         if not silent:
-            wanted = tuple(Subscription(each) for each in products)
-            message = Subscribe(wanted, token=token, credits=credit, start=start)
+            subscriptions = tuple(Subscription(each) for each in products)
+            message = Subscribe(subscriptions, token=token, credits=credit, start=start)
             hello = conversation.subscribe(message)
             expect(len(hello.channels) == len(products), "not every subscription has a channel")
         yield conversation
@@ -172,7 +172,7 @@ def _small_socket(url: str, timeout_s: float) -> socket.socket:
     place = socket.getaddrinfo(parts.hostname, port, type=socket.SOCK_STREAM)[0]
     small = socket.socket(*place[:3])
     try:
-        # before it connects, or the window is as large as the system likes it
+        # before it connects, or the system chooses the window
         small.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _SMALL_BUFFER_BYTES)
         small.settimeout(timeout_s)
         small.connect(place[4])

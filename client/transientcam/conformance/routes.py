@@ -1,4 +1,4 @@
-"""Every route of the interface: it is there, and answers as the OpenAPI document says."""
+"""Every route of the interface: it is there, and answers as the OpenAPI document describes."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -14,7 +14,7 @@ from transientcam.transport import answer_of
 from transientcam.transport.errors import media_type
 
 _OF_THE_SERVICE: Final = frozenset(("403", "408", "413", "429", "431"))
-"""Any request may be refused with these, whatever it asks for."""
+"""Any request may be refused with these, whatever its route."""
 _READ_TIMEOUTS: Final = 6.0
 ROUTES: Final = (
     "GET /info",
@@ -163,10 +163,10 @@ def _check_documented(operation: Mapping[str, Any], response: httpx.Response) ->
     status = str(response.status_code)
     if status in _OF_THE_SERVICE:
         return
-    said = "" if response.is_success else f" ({problem(answer_of(response))})"
+    reason = "" if response.is_success else f" ({problem(answer_of(response))})"
     known = operation["responses"]
     expect(
-        status in known, f"{_name(response)} gives {status}{said}, not one of {', '.join(known)}"
+        status in known, f"{_name(response)} gives {status}{reason}, not one of {', '.join(known)}"
     )
     content = known[status].get("content", {})
     found = _type(response)

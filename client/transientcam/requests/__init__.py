@@ -1,6 +1,6 @@
-"""What a client asks of a daemon: requests and the reading of their answers, without I/O.
+"""Requests to a daemon and the reading of their answers, without I/O.
 
-A `Request` says what to send and how to read the `Answer`; `Camera` and `AsyncCamera` send it.
+A `Request` holds what to send and how to read the `Answer`; `Camera` and `AsyncCamera` send it.
 """
 
 from transientcam.requests.calibrations import Calibrations

@@ -46,7 +46,7 @@ class Request(Generic[_T]):
         return accept if self.body is None else accept | {"content-type": self.content_type}
 
     def result(self, answer: Answer) -> _T:
-        """Return what the answer holds.
+        """Return the value that the answer holds.
 
         Raises
         ------
@@ -99,13 +99,13 @@ def upload(
 
 
 def problem(answer: Answer) -> ProblemError:
-    """Return the error that a refusal stands for, be it a problem document or not."""
+    """Return the error that a refusal stands for, whether it is a problem document or not."""
     if answer.media_type == PROBLEM_MEDIA_TYPE:
         try:
             return problem_error(_object(answer.body), status=answer.status)
         except ProtocolError:
-            pass  # a broken problem is still a refusal
-    # some proxy's page: its reason is enough, unless it is made to be read as it is
+            pass  # a malformed problem is still a refusal
+    # the page of a proxy: its reason phrase is enough, unless it is plain text
     plain = answer.body[:200] if answer.media_type == "text/plain" else b""
     text = plain.decode("utf-8", "replace").strip()
     return ProblemError(status=answer.status, title=answer.reason, detail=text)
@@ -141,7 +141,7 @@ def body_of(answer: Answer, media_type: str) -> bytes:
     Raises
     ------
     ProtocolError
-        If it is of another.
+        If its media type is another.
     """
     if answer.media_type != media_type:
         raise ProtocolError("content-type", answer.media_type, media_type)
@@ -174,7 +174,7 @@ def _plain(value: object) -> object:
 
 
 def query(params: Iterable[tuple[str, object]]) -> tuple[tuple[str, str], ...]:
-    """Return parameters as they travel, without those that are None."""
+    """Return parameters as strings, without those that are None."""
     return tuple((key, str(value)) for key, value in params if value is not None)
 
 

@@ -1,7 +1,7 @@
 """How requests and streams travel: addresses, options of httpx and websockets, their errors.
 
-It translates between the network libraries and the values of `transientcam.requests`; what is sent,
-and when, is up to the caller.
+Nothing here sends or receives: it converts between the network libraries and the values of
+`transientcam.requests`.
 """
 
 from transientcam.transport.address import parse_address

@@ -1,4 +1,4 @@
-"""The wire contract, for both ends: docs/stream.md says in words what stands here in code."""
+"""The wire contract of docs/stream.md, for both ends: constants, products, messages, parsing."""
 
 from transientcam.frame import Frame, FrameMeta, PixelCounts, PredictedStd
 from transientcam.wire.arrays import DTYPES, array_document, parse_array
