@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, cast
 
 from transientcam.errors import ParameterError
-from transientcam.transport.errors import translated
+from transientcam.transport import translated
 
 if TYPE_CHECKING:
     from zeroconf import ServiceInfo, ServiceListener, Zeroconf
@@ -29,16 +29,16 @@ _PLACE: Final = "the local network"
 
 @dataclass(frozen=True, slots=True)
 class FoundCamera:
-    """A camera's daemon, as it announces itself; nothing of it was asked yet.
+    """A camera's daemon, as it announces itself; no request was sent to it yet.
 
     Attributes
     ----------
     name
-        What it calls itself, unique on this network.
+        Its name, unique on this network.
     url
-        Where it is; what `Camera` takes.
+        Its address; what `Camera` takes.
     serial, firmware
-        Of the camera; empty where they are not told.
+        Of the camera; empty where they are not announced.
     api
         Versions of the interface, such as ``v1``.
     tls
@@ -63,12 +63,12 @@ def discover(
     timeout_s
         How long to listen; all of it is used.
     interfaces
-        Addresses of the network interfaces to ask on; all of this machine without them.
+        Addresses of the network interfaces to search on; all of this machine without them.
 
     Raises
     ------
     ServerUnreachable
-        If the network cannot be asked.
+        If the network cannot be searched.
     ModuleNotFoundError
         If zeroconf is not installed: ``pip install 'transientcam[discovery]'``.
     """
@@ -81,10 +81,10 @@ def discover(
     found: dict[str, FoundCamera] = {}
     ends_s = time.monotonic() + timeout_s
     with translated(_PLACE):
-        asked = list(interfaces) if interfaces else InterfaceChoice.All
-        network = Zeroconf(interfaces=asked)
+        searched = list(interfaces) if interfaces else InterfaceChoice.All
+        network = Zeroconf(interfaces=searched)
         try:
-            # its base class has nothing, and is not there where zeroconf is not installed
+            # its base class is empty, and only there where zeroconf is installed
             names = cast("ServiceListener", _Names(network, ends_s, found))
             browser = ServiceBrowser(network, SERVICE_TYPE, listener=names)
             time.sleep(timeout_s)
@@ -103,7 +103,7 @@ def _require_address(text: str) -> None:
 
 
 class _Names:
-    """Takes names as they are heard, and asks for what is behind each."""
+    """Listens for names, and resolves each to an address."""
 
     def __init__(self, network: "Zeroconf", ends_s: float, found: dict[str, FoundCamera]) -> None:
         self._network = network
@@ -126,7 +126,7 @@ class _Names:
 def read_announcement(info: "ServiceInfo") -> FoundCamera | None:
     """Return the camera that an announcement names; None where it names no address.
 
-    Whoever is on the network writes it, so that it is read with suspicion.
+    Any host on the network may have sent it, so none of it is trusted.
     """
     host = _host_of(info)
     if host is None or not info.port:

@@ -1,15 +1,75 @@
-"""One product of one frame, as a numpy array that knows its unit."""
+"""One product of one frame: a numpy array with its unit, axes and metadata."""
 
 import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from transientcam.errors import ParameterError
+
+
+class PixelCounts(TypedDict):
+    """Number of pixels of a frame that carry each flag; one pixel may carry several."""
+
+    total: int
+    valid: int
+    biased: int
+    no_signal: int
+    saturated: int
+    non_finite: int
+    degenerate: int
+    replaced: int
+
+
+class PredictedStd(TypedDict):
+    """Standard deviation that the sensor's noise gives a frame's range, in m."""
+
+    median: float
+    p90: float
+    """90 % of the pixels are better."""
+    first_order_share: float
+    """Share of the pixels where the noise model holds; that of the others is a rough figure."""
+
+
+class FrameMeta(TypedDict):
+    """Metadata of a frame, the same for all its products."""
+
+    frame: int
+    """Counted by the server from 1; never resets while it runs."""
+    sequence_id: int
+    calibration_id: str
+    reconstruction_id: int
+    """Counts the settings of the reconstruction that the server has had."""
+    device_time_s: float
+    """Start of the first exposure, by the camera's clock."""
+    host_time_s: float
+    """Arrival of the last image, Unix time."""
+    capture_s: float
+    reconstruct_s: float | None
+    """None until a product of this frame was computed."""
+    base_frequency_hz: float
+    harmonics: int
+    zeroth: str
+    exposure_s: float
+    takes: int
+    width: int
+    height: int
+    temperature_c: float
+    lost_images: int
+    """Images lost or corrupt between the frame before and this one."""
+    rejected_images: int | None
+    """Images left out of the average over takes as outliers; None until it was computed."""
+    pixels: PixelCounts | None
+    predicted_range_std_m: PredictedStd | None
+    """None until the range of this frame was computed."""
+    region: list[int]
+    """The pixels of the frame that the array holds: column and row of the first, width, height."""
+    decimation: int
+    """Every so many of them are in the array, both ways."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -25,23 +85,23 @@ class Frame:
     axes
         Name of each axis of `array`, slowest first; pixels are ``y``, ``x``.
     meta
-        What is known of the frame: its number, times, sequence, lost images, pixel counts; and
-        the ``region`` and ``decimation`` of its pixels.
+        Metadata of the frame: its number, times, sequence, lost images, pixel counts; and the
+        ``region`` and ``decimation`` of its pixels.
     array
         The values, read-only; NaN where a pixel has none.
     encode_s
         How long the server took to make this product and its bytes.
     channel
-        Which subscription of a stream it answers; None outside a stream.
+        The subscription of a stream that it belongs to; None outside a stream.
     extra
-        What only some products have: ``labels`` of raw, ``time_s`` of those over time, ``y`` of
+        Parts of some products: ``labels`` of raw, ``time_s`` of those over time, ``y`` of
         streak, ``radius`` of bounds, ``intrinsics`` of pointcloud.
     """
 
     product: str
     unit: str
     axes: tuple[str, ...]
-    meta: Mapping[str, Any]
+    meta: FrameMeta
     array: NDArray[Any]
     encode_s: float = 0.0
     channel: int | None = None
@@ -60,7 +120,7 @@ class Frame:
 
     @property
     def labels(self) -> Sequence[Mapping[str, Any]]:
-        """What each image of ``raw`` was taken with, in the order of its first axis; else empty."""
+        """Label of each image of ``raw``, in the order of its first axis; empty otherwise."""
         return tuple(self.extra.get("labels", ()))
 
     @property
@@ -97,10 +157,10 @@ class Frame:
 
 
 def npz_bytes(frame: Frame) -> bytes:
-    """Return a frame with everything that belongs to it, as `numpy.load` reads it.
+    """Return a frame and its metadata as an .npz file, which `numpy.load` reads.
 
-    ``array`` is there with ``product``, ``unit`` and ``axes``, ``meta`` (JSON), and what only some
-    products have: numbers and lists of numbers as arrays (``time_s``), all else as JSON
+    It holds ``array``, ``product``, ``unit``, ``axes``, ``meta`` (JSON) and the parts that only
+    some products have: numbers and lists of numbers as arrays (``time_s``), all else as JSON
     (``labels``).
     """
     parts: dict[str, Any] = {

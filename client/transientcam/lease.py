@@ -1,13 +1,13 @@
-"""Being alone in control of a camera, for the length of a block."""
+"""Exclusive control of a camera for the length of a block."""
 
 import asyncio
 import threading
 from collections.abc import Awaitable, Callable
-from types import TracebackType
 from typing import Any, Final, Literal
 
 from transientcam.errors import ProblemError, TransientcamError
-from transientcam.requests import request
+from transientcam.requests import Request
+from transientcam.requests.lease import give_lease_back, lease_id, renew_lease, take_lease
 
 OnLapse = Literal["stop", "keep"]
 _RENEWALS: Final = 3.0
@@ -15,116 +15,108 @@ _RENEWALS: Final = 3.0
 _LOST: Final = "/problems/lease-lost"
 
 
-class Lease:
-    """The lease of a camera, renewed on a thread of its own until its block ends.
-
-    Made by `Camera.lease`. Changes made through that camera are made under it.
+class BaseLease:
+    """What `Lease` and `AsyncLease` have in common.
 
     Attributes
     ----------
     holder
-        What others are told.
+        Name shown to other clients.
     """
 
-    def __init__(
-        self,
-        ask: Callable[[request.Request[dict[str, Any]]], dict[str, Any]],
-        show: Callable[[str | None], None],
-        terms: dict[str, Any],
-    ) -> None:
-        self._ask = ask
+    def __init__(self, show: Callable[[str | None], None], terms: dict[str, Any]) -> None:
         self._show = show
         self._terms = terms
-        self.holder: str = terms["holder"]
-        self._end = threading.Event()
+        self._renewed_every_s = terms["duration_s"] / _RENEWALS
         self._lost: ProblemError | None = None
-        self._thread: threading.Thread | None = None
+        self.holder: str = terms["holder"]
 
     @property
     def lost(self) -> bool:
         """Whether it was taken over, or could not be renewed in time."""
         return self._lost is not None
 
-    def __enter__(self) -> "Lease":
-        granted = self._ask(request.take_lease(self._terms))
-        self._show(request.lease_id(granted))
-        self._end.clear()
+    def _begin(self, granted: dict[str, Any]) -> None:
+        self._show(lease_id(granted))
         self._lost = None
+
+    def _renewal_failed(self, error: TransientcamError) -> None:
+        # after any other error the next renewal may succeed; if none does, the camera stops
+        if isinstance(error, ProblemError) and error.type == _LOST:
+            self._lost = error
+
+
+class Lease(BaseLease):
+    """The lease of a camera, renewed on a thread of its own until its block ends.
+
+    Made by `Camera.lease`. Changes made through that camera are made under it.
+    """
+
+    def __init__(
+        self,
+        ask: Callable[[Request[dict[str, Any]]], dict[str, Any]],
+        show: Callable[[str | None], None],
+        terms: dict[str, Any],
+    ) -> None:
+        super().__init__(show, terms)
+        self._ask = ask
+        self._end = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def __enter__(self) -> "Lease":
+        self._begin(self._ask(take_lease(self._terms)))
+        self._end.clear()
         self._thread = threading.Thread(target=self._keep, name="transientcam-lease", daemon=True)
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, _kind: object, error: object, _traceback: object) -> None:
         self._end.set()
         if self._thread is not None:
             self._thread.join()
         try:
             if not self.lost:
-                self._ask(request.give_lease_back())
+                self._ask(give_lease_back())
         except TransientcamError:
-            # an error on the way says more, and what cannot be given back lapses
+            # an error of the block says more, and a lease that is not given back lapses
             if error is None:
                 raise
         finally:
             self._show(None)
 
     def _keep(self) -> None:
-        while not self._end.wait(self._terms["duration_s"] / _RENEWALS):
+        while not self.lost and not self._end.wait(self._renewed_every_s):
             try:
-                self._ask(request.renew_lease())
-            except ProblemError as problem:
-                if problem.type == _LOST:
-                    self._lost = problem
-                    return
-            except TransientcamError:
-                pass  # the next renewal may come through; if none does, the camera stops
+                self._ask(renew_lease())
+            except TransientcamError as error:
+                self._renewal_failed(error)
 
 
-class AsyncLease:
+class AsyncLease(BaseLease):
     """The lease of a camera, renewed by a task until its block ends; the twin of `Lease`."""
 
     def __init__(
         self,
-        ask: Callable[[request.Request[dict[str, Any]]], Awaitable[dict[str, Any]]],
+        ask: Callable[[Request[dict[str, Any]]], Awaitable[dict[str, Any]]],
         show: Callable[[str | None], None],
         terms: dict[str, Any],
     ) -> None:
+        super().__init__(show, terms)
         self._ask = ask
-        self._show = show
-        self._terms = terms
-        self.holder: str = terms["holder"]
-        self._lost: ProblemError | None = None
         self._task: asyncio.Task[None] | None = None
 
-    @property
-    def lost(self) -> bool:
-        """Whether it was taken over, or could not be renewed in time."""
-        return self._lost is not None
-
     async def __aenter__(self) -> "AsyncLease":
-        granted = await self._ask(request.take_lease(self._terms))
-        self._show(request.lease_id(granted))
-        self._lost = None
+        self._begin(await self._ask(take_lease(self._terms)))
         self._task = asyncio.create_task(self._keep(), name="transientcam-lease")
         return self
 
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    async def __aexit__(self, _kind: object, error: object, _traceback: object) -> None:
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
         try:
             if not self.lost:
-                await self._ask(request.give_lease_back())
+                await self._ask(give_lease_back())
         except TransientcamError:
             if error is None:  # as above
                 raise
@@ -133,11 +125,8 @@ class AsyncLease:
 
     async def _keep(self) -> None:
         while not self.lost:
-            await asyncio.sleep(self._terms["duration_s"] / _RENEWALS)
+            await asyncio.sleep(self._renewed_every_s)
             try:
-                await self._ask(request.renew_lease())
-            except ProblemError as problem:
-                if problem.type == _LOST:
-                    self._lost = problem
-            except TransientcamError:
-                pass  # as above
+                await self._ask(renew_lease())
+            except TransientcamError as error:
+                self._renewal_failed(error)

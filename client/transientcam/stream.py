@@ -1,9 +1,8 @@
-"""Frames as they are captured, one after the other."""
+"""A stream of frames as they are captured, read by a thread."""
 
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from types import TracebackType
 from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
@@ -12,58 +11,64 @@ from websockets.typing import Data
 from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamError
 from transientcam.frame import Frame
 from transientcam.stream_state import DEFAULT_CREDITS, StreamState, subscribe_message
+from transientcam.transport import stream_options, translated
 from transientcam.transport.deadline import Deadline
-from transientcam.transport.errors import translated
-from transientcam.transport.options import threaded_stream_options
 from transientcam.wire import Channel, CloseCode, Hello, Notice, Subscription
 
 
-class Stream:
-    """An iterator of frames; made by `Camera.stream`.
-
-    It connects when the first frame is asked for, or on entering it as a context manager. A loop
-    over a stream that is not entered closes it when the loop is left. Asking for the next frame
-    tells the server that the one before is done with, so a slow loop gets fewer but fresh frames.
-
-    ``receive`` belongs to one thread; ``close`` may be called from any.
-    """
+class BaseStream:
+    """What `Stream` and `AsyncStream` report of their state."""
 
     def __init__(self, url: str, state: StreamState, *, timeout_s: float) -> None:
         self._url = url
         self._state = state
         self._timeout_s = timeout_s
-        self._stack = ExitStack()
-        self._connection: ClientConnection | None = None
-        self._entered = False
-        self._closed = threading.Event()
 
     @property
     def hello(self) -> Hello | None:
-        """How the server greeted; None before the first connection."""
+        """The server's greeting; None before the first connection."""
         return self._state.hello
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """What frames look like at present: unit, axes, dtype and shape of each subscription."""
+        """Unit, axes, dtype and shape of the frames of each subscription at present."""
         return self._state.channels
 
     @property
     def sequence(self) -> Mapping[str, Any]:
-        """What is captured at present: the applied sequence; empty before the first connection."""
+        """The sequence that is captured at present; empty before the first connection."""
         return self._state.sequence
 
     @property
     def notices(self) -> Sequence[Notice]:
         """The newest 256 notices, oldest first.
 
-        Beside those of docs/stream.md the client tells ``product-failed`` (with the problem),
+        Beside those of docs/stream.md the client adds ``product-failed`` (with the problem),
         ``connection-lost`` (``reason``) and ``reconnected`` (``attempts``).
         """
         return self._state.notices
 
+
+class Stream(BaseStream):
+    """An iterator of frames; made by `Camera.stream`.
+
+    It connects when the first frame is requested, or on entering it as a context manager. A loop
+    over a stream that is not entered closes it when the loop is left. Requesting the next frame
+    acknowledges the one before, so that a slow loop gets fewer but fresh frames.
+
+    ``receive`` belongs to one thread; ``close`` may be called from any.
+    """
+
+    def __init__(self, url: str, state: StreamState, *, timeout_s: float) -> None:
+        super().__init__(url, state, timeout_s=timeout_s)
+        self._stack = ExitStack()
+        self._connection: ClientConnection | None = None
+        self._entered = False
+        self._closed = threading.Event()
+
     @property
     def closed(self) -> bool:
-        """Whether it was closed for good, here."""
+        """Whether this client has closed it for good."""
         return self._closed.is_set()
 
     def receive(self, *, timeout_s: float | None = None) -> Frame:
@@ -74,7 +79,7 @@ class Stream:
         FrameTimeout
             If none comes within ``timeout_s`` (None: waits as long as it takes).
         StreamClosed, ServerUnreachable
-            If the connection is lost and not to be made again; code 1000 once this was closed.
+            If the connection is lost for good; code 1000 once this client has closed it.
         ProblemError
             If the server refuses the subscription.
         ProtocolError
@@ -98,7 +103,7 @@ class Stream:
         max_rate_hz: float | None = None,
         start: int | None = None,
     ) -> None:
-        """Ask for other products from now on, or from frame ``start`` on as far as it is kept.
+        """Subscribe to other products from now on, or from frame ``start`` on if it is kept.
 
         Frames that are already on their way still arrive.
 
@@ -126,12 +131,7 @@ class Stream:
             self._connect()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __iter__(self) -> Iterator[Frame]:
@@ -148,7 +148,10 @@ class Stream:
     def _connect(self) -> ClientConnection:
         with translated(self._url):
             connection: ClientConnection = self._stack.enter_context(
-                connect(self._url, **threaded_stream_options(self._url, timeout_s=self._timeout_s))
+                connect(
+                    self._url,
+                    **stream_options(self._url, timeout_s=self._timeout_s, threaded=True),
+                )
             )
             connection.send(self._state.opening(connection.subprotocol))
         if self.closed:  # meanwhile, by another thread

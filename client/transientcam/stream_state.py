@@ -1,8 +1,8 @@
 """The client's side of one stream, without any input or output.
 
-A stream's owner sends `opening` on every new connection, feeds what it receives to `received`,
-sends `acknowledgement` before it waits for the next message, and asks `retry_after_s` what to do
-when the connection is lost.
+A stream's owner sends `opening` on every new connection, passes every message it receives to
+`received`, sends `acknowledgement` before it waits for the next message, and waits `retry_after_s`
+before it connects again after a loss.
 """
 
 from collections import deque
@@ -19,7 +19,7 @@ from transientcam.errors import (
     TransientcamError,
 )
 from transientcam.frame import Frame
-from transientcam.requests.request import problem_error
+from transientcam.requests import problem_error
 from transientcam.wire import (
     ENCODINGS,
     MAX_CREDITS,
@@ -43,14 +43,14 @@ DEFAULT_CREDITS: Final = 2
 _KEPT_NOTICES = 256
 _FINAL = frozenset((CloseCode.POLICY, CloseCode.BAD_FIRST_MESSAGE, CloseCode.AUTHENTICATION_FAILED))
 _RESTARTING = frozenset((502, 503, 504))
-"""What a proxy, or a server not yet ready, answers to the handshake."""
+"""Statuses that a proxy, or a server not yet ready, answers the handshake with."""
 
 NoticeHandler = Callable[[Notice], object]
 
 
 @dataclass(frozen=True, slots=True)
 class Reconnect:
-    """How to come back after a lost connection: wait, try, and wait twice as long each time.
+    """How to reconnect after a lost connection: wait, try, and wait twice as long each time.
 
     Attributes
     ----------
@@ -59,8 +59,8 @@ class Reconnect:
     attempts
         How many times to try before giving up; None for no end.
     resume
-        Whether to go on with the frame after the last one, as far as the daemon has them still,
-        instead of the newest.
+        Whether to resume with the frame after the last one, as far as the daemon still has them,
+        instead of with the newest.
     """
 
     first_wait_s: float = 0.1
@@ -74,11 +74,11 @@ class Reconnect:
         return min(self.longest_wait_s, self.first_wait_s * 2.0 ** min(attempt, 32))
 
 
-def reconnect_policy(wanted: bool | Reconnect) -> Reconnect | None:
+def reconnect_policy(reconnect: bool | Reconnect) -> Reconnect | None:
     """Return the policy that the argument ``reconnect`` of a stream stands for."""
-    if isinstance(wanted, Reconnect):
-        return wanted
-    return Reconnect() if wanted else None
+    if isinstance(reconnect, Reconnect):
+        return reconnect
+    return Reconnect() if reconnect else None
 
 
 def subscribe_message(
@@ -124,7 +124,7 @@ def _check(subscription: Subscription) -> None:
 
 
 class StreamState:
-    """What one stream knows and owes; not safe for use from several threads at once."""
+    """State of one stream: what it received and has yet to acknowledge; not thread-safe."""
 
     def __init__(
         self,
@@ -150,7 +150,7 @@ class StreamState:
         Raises
         ------
         ProtocolError
-            If it chose none: a server that knows nothing of this protocol may do so.
+            If it chose none, as a server of another protocol may do.
         """
         if subprotocol != SUBPROTOCOL:
             raise ProtocolError("subprotocol", subprotocol, SUBPROTOCOL)
@@ -162,19 +162,19 @@ class StreamState:
         return encode(replace(self.subscribe, start=start))
 
     def resubscribe(self, subscribe: Subscribe) -> bytes:
-        """Return the message that asks for something else from now on."""
+        """Return the message that replaces the subscription."""
         self.subscribe = replace(subscribe, token=self.subscribe.token)
         return encode(self.subscribe)
 
     def received(self, data: bytes | str) -> Frame | None:
-        """Take in one message; return the frame if it was one.
+        """Process one message; return the frame if it is one.
 
         Raises
         ------
         ProblemError
-            If the server refuses what was asked of it.
+            If the server refuses a message of this client.
         ProtocolError
-            If the message is none of the protocol.
+            If the message is not one of the protocol.
         """
         message = parse_server_message(data)
         match message:
@@ -204,14 +204,14 @@ class StreamState:
             self.sequence = sequence
 
     def _refused(self, message: ErrorMessage) -> None:
-        # one product that fails is no reason to lose the others: only what answers a message of
-        # this client, and so names no channel, is raised
+        # one product that fails must not end the others: only the answer to a message of this
+        # client, which names no channel, is raised
         if "channel" not in message.problem:
             raise problem_error(message.problem)
         self.notify(Notice("product-failed", message.problem))
 
     def acknowledgement(self) -> bytes | None:
-        """Return what the server is owed for the frame handed out last, once; None for nothing."""
+        """Return the acknowledgement of the last frame, once; None if there is none to send."""
         if self._owed is None or self.subscribe.credits is None:
             return None
         owed, self._owed = self._owed, None
@@ -220,8 +220,8 @@ class StreamState:
     def retry_after_s(self, error: TransientcamError) -> float:
         """Return how long to wait before connecting again after ``error``, or raise it.
 
-        It is raised where no reconnection was asked for, none has succeeded before, the server
-        would refuse again, or the attempts are used up.
+        It is raised if reconnecting is off, no connection has succeeded before, the server would
+        refuse again, or the attempts are used up.
         """
         policy = self._reconnect
         if policy is None or self.hello is None or not _may_pass(error):
@@ -235,7 +235,7 @@ class StreamState:
         return wait_s
 
     def notify(self, notice: Notice) -> None:
-        """Keep a notice and hand it to whom it concerns."""
+        """Keep a notice and pass it to the handler."""
         self.notices.append(notice)
         if self._on_notice is not None:
             self._on_notice(notice)

@@ -6,10 +6,12 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from websockets.sync.server import Server, ServerConnection, serve
+
+from transientcam.frame import FrameMeta
 
 SPECIFICATION = Path(__file__).resolve().parents[2] / "docs" / "stream.md"
 _BLOCK = re.compile(r"```(hex|json) (\w+)\n(.*?)```", re.DOTALL)
@@ -35,12 +37,17 @@ def recorded() -> dict[str, Recording]:
     }
 
 
+def frame_meta(**known: object) -> FrameMeta:
+    """Return the metadata of a frame, as far as a test needs it."""
+    return cast("FrameMeta", known)
+
+
 Handler = Callable[[ServerConnection], None]
 Replay = Callable[[Handler], "ReplayServer"]
 
 
 class ReplayServer:
-    """A WebSocket server that lets ``handler`` talk to whoever connects."""
+    """A WebSocket server that runs ``handler`` for each client."""
 
     def __init__(self, handler: Handler, *, port: int = 0, **options: Any) -> None:
         self.connections = 0

@@ -1,17 +1,17 @@
-"""`Camera` and `AsyncCamera` against a transport that records: both ask the same."""
+"""`Camera` and `AsyncCamera` against a transport that records: both send the same requests."""
 
 import asyncio
 import inspect
 import json
 from collections.abc import Awaitable, Callable
-from typing import Any
+from typing import Any, assert_type
 
 import httpx
 import pytest
 
 import transientcam
 from tests.client.conftest import Recording
-from transientcam import AsyncCamera, AsyncStream, Camera, Stream
+from transientcam import AsyncCamera, AsyncStream, Camera, Frame, Stream
 from transientcam.errors import ParameterError, ProblemError, ServerUnreachable
 
 _URL = "http://lidar.example:8000"
@@ -69,7 +69,7 @@ _CALLS: dict[
     "configure": (
         lambda c: c.configure(takes=2),
         lambda c: c.configure(takes=2),
-        ("PUT", "sequence", "", {"harmonics": 3, "takes": 2}),
+        ("PUT", "sequence", "", {**_SEQUENCE, "takes": 2}),
     ),
     "validate": (
         lambda c: c.validate({"takes": 2}),
@@ -205,7 +205,7 @@ def _awaited(daemon: _Daemon, call: Callable[[AsyncCamera], Awaitable[object]]) 
 
 
 @pytest.mark.parametrize("name", _CALLS)
-def test_both_cameras_ask_for_the_same(name: str, daemon: _Daemon) -> None:
+def test_both_cameras_send_the_same_requests(name: str, daemon: _Daemon) -> None:
     call, async_call, (method, path, query, body) = _CALLS[name]
     expected = (method, f"/api/v1/{path}", query, body)
 
@@ -218,9 +218,9 @@ def test_both_cameras_ask_for_the_same(name: str, daemon: _Daemon) -> None:
     assert name == "set" or repr(result) == repr(async_result)
 
 
-def test_every_request_says_who_asks(daemon: _Daemon) -> None:
+def test_every_request_carries_token_and_user_agent(daemon: _Daemon) -> None:
     with Camera(_URL, token="secret", transport=httpx.MockTransport(daemon)) as camera:
-        camera.info  # noqa: B018 - reading it asks
+        camera.info  # noqa: B018 - reading it sends a request
     _awaited(daemon, lambda camera: camera.info())
 
     for request in daemon.requests:
@@ -228,9 +228,9 @@ def test_every_request_says_who_asks(daemon: _Daemon) -> None:
         assert request.headers["user-agent"] == f"transientcam/{transientcam.__version__}"
 
 
-def test_nothing_is_sent_to_prove_who_asks_without_a_token(daemon: _Daemon) -> None:
+def test_without_a_token_no_authorization_is_sent(daemon: _Daemon) -> None:
     with Camera(_URL, transport=httpx.MockTransport(daemon)) as camera:
-        camera.info  # noqa: B018 - reading it asks
+        camera.info  # noqa: B018 - reading it sends a request
 
     assert "authorization" not in daemon.requests[0].headers
 
@@ -249,6 +249,27 @@ def test_the_twins_take_the_same_arguments(name: str) -> None:
     one, other = getattr(Camera, name), getattr(AsyncCamera, name)
     if inspect.isfunction(one) and inspect.isfunction(other):
         assert inspect.signature(one).parameters == inspect.signature(other).parameters
+
+
+def test_type_checkers_see_what_either_returns(daemon: _Daemon) -> None:
+    async def asynchronous() -> None:
+        async with AsyncCamera(_URL, transport=httpx.MockTransport(daemon)) as camera:
+            assert_type(await camera.frame("range"), Frame)
+            assert_type(await camera.picture("range"), bytes)
+            assert_type(await camera.start(), dict[str, Any])
+            assert_type(await camera.jobs.cancel("5a0c"), dict[str, Any])
+
+    with Camera(_URL, transport=httpx.MockTransport(daemon)) as camera:
+        assert_type(camera.frame("range"), Frame)
+        assert_type(camera.picture("range"), bytes)
+        assert_type(camera.start(), dict[str, Any])
+        assert_type(camera.jobs.cancel("5a0c"), dict[str, Any])
+    asyncio.run(asynchronous())
+
+
+def test_a_request_that_cannot_be_built_is_refused_when_its_method_is_called() -> None:
+    with pytest.raises(ParameterError, match="number is 0"):
+        _ = AsyncCamera(_URL).frame("range", number=0)
 
 
 def test_a_refusal_reaches_the_caller_of_either() -> None:
@@ -281,12 +302,12 @@ def test_a_network_that_fails_reaches_the_caller_of_either_as_one_error() -> Non
         Camera(_URL, transport=httpx.MockTransport(fail)) as camera,
         pytest.raises(ServerUnreachable, match=f"{_URL}: Connection refused"),
     ):
-        camera.info  # noqa: B018 - reading it asks
+        camera.info  # noqa: B018 - reading it sends a request
     with pytest.raises(ServerUnreachable, match=f"{_URL}: Connection refused"):
         asyncio.run(asynchronous())
 
 
-def test_nobody_there_is_told_as_such_over_the_real_network() -> None:
+def test_no_answer_over_the_real_network_is_server_unreachable() -> None:
     with Camera("http://127.0.0.1:1", timeout_s=5.0) as camera:
         with pytest.raises(ServerUnreachable, match=r"http://127\.0\.0\.1:1: Connection refused"):
             camera.frame("range")

@@ -16,7 +16,7 @@ from transientcam.errors import ProblemError, StreamClosed
 
 _VIDEO: dict[str, Any] = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}
 _STILL: dict[str, Any] = {"harmonics": 3, "zeroth": "low-frequency", "exposure_s": 0.0005}
-_PATIENCE_S = 30.0
+_LONG_S = 30.0
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def held(camera: Camera) -> Camera:
 def _exhaust(stream: transientcam.Stream) -> None:
     """Receive until something is raised."""
     while True:
-        stream.receive(timeout_s=_PATIENCE_S)
+        stream.receive(timeout_s=_LONG_S)
 
 
 def test_info_says_what_is_there(camera: Camera) -> None:
@@ -195,7 +195,7 @@ def test_a_rate_can_be_limited(camera: Camera) -> None:
     camera.sequence = _VIDEO
 
     with camera.stream("range", max_rate_hz=4.0) as stream:
-        frames = [stream.receive(timeout_s=_PATIENCE_S) for _ in range(4)]
+        frames = [stream.receive(timeout_s=_LONG_S) for _ in range(4)]
 
     times_s = [frame.meta["device_time_s"] for frame in frames]
     period_s = camera.sequence["capture_s"]
@@ -203,13 +203,13 @@ def test_a_rate_can_be_limited(camera: Camera) -> None:
     assert np.mean(np.diff(times_s)) == pytest.approx(0.25, abs=period_s)
 
 
-def test_a_change_of_the_sequence_is_told_with_the_new_channels(camera: Camera) -> None:
+def test_a_change_of_the_sequence_is_announced_with_the_new_channels(camera: Camera) -> None:
     with camera.stream("coefficients") as stream:
-        before = stream.receive(timeout_s=_PATIENCE_S)
+        before = stream.receive(timeout_s=_LONG_S)
         applied = camera.configure(harmonics=4)
-        after = stream.receive(timeout_s=_PATIENCE_S)
+        after = stream.receive(timeout_s=_LONG_S)
         while after.meta["sequence_id"] != applied["sequence_id"]:
-            after = stream.receive(timeout_s=_PATIENCE_S)
+            after = stream.receive(timeout_s=_LONG_S)
 
         assert [notice.kind for notice in stream.notices].count("sequence-changed") == 1
         assert stream.sequence["harmonics"] == 4
@@ -221,35 +221,35 @@ def test_a_subscription_to_what_is_not_there_is_refused_with_its_place(camera: C
     stream = camera.stream("range", "rang")
 
     with pytest.raises(ProblemError) as caught:
-        stream.receive(timeout_s=_PATIENCE_S)
+        stream.receive(timeout_s=_LONG_S)
 
     assert caught.value.type == "/problems/unknown-product"
     with pytest.raises(StreamClosed) as closed:
-        stream.receive(timeout_s=_PATIENCE_S)
+        stream.receive(timeout_s=_LONG_S)
     assert closed.value.code == wire.CloseCode.BAD_FIRST_MESSAGE
 
 
 def test_a_wrong_change_of_a_subscription_leaves_the_stream_as_it_was(camera: Camera) -> None:
     with camera.stream("range") as stream:
-        stream.receive(timeout_s=_PATIENCE_S)
+        stream.receive(timeout_s=_LONG_S)
         stream.subscribe("transient")
 
         with pytest.raises(ProblemError, match="transient cannot be streamed"):
             _exhaust(stream)
-        assert stream.receive(timeout_s=_PATIENCE_S).product == "range"
+        assert stream.receive(timeout_s=_LONG_S).product == "range"
 
         stream.subscribe("brightness")
-        products = [stream.receive(timeout_s=_PATIENCE_S).product for _ in range(8)]
+        products = [stream.receive(timeout_s=_LONG_S).product for _ in range(8)]
         assert products[-1] == "brightness"
 
 
 def test_a_slow_reader_gets_fresh_frames_and_is_told_of_those_it_missed(camera: Camera) -> None:
     camera.sequence = _VIDEO
     with camera.stream("range", credits=1) as stream:
-        first = stream.receive(timeout_s=_PATIENCE_S)
+        first = stream.receive(timeout_s=_LONG_S)
         # while this reader does nothing, the camera goes on
         newest = camera.latest(wait_s=10.0, after=first.frame + 8)["frame"]
-        second = stream.receive(timeout_s=_PATIENCE_S)
+        second = stream.receive(timeout_s=_LONG_S)
 
     assert second.frame >= newest
     dropped = [notice for notice in stream.notices if notice.kind == "dropped"]
@@ -258,10 +258,10 @@ def test_a_slow_reader_gets_fresh_frames_and_is_told_of_those_it_missed(camera: 
 
 def test_an_unplugged_camera_is_told_and_comes_back_by_itself(camera: Camera) -> None:
     with camera.stream("range") as stream:
-        stream.receive(timeout_s=_PATIENCE_S)
+        stream.receive(timeout_s=_LONG_S)
         camera.cause("unplug")
         lost = _until(stream, "camera-lost", lambda: camera.cause("replug"))
-        frame = stream.receive(timeout_s=_PATIENCE_S)
+        frame = stream.receive(timeout_s=_LONG_S)
         kinds = [notice.kind for notice in stream.notices]
 
     assert lost.details["reason"]
@@ -282,12 +282,12 @@ def _until(stream: transientcam.Stream, kind: str, then: Any) -> Notice:
             continue
 
 
-def test_a_lost_image_is_told(camera: Camera) -> None:
+def test_a_lost_image_is_reported(camera: Camera) -> None:
     with camera.stream("range") as stream:
-        stream.receive(timeout_s=_PATIENCE_S)
+        stream.receive(timeout_s=_LONG_S)
         camera.cause("corrupt-image")
         while "lost-images" not in [notice.kind for notice in stream.notices]:
-            frame = stream.receive(timeout_s=_PATIENCE_S)
+            frame = stream.receive(timeout_s=_LONG_S)
 
     assert frame.frame > 0
 
@@ -297,11 +297,11 @@ def test_a_stream_survives_a_restart_of_the_daemon() -> None:
         port = int(first.url.rpartition(":")[2])
         client = Camera(first.url, timeout_s=20.0)
         stream = client.stream("range", reconnect=True)
-        stream.receive(timeout_s=_PATIENCE_S)
+        stream.receive(timeout_s=_LONG_S)
     with serving("sim:mirrors?noise=off", port=port), client:
-        frame = stream.receive(timeout_s=_PATIENCE_S)
+        frame = stream.receive(timeout_s=_LONG_S)
         while "reconnected" not in [notice.kind for notice in stream.notices]:
-            frame = stream.receive(timeout_s=_PATIENCE_S)
+            frame = stream.receive(timeout_s=_LONG_S)
         assert frame.product == "range"
 
 
@@ -309,7 +309,7 @@ def test_a_daemon_that_stops_says_goodbye() -> None:
     with serving("sim:mirrors?noise=off") as daemon:
         client = Camera(daemon.url, timeout_s=20.0)
         stream = client.stream("range")
-        stream.receive(timeout_s=_PATIENCE_S)
+        stream.receive(timeout_s=_LONG_S)
     with client, pytest.raises(StreamClosed) as caught:
         _exhaust(stream)
     assert caught.value.code == wire.CloseCode.GOING_AWAY
@@ -337,7 +337,7 @@ def test_the_asynchronous_twin_does_all_of_it(served: Served) -> None:
 def test_many_readers_take_the_same_frames_at_once(served: Served) -> None:
     async def read(camera: AsyncCamera) -> list[int]:
         async with camera.stream("range") as stream:
-            return [(await stream.receive(timeout_s=_PATIENCE_S)).frame for _ in range(5)]
+            return [(await stream.receive(timeout_s=_LONG_S)).frame for _ in range(5)]
 
     async def run() -> list[list[int]]:
         async with AsyncCamera(served.url, timeout_s=20.0) as camera:
@@ -349,11 +349,11 @@ def test_many_readers_take_the_same_frames_at_once(served: Served) -> None:
 
 def test_a_stream_begins_with_a_frame_that_has_passed(camera: Camera) -> None:
     with camera.stream("flags") as live:
-        latest = live.receive(timeout_s=_PATIENCE_S).frame
-        while live.receive(timeout_s=_PATIENCE_S).frame < latest + 4:
+        latest = live.receive(timeout_s=_LONG_S).frame
+        while live.receive(timeout_s=_LONG_S).frame < latest + 4:
             pass
     with camera.stream("flags", start=latest) as stream:
-        numbers = [stream.receive(timeout_s=_PATIENCE_S).frame for _ in range(4)]
+        numbers = [stream.receive(timeout_s=_LONG_S).frame for _ in range(4)]
 
     assert numbers == list(range(latest, latest + 4))
 
@@ -361,7 +361,7 @@ def test_a_stream_begins_with_a_frame_that_has_passed(camera: Camera) -> None:
 def test_a_thin_stream_holds_the_values_of_the_whole_one(camera: Camera) -> None:
     thin = wire.Subscription("range", encoding="u16", region=(10, 20, 60, 40), decimation=4)
     with camera.stream("range", thin) as stream:
-        whole, part = (stream.receive(timeout_s=_PATIENCE_S) for _ in range(2))
+        whole, part = (stream.receive(timeout_s=_LONG_S) for _ in range(2))
 
     assert part.frame == whole.frame
     assert part.meta["region"] == [10, 20, 60, 40]

@@ -1,4 +1,4 @@
-"""Eq. (2) from streamed coefficients."""
+"""Eq. (2) and reflection coefficients, from streamed coefficients, against dense solves."""
 
 from typing import Any
 
@@ -9,6 +9,8 @@ from scipy.integrate import trapezoid
 from scipy.linalg import toeplitz
 
 import transientcam
+from tests.client.conftest import frame_meta
+from transientcam.density import step_down, step_up
 from transientcam.errors import ParameterError
 
 _FREQUENCY_HZ = 23e6
@@ -142,7 +144,7 @@ def test_a_transient_repeats_after_the_unambiguous_time_however_often() -> None:
 
 def test_a_frame_is_taken_for_its_array() -> None:
     frame = transientcam.Frame(
-        "coefficients", "DN,1", ("coefficient", "y", "x"), {"frame": 1}, np.ones((3, 1, 1))
+        "coefficients", "DN,1", ("coefficient", "y", "x"), frame_meta(frame=1), np.ones((3, 1, 1))
     )
 
     np.testing.assert_array_equal(
@@ -168,3 +170,51 @@ def test_what_are_no_coefficients_are_refused(coefficients: Any, limit: str) -> 
 def test_what_is_no_frequency_is_refused(frequency_hz: float) -> None:
     with pytest.raises(ParameterError, match="base_frequency_hz is"):
         transientcam.transient(np.ones(3), 0.0, base_frequency_hz=frequency_hz)
+
+
+def _drawn_moments(harmonics: int, seed: int) -> NDArray[Any]:
+    """Return b_0 to b_m of three returns over a uniform part: their Toeplitz matrix is positive."""
+    draw = np.random.default_rng(seed)
+    phases_rad, weights = draw.uniform(0.0, 2.0 * np.pi, 3), draw.uniform(0.2, 2.0, 3)
+    uniform = draw.uniform(0.02, 1.0)
+    return _moments(phases_rad, weights, uniform=uniform, harmonics=harmonics)
+
+
+@pytest.mark.parametrize("harmonics", [1, 2, 3, 4, 8])
+def test_brightness_and_reflections_are_those_of_the_leading_blocks(harmonics: int) -> None:
+    moments = _drawn_moments(harmonics, seed=harmonics)
+
+    brightness, reflection = step_down(_coefficients(moments))
+
+    # g_k is the last coefficient of the solution of order k
+    for k in range(1, harmonics + 1):
+        last = _coefficients(moments[: k + 1])[-2:]
+        assert reflection[k - 1] == pytest.approx(complex(*last), abs=1e-9)
+    assert brightness == pytest.approx(moments[0].real, rel=1e-9)
+
+
+@pytest.mark.parametrize("harmonics", [1, 2, 3, 4, 8, 32])
+def test_stepping_up_undoes_stepping_down(harmonics: int) -> None:
+    planes = np.stack([_coefficients(_drawn_moments(harmonics, seed)) for seed in range(7)], axis=1)
+
+    again = step_up(*step_down(planes))
+
+    np.testing.assert_allclose(again, planes, rtol=1e-7, atol=1e-7)
+
+
+def test_pixels_without_a_value_stay_so_and_disturb_no_other() -> None:
+    planes = np.stack([_coefficients(_drawn_moments(4, seed)) for seed in range(3)], axis=1)
+    spoilt = planes.copy()
+    spoilt[:, 1] = np.nan
+
+    again = step_up(*step_down(spoilt))
+
+    assert np.isnan(again[:, 1]).all()
+    np.testing.assert_allclose(again[:, [0, 2]], planes[:, [0, 2]], rtol=1e-9, atol=1e-12)
+
+
+def test_a_pixel_without_light_has_no_reflection() -> None:
+    brightness, reflection = step_down(np.zeros((9, 1)))
+
+    assert brightness == [0.0]
+    assert not reflection.any()

@@ -101,7 +101,7 @@ def test_a_network_that_cannot_be_asked_is_an_error_of_ours(
         discover(timeout_s=0.1)
 
 
-def test_without_zeroconf_its_name_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_zeroconf_the_error_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "zeroconf", None)
 
     with pytest.raises(ModuleNotFoundError, match="zeroconf"):

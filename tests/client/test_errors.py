@@ -36,7 +36,7 @@ def test_every_error_is_in_the_tree_drawn_at_the_top() -> None:
     classes = [
         each
         for _, each in inspect.getmembers(errors, inspect.isclass)
-        if each.__module__ == errors.__name__
+        if each.__module__ == errors.__name__ and not each.__name__.startswith("_")
     ]
 
     assert {type(error) for error in _TREE} == set(classes) - {TransientcamError}
@@ -82,6 +82,17 @@ def test_a_problem_without_words_still_says_something() -> None:
     assert str(ProblemError(status=500, title="Internal Server Error")) == (
         "Internal Server Error (500)"
     )
+
+
+def test_an_error_shows_its_data_however_it_was_given() -> None:
+    error = StreamClosed(reason="bye", code=1001)
+
+    assert repr(error) == "StreamClosed(1001, 'bye')"
+    assert repr(_TREE[1]) == "ProblemError(404, '/problems/x', 'Title', 'Detail.')"
+
+
+def test_equal_errors_are_told_apart_and_can_be_kept_in_sets() -> None:
+    assert len({FrameTimeout(0.5), FrameTimeout(0.5)}) == 2
 
 
 def test_a_parameter_error_is_a_value_error_as_callers_expect() -> None:

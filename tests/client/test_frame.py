@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.client.conftest import frame_meta
 from transientcam import Frame
 from transientcam.errors import ParameterError
 
 
 def _frame(array: NDArray[Any], product: str = "range", unit: str = "m", **extra: object) -> Frame:
-    return Frame(product, unit, ("y", "x"), {"frame": 7}, array, extra=extra)
+    return Frame(product, unit, ("y", "x"), frame_meta(frame=7), array, extra=extra)
 
 
 def test_numpy_takes_a_frame_for_its_array_without_a_copy() -> None:
@@ -66,7 +67,7 @@ def test_times_and_labels_are_there_only_where_the_product_has_them() -> None:
 def test_a_pointcloud_gives_the_points_that_there_are_one_a_row() -> None:
     planes = np.arange(12, dtype=np.float32).reshape(3, 2, 2)
     planes[:, 0, 1] = np.nan
-    cloud = Frame("pointcloud", "m", ("coordinate", "y", "x"), {"frame": 7}, planes)
+    cloud = Frame("pointcloud", "m", ("coordinate", "y", "x"), frame_meta(frame=7), planes)
 
     assert cloud.points.tolist() == [[0, 4, 8], [2, 6, 10], [3, 7, 11]]
     assert cloud.points.flags.c_contiguous

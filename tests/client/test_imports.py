@@ -6,7 +6,7 @@ import sys
 import pytest
 
 import transientcam
-from transientcam import wire
+from transientcam import conformance, requests, transport, wire
 
 
 def test_the_public_names_are_these() -> None:
@@ -36,15 +36,24 @@ def test_the_public_names_are_these() -> None:
     ]
 
 
-@pytest.mark.parametrize("module", [transientcam, wire], ids=lambda module: module.__name__)
+@pytest.mark.parametrize(
+    "module",
+    [transientcam, conformance, requests, transport, wire],
+    ids=lambda module: module.__name__,
+)
 def test_public_names_are_sorted_and_exist(module: object) -> None:
-    names: list[str] = module.__all__  # type: ignore[attr-defined]  # both have one
+    names: list[str] = module.__all__  # type: ignore[attr-defined]  # all have one
 
     # as ruff sorts them: constants, then classes, then the rest
     assert (
         sorted(names, key=lambda name: (not name.isupper(), not name[:1].isupper(), name)) == names
     )
     assert all(hasattr(module, name) for name in names)
+
+
+@pytest.mark.parametrize("module", [conformance, requests, transport])
+def test_a_package_shows_few_names(module: object) -> None:
+    assert 3 <= len(module.__all__) <= 8  # type: ignore[attr-defined]  # all have one
 
 
 @pytest.mark.parametrize(

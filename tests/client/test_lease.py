@@ -10,7 +10,7 @@ import transientcam
 from tests.serving import Served, serving
 from transientcam import AsyncCamera, Camera
 from transientcam.errors import ProblemError, ProtocolError, ServerUnreachable
-from transientcam.requests import request as rest
+from transientcam.requests import Request
 
 OTHER = {"harmonics": 4}
 
@@ -88,7 +88,7 @@ def test_a_lease_that_was_taken_over_is_lost_and_changes_nothing_more(
     camera.configure(harmonics=3)
 
 
-def test_the_light_goes_off_whoever_holds_the_lease(camera: Camera, other: Camera) -> None:
+def test_the_light_goes_off_whichever_client_holds_the_lease(camera: Camera, other: Camera) -> None:
     with camera.lease("anna"):
         assert other.safe_off()["running"] is False
         assert camera.start()["running"] is True
@@ -130,7 +130,7 @@ class Answers:
         self._answers = list(answers)
         self.asked: list[str] = []
 
-    def __call__(self, request: rest.Request[Any]) -> dict[str, Any]:
+    def __call__(self, request: Request[Any]) -> dict[str, Any]:
         self.asked.append(request.method)
         answer = self._answers.pop(0)
         if isinstance(answer, Exception):
@@ -170,7 +170,7 @@ def test_a_lease_that_cannot_be_given_back_says_so() -> None:
 def test_a_renewal_that_does_not_come_through_is_tried_again() -> None:
     renewed = []
 
-    def ask(request: rest.Request[Any]) -> dict[str, Any]:
+    def ask(request: Request[Any]) -> dict[str, Any]:
         if request.method == "PUT":
             renewed.append(request)
             if len(renewed) == 1:

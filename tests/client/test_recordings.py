@@ -23,13 +23,13 @@ def test_a_camera_records_stops_and_downloads(daemon: Served, tmp_path: Path) ->
         running = camera.record(name="by hand", annotations={"a": 1})
         assert camera.recording(running["id"])["state"] == "recording"
         stopped = camera.stop_recording(running["id"])
-        told: list[tuple[int, int | None]] = []
+        reported: list[tuple[int, int | None]] = []
         camera.download_recording(
-            running["id"], tmp_path / "a.h5", progress=lambda *how_far: told.append(how_far)
+            running["id"], tmp_path / "a.h5", progress=lambda *how_far: reported.append(how_far)
         )
         size = (tmp_path / "a.h5").stat().st_size
-        assert told[-1] == (size, size)
-        assert [done for done, _ in told] == sorted({done for done, _ in told})
+        assert reported[-1] == (size, size)
+        assert [done for done, _ in reported] == sorted({done for done, _ in reported})
         listed = camera.recordings()["recordings"]
 
     assert stopped["state"] == "complete"

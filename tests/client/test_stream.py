@@ -182,13 +182,13 @@ def test_notices_are_told_while_frames_are_waited_for(
             connection.send(recorded[name].data)
         _until_gone(connection)
 
-    told: list[Notice] = []
-    client = connect(replay(handler).url, on_notice=told.append)
+    passed: list[Notice] = []
+    client = connect(replay(handler).url, on_notice=passed.append)
 
     client.receive(timeout_s=5.0)
 
-    assert [notice.kind for notice in told] == ["dropped"]
-    assert list(client.stream.notices) == told
+    assert [notice.kind for notice in passed] == ["dropped"]
+    assert list(client.stream.notices) == passed
 
 
 def test_no_frame_in_time_is_told_and_the_stream_stays(
@@ -267,7 +267,7 @@ def test_the_end_of_a_stream_is_raised_with_its_reason(
     assert caught.value.code == code
 
 
-def test_a_connection_that_just_breaks_is_told(
+def test_a_connection_that_just_breaks_is_reported(
     connect: _Connect, replay: _Start, recorded: dict[str, Recording]
 ) -> None:
     def handler(connection: ServerConnection) -> None:

@@ -119,14 +119,14 @@ def test_a_new_connection_owes_nothing_for_frames_of_the_old_one(
     assert state.acknowledgement() is None
 
 
-def test_notices_are_kept_and_told(recorded: dict[str, Recording]) -> None:
-    told: list[wire.Notice] = []
-    state = _state(on_notice=told.append)
+def test_notices_are_kept_and_passed_to_the_handler(recorded: dict[str, Recording]) -> None:
+    passed: list[wire.Notice] = []
+    state = _state(on_notice=passed.append)
 
     assert state.received(recorded["notice"].data) is None
 
     expected = wire.Notice("dropped", {"channel": 0, "count": 3, "total": 17})
-    assert told == [expected]
+    assert passed == [expected]
     assert list(state.notices) == [expected]
 
 
@@ -295,7 +295,7 @@ def _opened(state: StreamState) -> wire.Subscribe:
 
 
 @pytest.mark.parametrize(("resume", "start"), [(True, 18), (False, None)])
-def test_after_a_reconnection_only_who_wants_that_goes_on_where_it_was(
+def test_only_a_resuming_client_continues_after_the_last_frame(
     resume: bool, start: int | None, recorded: dict[str, Recording]
 ) -> None:
     subscribe = subscribe_message(("range",), token=None, credits=None, max_rate_hz=None, start=5)

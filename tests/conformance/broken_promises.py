@@ -183,7 +183,7 @@ BROKEN: list[tuple[str, Breaking, str]] = [
     (
         "an-unknown-field-is-named",
         answering(f"{API}/sequence/validate", "POST", limit=None),
-        "what would do",
+        "no `limit`",
     ),
     (
         "an-unknown-product-is-a-problem",
@@ -272,14 +272,14 @@ BROKEN: list[tuple[str, Breaking, str]] = [
     ("a-change-of-the-sequence-is-told", never_saying(kind="sequence-changed"), "no notice"),
     ("a-rate-limit-is-kept", Breaking(heard=_unlimited), "quarter"),
     # slow readers
-    ("drops-are-told", never_saying(kind="dropped"), "told as dropped"),
+    ("drops-are-told", never_saying(kind="dropped"), "reported as dropped"),
     (
         "who-does-not-acknowledge-gets-no-more-than-its-credits",
         Breaking(heard=_never_behind),
         "beyond the credits",
     ),
-    ("who-never-reads-delays-nobody", Breaking(said=Losing("flags", 4)), "lost"),
-    ("who-never-reads-loses-frames", never_saying(kind="dropped"), "told as dropped"),
+    ("who-never-reads-delays-nobody", Breaking(said=Losing("flags", 4)), "healthy client"),
+    ("who-never-reads-loses-frames", never_saying(kind="dropped"), "reported as dropped"),
     # resume
     ("a-stream-goes-on-where-it-stopped", Breaking(heard=_not_resuming), "resuming from"),
     ("a-gap-is-stated", Breaking(heard=_not_resuming), "resuming from 1"),

@@ -16,7 +16,7 @@ from transientcam.errors import ParameterError, ServerUnreachable
 from transientcam.wire import LEASE_HEADER
 from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
 
-PATIENCE_S = 20.0
+LONG_S = 20.0
 SHORT_S = 1.5
 BY_NAME = {each.name: each for each in CHECKS}
 
@@ -30,7 +30,7 @@ def said(report: Report) -> str:
 
 
 def test_the_daemon_keeps_every_promise(daemon: Breakable) -> None:
-    with Device(daemon.served.url, patience_s=PATIENCE_S) as device:
+    with Device(daemon.served.url, timeout_s=LONG_S) as device:
         before = device.state()
         report = run(device)
         after = device.state()
@@ -40,7 +40,7 @@ def test_the_daemon_keeps_every_promise(daemon: Breakable) -> None:
     assert not report.failed, said(report)
     assert len(report.results) == len(CHECKS) + 1
     assert {each.reason for each in report.results if each.outcome == "skipped"} <= {
-        "the service asks nobody for a token",
+        "the service requires no token",
     }
     assert after == before
     assert not recordings
@@ -53,8 +53,8 @@ def test_a_broken_promise_fails_its_check(
 ) -> None:
     breakable.breaker.current = breaking
     # some things take their time also where they are broken
-    patience_s = PATIENCE_S if BY_NAME[name].group in ("routes", "sizes") else SHORT_S
-    with Device(breakable.served.url, patience_s=patience_s) as device:
+    timeout_s = LONG_S if BY_NAME[name].group in ("routes", "sizes") else SHORT_S
+    with Device(breakable.served.url, timeout_s=timeout_s) as device:
         result = run(device, only(name)).results[0]
 
     assert (result.check.name, result.outcome) == (name, "failed"), result.reason
@@ -71,7 +71,7 @@ def test_a_broken_promise_fails_no_other_check(breakable: Breakable) -> None:
     breaking = {name: breaking for name, breaking, _ in BROKEN}
     for name in ("a-wrong-method-is-a-problem", "an-unknown-product-is-a-problem"):
         breakable.breaker.current = breaking[name]
-        with Device(breakable.served.url, patience_s=SHORT_S) as device:
+        with Device(breakable.served.url, timeout_s=SHORT_S) as device:
             report = run(device, chosen(["problems"]))
 
         assert [each.check.name for each in report.failed] == [name]
@@ -79,7 +79,7 @@ def test_a_broken_promise_fails_no_other_check(breakable: Breakable) -> None:
 
 def test_what_cannot_be_read_fails_a_check_and_ends_nothing(breakable: Breakable) -> None:
     breakable.breaker.current = Breaking(answer=lambda each: each.plain(200))
-    with Device(breakable.served.url, patience_s=SHORT_S) as device:
+    with Device(breakable.served.url, timeout_s=SHORT_S) as device:
         report = run(device, chosen(["routes", "tags", "lease", "parameters"]))
 
     passed = [each.check.name for each in report.results if each.outcome == "passed"]
@@ -105,7 +105,7 @@ Guarded = tuple[Breakable, dict[Role, str]]
 
 def test_with_tokens_the_promises_about_them_are_kept(guarded: Guarded) -> None:
     daemon, tokens = guarded
-    with Device(daemon.served.url, token=tokens[Role.ADMIN], patience_s=PATIENCE_S) as device:
+    with Device(daemon.served.url, token=tokens[Role.ADMIN], timeout_s=LONG_S) as device:
         report = run(device, chosen(["authentication", "stream"]))
 
     assert not report.failed, said(report)
@@ -121,7 +121,7 @@ def test_a_broken_promise_about_tokens_fails_its_check(
     daemon, tokens = guarded
     daemon.breaker.current = breaking
     try:
-        with Device(daemon.served.url, token=tokens[Role.ADMIN], patience_s=SHORT_S) as device:
+        with Device(daemon.served.url, token=tokens[Role.ADMIN], timeout_s=SHORT_S) as device:
             result = run(device, only(name)).results[0]
     finally:
         daemon.breaker.current = NOTHING
@@ -130,9 +130,9 @@ def test_a_broken_promise_about_tokens_fails_its_check(
     assert word in str(result.reason)
 
 
-def test_who_may_only_look_changes_nothing_and_is_told_why(guarded: Guarded) -> None:
+def test_a_viewer_changes_nothing_and_gets_the_reason(guarded: Guarded) -> None:
     daemon, tokens = guarded
-    with Device(daemon.served.url, token=tokens[Role.VIEWER], patience_s=PATIENCE_S) as device:
+    with Device(daemon.served.url, token=tokens[Role.VIEWER], timeout_s=LONG_S) as device:
         report = run(device, chosen(["tags", "lease", "recording"]))
 
     assert not report.failed, said(report)
@@ -141,8 +141,8 @@ def test_who_may_only_look_changes_nothing_and_is_told_why(guarded: Guarded) -> 
     assert "may not delete" in str(reasons["a-file-can-be-fetched-in-parts"])
 
 
-def test_a_camera_that_somebody_controls_is_left_alone(daemon: Breakable) -> None:
-    with Device(daemon.served.url, patience_s=PATIENCE_S) as device, httpx.Client() as other:
+def test_a_camera_that_another_client_controls_is_left_alone(daemon: Breakable) -> None:
+    with Device(daemon.served.url, timeout_s=LONG_S) as device, httpx.Client() as other:
         address = f"{daemon.served.url}{API}/lease"
         lease = other.post(address, json={"holder": "bench 2"}).json()
         try:
@@ -157,7 +157,7 @@ def test_a_camera_that_somebody_controls_is_left_alone(daemon: Breakable) -> Non
 
 
 def test_a_camera_that_does_not_capture_does_not_afterwards(daemon: Breakable) -> None:
-    with Device(daemon.served.url, patience_s=PATIENCE_S) as device:
+    with Device(daemon.served.url, timeout_s=LONG_S) as device:
         device.send("PUT", f"{API}/acquisition", json={"running": False})
         try:
             report = run(device, chosen(["resume"]))
@@ -171,7 +171,7 @@ def test_a_camera_that_does_not_capture_does_not_afterwards(daemon: Breakable) -
 
 def test_a_daemon_that_is_not_there_is_said_at_once() -> None:
     with (
-        Device("http://127.0.0.1:9", patience_s=SHORT_S) as device,
+        Device("http://127.0.0.1:9", timeout_s=SHORT_S) as device,
         pytest.raises(ServerUnreachable),
     ):
         run(device)

@@ -1,6 +1,6 @@
 """The ``transientcam`` command.
 
-Exit codes: 0 done, 1 failed (one sentence on standard error says why), 2 wrong usage,
+Exit codes: 0 done, 1 failed (with one sentence on standard error), 2 wrong usage,
 130 interrupted.
 """
 
@@ -56,8 +56,8 @@ def run(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(given: bool) -> None:
+    if given:
         typer.echo(f"transientcam {version('transientcam')}")
         raise typer.Exit
 
@@ -74,7 +74,7 @@ def _top(
 
 
 def _sentence(error: Exception, arguments: Sequence[str]) -> str | None:
-    """Return what to tell of an expected error, or None for a mistake in a program."""
+    """Return the sentence for an expected error, or None for a bug."""
     if isinstance(error, ModuleNotFoundError):
         module = error.name or ""
         if module.startswith("transientcam"):
@@ -84,6 +84,6 @@ def _sentence(error: Exception, arguments: Sequence[str]) -> str | None:
     if isinstance(error, OSError):
         place = f": {error.filename}" if error.filename is not None else ""
         return f"{error.strerror or error}{place}"
-    # the packages of this distribution each have a tree of errors, all of them made to be read
+    # the errors of each package of this distribution are sentences for users
     ours = (each.__module__.partition(".")[0] for each in type(error).__mro__)
     return str(error) if any(root.startswith("transientcam") for root in ours) else None

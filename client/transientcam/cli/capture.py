@@ -43,7 +43,7 @@ def capture(
     form: Annotated[
         Format | None, typer.Option("--format", help="Format; without it, by the file's suffix.")
     ] = None,
-    colour: Annotated[bool, typer.Option(help="PNG in colours for the eye.")] = False,
+    colour: Annotated[bool, typer.Option(help="PNG in false colours.")] = False,
     wait_s: Annotated[
         float, typer.Option(help="How long to wait for a frame that is still to come.")
     ] = 10.0,
@@ -52,7 +52,7 @@ def capture(
 ) -> None:
     """Save one product of a frame in a file."""
     form = form or _format_of(output)
-    wanted: dict[str, Any] = {
+    options: dict[str, Any] = {
         "number": number,
         "recording": recording,
         "region": _region_of(region),
@@ -60,15 +60,15 @@ def capture(
         "time_s": time_s,
         "bins": bins,
         "y": y,
-        # what is recorded is not waited for
+        # a recording has all its frames
         "wait_s": wait_s if recording is None else None,
     }
     with Camera(url, token=token) as camera:
         if form in MADE_BY_DAEMON:
-            data = camera.file(product, form.value, colour=colour, **wanted)
+            data = camera.file(product, form.value, colour=colour, **options)
             report: dict[str, object] = {"product": product}
         else:
-            frame = camera.frame(product, **wanted)
+            frame = camera.frame(product, **options)
             data = frame_bytes(frame, form)
             report = _report(frame)
     if str(output) == "-":

@@ -1,4 +1,4 @@
-"""``transientcam conformance``: whether a running camera keeps what is documented."""
+"""``transientcam conformance``: checks of a running camera against the documentation."""
 
 import json
 from pathlib import Path
@@ -37,14 +37,14 @@ def conformance(
     """Check a running camera, simulated or real, against the documented interface.
 
     It takes the lease, changes the sequence, records, unplugs a simulated camera, and sets
-    everything back. Exit code 0: every promise is kept, or was skipped for the reason told.
+    everything back. Exit code 0: every promise is kept, or was skipped for the reason printed.
     """
     checks = chosen(only or ())
     to_standard_output = report is not None and str(report) == "-"
     console = Console(stderr=to_standard_output, highlight=False)
     width = max(len(each.name) for each in CHECKS)
 
-    with Device(url, token=token, patience_s=timeout_s) as device, console.status("") as status:
+    with Device(url, token=token, timeout_s=timeout_s) as device, console.status("") as status:
 
         def begin(check: Check) -> None:
             status.update(f"{check.group}: {check.promise}")

@@ -1,4 +1,4 @@
-"""What ``transientcam doctor URL`` looks at: a daemon, as a client sees it."""
+"""The checks of ``transientcam doctor URL``: a daemon, as a client sees it."""
 
 import ssl
 import time
@@ -14,12 +14,10 @@ import httpx
 from transientcam.camera import Camera
 from transientcam.cli.findings import Finding
 from transientcam.errors import FrameTimeout, ProblemError, TransientcamError
-from transientcam.transport.address import parse_address
-from transientcam.transport.errors import translated
-from transientcam.transport.options import http_options
+from transientcam.transport import http_options, parse_address, translated
 
 CLOCKS_WITHIN_S: Final = 1.5
-"""The daemon's ``Date`` has whole seconds, so that nothing finer can be said."""
+"""The daemon's ``Date`` has whole seconds, so that nothing finer can be measured."""
 KEEPS_UP: Final = 0.9
 """Share of the camera's frames that should arrive."""
 CERTIFICATE_RENEWED: Final = timedelta(days=14)
@@ -31,12 +29,12 @@ _FIRST_FRAME_S = 10.0
 def of_daemon(
     url: str, *, token: str | None, seconds: float, timeout_s: float
 ) -> Iterator[Finding]:
-    """Look at a daemon, and watch its stream for some seconds."""
+    """Check a daemon, and watch its stream for some seconds."""
     base = parse_address(url).url
     with httpx.Client(**http_options(token=token, timeout_s=timeout_s)) as http:
         try:
             with translated(base):
-                asked_s = time.time()
+                sent_s = time.time()
                 with http.stream("GET", f"{base}/api/versions") as response:
                     response.read()
                     # the connection is to be had only while the answer is open
@@ -51,13 +49,13 @@ def of_daemon(
             message = f"what answers at {base} is no transientcam (status {response.status_code})"
             yield Finding("fault", "reachable", message, "check the address and its port")
             return
-        took_ms = (answered_s - asked_s) * 1e3
+        took_ms = (answered_s - sent_s) * 1e3
         yield Finding("ok", "reachable", f"{base} answered within {took_ms:.0f} ms")
         if ends is not None:
             yield _certificate(ends, now=datetime.now(UTC))
         yield _versions(found)
         yield _ready(http, base)
-        yield _clock(response.headers.get("date"), asked_s, answered_s)
+        yield _clock(response.headers.get("date"), sent_s, answered_s)
     try:
         with Camera(base, token=token, timeout_s=timeout_s) as camera:
             yield from _camera(camera, seconds)
@@ -112,14 +110,14 @@ def _ready(http: httpx.Client, base: str) -> Finding:
     return Finding("fault", "ready", why, "is the camera plugged in? Its daemon's log says more")
 
 
-def _clock(date: str | None, asked_s: float, answered_s: float) -> Finding:
-    """Compare the daemon's clock, which tells whole seconds, with this one."""
+def _clock(date: str | None, sent_s: float, answered_s: float) -> Finding:
+    """Compare the daemon's clock, which has whole seconds, with this one."""
     try:
         there_s = parsedate_to_datetime(date or "").replace(tzinfo=UTC).timestamp()
     except ValueError:
         return Finding("warning", "clock", "the daemon does not say what time it is")
-    # it was somewhere in the second that the header names, between question and answer
-    behind_s = max(0.0, asked_s - (there_s + 1.0))
+    # it was within the second that the header names, between request and answer
+    behind_s = max(0.0, sent_s - (there_s + 1.0))
     ahead_s = max(0.0, there_s - answered_s)
     apart_s = ahead_s or -behind_s
     if abs(apart_s) > CLOCKS_WITHIN_S:
@@ -165,20 +163,20 @@ def _stream(camera: Camera, seconds: float) -> Finding:
             numbers.append(frame.frame)
             size += frame.array.nbytes
         took_s = time.monotonic() - started_s
-        wanted_hz = float(stream.sequence["frame_rate_hz"])
+        expected_hz = float(stream.sequence["frame_rate_hz"])
     if not numbers:
-        message = f"no second frame within {seconds:g} s, at {wanted_hz:.3g} Hz"
+        message = f"no second frame within {seconds:g} s, at {expected_hz:.3g} Hz"
         return Finding("warning", "stream", message, "watch for longer: --seconds")
     missed = numbers[-1] - numbers[0] + 1 - len(numbers)
     message = (
-        f"{_PRODUCT} at {len(numbers) / took_s:.1f} Hz of the camera's {wanted_hz:.1f}, "
+        f"{_PRODUCT} at {len(numbers) / took_s:.1f} Hz of the camera's {expected_hz:.1f}, "
         f"{size / took_s / 1e6:.1f} MB/s, {median(latencies_s) * 1e3:.0f} ms old on arrival, "
         f"{missed} frames missed"
     )
-    if len(numbers) < KEEPS_UP * wanted_hz * took_s - 1.0:
+    if len(numbers) < KEEPS_UP * expected_hz * took_s - 1.0:
         remedy = (
             "is the network fast enough, or the daemon's machine? A lower max_rate_hz, a region or "
-            "a decimation asks for less"
+            "a decimation reduces the load"
         )
         return Finding("warning", "stream", message, remedy)
     return Finding("ok", "stream", message)

@@ -1,7 +1,7 @@
 """``transientcam devices``: cameras on USB and on the network, and what opens each.
 
-What is plugged in here only the driver knows; it offers its list as the entry point ``usb`` of the
-group ``transientcam.devices``.
+The list of USB cameras comes from the driver, through the entry point ``usb`` of the group
+``transientcam.devices``.
 """
 
 import json
@@ -29,7 +29,7 @@ def devices(
     ] = 2.0,
     interface: Annotated[
         list[str] | None,
-        typer.Option(help="Ask only on the interface of this address; may be repeated."),
+        typer.Option(help="Search only on the interface of this address; may be repeated."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -43,11 +43,11 @@ def devices(
     if as_json:
         typer.echo(json.dumps(document, indent=2))
     else:
-        _tell(document, network=network)
+        _print(document, network=network)
 
 
 def _plugged_in() -> dict[str, Any]:
-    """Return what the driver finds, or say how to get the driver."""
+    """Return the cameras that the driver finds, or how to install the driver."""
     try:
         for point in entry_points(group=GROUP, name="usb"):
             found: dict[str, Any] = point.load()()
@@ -67,10 +67,10 @@ def _announced(
     except ModuleNotFoundError as error:
         return (), str(CommandUnavailable(_VERB, error.name or "", "discovery"))
     except ServerUnreachable as error:
-        return (), f"The network cannot be asked: {error.reason}"
+        return (), f"The network cannot be searched: {error.reason}"
 
 
-def _tell(document: dict[str, Any], *, network: bool) -> None:
+def _print(document: dict[str, Any], *, network: bool) -> None:
     console = Console()
     plugged, announced = document["cameras"], document["network"]
     if plugged:
@@ -83,8 +83,8 @@ def _tell(document: dict[str, Any], *, network: bool) -> None:
     if announced:
         console.print(_network_table(announced))
     elif network:
-        told = document["network_problem"] or "No camera announces itself on the network."
-        console.print(escape(told), soft_wrap=True)
+        message = document["network_problem"] or "No camera announces itself on the network."
+        console.print(escape(message), soft_wrap=True)
     if document["simulated"]:
         simulated = ", ".join(document["simulated"])
         console.print(f"Simulated ones: {simulated} (transientcam scenes)", soft_wrap=True)

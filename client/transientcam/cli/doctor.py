@@ -1,4 +1,4 @@
-"""``transientcam doctor``: what is right, what is wrong, and what to do about it."""
+"""``transientcam doctor``: checks of this machine or of a daemon, with a remedy for each fault."""
 
 import json
 import platform
@@ -23,7 +23,7 @@ _WIDTH = 12
 def doctor(
     url: Annotated[
         str | None,
-        typer.Argument(metavar="[URL]", help="A daemon to look at; without it, this machine."),
+        typer.Argument(metavar="[URL]", help="A daemon to check; without it, this machine."),
     ] = None,
     config: Annotated[
         Path | None, typer.Option(help="Settings in TOML.  [default: as `transientcam serve`]")
@@ -37,9 +37,9 @@ def doctor(
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Check this machine, or a daemon, and say what to do about each fault.
+    """Check this machine, or a daemon, and print a remedy for each fault.
 
-    Exits with 0 where nothing is at fault (warnings are none), with 1 otherwise.
+    Exits with 0 if there is no fault (warnings are allowed), with 1 otherwise.
     """
     if url is None:
         found = chain(_of_client(), findings.of_this_machine(config))

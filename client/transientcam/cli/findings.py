@@ -1,8 +1,8 @@
-"""What ``transientcam doctor`` finds, and who looks.
+"""The findings of ``transientcam doctor``, and the checks that yield them.
 
 Each package offers its own checks as an entry point of the group ``transientcam.checks``: a
 function that takes ``config`` (the file of settings, or None) and yields tuples ``(level, check,
-message, remedy)``. Only what is installed is asked.
+message, remedy)``. Only installed packages have any.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -15,22 +15,22 @@ GROUP: Final = "transientcam.checks"
 
 Level = Literal["ok", "warning", "fault"]
 Reported = tuple[str, str, str, str | None]
-"""A finding as it crosses from one package to another."""
+"""A finding as a plain tuple, which other packages yield without importing this one."""
 Checks = Callable[[Path | None], Iterable[Reported]]
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What one check found.
+    """The result of one check.
 
     Attributes
     ----------
     level
-        ``fault``: something will not work; ``warning``: it will, but not all or not as well.
+        ``fault``: a part will not work; ``warning``: it will, but not fully or not as well.
     check
-        What was looked at.
+        What was checked.
     message
-        What was seen.
+        What was found.
     remedy
         What to do about it; None where there is nothing to do.
     """

@@ -21,13 +21,13 @@ class Format(StrEnum):
     NPZ = "npz"
     """``array`` with ``product``, ``unit``, ``axes``, ``meta`` (JSON), ``time_s``, ``labels``."""
     PNG = "png"
-    """As the daemon draws it: 16 bit, or colours for the eye."""
+    """As the daemon encodes it: 16 bit, or false colours."""
     TIFF = "tiff"
-    """The values as they are, a page for each image; also ``.tif``."""
+    """Unchanged values, a page for each image; also ``.tif``."""
     PLY = "ply"
     """Of pointcloud: points with range, amplitude and flags."""
     CSV = "csv"
-    """A line for each row, of what is an image."""
+    """A line for each row, of products that are images."""
     MSGPACK = "msgpack"
     """The message of docs/stream.md."""
     JSON = "json"
@@ -35,7 +35,7 @@ class Format(StrEnum):
 
 
 MADE_BY_DAEMON: Final = frozenset((Format.PNG, Format.TIFF, Format.PLY, Format.CSV))
-"""What is fetched as it is."""
+"""Formats that are downloaded as the daemon writes them."""
 
 
 def frame_bytes(frame: Frame, form: Format) -> bytes:

@@ -23,6 +23,6 @@ ProductsArgument = Annotated[
 ]
 TokenOption = Annotated[
     str | None,
-    typer.Option(envvar="TRANSIENTCAM_TOKEN", help="Proves who asks, where the daemon wants that."),
+    typer.Option(envvar="TRANSIENTCAM_TOKEN", help="Bearer token, where the daemon requires one."),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]

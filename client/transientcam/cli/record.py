@@ -1,4 +1,4 @@
-"""``transientcam record``: let the daemon record, and fetch the file if wanted."""
+"""``transientcam record``: record at the daemon, and download the file with ``--output``."""
 
 import json
 import time

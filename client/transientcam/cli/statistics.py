@@ -1,4 +1,4 @@
-"""What a watcher of a stream wants to know, from frames and notices as they come."""
+"""Rates, latencies and losses of a stream, from its frames and notices."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ _WINDOW_S: Final = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One frame as it was seen.
+    """The statistics at one frame.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Statistics:
         self._arrivals_s: deque[float] = deque()
 
     def frame(self, frame: Frame, *, now_s: float) -> Sample:
-        """Take in a frame that was received at ``now_s``, Unix time."""
+        """Count a frame that was received at ``now_s``, Unix time."""
         if frame.frame != self._newest:
             self._newest = frame.frame
             self._arrivals_s.append(now_s)
@@ -69,7 +69,7 @@ class Statistics:
         )
 
     def notice(self, notice: Notice) -> None:
-        """Take in a notice."""
+        """Count the losses that a notice reports."""
         count = notice.details.get("count")
         if isinstance(count, int):
             if notice.kind == "dropped":

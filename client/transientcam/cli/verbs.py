@@ -1,7 +1,7 @@
 """Verbs of the command line: functions, or groups of them, that packages offer as entry points.
 
-Only the verb that is asked for is imported, so that the client's verbs start fast and a server's
-verb that lacks its packages stands in nobody's way.
+Only the verb that is run is imported, so that the client's verbs start fast and work also where the
+server's packages are not installed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -26,15 +26,15 @@ def load_verbs(app: typer.Typer, arguments: Sequence[str]) -> None:
     """Add the verb that ``arguments`` name to ``app``, or all of them where they name none."""
     points = {point.name: point for point in entry_points(group=GROUP)}
     named = next((each for each in arguments if not each.startswith("-")), None)
-    wanted = [points[named]] if named in points else [points[name] for name in sorted(points)]
-    for point in wanted:
+    chosen = [points[named]] if named in points else [points[name] for name in sorted(points)]
+    for point in chosen:
         _add(app, point)
 
 
 def words_to_complete(environment: Mapping[str, str]) -> list[str]:
-    """Return the words so far, where a shell asks how they may go on; else nothing.
+    """Return the words so far, where a shell requests completions; else nothing.
 
-    bash hands them over in one variable, zsh and fish in another one.
+    bash passes them in one variable, zsh and fish in another one.
     """
     if "_TRANSIENTCAM_COMPLETE" not in environment:
         return []
@@ -43,7 +43,7 @@ def words_to_complete(environment: Mapping[str, str]) -> list[str]:
 
 
 def extra_of(module: str, verb: str) -> str | None:
-    """Return the extra that brings a missing ``module`` to a verb; None if it is not known."""
+    """Return the extra that installs a missing ``module`` of a verb; None if it is not known."""
     packages = [module.partition(".")[0]]
     packages += [point.module.partition(".")[0] for point in entry_points(group=GROUP, name=verb)]
     return next(filter(None, map(_EXTRA_OF_PACKAGE.get, packages)), None)

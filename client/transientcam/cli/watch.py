@@ -1,4 +1,4 @@
-"""``transientcam watch``: what a camera streams, as numbers."""
+"""``transientcam watch``: statistics of a stream, as it runs."""
 
 import json
 import time
@@ -26,14 +26,12 @@ def watch(
     max_rate_hz: Annotated[
         float | None, typer.Option(help="No more frames a second than this.")
     ] = None,
-    reconnect: Annotated[
-        bool, typer.Option(help="Come back by itself when the connection is lost.")
-    ] = True,
+    reconnect: Annotated[bool, typer.Option(help="Reconnect when the connection is lost.")] = True,
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show rate, latency, losses and the median of what a camera streams, until interrupted."""
-    wanted = products or ["range"]
+    names = products or ["range"]
     statistics = Statistics()
     display = Lines() if as_json else Screen(Console())
 
@@ -44,12 +42,12 @@ def watch(
     seen = 0
     with Camera(url, token=token) as camera, display.shown():
         stream = camera.stream(
-            *wanted, on_notice=on_notice, reconnect=reconnect, max_rate_hz=max_rate_hz
+            *names, on_notice=on_notice, reconnect=reconnect, max_rate_hz=max_rate_hz
         )
         try:
             for frame in stream:
                 display.sample(statistics.frame(frame, now_s=time.time()))
-                seen += frame.product == wanted[0]
+                seen += frame.product == names[0]
                 if seen == count:
                     break
         except KeyboardInterrupt:  # the way to end it, not a failure
@@ -63,7 +61,7 @@ class Lines:
         self._write = write
 
     def shown(self) -> AbstractContextManager[object]:
-        """Return what to show within."""
+        """Return the context in which to show."""
         return nullcontext()
 
     def sample(self, sample: Sample) -> None:
@@ -84,7 +82,7 @@ class Screen:
         self._live = Live(console=console, refresh_per_second=8) if console.is_terminal else None
 
     def shown(self) -> AbstractContextManager[object]:
-        """Return what to show within."""
+        """Return the context in which to show."""
         return self._live or nullcontext()
 
     def sample(self, sample: Sample) -> None:

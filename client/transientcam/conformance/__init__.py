@@ -1,4 +1,4 @@
-"""Whether a running camera keeps what is documented: each check is one promise, tried for real.
+"""Checks of a running camera against the documentation: each tries one promise of it.
 
 ``transientcam conformance URL`` runs them. They use nothing but the documented interface, and
 leave the camera as they found it.

@@ -1,4 +1,4 @@
-"""What a check is."""
+"""A check: a promise and the function that tries it."""
 
 import inspect
 from collections.abc import Callable
@@ -15,12 +15,12 @@ class Check:
     Attributes
     ----------
     group, name
-        What it is called in reports and on the command line.
+        Its name in reports and on the command line.
     promise
         The sentence of the contract.
     run
-        Returns where the promise is kept; else raises `PromiseBroken`, or `CheckSkipped` where it
-        cannot be tried.
+        Returns if the promise is kept; else raises `PromiseBroken`, or `CheckSkipped` if it cannot
+        be tried.
     """
 
     group: str

@@ -1,11 +1,10 @@
-"""The camera that is checked: requests, streams, and its state before anything was touched."""
+"""The camera that is checked: requests, streams, and its state before the checks."""
 
 import re
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
-from types import TracebackType
 from typing import Any, Final
 
 import httpx
@@ -13,51 +12,51 @@ import httpx
 from transientcam.conformance.conversation import Conversation, connected
 from transientcam.conformance.expecting import equal, expect, skip_unless
 from transientcam.errors import PromiseBroken, ProtocolError
-from transientcam.requests import request as rest
-from transientcam.transport.address import parse_address
-from transientcam.transport.errors import media_type, translated
-from transientcam.transport.options import answer, http_options
+from transientcam.requests import problem
+from transientcam.transport import answer_of, http_options, parse_address, translated
+from transientcam.transport.errors import media_type
+from transientcam.transport.options import set_lease
 from transientcam.wire import LEASE_HEADER, MEDIA_TYPE, PROBLEM_MEDIA_TYPE, Frame, parse_frame
 
 API: Final = "/api/v1"
 HOLDER: Final = "transientcam conformance"
 _STATE: Final = ("sequence", "reconstruction")
-_OF_THE_CAMERA: Final = rest.APPLIED_FIELDS | {"reconstruction_id"}
+_CHANGE_COUNTERS: Final = frozenset(("sequence_id", "reconstruction_id"))
 _LEASE_S: Final = 600.0
 _SHOWN = 120
 
 
 class Device:
-    """A running camera, its answers as they are, and what it was set to at first.
+    """A running camera, its raw answers, and its state before the checks.
 
     Parameters
     ----------
     url, token
         As of `Camera`.
-    patience_s
-        How long what should happen by itself may take.
+    timeout_s
+        How long an event may take that is not the answer to a request.
     """
 
-    def __init__(self, url: str, *, token: str | None = None, patience_s: float = 30.0) -> None:
+    def __init__(self, url: str, *, token: str | None = None, timeout_s: float = 30.0) -> None:
         self.address = parse_address(url)
         self.token = token
-        self.patience_s = patience_s
+        self.timeout_s = timeout_s
         self._http = httpx.Client(
-            base_url=self.address.url, **http_options(token=token, timeout_s=patience_s)
+            base_url=self.address.url, **http_options(token=token, timeout_s=timeout_s)
         )
         self._lease_id: str | None = None
         self.answers: list[tuple[dict[str, Any], httpx.Response]] = []
-        """What routes were read already, each with its description."""
+        """The answers of routes that were read already, each with the route's description."""
 
     # -- requests ------------------------------------------------------------------------------
 
     def send(self, method: str, path: str, **options: Any) -> httpx.Response:
-        """Return the answer to a request, whatever it is."""
+        """Return the answer to a request, whatever its status."""
         with translated(self.address.url):
             return self._http.request(method, path, **options)
 
     def peek(self, path: str, *, most_bytes: int = 2**26, **options: Any) -> httpx.Response:
-        """Return an answer that may have no end: its head, and no more than so much of its body."""
+        """Return an answer that may be endless: its head, and its body if it has an end."""
         with translated(self.address.url), self._http.stream("GET", path, **options) as response:
             if not media_type(response.headers.get("content-type", "")).startswith("multipart/"):
                 response.read()
@@ -78,8 +77,8 @@ class Device:
         """Return the JSON document that a request is answered with."""
         what = _named(response)
         if response.status_code != status:
-            said = rest.problem(answer(response))
-            raise PromiseBroken(f"{what} is answered with {response.status_code}: {said}")
+            reason = problem(answer_of(response))
+            raise PromiseBroken(f"{what} is answered with {response.status_code}: {reason}")
         equal(_media_type(response), "application/json", f"the media type of {what}")
         return _object(response)
 
@@ -101,15 +100,15 @@ class Device:
             )
         if field is not None:
             equal(document.get("field"), field, f"`field` in the problem of {what}")
-            expect("limit" in document, f"the problem of {what} does not say what would do")
+            expect("limit" in document, f"the problem of {what} has no `limit`")
         return document
 
     def frame(self, path: str, **options: Any) -> Frame:
         """Return the product of a frame at a path, as msgpack."""
         response = self.send("GET", path, headers={"accept": MEDIA_TYPE}, **options)
         if response.status_code != httpx.codes.OK:
-            said = rest.problem(answer(response))
-            raise PromiseBroken(f"{_named(response)} is refused: {said}")
+            reason = problem(answer_of(response))
+            raise PromiseBroken(f"{_named(response)} is refused: {reason}")
         equal(_media_type(response), MEDIA_TYPE, f"the media type of {_named(response)}")
         try:
             return parse_frame(response.content)
@@ -119,7 +118,7 @@ class Device:
     @contextmanager
     def stream(self, *products: str, **options: Any) -> Iterator[Conversation]:
         """Subscribe for the length of a block; options as of `connected`."""
-        chosen = {"token": self.token, "patience_s": self.patience_s} | options
+        chosen = {"token": self.token, "timeout_s": self.timeout_s} | options
         with connected(self.address.stream, *products, **chosen) as conversation:
             yield conversation
 
@@ -132,42 +131,42 @@ class Device:
 
     def offers(self, method: str, path: str) -> bool:
         """Return whether an operation is described."""
-        wanted = _nameless(API + path)
+        described = _nameless(API + path)
         paths = self.openapi.get("paths", {})
-        return any(method.lower() in paths[each] for each in paths if _nameless(each) == wanted)
+        return any(method.lower() in paths[each] for each in paths if _nameless(each) == described)
 
     @property
     def camera(self) -> dict[str, Any]:
-        """What the camera can do and how it is."""
+        """Capabilities and state of the camera."""
         return self.read(f"{API}/camera")
 
     @property
     def sequence(self) -> dict[str, Any]:
-        """What is captured."""
+        """The sequence that is captured."""
         return self.read(f"{API}/sequence")
 
     def require_simulation(self) -> None:
-        """Skip the check where the camera is a real one."""
+        """Skip the check unless the camera is simulated."""
         skip_unless(self.camera["simulated"], "the camera is a real one: nothing can be broken")
 
     def wait_until(self, happened: Callable[[], bool], what: str) -> None:
-        """Wait for something; it is a broken promise if it does not come in time."""
-        end_s = time.monotonic() + self.patience_s
+        """Wait until ``happened`` returns true; a promise is broken if it does not in time."""
+        end_s = time.monotonic() + self.timeout_s
         while not happened():
             if time.monotonic() >= end_s:
-                raise PromiseBroken(f"{what} within {self.patience_s:g} s")
+                raise PromiseBroken(f"{what} within {self.timeout_s:g} s")
             time.sleep(0.05)
 
     # -- changing it ---------------------------------------------------------------------------
 
     @contextmanager
     def control(self) -> Iterator[None]:
-        """Be alone in changing things for a block, and undo at its end what it has changed.
+        """Hold the lease for a block, and undo its changes at the end.
 
         Raises
         ------
         CheckSkipped
-            If somebody else controls the camera, or the token may only look.
+            If another client holds the lease, or the token allows no changes.
         """
         if self._lease_id is not None:
             yield
@@ -175,7 +174,7 @@ class Device:
         terms = {"holder": HOLDER, "duration_s": _LEASE_S, "on_lapse": "keep"}
         response = self.send("POST", f"{API}/lease", json=terms)
         if response.status_code in (401, 403, 409):
-            skip_unless(False, f"nothing may be changed: {rest.problem(answer(response))}")
+            skip_unless(False, f"nothing may be changed: {problem(answer_of(response))}")
         granted = self.document(response, status=201)
         before = self.state()
         self.hold(granted["lease_id"])
@@ -195,7 +194,7 @@ class Device:
 
     @contextmanager
     def as_another(self) -> Iterator[dict[str, str]]:
-        """Be somebody without the lease for a block; yields the header that shows it."""
+        """Send requests without the lease for a block; yields the header that carries it."""
         lease_id = self._lease_id
         assert lease_id is not None  # noqa: S101 - it is used within `control`
         del self._http.headers[LEASE_HEADER]
@@ -205,16 +204,13 @@ class Device:
             self.hold(self._lease_id)
 
     def hold(self, lease_id: str | None) -> None:
-        """Show this lease with every change from now on."""
+        """Send this lease with every change from now on."""
         self._lease_id = lease_id
-        if lease_id is None:
-            self._http.headers.pop(LEASE_HEADER, None)
-        else:
-            self._http.headers[LEASE_HEADER] = lease_id
+        set_lease(self._http.headers, lease_id)
 
     @contextmanager
     def capturing(self) -> Iterator[None]:
-        """Let the camera capture for the length of a block, if it does not anyway."""
+        """Capture for the length of a block."""
         if self.read(f"{API}/acquisition")["running"]:
             yield
             return
@@ -223,19 +219,19 @@ class Device:
             yield
 
     def accepted(self, sequence: Mapping[str, Any]) -> dict[str, Any]:
-        """Return a sequence that can be set; skip the check where the camera does not take it."""
+        """Return the sequence if it can be set; skip the check otherwise."""
         response = self.send("POST", f"{API}/sequence/validate", json=dict(sequence))
         if not response.is_success:
-            skip_unless(False, f"this camera does not take it: {rest.problem(answer(response))}")
+            skip_unless(False, f"this camera does not take it: {problem(answer_of(response))}")
         return dict(sequence)
 
     def state(self) -> dict[str, Any]:
-        """Return everything that checks change, without what counts changes."""
+        """Return all settings that checks change, without the counters of their changes."""
         state = {
             name: {
                 key: value
                 for key, value in self.read(f"{API}/{name}").items()
-                if key not in _OF_THE_CAMERA
+                if key not in _CHANGE_COUNTERS
             }
             for name in _STATE
             if self.offers("PUT", f"/{name}")
@@ -248,8 +244,8 @@ class Device:
             if now.get(name) != before.get(name):
                 self.document(self.send("PUT", f"{API}/{name}", json=before[name]))
         if now["running"] != before["running"]:
-            wanted = {"running": before["running"]}
-            self.document(self.send("PUT", f"{API}/acquisition", json=wanted))
+            body = {"running": before["running"]}
+            self.document(self.send("PUT", f"{API}/acquisition", json=body))
 
     # -- life ----------------------------------------------------------------------------------
 
@@ -260,17 +256,12 @@ class Device:
     def __enter__(self) -> "Device":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
 def _nameless(path: str) -> str:
-    """Return a path without the names of its parameters, which clients never see."""
+    """Return a path without the names of its parameters, which are no part of the contract."""
     return re.sub(r"\{\w+\}", "{}", path)
 
 

@@ -1,22 +1,22 @@
-"""How a check says that a promise was not kept, or cannot be tried."""
+"""Assertions of checks: a promise was kept, or can be tried at all."""
 
 from transientcam.errors import CheckSkipped, PromiseBroken
 
 
 def expect(kept: object, what: str) -> None:
-    """Say ``what`` is wrong unless a promise was ``kept``."""
+    """Raise `PromiseBroken` with ``what`` unless the promise was ``kept``."""
     if not kept:
         raise PromiseBroken(what)
 
 
-def equal(found: object, wanted: object, what: str) -> None:
-    """Say what was ``found`` unless it is what was ``wanted``."""
-    if found != wanted:
-        raise PromiseBroken(f"{what} is {_shown(found)}, not {_shown(wanted)}")
+def equal(found: object, expected: object, what: str) -> None:
+    """Raise `PromiseBroken` unless ``found`` equals ``expected``; ``what`` names it."""
+    if found != expected:
+        raise PromiseBroken(f"{what} is {_shown(found)}, not {_shown(expected)}")
 
 
 def skip_unless(possible: object, why: str) -> None:
-    """Leave the check out unless it is ``possible``."""
+    """Skip the check unless it is ``possible``."""
     if not possible:
         raise CheckSkipped(why)
 

@@ -1,4 +1,4 @@
-"""The lease: one controller, whom others are told of, and watchers whom nothing blocks."""
+"""The lease: one client in control, known to the others, and readers that are never blocked."""
 
 from transientcam.conformance.check import checks
 from transientcam.conformance.device import API, HOLDER, Device
@@ -7,7 +7,7 @@ from transientcam.conformance.expecting import equal, expect
 _LEASE = f"{API}/lease"
 _ACQUISITION = f"{API}/acquisition"
 _SHORT_S = 1.0
-_NEXT = "the next one"
+_NEXT = "the next holder"
 
 
 def a_second_writer_is_told_who_controls_it(device: Device) -> None:
@@ -16,26 +16,26 @@ def a_second_writer_is_told_who_controls_it(device: Device) -> None:
         change = {"running": device.read(_ACQUISITION)["running"]}
         refused = device.refusal(device.send("PUT", _ACQUISITION, json=change), 409, "lease-held")
         equal(refused.get("holder"), HOLDER, "`holder` in the problem")
-        expect(refused.get("expires_in_s", 0.0) > 0.0, "the problem does not say for how long")
-        second = device.send("POST", _LEASE, json={"holder": "somebody else"})
+        expect(refused.get("expires_in_s", 0.0) > 0.0, "the problem has no time of expiry")
+        second = device.send("POST", _LEASE, json={"holder": "another client"})
         device.refusal(second, 409, "lease-held")
 
 
 def watchers_are_never_blocked(device: Device) -> None:
-    """Who only looks needs no lease, whoever holds it."""
+    """Reading requires no lease, whichever client holds it."""
     with device.control(), device.as_another():
         for path in ("camera", "sequence", "acquisition"):
             device.read(f"{API}/{path}")
         held = device.read(_LEASE)
         equal((held["held"], held["holder"]), (True, HOLDER), "who holds the lease")
-        expect("lease_id" not in held, "the lease's id is shown to everybody")
+        expect("lease_id" not in held, "the lease's id is shown to other clients")
 
 
 def the_holder_changes_things(device: Device) -> None:
     """Changes that carry the lease in Transientcam-Lease are done."""
     with device.control():
-        wanted = {"running": device.read(_ACQUISITION)["running"]}
-        device.document(device.send("PUT", _ACQUISITION, json=wanted))
+        body = {"running": device.read(_ACQUISITION)["running"]}
+        device.document(device.send("PUT", _ACQUISITION, json=body))
 
 
 def a_renewed_lease_lasts_on(device: Device) -> None:
@@ -46,7 +46,7 @@ def a_renewed_lease_lasts_on(device: Device) -> None:
 
 
 def a_lease_given_back_is_over(device: Device) -> None:
-    """After DELETE everybody may change things again, and the former lease is refused."""
+    """After DELETE every client may make changes again, and the former lease is refused."""
     with device.control(), device.as_another() as own:
         device.document(device.send("DELETE", _LEASE, headers=own))
         equal(device.read(_LEASE)["held"], False, "`held` after it was given back")
@@ -57,7 +57,7 @@ def a_lease_given_back_is_over(device: Device) -> None:
 
 
 def a_lease_that_nobody_renews_lapses_and_the_light_goes_off(device: Device) -> None:
-    """A lease that is not renewed lapses: the capture and the light stop, and streams are told."""
+    """A lease that is not renewed lapses: capture and light stop, and streams get a notice."""
     with (
         device.control(),
         device.capturing(),
@@ -66,8 +66,8 @@ def a_lease_that_nobody_renews_lapses_and_the_light_goes_off(device: Device) -> 
     ):
         terms = {"duration_s": _SHORT_S, "on_lapse": "stop"}
         device.document(device.send("PUT", _LEASE, json=terms, headers=own))
-        told = watcher.notice("lease-changed")
-        found = told.details.get("change"), told.details.get("holder")
+        details = watcher.notice("lease-changed").details
+        found = details.get("change"), details.get("holder")
         equal(found, ("lapsed", HOLDER), "change and holder in the notice")
         equal(device.read(_LEASE)["held"], False, "`held` after the lease lapsed")
         device.refusal(device.send("PUT", _LEASE, headers=own), 409, "lease-lost")
@@ -79,19 +79,21 @@ def a_lease_that_nobody_renews_lapses_and_the_light_goes_off(device: Device) -> 
 
 
 def a_takeover_is_told(device: Device) -> None:
-    """Who takes the lease over is granted it, and the former holder hears of it."""
+    """A client that takes the lease over gets it, and a notice names the former holder."""
     with device.control(), device.stream("flags") as watcher, device.as_another() as own:
         terms = {"holder": _NEXT, "takeover": True, "on_lapse": "keep"}
         granted = device.document(device.send("POST", _LEASE, json=terms), status=201)
         device.hold(granted["lease_id"])
         device.refusal(device.send("PUT", _LEASE, headers=own), 409, "lease-lost")
-        told = watcher.notice("lease-changed").details
-        found = told.get("change"), told.get("holder"), told.get("from")
-        equal(found, ("taken-over", _NEXT, HOLDER), "change, holder and former holder told")
+        details = watcher.notice("lease-changed").details
+        found = details.get("change"), details.get("holder"), details.get("from")
+        equal(
+            found, ("taken-over", _NEXT, HOLDER), "change, holder and former holder in the notice"
+        )
 
 
 def the_light_can_be_switched_off_by_anybody(device: Device) -> None:
-    """safe-off stops the capture and the light whoever holds the lease."""
+    """safe-off stops the capture and the light, whichever client holds the lease."""
     with device.control(), device.as_another():
         stopped = device.document(device.send("POST", f"{_ACQUISITION}/safe-off"))
         equal(stopped["running"], False, "`running` after safe-off")

@@ -1,4 +1,4 @@
-"""Parameters: each says what it may be, that is true, and nothing else is taken."""
+"""Parameters: each has limits, its value is within them, and no other value is accepted."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
@@ -6,8 +6,8 @@ from typing import Any, Final
 from transientcam.conformance.check import checks
 from transientcam.conformance.device import API, Device
 from transientcam.conformance.expecting import equal, expect
-from transientcam.requests.request import problem
-from transientcam.transport.options import answer
+from transientcam.requests import problem
+from transientcam.transport import answer_of
 
 _SEQUENCE: Final = f"{API}/sequence"
 _CHANGEABLE: Final = "read-write"
@@ -26,7 +26,7 @@ def every_value_is_within_its_limits(device: Device) -> None:
 
 
 def every_parameter_has_unit_and_meaning(device: Device) -> None:
-    """Every parameter says its type, unit, access and meaning, and where it stands."""
+    """Every parameter has a type, unit, access, meaning, resource and pointer."""
     for each in _parameters(device):
         for key in ("resource", "pointer", "type", "access", "description"):
             expect(each.get(key), f"{each['name']} has no `{key}`")
@@ -80,7 +80,7 @@ def a_parameter_out_of_range_is_refused_and_changes_nothing(device: Device) -> N
 
 
 def the_limits_of_a_sequence_are_taken(device: Device) -> None:
-    """What lies on a limit of the sequence is taken: min and max belong to the range."""
+    """Values on a limit of the sequence are accepted: min and max belong to the range."""
     for each in _parameters(device):
         if each["resource"] != _SEQUENCE or each["access"] != _CHANGEABLE:
             continue
@@ -90,15 +90,15 @@ def the_limits_of_a_sequence_are_taken(device: Device) -> None:
             body = _with(device.sequence, each["pointer"], value)
             response = device.send("POST", f"{_SEQUENCE}/validate", json=body)
             refused = f"{each['name']} = {value}, its limit, is refused"
-            expect(response.is_success, f"{refused}: {problem(answer(response))}")
+            expect(response.is_success, f"{refused}: {problem(answer_of(response))}")
 
 
 def a_checked_sequence_is_not_set(device: Device) -> None:
-    """Validating a sequence says what would be set, and sets nothing."""
+    """Validating a sequence returns what would be set, and sets nothing."""
     before = device.sequence
-    wanted = {"harmonics": 1, "exposure_s": device.camera["capabilities"]["max_exposure_s"]}
-    checked = device.document(device.send("POST", f"{_SEQUENCE}/validate", json=wanted))
-    equal({key: checked[key] for key in wanted}, wanted, "what would be set")
+    body = {"harmonics": 1, "exposure_s": device.camera["capabilities"]["max_exposure_s"]}
+    checked = device.document(device.send("POST", f"{_SEQUENCE}/validate", json=body))
+    equal({key: checked[key] for key in body}, body, "what would be set")
     equal(device.sequence, before, "the sequence after a check")
 
 

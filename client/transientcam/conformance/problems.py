@@ -1,4 +1,4 @@
-"""Whatever goes wrong is answered with a problem document (RFC 9457) of a known type."""
+"""Every error is answered with a problem document (RFC 9457) of a known type."""
 
 import httpx
 
@@ -65,7 +65,7 @@ def a_body_that_is_too_large_is_a_problem(device: Device) -> None:
 
 
 def every_problem_has_a_page(device: Device) -> None:
-    """The type of a problem is the address of a page that says what it means."""
+    """The type of a problem is the address of a page that explains it."""
     types = {
         device.refusal(device.send(method, path), status)["type"]
         for method, path, status in (

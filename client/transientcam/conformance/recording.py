@@ -1,4 +1,4 @@
-"""Recordings: what was captured, bit for bit, in their files and when they are replayed."""
+"""Recordings: the captured images, bit for bit, in their files and when they are replayed."""
 
 import tempfile
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ _ANNOTATIONS: Final = {"of": "transientcam conformance"}
 
 
 def a_recording_is_told_and_described(device: Device) -> None:
-    """Streams hear when a recording begins and ends, and its description says what is in it."""
+    """Streams get notices when a recording begins and ends, and its description is complete."""
     with _recorded(device) as (recording, _):
         found = recording["state"], recording["frames"], recording["dropped_frames"]
         equal(found, ("complete", _FRAMES, 0), "state, frames and dropped frames of the recording")
@@ -74,17 +74,17 @@ def a_replay_is_those_frames_again(device: Device) -> None:
     with _recorded(device) as (recording, streamed), tempfile.TemporaryDirectory() as name:
         file = Path(name) / "recording.h5"
         file.write_bytes(device.send("GET", f"{_RECORDINGS}/{recording['id']}/file").content)
-        wanted = [each.array for each in streamed[-_FRAMES:]]
+        recorded = [each.array for each in streamed[-_FRAMES:]]
         with (
             replayed(file) as address,
-            Device(address, patience_s=device.patience_s) as replay,
+            Device(address, timeout_s=device.timeout_s) as replay,
             replay.stream("raw") as stream,
         ):
             found = [stream.frame().array for _ in range(_FRAMES + 1)]
-    begin = next((k for k, each in enumerate(wanted) if np.array_equal(each, found[0])), None)
+    begin = next((k for k, each in enumerate(recorded) if np.array_equal(each, found[0])), None)
     expect(begin is not None, "the first replayed frame is none of those that were streamed")
     for index, array in enumerate(found, start=begin or 0):
-        same = np.array_equal(array, wanted[index % _FRAMES])
+        same = np.array_equal(array, recorded[index % _FRAMES])
         expect(same, f"replayed frame {index - (begin or 0)} differs from the streamed one")
 
 
@@ -95,15 +95,15 @@ def _recorded(device: Device) -> Iterator[tuple[dict[str, Any], list[Frame]]]:
         stream.frame()
         running = _start(device, ids, frames=_FRAMES)
         streamed: list[Frame] = []
-        told: list[Notice] = []
-        while not (told and told[-1].kind == "recording-stopped"):
+        notices: list[Notice] = []
+        while not (notices and notices[-1].kind == "recording-stopped"):
             match stream.receive():
                 case Frame() as frame:
                     streamed.append(frame)
                 case Notice() as notice if notice.kind.startswith("recording-"):
-                    told.append(notice)
-        equal(told[0].kind, "recording-started", "the first notice")
-        for notice in told:
+                    notices.append(notice)
+        equal(notices[0].kind, "recording-started", "the first notice")
+        for notice in notices:
             equal(notice.details.get("recording"), running["id"], f"`recording` of {notice.kind}")
         path = f"{_RECORDINGS}/{running['id']}"
         device.wait_until(
@@ -121,8 +121,8 @@ def _expect_streamed(recorded: Frame, streamed: list[Frame]) -> None:
 
 
 def _start(device: Device, ids: list[str], *, frames: int | None) -> dict[str, Any]:
-    wanted = {"name": "conformance", "annotations": _ANNOTATIONS}
-    body = wanted if frames is None else wanted | {"frames": frames}
+    body: dict[str, Any] = {"name": "conformance", "annotations": _ANNOTATIONS}
+    body |= {} if frames is None else {"frames": frames}
     response = device.send("POST", _RECORDINGS, json=body)
     skip_unless(response.status_code != 409, "a recording runs already")
     skip_unless(response.status_code != 507, "the disk of the service takes no recording")
@@ -133,7 +133,7 @@ def _start(device: Device, ids: list[str], *, frames: int | None) -> dict[str, A
 
 @contextmanager
 def _deletable(device: Device) -> Iterator[list[str]]:
-    """Delete at the end what was recorded; without leave to do so nothing is recorded."""
+    """Delete recordings at the end; without permission to do so, none is made."""
     probe = device.send("DELETE", f"{_RECORDINGS}/none")
     skip_unless(probe.status_code == 404, "this token may not delete what would be recorded")
     ids: list[str] = []

@@ -24,7 +24,7 @@ def can_replay() -> bool:
 def replayed(file: Path) -> Iterator[str]:
     """Serve a recording, over and over, for the length of a block; yields the address."""
     settings = file.with_suffix(".toml")
-    settings.touch()  # so that settings of somebody else are not found
+    settings.touch()  # so that no other settings are found
     environment = {k: v for k, v in os.environ.items() if not k.startswith("TRANSIENTCAM_")}
     environment |= {"TRANSIENTCAM_KERNELS": "off", "XDG_DATA_HOME": str(file.parent)}
     arguments = ["serve", "--camera", f"recording:{file}?loop=on", "--port", "0"]

@@ -1,4 +1,4 @@
-"""What came of each check."""
+"""The results of checks."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -12,12 +12,12 @@ Outcome = Literal["passed", "failed", "skipped"]
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What came of one check.
+    """The result of one check.
 
     Attributes
     ----------
     reason
-        What is wrong, or why it was skipped; None where it passed.
+        Why it failed or was skipped; None if it passed.
     """
 
     check: Check
@@ -39,13 +39,13 @@ class Result:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What came of all of them.
+    """The results of all checks.
 
     Attributes
     ----------
     camera
-        Model, serial and firmware of the camera, name and version of its service; empty where it
-        did not say.
+        Model, serial and firmware of the camera, name and version of its service; empty if
+        they could not be read.
     began_s
         Unix time.
     """

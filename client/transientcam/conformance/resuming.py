@@ -1,4 +1,4 @@
-"""Coming back: what was missed is sent, or it is said what is missing."""
+"""Resuming a stream: missed frames are sent, or reported as missing."""
 
 from transientcam.conformance.check import checks
 from transientcam.conformance.device import Device
@@ -9,7 +9,7 @@ _AFTER = 3
 
 
 def a_stream_goes_on_where_it_stopped(device: Device) -> None:
-    """A stream with `start` begins with that frame, or says with a gap which are missing."""
+    """A stream with `start` begins with that frame, or with a gap that names the missing ones."""
     with device.capturing():
         with device.stream("flags") as stream:
             last = stream.frame().frame
@@ -19,7 +19,7 @@ def a_stream_goes_on_where_it_stopped(device: Device) -> None:
 
 
 def a_gap_is_stated(device: Device) -> None:
-    """What is not kept any more is told as a gap from the frame asked for to the one missing last.
+    """Frames that are no longer kept are reported as a gap from `start` to the last missing one.
 
     The first frame follows the gap without a hole.
     """
@@ -44,7 +44,7 @@ def _expect_from(device: Device, start: int) -> None:
 
 
 def _after(notice: Notice, due: int) -> int:
-    """Return which frame is next after some are said to be missing."""
+    """Return which frame is next after a notice of missing ones."""
     if notice.kind == "dropped":
         return due + int(notice.details["count"])
     equal(notice.details.get("from"), due, "`from` of a gap")

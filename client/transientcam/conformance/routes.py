@@ -1,4 +1,4 @@
-"""Every route of the interface: it is there, and answers as the OpenAPI document says."""
+"""Every route of the interface: it is there, and answers as the OpenAPI document describes."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -9,13 +9,13 @@ import httpx
 from transientcam.conformance.check import checks
 from transientcam.conformance.device import API, Device
 from transientcam.conformance.expecting import expect, skip_unless
-from transientcam.requests.request import problem
+from transientcam.requests import problem
+from transientcam.transport import answer_of
 from transientcam.transport.errors import media_type
-from transientcam.transport.options import answer
 
 _OF_THE_SERVICE: Final = frozenset(("403", "408", "413", "429", "431"))
-"""Any request may be refused with these, whatever it asks for."""
-_PATIENCES: Final = 6.0
+"""Any request may be refused with these, whatever its route."""
+_READ_TIMEOUTS: Final = 6.0
 ROUTES: Final = (
     "GET /info",
     "GET /camera",
@@ -139,8 +139,8 @@ def _answers(device: Device) -> list[tuple[dict[str, Any], httpx.Response]]:
                 if each["in"] == "query" and each.get("required")
             }
             # some compute for long, and more so on a machine that is busy
-            patience_s = _PATIENCES * device.patience_s
-            response = device.peek(_concrete(path, operation), params=query, timeout=patience_s)
+            timeout_s = _READ_TIMEOUTS * device.timeout_s
+            response = device.peek(_concrete(path, operation), params=query, timeout=timeout_s)
             device.answers.append((operation, response))
     return device.answers
 
@@ -163,10 +163,10 @@ def _check_documented(operation: Mapping[str, Any], response: httpx.Response) ->
     status = str(response.status_code)
     if status in _OF_THE_SERVICE:
         return
-    said = "" if response.is_success else f" ({problem(answer(response))})"
+    reason = "" if response.is_success else f" ({problem(answer_of(response))})"
     known = operation["responses"]
     expect(
-        status in known, f"{_name(response)} gives {status}{said}, not one of {', '.join(known)}"
+        status in known, f"{_name(response)} gives {status}{reason}, not one of {', '.join(known)}"
     )
     content = known[status].get("content", {})
     found = _type(response)

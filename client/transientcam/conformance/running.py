@@ -42,11 +42,11 @@ GROUPS: Final = tuple(dict.fromkeys(each.group for each in CHECKS))
 _LEFT: Final = Check(
     "afterwards",
     "the-camera-is-left-as-it-was",
-    "What was checked is set as it was before: sequence, reconstruction, and whether it captures.",
+    "Sequence, reconstruction and acquisition are set as they were before the checks.",
     lambda device: None,
 )
 _MALFORMED: Final = (KeyError, IndexError, TypeError, ValueError, AttributeError)
-"""What reading an answer raises that is not the document it should be."""
+"""Errors of reading a document that has not the form it should have."""
 
 
 def chosen(groups: Collection[str]) -> tuple[Check, ...]:
@@ -74,12 +74,12 @@ def run(
 ) -> Report:
     """Try every check in turn, and report.
 
-    ``begin`` and ``end`` are told of each.
+    ``begin`` and ``end`` are called with each check and its result.
 
     Raises
     ------
     ServerUnreachable, ProblemError, ProtocolError
-        If nothing that could be checked answers at the address.
+        If no camera answers at the address.
     """
     began_s, start_s = unix_s(), clock()
     camera = _identity(device)
@@ -111,14 +111,14 @@ def _try(check: Check, device: Device, clock: Callable[[], float]) -> Result:
 
 
 def _identity(device: Device) -> dict[str, Any]:
-    """Return what names the camera; the first request, which an address that is wrong fails."""
+    """Return the names of camera and service; a wrong address fails here, at the first request."""
     device.send("GET", "/livez")
     try:
         info, camera = device.read(f"{API}/info"), device.camera["capabilities"]
         names = {key: camera[key] for key in ("model", "serial", "firmware")}
         return {"service": info["name"], "version": info["version"], **names}
     except (TransientcamError, *_MALFORMED):
-        return {}  # which the checks will say better
+        return {}  # the checks report it in detail
 
 
 def _settings(device: Device) -> Mapping[str, Any] | None:
@@ -130,7 +130,7 @@ def _settings(device: Device) -> Mapping[str, Any] | None:
 
 def _left_as(before: Mapping[str, Any] | None, device: Device) -> Result:
     if before is None:
-        return Result(_LEFT, "skipped", "it did not say how it was set", 0.0)
+        return Result(_LEFT, "skipped", "its settings could not be read before", 0.0)
     after = _settings(device)
     if after == before:
         return Result(_LEFT, "passed", None, 0.0)

@@ -37,7 +37,7 @@ def a_message_over_16_mib_arrives_whole(device: Device) -> None:
 
 
 def an_answer_without_measure_is_refused(device: Device) -> None:
-    """More times of flight than may be asked for are refused with 422, naming the limit."""
+    """A request for too many times of flight is refused with 422, naming the limit."""
     with device.capturing():
         params = {"bins": 10**9, "wait_s": 10.0}
         response = device.send("GET", f"{API}/frames/latest/transient", params=params)
@@ -51,23 +51,26 @@ def _expect_transient(device: Device, size_bytes: int) -> None:
     with device.capturing():
         params = {"bins": bins, "wait_s": 10.0}
         frame = device.frame(f"{API}/frames/latest/transient", params=params)
-        wanted = (bins, capabilities["height"], capabilities["width"])
-        equal(frame.array.shape, wanted, "the shape of the answer")
+        shape = (bins, capabilities["height"], capabilities["width"])
+        equal(frame.array.shape, shape, "the shape of the answer")
         expect(frame.array.nbytes > size_bytes, f"the answer has {frame.array.nbytes} bytes")
-        expect(frame.time_s is not None and len(frame.time_s) == bins, "not every time is told")
+        expect(
+            frame.time_s is not None and len(frame.time_s) == bins,
+            "not every time of flight is listed",
+        )
 
 
 @contextmanager
 def _large(device: Device, size_bytes: int) -> Iterator[Conversation]:
     """Stream raw images at a sequence with so many that a frame is large."""
     with device.control(), device.capturing(), device.stream("flags") as stream:
-        wanted = device.accepted(_sequence(device.camera["capabilities"], size_bytes))
-        applied = device.document(device.send("PUT", f"{API}/sequence", json=wanted))
+        large = device.accepted(_sequence(device.camera["capabilities"], size_bytes))
+        applied = device.document(device.send("PUT", f"{API}/sequence", json=large))
         skip_unless(
             applied["capture_s"] < _LONGEST_CAPTURE_S,
             f"a frame of that size takes {applied['capture_s']:.0f} s to capture",
         )
-        stream.say({"type": "subscribe", "v": 1, "subscriptions": [{"product": "raw"}]})
+        stream.send({"type": "subscribe", "v": 1, "subscriptions": [{"product": "raw"}]})
         stream.greeting()
         yield stream
 

@@ -1,4 +1,4 @@
-"""Slow readers lose frames and are told so; nobody else notices."""
+"""Slow readers lose frames, with notices; no other client is affected."""
 
 import math
 from typing import Final
@@ -21,7 +21,7 @@ _LARGE: Final = ("raw", "coefficients", "moments", "brightness", "direct", "indi
 
 
 def drops_are_told(device: Device) -> None:
-    """Who acknowledges late gets the newest frame, and is told how many were dropped before."""
+    """A late acknowledgement is answered with the newest frame and the number dropped before."""
     with (
         device.capturing(),
         device.stream("flags") as steady,
@@ -33,7 +33,7 @@ def drops_are_told(device: Device) -> None:
         second = slow.frame()
         missed = second.frame - first.frame - 1
         expect(missed >= 3, f"{missed} frames are missing between two, 5 after the first were due")
-        equal(slow.dropped(_channel(slow)), missed, "the number of frames told as dropped")
+        equal(slow.dropped(_channel(slow)), missed, "the number of frames reported as dropped")
 
 
 def who_does_not_acknowledge_gets_no_more_than_its_credits(device: Device) -> None:
@@ -58,7 +58,7 @@ def who_never_reads_delays_nobody(device: Device) -> None:
 
 
 def who_never_reads_loses_frames(device: Device) -> None:
-    """What a client does not read is not kept for it: it loses frames, and is told how many."""
+    """Frames are not kept for a client that does not read: it loses them, and gets their number."""
     lost = any(_loses_frames(device, size_bytes) for size_bytes in _MORE_THAN_BUFFERS_BYTES)
     expect(lost, "everything was kept for a client that does not read")
 
@@ -70,12 +70,16 @@ def _gets_everything(device: Device) -> bool:
     ):
         numbers = [healthy.frame().frame for _ in range(_FRAMES)]
         missed = numbers[-1] - numbers[0] + 1 - len(numbers)
-        equal(healthy.dropped(_channel(healthy)), missed, "what a healthy client is told it lost")
+        equal(
+            healthy.dropped(_channel(healthy)),
+            missed,
+            "the number of frames reported to a healthy client as dropped",
+        )
         return not missed
 
 
 def _loses_frames(device: Device, size_bytes: int) -> bool:
-    """Leave so much unread, and say whether any of it was dropped."""
+    """Leave so much unread, and return whether any of it was dropped."""
     with (
         device.capturing(),
         device.stream(*_LARGE, unread=True) as stuck,
@@ -89,14 +93,14 @@ def _loses_frames(device: Device, size_bytes: int) -> bool:
 
 
 def _has_dropped(stuck: Conversation, last: int) -> bool:
-    """Read what has waited: every gap between frames of a channel was told as dropped."""
+    """Read what has waited: every gap between frames of a channel was reported as dropped."""
     channel = _channel(stuck)
     newest = stuck.frame(lambda each: each.channel == channel).frame
     while newest < last:
         number = stuck.frame(lambda each: each.channel == channel).frame
         missed = number - newest - 1
         if missed:
-            equal(stuck.dropped(channel), missed, "the frames told as dropped")
+            equal(stuck.dropped(channel), missed, "the frames reported as dropped")
             return True
         newest = number
     return False

@@ -17,7 +17,7 @@ def a_handshake_without_the_subprotocol_is_refused(device: Device) -> None:
         "upgrade": "websocket",
         "sec-websocket-version": "13",
         "sec-websocket-key": "dGhlIHNhbXBsZSBub25jZQ==",
-        "sec-websocket-protocol": "somebody.elses.v7",
+        "sec-websocket-protocol": "another.protocol.v7",
     }
     response = device.send("GET", f"{API}/stream", headers=headers)
     problem = device.refusal(response, 400, "subprotocol-required")
@@ -25,7 +25,7 @@ def a_handshake_without_the_subprotocol_is_refused(device: Device) -> None:
 
 
 def the_greeting_says_what_frames_look_like(device: Device) -> None:
-    """Every channel of the hello says product, unit, axes, dtype and shape, and frames agree."""
+    """Every channel of the hello has product, unit, axes, dtype and shape, and frames agree."""
     products = ("range", "flags", "coefficients", "raw")
     with device.capturing(), device.stream(*products) as stream:
         channels = {each.channel: each for each in stream.channels}
@@ -35,8 +35,9 @@ def the_greeting_says_what_frames_look_like(device: Device) -> None:
             channel = channels[-1 if frame.channel is None else frame.channel]
             known = PRODUCTS[frame.product]
             found = frame.product, frame.unit, frame.axes, frame.array.dtype, frame.array.shape
-            told = channel.product, channel.unit, channel.axes, channel.dtype, channel.shape
-            equal(found, (*told[:3], np.dtype(told[3]), told[4]), f"a frame of {channel.product}")
+            names = channel.product, channel.unit, channel.axes
+            expected = (*names, np.dtype(channel.dtype), channel.shape)
+            equal(found, expected, f"a frame of {channel.product}")
             equal(frame.axes, known.axes, f"the axes of {known.name}")
 
 
@@ -51,7 +52,7 @@ def the_products_of_a_frame_come_together(device: Device) -> None:
 
 
 def frames_are_counted_and_told_of(device: Device) -> None:
-    """Every frame says its number, sequence, times and lost images; numbers only grow."""
+    """Every frame has its number, sequence, times and lost images; numbers only grow."""
     with device.capturing(), device.stream("flags") as stream:
         frames = [stream.frame() for _ in range(4)]
         numbers = [each.frame for each in frames]
@@ -60,7 +61,7 @@ def frames_are_counted_and_told_of(device: Device) -> None:
         expect(times == sorted(set(times)), f"frames begin at {times} s")
         for frame in frames:
             missing = [key for key in _META if frame.meta.get(key) is None]
-            expect(not missing, f"frame {frame.frame} does not say {', '.join(missing)}")
+            expect(not missing, f"frame {frame.frame} has no {', '.join(missing)}")
 
 
 def a_streamed_frame_is_the_one_that_is_asked_for(device: Device) -> None:
@@ -80,18 +81,18 @@ def a_streamed_frame_is_the_one_that_is_asked_for(device: Device) -> None:
 def a_bad_first_message_ends_the_stream(device: Device) -> None:
     """A first message that is no subscription is answered with a problem, then closed with 4001."""
     with device.stream(silent=True) as stream:
-        stream.say({"type": "ack", "frame": 1})
+        stream.send({"type": "ack", "frame": 1})
         equal(stream.problem().get("type"), "/problems/bad-message", "the problem")
         equal(stream.close_code(), CloseCode.BAD_FIRST_MESSAGE, "the close code")
 
 
 def a_bad_later_message_disturbs_nothing(device: Device) -> None:
-    """A later message that cannot be used is answered with a problem; the stream goes on."""
+    """A later message that cannot be used is answered with a problem; the stream continues."""
     with device.capturing(), device.stream("flags") as stream:
         stream.frame()
-        stream.say({"type": "subscribe", "v": 1, "subscriptions": [{"product": "no-such"}]})
+        stream.send({"type": "subscribe", "v": 1, "subscriptions": [{"product": "no-such"}]})
         expect(stream.problem().get("type"), "the problem has no type")
-        stream.say_text("not binary")
+        stream.send_text("not binary")
         equal(stream.problem().get("type"), "/problems/bad-message", "the problem of a text")
         equal(stream.frame().product, "flags", "the product streamed afterwards")
 
@@ -100,21 +101,23 @@ def a_subscription_can_be_replaced(device: Device) -> None:
     """A later subscribe replaces the subscription, and is answered with a new hello."""
     with device.capturing(), device.stream("flags") as stream:
         stream.frame()
-        stream.say({"type": "subscribe", "v": 1, "subscriptions": [{"product": "range"}]})
+        stream.send({"type": "subscribe", "v": 1, "subscriptions": [{"product": "range"}]})
         greeted = stream.greeting()
-        equal([each.product for each in greeted.channels], ["range"], "the channels told")
+        equal(
+            [each.product for each in greeted.channels], ["range"], "the channels of the new hello"
+        )
         equal(stream.frame().product, "range", "the product streamed afterwards")
 
 
 def a_change_of_the_sequence_is_told(device: Device) -> None:
-    """A changed sequence is told to every stream, with what frames look like from then on."""
+    """A changed sequence is announced to every stream, with the channels from then on."""
     with device.control(), device.capturing(), device.stream("moments") as stream:
         present = device.sequence
         other = 2 if present["harmonics"] != 2 else 3
-        wanted = device.accepted(present | {"harmonics": other, "zeroth": "on-off"})
-        applied = device.document(device.send("PUT", f"{API}/sequence", json=wanted))
+        changed = device.accepted(present | {"harmonics": other, "zeroth": "on-off"})
+        applied = device.document(device.send("PUT", f"{API}/sequence", json=changed))
         stream.notice("sequence-changed")
-        equal(stream.channels[0].shape[0], other + 1, "the moments told")
+        equal(stream.channels[0].shape[0], other + 1, "the moments in the notice")
         new = applied["sequence_id"]  # some frames of the former may still be on their way
         frame = stream.frame(lambda each: each.meta["sequence_id"] == new)
         equal(frame.array.shape[0], other + 1, "the moments of the first new frame")
@@ -126,7 +129,7 @@ def a_rate_limit_is_kept(device: Device) -> None:
         rate_hz = device.sequence["frame_rate_hz"]
         slow = {"product": "range", "max_rate_hz": rate_hz / 4.0}
         message = {"type": "subscribe", "v": 1, "subscriptions": [{"product": "flags"}, slow]}
-        stream.say(message)
+        stream.send(message)
         stream.greeting()
         names = [stream.frame().product for _ in range(15)]
         expect(

@@ -1,4 +1,4 @@
-"""ETag and If-Match: nobody overwrites what somebody else has changed meanwhile."""
+"""ETag and If-Match: no client overwrites a change that another has made meanwhile."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from transientcam.conformance.device import API, Device
 from transientcam.conformance.expecting import equal, expect
 
 _SEQUENCE = f"{API}/sequence"
-_STALE = '"of-somebody-else"'
+_STALE = '"of-another-state"'
 
 
 def what_can_be_changed_has_a_tag(device: Device) -> None:
@@ -42,19 +42,19 @@ def a_stale_tag_changes_nothing(device: Device) -> None:
 def the_right_tag_changes_it(device: Device) -> None:
     """A PUT whose If-Match names the present state is done, and answered with the new ETag."""
     with device.control():
-        wanted = _other(device)
+        changed = _other(device)
         tag = _tag(device, _SEQUENCE)
-        response = device.send("PUT", _SEQUENCE, json=wanted, headers={"if-match": tag})
+        response = device.send("PUT", _SEQUENCE, json=changed, headers={"if-match": tag})
         device.document(response)
         new = response.headers.get("etag")
         expect(new is not None and new != tag, f"the new ETag is {new}, that before was {tag}")
         equal(_tag(device, _SEQUENCE), new, "the ETag read afterwards")
-        again = device.send("PUT", _SEQUENCE, json=wanted, headers={"if-match": tag})
+        again = device.send("PUT", _SEQUENCE, json=changed, headers={"if-match": tag})
         device.refusal(again, 412, "sequence-changed")
 
 
 def _tagged(device: Device) -> list[str]:
-    """Return every resource whose description says that it takes If-Match."""
+    """Return every resource that takes If-Match by its description."""
     return [
         path
         for path, methods in sorted(device.openapi["paths"].items())

@@ -1,4 +1,4 @@
-"""A camera that is unplugged: it is told, answered for, and found again. Simulated cameras only."""
+"""A camera that is unplugged: notices, answers and recovery. Simulated cameras only."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,22 +10,22 @@ from transientcam.conformance.expecting import equal, expect
 
 
 def an_unplugged_camera_is_told(device: Device) -> None:
-    """Streams hear camera-lost with a reason; /readyz gives 503 with it, /livez goes on."""
+    """Streams get camera-lost with a reason; /readyz answers 503 with it, /livez still answers."""
     with _simulated(device) as stream, _unplugged(device):
         lost = stream.notice("camera-lost")
         expect(lost.details.get("reason"), "camera-lost has no reason")
         problem = device.refusal(device.send("GET", "/readyz"), 503, "not-ready")
-        expect(problem.get("reasons"), "/readyz does not say why")
+        expect(problem.get("reasons"), "/readyz has no reasons")
         device.read("/livez")
         equal(device.camera["state"], "lost", "the state of the camera")
 
 
 def a_lost_camera_refuses_and_remembers(device: Device) -> None:
-    """What needs the camera is refused with camera-lost; what was captured can still be read."""
+    """Changes are refused with camera-lost; frames captured before can still be read."""
     with _simulated(device) as stream, _unplugged(device):
         stream.notice("camera-lost")
-        wanted = {"harmonics": 2}
-        device.refusal(device.send("PUT", f"{API}/sequence", json=wanted), 503, "camera-lost")
+        body = {"harmonics": 2}
+        device.refusal(device.send("PUT", f"{API}/sequence", json=body), 503, "camera-lost")
         device.read(f"{API}/frames/latest")
 
 
@@ -44,12 +44,12 @@ def a_camera_that_is_back_goes_on(device: Device) -> None:
 
 
 def spoilt_images_are_counted(device: Device) -> None:
-    """Images that are lost or corrupt cost their frame; the next one and a notice say how many."""
+    """Lost or corrupt images cost their frame; a notice and the camera's counters count them."""
     for fault in ("corrupt-image", "drop-image"):
         with _simulated(device) as stream:
-            _cause(device, fault)
-            told = stream.notice("lost-images")
-            expect(told.details.get("count", 0) >= 1, f"{fault}: no lost image is told")
+            _inject_fault(device, fault)
+            notice = stream.notice("lost-images")
+            expect(notice.details.get("count", 0) >= 1, f"{fault}: no lost image is counted")
             stream.frame()
     counters = device.camera["counters"]
     expect(counters["lost"] + counters["corrupt"] >= 2, "/camera counts no lost or corrupt image")
@@ -65,15 +65,15 @@ def _simulated(device: Device) -> Iterator[Conversation]:
 
 @contextmanager
 def _unplugged(device: Device) -> Iterator[None]:
-    _cause(device, "unplug")
+    _inject_fault(device, "unplug")
     try:
         yield
     finally:
-        _cause(device, "replug")
+        _inject_fault(device, "replug")
         device.wait_until(lambda: device.camera["state"] != "lost", "the camera is not found again")
 
 
-def _cause(device: Device, fault: str) -> None:
+def _inject_fault(device: Device, fault: str) -> None:
     device.document(device.send("POST", f"{API}/simulation/faults", json={"fault": fault}))
 
 

@@ -1,23 +1,22 @@
-"""The calibrations of a daemon, seen from afar; one class for `Camera` and `AsyncCamera`."""
+"""The calibrations that a daemon keeps; one class for `Camera` and `AsyncCamera`."""
 
 from collections.abc import Callable
 from typing import Any, Final, Generic, TypeVar
 from urllib.parse import quote
 
-from transientcam.requests import request
+from transientcam.requests.request import Request, document, file, upload
 
 _BINARY: Final = "application/octet-stream"
 _Document = TypeVar("_Document")
 _Bytes = TypeVar("_Bytes")
-_PATIENCE_S: Final = 60.0
-"""How much longer than usual it takes to send or evaluate what may be large."""
+_EXTRA_TIMEOUT_S: Final = 60.0
+"""How much longer than usual it takes to send or evaluate a file that may be large."""
 
 
 class Calibrations(Generic[_Document, _Bytes]):
     """The calibrations of a daemon; made by ``camera.calibrations``.
 
-    What a method returns is a document (or bytes) from a `Camera`, and to be awaited from an
-    `AsyncCamera`.
+    Methods return a document (or bytes); those of an `AsyncCamera` an awaitable of it.
 
     ::
 
@@ -28,54 +27,56 @@ class Calibrations(Generic[_Document, _Bytes]):
 
     def __init__(
         self,
-        ask: Callable[[request.Request[dict[str, Any]]], _Document],
-        fetch: Callable[[request.Request[bytes]], _Bytes],
+        ask: Callable[[Request[dict[str, Any]]], _Document],
+        fetch: Callable[[Request[bytes]], _Bytes],
     ) -> None:
         self._ask = ask
         self._fetch = fetch
 
     def all(self) -> _Document:
         """Return all of them, in ``calibrations``, the newest first, and the ``active`` one."""
-        return self._ask(request.document("calibrations"))
+        return self._ask(document("calibrations"))
 
     def get(self, calibration_id: str) -> _Document:
-        """Describe one."""
-        return self._ask(request.document(_path(calibration_id)))
+        """Return the description of one."""
+        return self._ask(document(_path(calibration_id)))
 
     def measure(self, *, name: str = "", frames: int = 40, activate: bool = False) -> _Document:
         """Start measuring one with the present sequence; returns the job.
 
         Put filter and diffusor before the lens first, so that the light shines at the sensor.
         """
-        wanted = {"name": name, "frames": frames, "activate": activate}
-        return self._ask(request.document("calibrations", method="POST", body=wanted))
+        body = {"name": name, "frames": frames, "activate": activate}
+        return self._ask(document("calibrations", method="POST", body=body))
 
     def active(self) -> _Document:
-        """Return which one is active, and what frames are really calibrated by."""
-        return self._ask(request.document("calibrations/active"))
+        """Return which one is active, and which one frames are calibrated with at present."""
+        return self._ask(document("calibrations/active"))
 
     def activate(self, calibration_id: str) -> _Document:
         """Use one, or ``"nominal"`` for none, from the next frame on."""
         body = {"id": calibration_id}
         return self._ask(
-            request.document("calibrations/active", method="PUT", body=body, patience_s=_PATIENCE_S)
+            document(
+                "calibrations/active", method="PUT", body=body, extra_timeout_s=_EXTRA_TIMEOUT_S
+            )
         )
 
     def export(self, calibration_id: str) -> _Bytes:
         """Return the file of one, an .npz."""
-        return self._fetch(request.file(_path(calibration_id) + "/file", _BINARY))
+        return self._fetch(file(_path(calibration_id) + "/file", _BINARY))
 
     def take_in(self, content: bytes) -> _Document:
-        """Let the daemon keep a file that was exported, and describe it."""
+        """Import a file that was exported, and return its description."""
         return self._ask(
-            request.upload(
-                "calibrations/import", content, media_type=_BINARY, patience_s=_PATIENCE_S
+            upload(
+                "calibrations/import", content, media_type=_BINARY, extra_timeout_s=_EXTRA_TIMEOUT_S
             )
         )
 
     def delete(self, calibration_id: str) -> _Document:
         """Delete one for good."""
-        return self._ask(request.document(_path(calibration_id), method="DELETE"))
+        return self._ask(document(_path(calibration_id), method="DELETE"))
 
 
 def _path(calibration_id: str) -> str:

@@ -1,4 +1,4 @@
-"""Requests for frames: which one, which part of what, and in which format."""
+"""Requests for frames: which frame, which part of a product, in which format."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,8 @@ import numpy as np
 
 from transientcam.errors import ParameterError
 from transientcam.frame import Frame
-from transientcam.requests.request import Request, body_of, document, query, recording_path, segment
+from transientcam.requests.recordings import recording_path
+from transientcam.requests.request import Request, body_of, document, query, segment
 from transientcam.wire import MEDIA_TYPE, parse_frame
 
 _MEDIA_TYPES: Final = {
@@ -23,24 +24,24 @@ _MEDIA_TYPES: Final = {
 
 
 class FileFormat(StrEnum):
-    """What the daemon writes frames as, for other programs."""
+    """File formats that the daemon writes frames in."""
 
     PNG = "png"
-    """16 bit (range in mm), of what is an image."""
+    """16 bit (range in mm), of products that are images."""
     NPY = "npy"
     """The array alone."""
     NPZ = "npz"
-    """The array with all that is known of it."""
+    """The array with its metadata."""
     TIFF = "tiff"
-    """Values as they are, a page for each image."""
+    """Unchanged values, a page for each image."""
     PLY = "ply"
     """Of ``pointcloud``: points with range, amplitude and flags."""
     CSV = "csv"
-    """A line for each row, of what is an image."""
+    """A line for each row, of products that are images."""
 
     @property
     def media_type(self) -> str:
-        """What the daemon calls it."""
+        """Its media type, as the daemon names it."""
         return _MEDIA_TYPES[self]
 
 
@@ -48,8 +49,8 @@ class FileFormat(StrEnum):
 class Which:
     """Which frame: the newest, one by its ``number``, or one of a ``recording`` (from 1).
 
-    The newest is one after frame ``after``; one that is still to come is waited for as long as
-    ``wait_s``.
+    The newest has to be newer than frame ``after``; the daemon waits up to ``wait_s`` for a frame
+    that is still to come.
     """
 
     number: int | None = None
@@ -59,12 +60,12 @@ class Which:
 
     @property
     def path(self) -> str:
-        """Where it is.
+        """Its path.
 
         Raises
         ------
         ParameterError
-            If the number is none, or ``recording`` is no id.
+            If ``number`` is below 1, or ``recording`` is no id.
         """
         if self.number is not None and self.number < 1:
             raise ParameterError("number", self.number, "from 1")
@@ -73,18 +74,18 @@ class Which:
 
     @property
     def params(self) -> tuple[tuple[str, object], ...]:
-        """What of it goes into a query."""
+        """Its parameters in a query."""
         return (("wait_s", self.wait_s), ("after", self.after))
 
     @property
-    def patience_s(self) -> float:
-        """How much longer the answer may take."""
+    def extra_timeout_s(self) -> float:
+        """How much longer than usual the answer may take."""
         return self.wait_s or 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Which part of a product: times of flight, row, region, every so many pixels."""
+    """Which part of a product: times of flight, row, region, every ``decimation``-th pixel."""
 
     time_s: object = None
     bins: int | None = None
@@ -94,7 +95,7 @@ class Part:
 
     @property
     def params(self) -> tuple[tuple[str, object], ...]:
-        """What of it goes into a query.
+        """Its parameters in a query.
 
         Raises
         ------
@@ -111,17 +112,12 @@ class Part:
 
 
 WHOLE: Final = Part()
-"""All of a product that has no times of flight."""
+"""The whole of a product."""
 
 
 def meta(which: Which) -> Request[dict[str, Any]]:
-    """Build the request for what is known of a frame."""
-    return document(which.path, params=which.params, patience_s=which.patience_s)
-
-
-def timeline(recording_id: str) -> Request[dict[str, Any]]:
-    """Build the request for which frames a recording has, and when they were captured."""
-    return document(f"{recording_path(recording_id)}/frames")
+    """Build the request for the metadata of a frame."""
+    return document(which.path, params=which.params, extra_timeout_s=which.extra_timeout_s)
 
 
 def frame(product: str, which: Which, part: Part = WHOLE) -> Request[Frame]:
@@ -132,7 +128,7 @@ def frame(product: str, which: Which, part: Part = WHOLE) -> Request[Frame]:
         lambda answer: parse_frame(body_of(answer, MEDIA_TYPE)),
         query((*part.params, *which.params)),
         accept=MEDIA_TYPE,
-        patience_s=which.patience_s,
+        extra_timeout_s=which.extra_timeout_s,
     )
 
 
@@ -155,14 +151,14 @@ def file(
         lambda answer: body_of(answer, media_type),
         query((("view", "colour" if colour else None), *part.params, *which.params)),
         accept=media_type,
-        patience_s=which.patience_s,
+        extra_timeout_s=which.extra_timeout_s,
     )
 
 
 def pixel(which: Which, *, x: int, y: int, bins: int | None = None) -> Request[dict[str, Any]]:
     """Build the request for everything about one pixel of a frame."""
     params = (("x", x), ("y", y), ("bins", bins), *which.params)
-    return document(f"{which.path}/pixel", params=params, patience_s=which.patience_s)
+    return document(f"{which.path}/pixel", params=params, extra_timeout_s=which.extra_timeout_s)
 
 
 def _times(time_s: object) -> Iterable[tuple[str, object]]:

@@ -1,20 +1,16 @@
-"""Long work of a daemon, seen from afar.
-
-`Jobs` serves `Camera` and `AsyncCamera` alike: what a method returns is a document for one, and to
-be awaited for the other.
-"""
+"""The long-running jobs of a daemon; one class for `Camera` and `AsyncCamera`."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Final, Generic, TypeVar
 from urllib.parse import quote
 
-from transientcam.requests import request
+from transientcam.requests.request import Request, document, problem_error
 
 _Document = TypeVar("_Document")
 WAIT_S: Final = 10.0
 """How long one request waits for the end of a job."""
 PROGRESS_EVERY_S: Final = 0.5
-"""The same where somebody wants to be told meanwhile."""
+"""The same where the caller follows the progress."""
 OnProgress = Callable[[Mapping[str, Any]], None]
 
 
@@ -22,32 +18,32 @@ class Jobs(Generic[_Document]):
     """The jobs of a daemon; made by ``camera.jobs``.
 
     Methods return documents, as ``GET /api/v1/jobs/{id}`` has them: ``id``, ``kind``, ``state``,
-    ``progress``, ``step``, ``result``, ``problem``.
+    ``progress``, ``step``, ``result``, ``problem``; those of an `AsyncCamera` return awaitables.
     """
 
-    def __init__(self, ask: Callable[[request.Request[dict[str, Any]]], _Document]) -> None:
+    def __init__(self, ask: Callable[[Request[dict[str, Any]]], _Document]) -> None:
         self._ask = ask
 
     def all(self) -> _Document:
-        """Return what runs, what waits and the last ones that have ended, in ``jobs``."""
-        return self._ask(request.document("jobs"))
+        """Return those that run, those that wait and the last ones that have ended, in ``jobs``."""
+        return self._ask(document("jobs"))
 
     def get(self, job_id: str, *, wait_s: float = 0.0) -> _Document:
-        """Return how far a job is, once it has ended or after ``wait_s``, at most 30 s."""
+        """Return a job once it has ended, or after ``wait_s``, at most 30 s."""
         return self._ask(waiting(job_id, wait_s=wait_s))
 
     def cancel(self, job_id: str) -> _Document:
-        """Let a job end as soon as it can."""
-        return self._ask(request.document(f"{_path(job_id)}/cancel", method="POST"))
+        """Cancel a job; it ends as soon as it can."""
+        return self._ask(document(f"{_path(job_id)}/cancel", method="POST"))
 
 
-def waiting(job_id: str, *, wait_s: float) -> request.Request[dict[str, Any]]:
-    """Build the request for a job, answered when it has ended or after a while."""
-    return request.document(_path(job_id), params=[("wait_s", wait_s)], patience_s=wait_s)
+def waiting(job_id: str, *, wait_s: float) -> Request[dict[str, Any]]:
+    """Build the request for a job, answered when it has ended or after ``wait_s``."""
+    return document(_path(job_id), params=[("wait_s", wait_s)], extra_timeout_s=wait_s)
 
 
 def ended(job: Mapping[str, Any]) -> bool:
-    """Return whether nothing more will happen to a job.
+    """Return whether a job is done or cancelled.
 
     Raises
     ------
@@ -55,7 +51,7 @@ def ended(job: Mapping[str, Any]) -> bool:
         If it failed.
     """
     if job.get("state") == "failed":
-        raise request.problem_error(job.get("problem") or {})
+        raise problem_error(job.get("problem") or {})
     return job.get("state") in ("done", "cancelled")
 
 

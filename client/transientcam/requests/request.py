@@ -1,7 +1,4 @@
-"""Requests and the reading of their answers, without any input or output.
-
-`Camera` and `AsyncCamera` send what is built here and hand back what is read here.
-"""
+"""One request and the reading of its answer, as values."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping
@@ -16,22 +13,10 @@ from transientcam.wire import PROBLEM_MEDIA_TYPE
 _T = TypeVar("_T")
 _JSON: Final = "application/json"
 
-APPLIED_FIELDS: Final = frozenset(
-    (
-        "sequence_id",
-        "images",
-        "capture_s",
-        "frame_rate_hz",
-        "unambiguous_range_m",
-        "data_rate_bytes_s",
-    )
-)
-"""What the server adds to a sequence; left out when a sequence that was read is written back."""
-
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What came back: status, media type (without parameters) and body."""
+    """An answer read to its end: status, media type (without parameters) and body."""
 
     status: int
     media_type: str
@@ -49,8 +34,8 @@ class Request(Generic[_T]):
     params: tuple[tuple[str, str], ...] = ()
     body: bytes | None = None
     accept: str = _JSON
-    patience_s: float = 0.0
-    """How much longer than usual the server may take, because it was asked to wait."""
+    extra_timeout_s: float = 0.0
+    """How much longer than usual the server may take, because the request lets it wait."""
     content_type: str = _JSON
     """Of the body, where there is one."""
 
@@ -61,7 +46,7 @@ class Request(Generic[_T]):
         return accept if self.body is None else accept | {"content-type": self.content_type}
 
     def result(self, answer: Answer) -> _T:
-        """Return what the answer holds.
+        """Return the value that the answer holds.
 
         Raises
         ------
@@ -81,7 +66,7 @@ def document(
     method: str = "GET",
     body: Mapping[str, Any] | None = None,
     params: Iterable[tuple[str, object]] = (),
-    patience_s: float = 0.0,
+    extra_timeout_s: float = 0.0,
 ) -> Request[dict[str, Any]]:
     """Build a request that is answered with a JSON object."""
     return Request(
@@ -90,7 +75,7 @@ def document(
         _read_document,
         query(params),
         None if body is None else _json_bytes(body),
-        patience_s=patience_s,
+        extra_timeout_s=extra_timeout_s,
     )
 
 
@@ -100,7 +85,7 @@ def file(path: str, media_type: str) -> Request[bytes]:
 
 
 def upload(
-    path: str, content: bytes, *, media_type: str, patience_s: float
+    path: str, content: bytes, *, media_type: str, extra_timeout_s: float
 ) -> Request[dict[str, Any]]:
     """Build a request that sends a file and is answered with a JSON object."""
     return Request(
@@ -108,111 +93,19 @@ def upload(
         path,
         _read_document,
         body=content,
-        patience_s=patience_s,
+        extra_timeout_s=extra_timeout_s,
         content_type=media_type,
     )
 
 
-def reconstruction(settings: Mapping[str, Any]) -> Request[dict[str, Any]]:
-    """Build the request that changes how frames are computed."""
-    return document("reconstruction", method="PUT", body=settings)
-
-
-def sequence(
-    settings: Mapping[str, Any], *, only_validate: bool = False
-) -> Request[dict[str, Any]]:
-    """Build the request that sets a sequence, or only asks what would be set."""
-    wanted = {key: value for key, value in settings.items() if key not in APPLIED_FIELDS}
-    if only_validate:
-        return document("sequence/validate", method="POST", body=wanted)
-    return document("sequence", method="PUT", body=wanted)
-
-
-def acquire(*, running: bool) -> Request[dict[str, Any]]:
-    """Build the request that lets the camera capture, or rest."""
-    return document("acquisition", method="PUT", body={"running": running})
-
-
-def simulation(scene: str | None, effects: Mapping[str, str] | None) -> Request[dict[str, Any]]:
-    """Build the request that changes the simulated world; None lets it be as it is."""
-    wanted = {"scene": scene, "effects": None if effects is None else dict(effects)}
-    body = {key: value for key, value in wanted.items() if value is not None}
-    return document("simulation", method="PUT", body=body, patience_s=60.0)
-
-
-def fault(name: str) -> Request[dict[str, Any]]:
-    """Build the request that lets something go wrong in the simulation."""
-    return document("simulation/faults", method="POST", body={"fault": name})
-
-
-def take_lease(terms: Mapping[str, Any]) -> Request[dict[str, Any]]:
-    """Build the request for the lease."""
-    return document("lease", method="POST", body=terms)
-
-
-def renew_lease() -> Request[dict[str, Any]]:
-    """Build the request that lets the lease last from now on."""
-    return document("lease", method="PUT", body={})
-
-
-def give_lease_back() -> Request[dict[str, Any]]:
-    """Build the request that gives the lease back."""
-    return document("lease", method="DELETE")
-
-
-def lease_id(granted: Mapping[str, Any]) -> str:
-    """Return what is to be shown with every change."""
-    value = granted.get("lease_id")
-    if not isinstance(value, str):
-        raise ProtocolError("lease_id", value, "a string")
-    return value
-
-
-def record(
-    *,
-    name: str | None,
-    duration_s: float | None,
-    frames: int | None,
-    history_s: float | None,
-    annotations: Mapping[str, Any] | None,
-) -> Request[dict[str, Any]]:
-    """Build the request that starts a recording."""
-    wanted = {
-        "name": name,
-        "duration_s": duration_s,
-        "frames": frames,
-        "history_s": history_s,
-        "annotations": None if annotations is None else dict(annotations),
-    }
-    body = {key: value for key, value in wanted.items() if value is not None}
-    return document("recordings", method="POST", body=body)
-
-
-def recording(
-    recording_id: str, *, method: str = "GET", part: str = "", patience_s: float = 0.0
-) -> Request[dict[str, Any]]:
-    """Build a request about one recording."""
-    return document(recording_path(recording_id) + part, method=method, patience_s=patience_s)
-
-
-def recording_file(recording_id: str) -> str:
-    """Return the path of a recording's file."""
-    return recording_path(recording_id) + "/file"
-
-
-def recording_path(recording_id: str) -> str:
-    """Return the path of a recording."""
-    return f"recordings/{segment(recording_id)}"
-
-
 def problem(answer: Answer) -> ProblemError:
-    """Return the error that a refusal stands for, be it a problem document or not."""
+    """Return the error that a refusal stands for, whether it is a problem document or not."""
     if answer.media_type == PROBLEM_MEDIA_TYPE:
         try:
             return problem_error(_object(answer.body), status=answer.status)
         except ProtocolError:
-            pass  # a broken problem is still a refusal
-    # some proxy's page: its reason is enough, unless it is made to be read as it is
+            pass  # a malformed problem is still a refusal
+    # the page of a proxy: its reason phrase is enough, unless it is plain text
     plain = answer.body[:200] if answer.media_type == "text/plain" else b""
     text = plain.decode("utf-8", "replace").strip()
     return ProblemError(status=answer.status, title=answer.reason, detail=text)
@@ -234,7 +127,7 @@ def problem_error(fields: Mapping[str, Any], *, status: int = 0) -> ProblemError
         field=text("field", "") or None,
         value=fields.get("value"),
         limit=fields.get("limit"),
-        document=fields,
+        document=dict(fields),
     )
 
 
@@ -248,7 +141,7 @@ def body_of(answer: Answer, media_type: str) -> bytes:
     Raises
     ------
     ProtocolError
-        If it is of another.
+        If its media type is another.
     """
     if answer.media_type != media_type:
         raise ProtocolError("content-type", answer.media_type, media_type)
@@ -281,7 +174,7 @@ def _plain(value: object) -> object:
 
 
 def query(params: Iterable[tuple[str, object]]) -> tuple[tuple[str, str], ...]:
-    """Return parameters as they travel, without those that are None."""
+    """Return parameters as strings, without those that are None."""
     return tuple((key, str(value)) for key, value in params if value is not None)
 
 

@@ -1,4 +1,4 @@
-"""Where a camera's daemon is: one address for requests, one for streams."""
+"""The address of a camera's daemon, for requests and for streams."""
 
 from dataclasses import dataclass
 from urllib.parse import urlsplit, urlunsplit
@@ -40,7 +40,7 @@ def parse_address(url: str) -> Address:
     limit = "an address like http://127.0.0.1:8000"
     try:
         parts = urlsplit(url if "://" in url else f"http://{url}")
-        _ = parts.port  # computed, and checked, only when asked for
+        _ = parts.port  # checked only when it is read
     except ValueError as error:
         raise ParameterError("url", url, limit) from error
     if parts.scheme not in _STREAM_SCHEMES or not parts.hostname or parts.query or parts.fragment:

@@ -1,4 +1,4 @@
-"""A point in time by which something must have happened."""
+"""A point in time until which to wait."""
 
 import time
 from collections.abc import Callable
@@ -23,10 +23,10 @@ class Deadline:
         return max(0.0, self._timeout_s - (self._clock() - self._start_s))
 
     def allows(self, wait_s: float) -> bool:
-        """Tell whether ``wait_s`` from now is still before the deadline."""
+        """Return whether ``wait_s`` from now is still before the deadline."""
         left_s = self.left_s()
         return left_s is None or wait_s < left_s
 
     def missed(self) -> FrameTimeout:
-        """Return the error that says so."""
+        """Return the error for a missed deadline."""
         return FrameTimeout(self._timeout_s or 0.0)

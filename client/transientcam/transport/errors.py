@@ -1,6 +1,6 @@
 """The one place where errors of the network libraries become errors of this package.
 
-(msgpack's become `ProtocolError` where msgpack is used, in `wire.codec`.)
+Those of msgpack become `ProtocolError` where msgpack is used, in `wire.codec`.
 """
 
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from transientcam.errors import (
     StreamClosed,
     TransientcamError,
 )
-from transientcam.requests.request import Answer, problem
+from transientcam.requests import Answer, problem
 from transientcam.wire import CloseCode
 
 FOREIGN = (
@@ -43,7 +43,7 @@ def translate(error: Exception, url: str) -> TransientcamError:
     """Return our error for a foreign one; the most specific match wins."""
     match error:
         case ws.ConnectionClosed():
-            close = error.rcvd or error.sent  # the latter where this end saw the fault
+            close = error.rcvd or error.sent  # the latter if this end found the fault
             if close is None:
                 return StreamClosed(CloseCode.ABNORMAL, "the connection broke")
             return StreamClosed(close.code, close.reason)
@@ -74,7 +74,7 @@ def translate(error: Exception, url: str) -> TransientcamError:
 
 
 def _reason(error: BaseException) -> str:
-    """Return what the operating system said first, without its number."""
+    """Return the first message of the operating system, without its error number."""
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, OSError) and cause.strerror:

@@ -1,4 +1,4 @@
-"""What the synchronous and the asynchronous client tell httpx and websockets, said once."""
+"""The options of httpx and websockets, for the synchronous and the asynchronous client."""
 
 from collections.abc import Callable
 from importlib.metadata import version
@@ -7,10 +7,10 @@ from typing import Any, Final
 import httpx
 from websockets.typing import Subprotocol
 
-from transientcam.requests.request import Answer, Request
+from transientcam.requests import Answer, Request
 from transientcam.transport.errors import media_type
 from transientcam.transport.tls import shared_context
-from transientcam.wire import MAX_SERVER_MESSAGE_BYTES, SUBPROTOCOL
+from transientcam.wire import LEASE_HEADER, MAX_SERVER_MESSAGE_BYTES, SUBPROTOCOL
 
 USER_AGENT: Final = f"transientcam/{version('transientcam')}"
 _CLOSE_WITHIN_S = 1.0
@@ -18,7 +18,7 @@ _QUEUED_MESSAGES = 256
 
 
 def http_options(*, token: str | None, timeout_s: float) -> dict[str, Any]:
-    """Return what an httpx client is made with."""
+    """Return the options of an httpx client."""
     headers = {"user-agent": USER_AGENT}
     if token is not None:
         headers["authorization"] = f"Bearer {token}"
@@ -26,16 +26,16 @@ def http_options(*, token: str | None, timeout_s: float) -> dict[str, Any]:
 
 
 def request_options(request: Request[Any], *, timeout_s: float) -> dict[str, Any]:
-    """Return what an httpx client sends for a request."""
+    """Return the options of one request, besides its method and address."""
     return {
         "params": list(request.params),
         "content": request.body,
         "headers": request.headers,
-        "timeout": timeout_s + request.patience_s,
+        "timeout": timeout_s + request.extra_timeout_s,
     }
 
 
-def answer(response: httpx.Response) -> Answer:
+def answer_of(response: httpx.Response) -> Answer:
     """Return the answer in a response that was read to its end."""
     return Answer(
         response.status_code,
@@ -45,31 +45,39 @@ def answer(response: httpx.Response) -> Answer:
     )
 
 
+def set_lease(headers: httpx.Headers, lease_id: str | None) -> None:
+    """Send this lease with every request from now on; None sends none."""
+    if lease_id is None:
+        headers.pop(LEASE_HEADER, None)
+    else:
+        headers[LEASE_HEADER] = lease_id
+
+
 Progress = Callable[[int, int | None], object]
-"""Takes the bytes that came, and how many there are; None where that is not known."""
+"""Takes the bytes received so far and their total; None where the total is unknown."""
 
 
-class Told:
-    """How far a download has come, told to whoever wants to know."""
+class DownloadProgress:
+    """Counts the bytes of a download and reports them to ``progress``."""
 
     def __init__(self, response: httpx.Response, progress: Progress | None) -> None:
         length = response.headers.get("content-length", "")
-        # what was packed for the way has another length here
+        # a compressed body has another length once it is decoded
         plain = length.isdecimal() and "content-encoding" not in response.headers
         self._total = int(length) if plain else None
         self._progress = progress
         self._done = 0
 
-    def wrote(self, count: int) -> None:
-        """Tell of some more bytes."""
+    def add(self, count: int) -> None:
+        """Count ``count`` more bytes, and report."""
         self._done += count
         if self._progress is not None:
             self._progress(self._done, self._total)
 
 
-def stream_options(*, timeout_s: float) -> dict[str, Any]:
-    """Return what a websockets client is made with."""
-    return {
+def stream_options(url: str, *, timeout_s: float, threaded: bool = False) -> dict[str, Any]:
+    """Return the options of a websockets client; ``threaded`` for one that reads on a thread."""
+    options: dict[str, Any] = {
         "subprotocols": [Subprotocol(SUBPROTOCOL)],
         "user_agent_header": USER_AGENT,
         "open_timeout": timeout_s,
@@ -78,12 +86,7 @@ def stream_options(*, timeout_s: float) -> dict[str, Any]:
         # Deflating a frame takes longer than sending it, and floats hardly shrink.
         "compression": None,
         # Credits bound the frames on their way, so this bounds only notices. A full queue stops
-        # the reading of pongs, and the connection of a reader that thinks for long would be cut.
+        # the reading of pongs, which would cut the connection of a slow reader.
         "max_queue": _QUEUED_MESSAGES,
     }
-
-
-def threaded_stream_options(url: str, *, timeout_s: float) -> dict[str, Any]:
-    """Return the same for a client that reads on a thread of its own."""
-    options = stream_options(timeout_s=timeout_s)
-    return options | {"ssl": shared_context()} if url.startswith("wss:") else options
+    return options | {"ssl": shared_context()} if threaded and url.startswith("wss:") else options

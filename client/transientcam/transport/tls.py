@@ -12,21 +12,21 @@ _Result = TypeVar("_Result")
 
 
 class SharedSocket(ssl.SSLSocket):
-    """A TLS socket whose reader never keeps others from writing, nor outlives ``close``.
+    """A TLS socket whose reader never blocks writers, nor outlives ``close``.
 
     websockets reads on a thread as soon as there is something to read. Where that is no data but a
     session ticket, which TLS 1.3 sends after its handshake (RFC 8446, Sec. 4.6.1), an ordinary
     socket goes on reading inside OpenSSL, whose objects are for one thread at a time: about one
-    connection in 300 lost what another thread wrote then, and could not be closed. Here OpenSSL is
-    never waited in: whoever can't go on gives his turn back and waits outside.
+    connection in 300 lost what another thread wrote then, and could not be closed. Here no thread
+    waits inside OpenSSL: one that has to wait releases the lock first.
     """
 
     _turn: "threading.Lock | None" = None
-    """Whose turn it is with OpenSSL; None until the handshake is over."""
+    """Held by the thread that is inside OpenSSL; None until the handshake is over."""
     _timeout_s: float | None = None
 
     def do_handshake(self, block: bool = False) -> None:
-        """Shake hands; from then on nothing blocks inside OpenSSL."""
+        """Perform the handshake; from then on no call blocks inside OpenSSL."""
         super().do_handshake(block)
         self._timeout_s = super().gettimeout()
         super().settimeout(0.0)
@@ -54,7 +54,7 @@ class SharedSocket(ssl.SSLSocket):
         return self._take_turns(lambda: send(data, flags), selectors.EVENT_WRITE)
 
     def close(self) -> None:
-        """Close it; who waits in `recv` returns."""
+        """Close it; a thread that waits in `recv` returns."""
         with contextlib.suppress(OSError):  # it was never connected, or the other end is gone
             socket.socket.shutdown(self, socket.SHUT_RDWR)
         with self._turn or contextlib.nullcontext():
@@ -71,9 +71,9 @@ class SharedSocket(ssl.SSLSocket):
                     event = selectors.EVENT_READ
                 except ssl.SSLWantWriteError:
                     event = selectors.EVENT_WRITE
-                except BlockingIOError:  # after `shutdown`, when OpenSSL is not asked any more
+                except BlockingIOError:  # after `shutdown`, which bypasses OpenSSL
                     event = usual_event
-                # a handle of its own: what is closed meanwhile may at once be somebody else's
+                # a handle of its own: the number of one that is closed meanwhile may be reused
                 handle = socket.fromfd(self.fileno(), self.family, self.type)
             with handle, selectors.DefaultSelector() as selector:
                 selector.register(handle, event)
@@ -82,7 +82,7 @@ class SharedSocket(ssl.SSLSocket):
 
 
 def shared_context() -> ssl.SSLContext:
-    """Return what trusts the usual authorities, or those of ``SSL_CERT_FILE``."""
+    """Return a context that trusts the usual authorities, or those of ``SSL_CERT_FILE``."""
     context = ssl.create_default_context()
     context.sslsocket_class = SharedSocket
     return context

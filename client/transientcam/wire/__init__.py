@@ -1,6 +1,6 @@
-"""The wire contract, for both ends: docs/stream.md says in words what stands here in code."""
+"""The wire contract of docs/stream.md, for both ends: constants, products, messages, parsing."""
 
-from transientcam.frame import Frame
+from transientcam.frame import Frame, FrameMeta, PixelCounts, PredictedStd
 from transientcam.wire.arrays import DTYPES, array_document, parse_array
 from transientcam.wire.codec import ALIGNMENT, pack, unpack
 from transientcam.wire.contract import (
@@ -36,11 +36,8 @@ from transientcam.wire.messages import (
     Channel,
     ClientMessage,
     ErrorMessage,
-    FrameMeta,
     Hello,
     Notice,
-    PixelCounts,
-    PredictedStd,
     ServerMessage,
     Subscribe,
     Subscription,

@@ -11,7 +11,7 @@ from transientcam.errors import ParameterError, ProtocolError
 from transientcam.wire import fields
 
 DTYPES: Final = {name: np.dtype(name) for name in ("<f4", "<f8", "<c8", "<u2", "|u1")}
-"""What may travel; no type whose bytes could stand for an object is among them."""
+"""The dtypes that messages may hold; none whose bytes could stand for a Python object."""
 MAX_DIMENSIONS: Final = 6
 MAX_LENGTH: Final = 2**31 - 1
 MAX_BYTES: Final = 2**32 - 1
@@ -19,7 +19,7 @@ MAX_BYTES: Final = 2**32 - 1
 
 
 def wire_array(array: NDArray[Any]) -> NDArray[Any]:
-    """Return ``array`` in the form that travels: C order, little-endian, a known dtype.
+    """Return ``array`` in the form that messages hold: C order, little-endian, a known dtype.
 
     The same object comes back where it already has that form.
 

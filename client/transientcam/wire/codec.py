@@ -1,4 +1,4 @@
-"""Bytes to maps and maps to bytes: the only place that knows msgpack."""
+"""Bytes to maps and maps to bytes: the only place that uses msgpack."""
 
 from collections.abc import Mapping
 from typing import Any, Final, NoReturn

@@ -1,4 +1,4 @@
-"""What both ends agree on: names, numbers and the table of products."""
+"""Names, limits and the table of products, common to both ends."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -19,7 +19,7 @@ MAX_SERVER_MESSAGE_BYTES: Final = 512 * 1024 * 1024
 """The client reads no message longer than this: 640 x 480 at 32 harmonics is 80 MB."""
 MAX_SUBSCRIPTIONS: Final = 16
 F32: Final = "f32"
-"""Values as they are, whatever their dtype."""
+"""Unchanged values, whatever their dtype."""
 U16: Final = "u16"
 """Images of float in steps: ``offset + scale * code``."""
 REFLECTION16: Final = "reflection16"
@@ -27,7 +27,7 @@ REFLECTION16: Final = "reflection16"
 ENCODINGS: Final = (F32, U16, REFLECTION16)
 MAX_CREDITS: Final = 64
 MAX_DECIMATION: Final = 64
-"""Of every so many pixels one is sent, both ways."""
+"""At most every 64th pixel is sent, both ways."""
 FIRST_MESSAGE_WITHIN_S: Final = 10.0
 
 
@@ -43,13 +43,13 @@ class CloseCode(IntEnum):
     ABNORMAL = 1006
     """The connection broke; never sent."""
     POLICY = 1008
-    """The origin of the page is not allowed here."""
+    """The origin of the page is not allowed."""
     TOO_BIG = 1009
     INTERNAL_ERROR = 1011
     TRY_AGAIN_LATER = 1013
     """Too many clients, or too many messages wait for this one."""
     BAD_FIRST_MESSAGE = 4001
-    """The first message was none, late, or no valid ``subscribe``."""
+    """The first message was missing, late, or no valid ``subscribe``."""
     AUTHENTICATION_FAILED = 4003
     TOO_MANY_MESSAGES = 4008
     """The client sent more messages a second than the server reads."""
@@ -57,7 +57,7 @@ class CloseCode(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Product:
-    """One kind of array a frame can be asked for.
+    """One kind of array that a frame offers.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Product:
 
     @property
     def encodings(self) -> tuple[str, ...]:
-        """Names of the encodings that it can travel in."""
+        """Names of the encodings that it can be sent in."""
         if self.axes == _IMAGE and self.dtype == "<f4":
             return F32, U16
         return (F32, REFLECTION16) if self.name == "coefficients" else (F32,)

@@ -1,7 +1,7 @@
 """Arrays in fewer bytes: what the encodings ``u16`` and ``reflection16`` of docs/stream.md do.
 
-Both ends are here, so that what one writes the other reads: arrays of `float32` to codes of 16
-bits with the fields that say what they mean, and back.
+Both directions are here: arrays of `float32` to codes of 16 bits with the fields that a decoder
+needs, and back.
 """
 
 from collections.abc import Mapping
@@ -20,11 +20,11 @@ _LAST_CODE: Final = 65535
 _ZERO: Final = 32768
 _UNIT: Final = 32767.0
 _MOST: Final = 1.0 - 2.0 / _UNIT
-"""Keeps |g| below 1 whatever the rounding of its two parts does."""
+"""Keeps |g| below 1 for any rounding of its two parts."""
 
 
 class Coded(NamedTuple):
-    """Codes of an array, and what the message says beside them."""
+    """Codes of an array, and the fields that a decoder needs."""
 
     array: NDArray[np.uint16]
     fields: dict[str, Any]
@@ -52,7 +52,7 @@ def encode_u16(array: NDArray[Any]) -> Coded:
 
 def decode_u16(codes: NDArray[Any], *, scale: float, offset: float) -> NDArray[np.float32]:
     """Return the values that `encode_u16` was given, to half of ``scale``; NaN for code 0."""
-    with np.errstate(over="ignore"):  # of numbers that nobody who means well sends
+    with np.errstate(over="ignore"):  # of numbers that no encoder of ours sends
         values = (offset + scale * codes.astype(np.float64)).astype(np.float32)
     values[codes == 0] = np.nan
     return values
@@ -62,8 +62,8 @@ def encode_reflection16(coefficients: NDArray[np.floating[Any]]) -> Coded:
     """Return ``coefficients``, (2m + 1, ...), as brightness and 2m planes of codes.
 
     A reflection coefficient g becomes u = (2 / pi) arcsin|g| g / |g|, which is finer than g where
-    |g| is near 1, and its two parts ``32768 + 32767 Re u`` and ``Im u``. Whatever the rounding
-    does, |g| stays below 1, and so the density positive.
+    |g| is near 1, and its two parts ``32768 + 32767 Re u`` and ``Im u``. |g| stays below 1
+    for any rounding, and so the density positive.
     """
     brightness, reflection = step_down(coefficients)
     missing = ~np.isfinite(brightness)
@@ -95,7 +95,7 @@ def decoded(encoding: str, array: NDArray[Any], document: Mapping[str, Any]) -> 
     Raises
     ------
     ProtocolError
-        If the encoding is unknown, or what belongs to it is missing or does not fit the array.
+        If the encoding is unknown, or one of its fields is missing or does not fit the array.
     """
     if encoding == U16:
         _require_codes(array, dimensions=2)

@@ -2,73 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypedDict
+from typing import Any
 
 from numpy.typing import NDArray
 
 from transientcam.frame import Frame
 from transientcam.wire.codec import pack, pack_with_array
 from transientcam.wire.contract import F32, VERSION
-
-
-class PixelCounts(TypedDict):
-    """How many pixels of a frame carry each flag; one pixel may carry several."""
-
-    total: int
-    valid: int
-    biased: int
-    no_signal: int
-    saturated: int
-    non_finite: int
-    degenerate: int
-    replaced: int
-
-
-class PredictedStd(TypedDict):
-    """Standard deviation that the sensor's noise gives a frame's range, in m."""
-
-    median: float
-    p90: float
-    """90 % of the pixels are better."""
-    first_order_share: float
-    """Share of the pixels where the noise model holds; that of the others is a rough figure."""
-
-
-class FrameMeta(TypedDict):
-    """What is known of a frame, whatever product of it is sent."""
-
-    frame: int
-    """Counted by the server from 1; never resets while it runs."""
-    sequence_id: int
-    calibration_id: str
-    reconstruction_id: int
-    """Counts the settings of the reconstruction that the server has had."""
-    device_time_s: float
-    """Start of the first exposure, by the camera's clock."""
-    host_time_s: float
-    """Arrival of the last image, Unix time."""
-    capture_s: float
-    reconstruct_s: float | None
-    """None until something of this frame was computed."""
-    base_frequency_hz: float
-    harmonics: int
-    zeroth: str
-    exposure_s: float
-    takes: int
-    width: int
-    height: int
-    temperature_c: float
-    lost_images: int
-    """Images lost or corrupt between the frame before and this one."""
-    rejected_images: int | None
-    """Images left out of the average over takes as outliers; None until it was computed."""
-    pixels: PixelCounts | None
-    predicted_range_std_m: PredictedStd | None
-    """None until the range of this frame was computed."""
-    region: list[int]
-    """Which pixels of the frame this is about: column and row of the first, width, height."""
-    decimation: int
-    """Only every so many of them are here, both ways."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +34,7 @@ class Subscription:
     decimation: int = 1
 
     def to_document(self) -> dict[str, Any]:
-        """Return the map that travels; what says no more than the default is left out."""
+        """Return it as a map, without options that have their default."""
         document: dict[str, Any] = {"product": self.product, "max_rate_hz": self.max_rate_hz}
         if self.encoding != F32:
             document["encoding"] = self.encoding
@@ -103,10 +43,10 @@ class Subscription:
 
 @dataclass(frozen=True, slots=True)
 class Subscribe:
-    """What a client wants from now on, instead of what it had.
+    """A client's subscriptions, which replace those before.
 
-    ``credits`` is how many frames the server may have on the way unacknowledged (None: as many as
-    it likes), ``start`` the first frame wanted (None: the next).
+    ``credits`` is how many frames the server may have on the way unacknowledged (None: no limit),
+    ``start`` the first frame to send (None: the next).
     """
 
     subscriptions: tuple[Subscription, ...]
@@ -115,7 +55,7 @@ class Subscribe:
     start: int | None = None
 
     def to_document(self) -> dict[str, Any]:
-        """Return the map that travels."""
+        """Return the message as a map."""
         return {
             "type": "subscribe",
             "v": VERSION,
@@ -128,20 +68,20 @@ class Subscribe:
 
 @dataclass(frozen=True, slots=True)
 class Ack:
-    """The client is done with this frame and all before it."""
+    """The client acknowledges this frame and all before it."""
 
     frame: int
 
     def to_document(self) -> dict[str, Any]:
-        """Return the map that travels."""
+        """Return the message as a map."""
         return {"type": "ack", "frame": self.frame}
 
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """What the messages of one subscription look like: ``dtype`` and ``shape`` are of its arrays.
+    """Description of the frames of one subscription: ``dtype`` and ``shape`` are of its arrays.
 
-    An array that travels as codes is decoded before a `Frame` holds it.
+    An array that is sent as codes is decoded before a `Frame` holds it.
     """
 
     channel: int
@@ -155,7 +95,7 @@ class Channel:
     decimation: int = 1
 
     def to_document(self) -> dict[str, Any]:
-        """Return the map that travels."""
+        """Return the message as a map."""
         return {
             "channel": self.channel,
             "product": self.product,
@@ -179,7 +119,7 @@ class Hello:
     camera: Mapping[str, Any]
 
     def to_document(self) -> dict[str, Any]:
-        """Return the map that travels."""
+        """Return the message as a map."""
         return {
             "type": "hello",
             "v": VERSION,
@@ -193,32 +133,32 @@ class Hello:
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Something a client should know: ``kind``, and what more there is to it in ``details``.
+    """An event for clients: its ``kind``, and its other keys in ``details``.
 
-    `NOTICES` lists the kinds there are. A client passes over kinds it does not know.
+    `NOTICES` lists the kinds. A client ignores unknown ones.
     """
 
     kind: str
     details: Mapping[str, Any] = field(default_factory=dict)
 
     def to_document(self) -> dict[str, Any]:
-        """Return the map that travels."""
+        """Return the message as a map."""
         return {"type": "notice", "kind": self.kind, **self.details}
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorMessage:
-    """The answer to a bad message: a problem as REST would answer it."""
+    """The answer to a bad message: a problem document, as over REST."""
 
     problem: Mapping[str, Any]
 
     def to_document(self) -> dict[str, Any]:
-        """Return the map that travels."""
+        """Return the message as a map."""
         return {"type": "error", "problem": dict(self.problem)}
 
 
 def _cut(region: tuple[int, ...] | None, decimation: int) -> dict[str, Any]:
-    """Return which pixels are meant, as far as it is not all of them."""
+    """Return region and decimation as a map, without those that have their default."""
     cut: dict[str, Any] = {} if region is None else {"region": list(region)}
     return cut if decimation == 1 else cut | {"decimation": decimation}
 

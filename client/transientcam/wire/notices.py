@@ -14,7 +14,7 @@ class NoticeKind:
     Attributes
     ----------
     keys
-        What it carries: the names of JSON types by key; several where it may be either.
+        The names of JSON types by key; several where it may be either.
     optional
         Those of them that may be left out.
     """
@@ -93,4 +93,4 @@ NOTICES: Final[dict[str, NoticeKind]] = {
         NoticeKind("job-changed", "a job began or ended", {"job": "object"}),
     )
 }
-"""Every kind by its name; a client passes over those it does not know."""
+"""Every kind by its name; a client ignores unknown ones."""

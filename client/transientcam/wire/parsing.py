@@ -1,10 +1,10 @@
-"""Messages from untrusted bytes: every failure is one `ProtocolError` that names its place."""
+"""Messages from untrusted bytes: every failure is a `ProtocolError` that names its place."""
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from transientcam.errors import ProtocolError
-from transientcam.frame import Frame
+from transientcam.frame import Frame, FrameMeta
 from transientcam.wire import fields
 from transientcam.wire.arrays import DTYPES, MAX_DIMENSIONS, MAX_LENGTH, parse_array
 from transientcam.wire.codec import unpack
@@ -57,7 +57,7 @@ def parse_client_message(data: bytes | bytearray | memoryview | str) -> ClientMe
     Raises
     ------
     ProtocolError
-        Naming the first part that is not as docs/stream.md says.
+        Naming the first part that docs/stream.md does not allow.
     """
     document = unpack(data, max_bytes=MAX_CLIENT_MESSAGE_BYTES)
     kind = fields.text(document, "type")
@@ -76,7 +76,7 @@ def parse_server_message(
     Raises
     ------
     ProtocolError
-        Naming the first part that is not as docs/stream.md says.
+        Naming the first part that docs/stream.md does not allow.
     """
     document = unpack(data, max_bytes=max_bytes)
     match fields.text(document, "type"):
@@ -115,7 +115,7 @@ def parse_channels(document: Mapping[str, Any]) -> tuple[Channel, ...]:
     Raises
     ------
     ProtocolError
-        Naming the first part that is not as docs/stream.md says.
+        Naming the first part that docs/stream.md does not allow.
     """
     items = fields.sequence(document, "channels", max_length=_MAX_CHANNELS)
     return tuple(_channel(item, f"channels[{index}]") for index, item in enumerate(items))
@@ -224,7 +224,7 @@ def _frame(document: Mapping[str, Any]) -> Frame:
         product=fields.text(document, "product"),
         unit=fields.text(document, "unit"),
         axes=axes,
-        meta=meta,
+        meta=cast("FrameMeta", meta),  # of its keys only ``frame`` is checked
         array=array,
         encode_s=fields.number(document, "encode_s"),
         channel=_optional_integer(document, "channel", minimum=0, maximum=MAX_INTEGER),

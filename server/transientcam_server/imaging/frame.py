@@ -12,13 +12,14 @@ from collections import OrderedDict
 from collections.abc import Callable, Coroutine, Hashable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam import Frame as EncodedFrame
+from transientcam.frame import FrameMeta
 from transientcam_driver import RawFrame, Truth
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
@@ -266,7 +267,7 @@ class Frame:
                 product.name,
                 product.description.unit,
                 product.description.axes,
-                self.meta() | view.crop.to_meta(*self.shape),
+                cast("FrameMeta", self.meta() | view.crop.to_meta(*self.shape)),
                 channel=channel,
                 extra=extra | dict(zip(encoding.beside, beside, strict=True)),
             )

@@ -167,7 +167,7 @@ def test_a_missing_module_of_our_own_is_a_mistake_and_not_hidden(install: _Insta
 @pytest.mark.parametrize(
     ("verb", "extra"), [("serve", "server"), ("reconstruct", "server"), ("scenes", "driver")]
 )
-def test_each_verb_of_another_package_knows_its_extra(verb: str, extra: str) -> None:
+def test_each_verb_of_another_package_has_its_extra(verb: str, extra: str) -> None:
     assert verbs.extra_of("some_library", verb) == extra
     assert extra in str(CommandUnavailable(verb, "some_library", extra))
 

@@ -1,4 +1,4 @@
-"""What a shell is told when somebody presses Tab."""
+"""Completion of the command line in a shell."""
 
 import shutil
 import subprocess

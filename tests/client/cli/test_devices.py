@@ -37,13 +37,13 @@ def failing(error: Exception) -> Callable[..., Any]:
     return fail
 
 
-def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+def printed_by(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     assert run(["devices", *arguments]) == 0
     return " ".join(capsys.readouterr().out.split())
 
 
 def listed(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
-    document: dict[str, Any] = json.loads(told(capsys, "--json", *arguments))
+    document: dict[str, Any] = json.loads(printed_by(capsys, "--json", *arguments))
     return document
 
 
@@ -53,7 +53,7 @@ def test_cameras_are_listed_by_the_name_that_opens_them(
     plug(monkeypatch, FREE, FORBIDDEN)
     monkeypatch.setattr(devices, "discover", lambda **_: (ANNOUNCED,))
 
-    words = told(capsys)
+    words = printed_by(capsys)
 
     assert "usb:A-17 A-17 AMCW lidar /dev/bus/usb/001/004" in words
     assert "/dev/bus/usb/001/005: no permission to open it" in words
@@ -88,7 +88,7 @@ def test_cameras_are_printed_as_json(
 def test_an_empty_bus_and_a_silent_network_are_no_failure(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    words = told(capsys)
+    words = printed_by(capsys)
 
     assert "No camera is plugged in." in words
     assert "No camera announces itself on the network." in words
@@ -106,7 +106,7 @@ def test_the_network_is_asked_as_told_or_not_at_all(
     monkeypatch.setattr(devices, "discover", heard)
 
     listed(capsys, "--timeout-s", "0.5", "--interface", "127.0.0.1")
-    words = told(capsys, "--no-network")
+    words = printed_by(capsys, "--no-network")
 
     assert asked == [{"timeout_s": 0.5, "interfaces": ["127.0.0.1"]}]
     assert "network" not in words
@@ -121,7 +121,7 @@ def test_a_missing_libusb_is_told_beside_the_others(
     monkeypatch.setattr(scenes, "list_cameras", missing)
     monkeypatch.setattr(devices, "discover", lambda **_: (ANNOUNCED,))
 
-    assert "libusb-1.0 was not found" in told(capsys)
+    assert "libusb-1.0 was not found" in printed_by(capsys)
     document = listed(capsys)
     assert "apt install" in document["problem"]
     assert len(document["network"]) == 1
@@ -130,7 +130,7 @@ def test_a_missing_libusb_is_told_beside_the_others(
 @pytest.mark.parametrize(
     ("error", "words"),
     [
-        (ServerUnreachable("the local network", "unreachable"), "cannot be asked: unreachable"),
+        (ServerUnreachable("the local network", "unreachable"), "cannot be searched: unreachable"),
         (ModuleNotFoundError("no", name="zeroconf"), "pip install 'transientcam[discovery]'"),
     ],
 )
@@ -143,7 +143,7 @@ def test_a_network_that_cannot_be_asked_is_told_beside_usb(
     plug(monkeypatch, FREE)
     monkeypatch.setattr(devices, "discover", failing(error))
 
-    printed = told(capsys)
+    printed = printed_by(capsys)
 
     assert words in printed
     assert "usb:A-17" in printed

@@ -47,7 +47,7 @@ def offer(monkeypatch: pytest.MonkeyPatch) -> _Offer:
     return make
 
 
-def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, dict[str, Any]]:
+def report(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, dict[str, Any]]:
     code = run(["doctor", "--json", *arguments])
     return code, json.loads(capsys.readouterr().out)
 
@@ -66,7 +66,7 @@ def test_only_a_fault_fails(
 ) -> None:
     offer([("ok", "first", "fine", None), (level, "second", "seen", "do something")])
 
-    found, document = told(capsys)
+    found, document = report(capsys)
 
     assert (found, document["verdict"]) == (code, verdict)
     assert document["findings"][-1] == {
@@ -102,7 +102,7 @@ def test_a_check_that_fails_is_a_fault_and_ends_nothing_else(
 
     offer(broken())
 
-    code, document = told(capsys)
+    code, document = report(capsys)
 
     assert code == 1
     assert of(document, "first")["level"] == "ok"
@@ -115,7 +115,7 @@ def test_a_package_that_is_not_installed_is_no_fault(
     point = EntryPoint("server", "package_that_is_not_there:checks", findings.GROUP)
     monkeypatch.setattr(findings, "entry_points", lambda group: [point])
 
-    code, document = told(capsys)
+    code, document = report(capsys)
 
     assert code == 0
     assert "transientcam[server]" in of(document, "server")["remedy"]
@@ -127,7 +127,7 @@ def test_the_settings_file_reaches_the_checks(
     file = tmp_path / "a.toml"
     file.write_text("bogus = 1\n")
 
-    code, document = told(capsys, "--config", str(file))
+    code, document = report(capsys, "--config", str(file))
 
     assert code == 1
     assert "bogus" in of(document, "settings")["message"]
@@ -136,7 +136,7 @@ def test_the_settings_file_reaches_the_checks(
 def test_a_daemon_that_streams_is_in_order(
     daemon: Served, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code, document = told(capsys, daemon.url, "--seconds", "1")
+    code, document = report(capsys, daemon.url, "--seconds", "1")
 
     assert code == 0
     checked = [each["check"] for each in document["findings"]]
@@ -151,7 +151,7 @@ def test_a_stopped_capture_is_a_warning_that_says_how_to_start_it(
 ) -> None:
     with serving("sim:wall?noise=off") as served:
         served.service.acquisition.set_running(False).result()
-        code, document = told(capsys, served.url)
+        code, document = report(capsys, served.url)
 
     assert code == 0
     assert of(document, "stream")["level"] == "warning"
@@ -164,35 +164,37 @@ def test_an_unplugged_camera_is_a_fault(capsys: pytest.CaptureFixture[str]) -> N
         served.camera.simulation.unplug()
         while served.service.acquisition.status().state != "lost":
             time.sleep(0.01)
-        code, document = told(capsys, served.url)
+        code, document = report(capsys, served.url)
 
     assert code == 1
     assert of(document, "ready")["level"] == "fault"
     assert of(document, "camera")["level"] == "fault"
 
 
-def test_a_daemon_that_wants_a_token_says_how_to_give_one(
+def test_without_a_required_token_the_remedy_names_the_option(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("TRANSIENTCAM_TOKEN", raising=False)
     with serving(
         "sim:wall?noise=off", require_token=True, tokens_file=tmp_path / "tokens.json"
     ) as served:
-        code, document = told(capsys, served.url)
+        code, document = report(capsys, served.url)
 
     assert code == 1
     assert "--token" in of(document, "access")["remedy"]
 
 
-def test_nobody_at_the_address_is_a_fault_and_the_end(capsys: pytest.CaptureFixture[str]) -> None:
-    code, document = told(capsys, "127.0.0.1:1", "--timeout-s", "2")
+def test_no_answer_from_the_address_is_a_fault_and_the_end(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    code, document = report(capsys, "127.0.0.1:1", "--timeout-s", "2")
 
     assert code == 1
     assert document["findings"][-1]["check"] == "reachable"
     assert "transientcam serve" in document["findings"][-1]["remedy"]
 
 
-def test_another_program_at_the_address_is_told(
+def test_another_program_at_the_address_is_a_fault(
     replay: Callable[..., ReplayServer], capsys: pytest.CaptureFixture[str]
 ) -> None:
     def not_found(connection: ServerConnection, request: object) -> Response:
@@ -200,7 +202,7 @@ def test_another_program_at_the_address_is_told(
 
     server = replay(lambda connection: None, process_request=not_found)
 
-    code, document = told(capsys, server.url)
+    code, document = report(capsys, server.url)
 
     assert code == 1
     assert "no transientcam (status 404)" in document["findings"][-1]["message"]
@@ -220,7 +222,7 @@ def test_a_certificate_that_ends_soon_is_a_warning(
     issued.private_key_and_cert_chain_pem.write_to_path(tmp_path / "both.pem")
     monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "authority.pem"))
     with serving("sim:wall?noise=off", tls_certificate=tmp_path / "both.pem") as served:
-        _, document = told(capsys, served.url, "--seconds", "0.2")
+        _, document = report(capsys, served.url, "--seconds", "0.2")
 
     assert of(document, "reachable")["level"] == "ok"
     assert of(document, "certificate")["level"] == level

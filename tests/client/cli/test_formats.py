@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.client.conftest import frame_meta
 from transientcam import Frame, wire
 from transientcam.cli.formats import Format, frame_bytes
 
-_META = {"frame": 7, "host_time_s": 1.5, "pixels": None}
+_META = frame_meta(frame=7, host_time_s=1.5, pixels=None)
 _RANGE = Frame("range", "m", ("y", "x"), _META, np.array([[1.5, np.nan]], "<f4"))
 _TRANSIENT = Frame(
     "transient",

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.client.conftest import frame_meta
 from transientcam import Frame, Notice
 from transientcam.cli.statistics import Statistics
 
@@ -12,7 +13,7 @@ def _frame(number: int, *, product: str = "range", host_time_s: float = 0.0) -> 
     array = np.array([1.0, 2.0, np.nan, 9.0], "<f4").reshape(
         (1, 4) if product == "range" else (2, 1, 2)
     )
-    return Frame(product, "m", axes, {"frame": number, "host_time_s": host_time_s}, array)
+    return Frame(product, "m", axes, frame_meta(frame=number, host_time_s=host_time_s), array)
 
 
 def test_the_rate_is_that_of_the_arrivals_in_the_last_seconds() -> None:
@@ -70,7 +71,7 @@ def test_a_sample_says_what_was_seen_and_lost() -> None:
 
 def test_there_is_no_median_of_what_is_no_image_or_has_no_value() -> None:
     dark = Frame(
-        "range", "m", ("y", "x"), {"frame": 2, "host_time_s": 0.0}, np.full((1, 1), np.nan)
+        "range", "m", ("y", "x"), frame_meta(frame=2, host_time_s=0.0), np.full((1, 1), np.nan)
     )
 
     assert Statistics().frame(_frame(1, product="moments"), now_s=0.0).median is None

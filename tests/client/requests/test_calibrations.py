@@ -8,15 +8,13 @@ import pytest
 
 from tests.serving import Served, serving
 from transientcam import AsyncCamera, Camera, ProblemError
-from transientcam.requests import request as rest
-from transientcam.requests.calibrations import Calibrations
-from transientcam.requests.jobs import Jobs
+from transientcam.requests import Calibrations, Jobs, Request
 
 
 def test_a_name_never_leaves_its_place_in_the_address() -> None:
     paths: list[str] = []
 
-    def note(request: rest.Request[Any]) -> None:
+    def note(request: Request[Any]) -> None:
         paths.append(request.path)
 
     Calibrations(note, note).get("../info?x")
@@ -32,10 +30,12 @@ def daemon() -> Iterator[Served]:
 
 
 def test_a_camera_measures_uses_and_moves_a_calibration(daemon: Served) -> None:
-    told: list[float] = []
+    progress: list[float] = []
     with Camera(daemon.url, timeout_s=30) as camera:
         job = camera.calibrations.measure(name="warm", frames=3)
-        done = camera.wait_for(job["id"], on_progress=lambda each: told.append(each["progress"]))
+        done = camera.wait_for(
+            job["id"], on_progress=lambda each: progress.append(each["progress"])
+        )
         identity = done["result"]["calibration"]
         assert camera.calibrations.active()["id"] == "nominal"
         camera.calibrations.activate(identity)
@@ -47,7 +47,7 @@ def test_a_camera_measures_uses_and_moves_a_calibration(daemon: Served) -> None:
         assert camera.calibrations.get(identity)["fits"]
         assert [each["state"] for each in camera.jobs.all()["jobs"]] == ["done"]
 
-    assert told == sorted(told)
+    assert progress == sorted(progress)
 
 
 def test_an_async_camera_does_the_same(daemon: Served) -> None:

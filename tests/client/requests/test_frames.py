@@ -9,10 +9,8 @@ import pytest
 from tests.client.conftest import Recording
 from transientcam import wire
 from transientcam.errors import ParameterError, ProtocolError
-from transientcam.requests import frames
-from transientcam.requests import request as rest
+from transientcam.requests import Answer, Request, frames
 from transientcam.requests.frames import FileFormat, Part, Which
-from transientcam.requests.request import Answer
 
 
 def test_times_of_flight_keep_every_digit() -> None:
@@ -42,12 +40,12 @@ def test_a_product_that_is_no_name_never_becomes_a_path(product: str) -> None:
         frames.file(product, "png", Which())
 
 
-def test_a_request_that_waits_has_the_patience_for_it() -> None:
+def test_a_request_that_waits_has_a_longer_timeout() -> None:
     request = frames.meta(Which(wait_s=7.5, after=3))
 
     assert request.params == (("wait_s", "7.5"), ("after", "3"))
-    assert request.patience_s == 7.5
-    assert frames.meta(Which()).patience_s == 0.0
+    assert request.extra_timeout_s == 7.5
+    assert frames.meta(Which()).extra_timeout_s == 0.0
 
 
 def test_a_frame_is_read_from_the_body(recorded: dict[str, Recording]) -> None:
@@ -66,7 +64,7 @@ def test_a_frame_is_read_from_the_body(recorded: dict[str, Recording]) -> None:
         (frames.file("range", "png", Which()), "text/html"),
     ],
 )
-def test_a_body_of_another_kind_is_refused(request_: rest.Request[Any], media_type: str) -> None:
+def test_a_body_of_another_kind_is_refused(request_: Request[Any], media_type: str) -> None:
     with pytest.raises(ProtocolError, match="content-type is"):
         request_.result(Answer(200, media_type, b"\x89PNG"))
 
@@ -121,6 +119,6 @@ def test_a_file_is_asked_for_and_read_as_what_it_is(form: FileFormat) -> None:
     assert request.result(Answer(200, form.media_type, b"data")) == b"data"
 
 
-def test_a_format_that_nobody_makes_is_refused_before_anything_is_sent() -> None:
+def test_an_unknown_format_is_refused_before_anything_is_sent() -> None:
     with pytest.raises(ParameterError, match="form is 'bmp', but must be one of png, npy"):
         frames.file("range", "bmp", Which())

@@ -47,10 +47,10 @@ def _made(kind: type[Exception]) -> Exception:
     try:
         parameters = inspect.signature(kind).parameters
     except ValueError:  # one without a constructor of its own
-        return kind("told so")
+        return kind("a reason")
     given, named = [], {}
     for name, parameter in parameters.items():
-        value = _ARGUMENTS.get(name, "told so")
+        value = _ARGUMENTS.get(name, "a reason")
         if parameter.default is parameter.empty and parameter.kind is parameter.KEYWORD_ONLY:
             named[name] = value
         elif parameter.default is parameter.empty and parameter.kind is not parameter.VAR_KEYWORD:

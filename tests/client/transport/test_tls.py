@@ -81,7 +81,9 @@ def beside() -> Iterator[Callable[[Callable[[], bytes]], Callable[[], bytes]]]:
 Beside = Callable[[Callable[[], bytes]], Callable[[], bytes]]
 
 
-def test_who_waits_for_data_keeps_nobody_from_writing(shared: SharedSocket, beside: Beside) -> None:
+def test_a_thread_that_waits_for_data_blocks_no_writer(
+    shared: SharedSocket, beside: Beside
+) -> None:
     reading = beside(lambda: shared.recv(65536))
 
     shared.sendall(b"hello")

@@ -183,7 +183,7 @@ def test_codes_that_cannot_be_read_are_refused_by_name(
 
 
 @given(scale=st.floats(), offset=st.floats(), codes=hnp.arrays(np.uint16, (2, 2)))
-def test_no_scale_that_somebody_may_send_raises_anything_else(
+def test_no_scale_in_a_message_raises_anything_else(
     scale: float, offset: float, codes: NDArray[np.uint16]
 ) -> None:
     with contextlib.suppress(ProtocolError):

@@ -139,7 +139,7 @@ def test_values_are_encoded_as_recorded(
     name: str, coded: wire.Coded, recorded: dict[str, Recording]
 ) -> None:
     document = msgpack.unpackb(recorded[name].data)
-    told = ("approximate", "max_error", "median_error", "encoding")
+    names = ("approximate", "max_error", "median_error", "encoding")
 
     data = wire.encode_frame(
         product=document["product"],
@@ -149,7 +149,7 @@ def test_values_are_encoded_as_recorded(
         array=coded.array,
         encode_s=document["encode_s"],
         channel=0,
-        extra={key: document[key] for key in told if key in document} | coded.fields,
+        extra={key: document[key] for key in names if key in document} | coded.fields,
     )
 
     assert data == recorded[name].data

@@ -1,6 +1,6 @@
 """What the encodings of a stream write, read by the wire contract."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -49,7 +49,16 @@ def test_the_channel_table_says_what_the_messages_of_each_encoding_hold(name: st
     )
     for chosen in product.description.encodings:
         encoding = STREAM_ENCODINGS[chosen]
-        data = encoding.encode(Frame(name, "DN", product.description.axes, _META, array, channel=3))
+        data = encoding.encode(
+            Frame(
+                name,
+                "DN",
+                product.description.axes,
+                cast("wire.FrameMeta", _META),
+                array,
+                channel=3,
+            )
+        )
         travelled = wire.unpack(data, max_bytes=2**20)
 
         dtype, lengths = travelling(product, encoding, shape)

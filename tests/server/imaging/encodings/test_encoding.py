@@ -2,7 +2,7 @@ import io
 import json
 import struct
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ from transientcam_server.imaging.encodings.encoding import (
 )
 from transientcam_server.imaging.products import PRODUCTS
 
-META = {"frame": 7, "base_frequency_hz": 23e6}
+META = cast("wire.FrameMeta", {"frame": 7, "base_frequency_hz": 23e6})
 
 
 def encoded(
@@ -47,7 +47,7 @@ def test_msgpack_holds_the_array_and_the_meta() -> None:
 
     np.testing.assert_array_equal(message.array, array)
     assert (message.product, message.unit, message.axes) == ("range", "m", ("y", "x"))
-    assert message.meta == META
+    assert dict(message.meta) == META
     assert message.channel is None
     assert message.encode_s >= 0.0
 

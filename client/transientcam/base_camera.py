@@ -1,0 +1,233 @@
+"""What `Camera` and `AsyncCamera` have in common: every request, stated once."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, Generic, TypeVar, overload
+
+from transientcam.frame import Frame
+from transientcam.requests import Calibrations, Jobs, Request, changes, frames, recordings
+from transientcam.requests.frames import Part, Which
+from transientcam.transport import parse_address
+
+_Document = TypeVar("_Document")
+_Frame = TypeVar("_Frame")
+_Bytes = TypeVar("_Bytes")
+
+
+class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
+    """The requests of a camera; what they return is up to `_ask`.
+
+    From a `Camera` that is a document, a `Frame` or bytes, from an `AsyncCamera` a coroutine of
+    the same. A request that cannot be built raises `ParameterError` when its method is called.
+    """
+
+    def __init__(self, url: str, *, token: str | None, timeout_s: float) -> None:
+        self._address = parse_address(url)
+        self._token = token
+        self._timeout_s = timeout_s
+
+    @overload
+    @abstractmethod
+    def _ask(self, request: Request[dict[str, Any]]) -> _Document: ...
+    @overload
+    @abstractmethod
+    def _ask(self, request: Request[Frame]) -> _Frame: ...
+    @overload
+    @abstractmethod
+    def _ask(self, request: Request[bytes]) -> _Bytes: ...
+    @abstractmethod
+    def _ask(self, request: Request[Any]) -> Any:
+        """Send a request, and return the result of its answer."""
+
+    @property
+    def url(self) -> str:
+        """Address of the daemon."""
+        return self._address.url
+
+    def validate(self, settings: Mapping[str, Any]) -> _Document:
+        """Return what a sequence would really be set to, without setting it."""
+        return self._ask(changes.validate_sequence(settings))
+
+    @property
+    def calibrations(self) -> Calibrations[_Document, _Bytes]:
+        """The calibrations that the daemon keeps: to measure, use, export and import."""
+        return Calibrations(self._ask, self._ask)
+
+    @property
+    def jobs(self) -> Jobs[_Document]:
+        """Long-running jobs of the daemon: their progress and their end."""
+        return Jobs(self._ask)
+
+    def start(self) -> _Document:
+        """Start the capture."""
+        return self._ask(changes.set_running(True))
+
+    def stop(self) -> _Document:
+        """Stop the capture."""
+        return self._ask(changes.set_running(False))
+
+    def safe_off(self) -> _Document:
+        """Switch the light off, whichever client holds the lease."""
+        return self._ask(changes.safe_off())
+
+    def timeline(self, recording: str) -> _Document:
+        """Return which frames a recording has, and when they were captured."""
+        return self._ask(recordings.timeline(recording))
+
+    def meta(
+        self,
+        *,
+        number: int | None = None,
+        recording: str | None = None,
+        wait_s: float | None = None,
+        after: int | None = None,
+    ) -> _Document:
+        """Return the metadata of a frame; parameters as for `frame`."""
+        return self._ask(frames.meta(Which(number, recording, wait_s, after)))
+
+    def latest(self, *, wait_s: float | None = None, after: int | None = None) -> _Document:
+        """Return the metadata of the newest frame; ``wait_s`` and ``after`` as for `frame`."""
+        return self.meta(wait_s=wait_s, after=after)
+
+    def frame(
+        self,
+        product: str,
+        *,
+        number: int | None = None,
+        recording: str | None = None,
+        region: Sequence[int] | None = None,
+        decimation: int | None = None,
+        time_s: object = None,
+        bins: int | None = None,
+        y: int | None = None,
+        wait_s: float | None = None,
+        after: int | None = None,
+    ) -> _Frame:
+        """Return one product of the newest frame, or of another one.
+
+        Parameters
+        ----------
+        product
+            Its name; `wire.PRODUCTS` lists them.
+        number
+            A former frame, as far as `frames` has it, or one that is still to come.
+        recording
+            Id of a recording instead, whose frames are counted from 1.
+        region
+            x, y, width and height of the part to return, in pixels.
+        decimation
+            Every so many pixels of it, both ways.
+        time_s
+            For products over time: the times of flight to evaluate at, in s.
+        bins
+            For the same, instead: how many times, evenly over the unambiguous time.
+        y
+            For ``streak``: its row.
+        wait_s
+            How long to wait for a frame, if there is none yet, or none after ``after``.
+        after
+            Number of a frame; the one returned has to be newer.
+        """
+        which = Which(number, recording, wait_s, after)
+        part = Part(time_s, bins, y, region, decimation)
+        return self._ask(frames.frame(product, which, part))
+
+    def file(
+        self,
+        product: str,
+        form: str,
+        *,
+        colour: bool = False,
+        number: int | None = None,
+        recording: str | None = None,
+        region: Sequence[int] | None = None,
+        decimation: int | None = None,
+        time_s: object = None,
+        bins: int | None = None,
+        y: int | None = None,
+        wait_s: float | None = None,
+        after: int | None = None,
+    ) -> _Bytes:
+        """Return one product of a frame as a file; parameters as for `frame`.
+
+        ``form`` is ``"png"``, ``"npy"``, ``"npz"``, ``"tiff"``, ``"ply"`` or ``"csv"``; not every
+        product fits every one. ``colour`` makes a PNG in false colours.
+        """
+        which = Which(number, recording, wait_s, after)
+        part = Part(time_s, bins, y, region, decimation)
+        return self._ask(frames.file(product, form, which, part, colour=colour))
+
+    def picture(
+        self,
+        product: str,
+        *,
+        colour: bool = False,
+        wait_s: float | None = None,
+        after: int | None = None,
+    ) -> _Bytes:
+        """Return one product of the newest frame as PNG: 16 bit (range in mm), or false colours."""
+        return self.file(product, "png", colour=colour, wait_s=wait_s, after=after)
+
+    def pixel(
+        self,
+        *,
+        x: int,
+        y: int,
+        bins: int | None = None,
+        number: int | None = None,
+        recording: str | None = None,
+        wait_s: float | None = None,
+        after: int | None = None,
+    ) -> _Document:
+        """Return everything about one pixel of a frame; parameters as for `frame`."""
+        which = Which(number, recording, wait_s, after)
+        return self._ask(frames.pixel(which, x=x, y=y, bins=bins))
+
+    def simulate(
+        self, scene: str | None = None, *, effects: Mapping[str, str] | None = None
+    ) -> _Document:
+        """Put a simulated camera before a built-in scene; capturing goes on meanwhile.
+
+        ``effects`` replaces all earlier choices: "auto", "on" or "off" by name.
+        """
+        return self._ask(changes.set_simulation(scene, effects))
+
+    def cause(self, fault: str) -> _Document:
+        """Inject a fault into the simulation: unplug, replug, corrupt-image or drop-image."""
+        return self._ask(changes.inject_fault(fault))
+
+    def record(
+        self,
+        *,
+        name: str | None = None,
+        duration_s: float | None = None,
+        frames: int | None = None,
+        history_s: float | None = None,
+        annotations: Mapping[str, Any] | None = None,
+    ) -> _Document:
+        """Record raw frames at the daemon, until a limit or `stop_recording`.
+
+        With ``history_s`` the recording begins with the frames of the last seconds. Returns its
+        description.
+        """
+        return self._ask(
+            recordings.record(
+                name=name,
+                duration_s=duration_s,
+                frames=frames,
+                history_s=history_s,
+                annotations=annotations,
+            )
+        )
+
+    def recordings(self) -> _Document:
+        """Return all recordings of the daemon, the newest first."""
+        return self._ask(recordings.all_recordings())
+
+    def recording(self, recording_id: str) -> _Document:
+        """Return the description of a recording."""
+        return self._ask(recordings.describe(recording_id))
+
+    def stop_recording(self, recording_id: str) -> _Document:
+        """End a recording, wait until it is on the disk, and return its description."""
+        return self._ask(recordings.stop(recording_id))
