@@ -21,7 +21,6 @@ from transientcam.errors import (
 from transientcam.frame import Frame
 from transientcam.requests import problem_error
 from transientcam.wire import (
-    ENCODINGS,
     MAX_CREDITS,
     MAX_DECIMATION,
     SUBPROTOCOL,
@@ -34,6 +33,7 @@ from transientcam.wire import (
     Subscribe,
     Subscription,
     encode,
+    encoding_names,
     fields,
     parse_channels,
     parse_server_message,
@@ -114,8 +114,10 @@ def _check(subscription: Subscription) -> None:
     rate_hz, region = subscription.max_rate_hz, subscription.region
     if rate_hz is not None and not 0.0 < rate_hz < float("inf"):
         raise ParameterError("max_rate_hz", rate_hz, "a number of Hz above 0")
-    if subscription.encoding not in ENCODINGS:
-        raise ParameterError("encoding", subscription.encoding, f"one of {', '.join(ENCODINGS)}")
+    if subscription.encoding not in encoding_names():
+        raise ParameterError(
+            "encoding", subscription.encoding, f"one of {', '.join(encoding_names())}"
+        )
     if region is not None and (len(region) != len("xywh") or min(region) < 0):
         raise ParameterError("region", region, "x, y, width and height in pixels")
     if not 1 <= subscription.decimation <= MAX_DECIMATION:

@@ -4,7 +4,6 @@ from transientcam.frame import Frame, FrameMeta, PixelCounts, PredictedStd
 from transientcam.wire.arrays import DTYPES, array_document, parse_array
 from transientcam.wire.codec import ALIGNMENT, pack, unpack
 from transientcam.wire.contract import (
-    ENCODINGS,
     F32,
     FIRST_MESSAGE_WITHIN_S,
     LEASE_HEADER,
@@ -16,20 +15,21 @@ from transientcam.wire.contract import (
     MEDIA_TYPE,
     MEDIA_TYPE_ALIASES,
     PROBLEM_MEDIA_TYPE,
-    PRODUCTS,
     REFLECTION16,
     SUBPROTOCOL,
     U16,
     VERSION,
     CloseCode,
-    Product,
 )
 from transientcam.wire.encodings import (
+    ENCODINGS,
     Coded,
+    Encoding,
     decode_reflection16,
     decode_u16,
     encode_reflection16,
     encode_u16,
+    encoding_names,
 )
 from transientcam.wire.messages import (
     Ack,
@@ -51,6 +51,7 @@ from transientcam.wire.parsing import (
     parse_frame,
     parse_server_message,
 )
+from transientcam.wire.products import PRODUCTS, Product
 
 __all__ = [
     "ALIGNMENT",
@@ -78,6 +79,7 @@ __all__ = [
     "ClientMessage",
     "CloseCode",
     "Coded",
+    "Encoding",
     "ErrorMessage",
     "Frame",
     "FrameMeta",
@@ -97,6 +99,7 @@ __all__ = [
     "encode_frame",
     "encode_reflection16",
     "encode_u16",
+    "encoding_names",
     "pack",
     "parse_array",
     "parse_channels",

@@ -9,7 +9,6 @@ from transientcam.wire import fields
 from transientcam.wire.arrays import DTYPES, MAX_DIMENSIONS, MAX_LENGTH, parse_array
 from transientcam.wire.codec import unpack
 from transientcam.wire.contract import (
-    ENCODINGS,
     F32,
     MAX_CLIENT_MESSAGE_BYTES,
     MAX_CREDITS,
@@ -18,7 +17,7 @@ from transientcam.wire.contract import (
     MAX_SUBSCRIPTIONS,
     VERSION,
 )
-from transientcam.wire.encodings import decoded
+from transientcam.wire.encodings import decoded, encoding_names
 from transientcam.wire.messages import (
     Ack,
     Channel,
@@ -160,8 +159,8 @@ def _encoding(item: Mapping[str, Any], path: str) -> str:
     if not _given(item, "encoding"):
         return F32
     encoding = fields.text(item, "encoding", path=path)
-    if encoding not in ENCODINGS:
-        raise ProtocolError(f"{path}.encoding", encoding, f"one of {', '.join(ENCODINGS)}")
+    if encoding not in encoding_names():
+        raise ProtocolError(f"{path}.encoding", encoding, f"one of {', '.join(encoding_names())}")
     return encoding
 
 

@@ -1,13 +1,14 @@
 """What a frame is asked, whether it is the latest, a former one or recorded: query and answer."""
 
 import json
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Literal
 
 from fastapi import Depends, Path, Query, Request, Response
 from pydantic import FiniteFloat
 
+from transientcam import wire
 from transientcam_server.api.negotiation import negotiate
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
@@ -28,6 +29,11 @@ DEFAULT_BINS: Final = 64
 MAX_NUMBER: Final = 2**53 - 1
 LATEST: Final = "latest"
 
+
+def _named(names: Iterable[str]) -> str:
+    return ", ".join(f"`{name}`" for name in names)
+
+
 FrameName = Annotated[
     str,
     Path(
@@ -39,8 +45,8 @@ FrameName = Annotated[
 ProductName = Annotated[
     str,
     Path(
-        description="name of the product, without or with one of the suffixes "
-        + ", ".join(f"`.{name}`" for name in ENCODINGS),
+        description=f"one of {_named(wire.PRODUCTS)}, without or with one of the suffixes "
+        + _named(f".{name}" for name in ENCODINGS),
         examples=["range", "range.npy", "transient.npz", "pointcloud.ply"],
     ),
 ]

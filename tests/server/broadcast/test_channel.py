@@ -2,12 +2,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from transientcam_server.broadcast.channel import UNNUMBERED, Channel, ChannelNumbers
-from transientcam_server.imaging.encodings.compact import STREAM_ENCODINGS
+from transientcam_server.imaging.encodings.compact import stream_encoding
 from transientcam_server.imaging.encodings.encoding import MSGPACK, Encoding
 from transientcam_server.imaging.products import PRODUCTS
 from transientcam_server.imaging.view import WHOLE, Crop
 
-_U16 = STREAM_ENCODINGS["u16"]
+_U16 = stream_encoding("u16")
 
 
 def channel(

@@ -120,7 +120,7 @@ def _schemas() -> dict[str, _Schema]:
             {
                 "product": {"type": "string", "enum": sorted(wire.PRODUCTS)},
                 "max_rate_hz": _or_nil({"type": "number", "exclusiveMinimum": 0}),
-                "encoding": _or_nil({"type": "string", "enum": list(wire.ENCODINGS)}),
+                "encoding": _or_nil({"type": "string", "enum": list(wire.encoding_names())}),
                 "region": _or_nil(_REGION),
                 "decimation": _or_nil(_integer(1, wire.MAX_DECIMATION)),
             },
@@ -179,10 +179,8 @@ def _frame() -> _Schema:
             "meta": _reference("schemas", "meta"),
             "encode_s": {"type": "number"},
             "labels": {"type": "array", "items": {"type": "object"}, "description": "raw alone"},
-            "encoding": {"type": "string", "enum": [wire.U16, wire.REFLECTION16]},
-            "scale": {"type": "number", "description": f"{wire.U16} alone, as is offset"},
-            "offset": {"type": "number"},
-            "brightness": _reference("schemas", "array"),
+            "encoding": {"type": "string", "enum": list(wire.ENCODINGS)},
+            **_encoding_fields(),
             "approximate": {"type": "boolean"},
             "max_error": {"type": "number", "description": "of the density, over its peak"},
             "median_error": {"type": "number"},
@@ -194,6 +192,15 @@ def _frame() -> _Schema:
             *("pad", "array"),
         ),
     )
+
+
+def _encoding_fields() -> dict[str, _Schema]:
+    """Return the fields that only messages in some encoding have."""
+    return {
+        name: {**schema, "description": f"{encoding.name} alone"}
+        for encoding in wire.ENCODINGS.values()
+        for name, schema in encoding.fields.items()
+    }
 
 
 def _notice(kind: wire.NoticeKind) -> _Schema:

@@ -35,7 +35,7 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
             path="/api/v1/stream",
             subprotocol=wire.SUBPROTOCOL,
             asyncapi=asyncapi.PATH,
-            encodings=list(wire.ENCODINGS),
+            encodings=list(wire.encoding_names()),
         ),
         products=[_product(product) for product in service.pipeline.products.values()],
         caller=InfoDocument.CallerDocument.model_validate(

@@ -20,7 +20,7 @@ from transientcam_server.broadcast.outbox import Close, Outbox
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.errors.translation import problem_document, problem_of
-from transientcam_server.imaging.encodings.compact import STREAM_ENCODINGS
+from transientcam_server.imaging.encodings.compact import stream_encoding
 from transientcam_server.imaging.view import Crop
 from transientcam_server.service import Service
 
@@ -232,7 +232,7 @@ class _Client:
             )
         except Problem as problem:
             raise Problem(kinds.BAD_MESSAGE, problem.detail, **problem.extensions) from None
-        encoding = STREAM_ENCODINGS[wanted.encoding]
+        encoding = stream_encoding(wanted.encoding)
         return Channel(UNNUMBERED, product, wanted.max_rate_hz, encoding, crop)
 
     async def _send_away(self) -> None:
@@ -258,7 +258,7 @@ def _alike(one: Channel, other: Channel) -> bool:
     """Whether two channels would carry the same bytes."""
     return (
         one.product.name == other.product.name
-        and one.encoding is other.encoding
+        and one.encoding.name == other.encoding.name
         and one.crop == other.crop
     )
 

@@ -1,6 +1,6 @@
 """Encodings of products: files for HTTP answers, compact messages for the stream."""
 
-from transientcam_server.imaging.encodings.compact import STREAM_ENCODINGS
+from transientcam_server.imaging.encodings.compact import stream_encoding
 from transientcam_server.imaging.encodings.encoding import ENCODINGS, Encoding
 
-__all__ = ["ENCODINGS", "STREAM_ENCODINGS", "Encoding"]
+__all__ = ["ENCODINGS", "Encoding", "stream_encoding"]

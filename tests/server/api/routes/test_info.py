@@ -13,7 +13,7 @@ def test_the_service_says_what_it_is_and_what_its_frames_have(http: httpx.Client
         "path": "/api/v1/stream",
         "subprotocol": wire.SUBPROTOCOL,
         "asyncapi": "/asyncapi.json",
-        "encodings": list(wire.ENCODINGS),
+        "encodings": list(wire.encoding_names()),
     }
     assert info["caller"] == {"name": "anybody", "role": "admin"}
     products = {product["name"]: product for product in info["products"]}
