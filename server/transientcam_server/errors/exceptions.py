@@ -13,7 +13,8 @@
     │   └── NotConvertible   the format asked for is none that recordings are converted to
     ├── TokenFileError       the file of tokens cannot be read or written
     ├── UnknownToken         no token has this id
-    ├── JobCancelled         somebody wants a job to end
+    ├── JobCancelled         a client cancelled a job
+    ├── SequenceConflict     the running sequence is not the one that a change was made for
     └── Problem              a request cannot be answered; see `transientcam_server.api.problems`
 
 Errors of the driver and of the arithmetic become problems in one place,
@@ -23,6 +24,7 @@ Errors of the driver and of the arithmetic become problems in one place,
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from transientcam_driver import AppliedSequence
 from transientcam_server.errors.kinds import ProblemKind
 
 
@@ -167,6 +169,17 @@ class JobCancelled(ServerError):  # noqa: N818 - says what is wrong
 
     def __str__(self) -> str:
         return f"the job {self.job_id} was cancelled"
+
+
+class SequenceConflict(ServerError):  # noqa: N818 - says what is wrong
+    """The sequence was changed since; ``running`` is the one that runs now."""
+
+    def __init__(self, running: AppliedSequence) -> None:
+        super().__init__(running)
+        self.running = running
+
+    def __str__(self) -> str:
+        return f"the running sequence has epoch {self.running.epoch}"
 
 
 class Problem(ServerError):  # noqa: N818 - RFC 9457 calls it so
