@@ -9,8 +9,7 @@ from fastapi import Depends, Path, Query, Request, Response
 from pydantic import FiniteFloat
 
 from transientcam_server.api.negotiation import negotiate
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging.encodings.encoding import (
     COLOUR_PNG,
     ENCODINGS,

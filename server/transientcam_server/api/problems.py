@@ -14,15 +14,14 @@ from starlette.routing import Match
 from transientcam.wire import PROBLEM_MEDIA_TYPE
 from transientcam_driver import DriverError
 from transientcam_moments import ParameterError
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem, kinds
 from transientcam_server.errors.kinds import ProblemKind
 from transientcam_server.errors.translation import (
     ProblemDocument,
     plain,
-    shortened,
     problem_document,
     problem_of,
+    shortened,
 )
 from transientcam_server.logs import request_id
 

@@ -120,5 +120,6 @@ def plain(value: object) -> object:
 
 
 def shortened(text: str) -> str:
+    """Return a text of at most 200 characters that can be encoded."""
     text = text.encode("utf-8", "replace").decode()  # JSON may bring half a character
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"

@@ -10,8 +10,7 @@ from pydantic import AfterValidator, BaseModel, Field, ValidationError
 from transientcam.errors import ProtocolError
 from transientcam_driver import CameraFault, CameraLost, CameraNotFound, FrameTimeout, SequenceError
 from transientcam_server.api.problems import _of_validation, documented, problem_response
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem, kinds
 from transientcam_server.errors.translation import problem_document, problem_of
 
 

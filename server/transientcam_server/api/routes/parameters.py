@@ -6,7 +6,7 @@ from fastapi import APIRouter
 
 from transientcam_server.api import parameters
 from transientcam_server.api.dependencies import ServiceOf
-from transientcam_server.api.documents.document import Document
+from transientcam_server.api.documents import Document
 from transientcam_server.recording.replay import ReplayCamera
 
 router = APIRouter(tags=["parameters"])

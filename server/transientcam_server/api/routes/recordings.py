@@ -7,8 +7,8 @@ from fastapi import APIRouter, Path, status
 from fastapi.responses import FileResponse
 
 from transientcam_server.api import downloads
+from transientcam_server.api.auth import Role
 from transientcam_server.api.auth.permissions import needs
-from transientcam_server.api.auth.tokens import Role
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.recording import (
     RecordingChange,

@@ -8,8 +8,8 @@ from pydantic import WithJsonSchema
 
 from transientcam_driver import AppliedSequence, Sequence
 from transientcam_server.api import etags
+from transientcam_server.api.auth import Role
 from transientcam_server.api.auth.permissions import needs
-from transientcam_server.api.auth.tokens import Role
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.sequence import AppliedDocument, SequenceDocument
 from transientcam_server.api.problems import documented
