@@ -40,6 +40,7 @@ paper: .venv/test.stamp  ## Make the paper's figures, beside what the paper says
 
 docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (more than an hour on a quiet machine)
 	$(BIN)/python -m benchmarks.reference --write
+	$(BIN)/python -m benchmarks.examples --write
 	$(BIN)/python -m benchmarks --write
 	$(BIN)/python -m benchmarks.stability
 	$(BIN)/python -m benchmarks.accuracy --write

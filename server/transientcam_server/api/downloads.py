@@ -8,8 +8,7 @@ from typing import Annotated, Any, Final
 from fastapi import Header
 from fastapi.responses import FileResponse
 
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem, kinds
 
 _RANGES: Final = re.compile(r"bytes=\s*(\d+-\d*|-\d+)(\s*,\s*(\d+-\d*|-\d+))*\s*", re.ASCII)
 Range = Annotated[

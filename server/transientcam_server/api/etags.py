@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final
 
 from fastapi import Header
 
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem
 from transientcam_server.errors.kinds import ProblemKind
 
 IfMatch = Annotated[

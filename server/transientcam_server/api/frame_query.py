@@ -10,8 +10,7 @@ from pydantic import FiniteFloat
 
 from transientcam import wire
 from transientcam_server.api.negotiation import negotiate
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging.encodings.encoding import (
     COLOUR_PNG,
     ENCODINGS,

@@ -1,8 +1,7 @@
 """Which encoding an HTTP answer has: by its suffix or by the Accept header."""
 
 from transientcam import wire
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging.encodings.encoding import ENCODINGS, MSGPACK, PNG, TIFF, Encoding
 from transientcam_server.imaging.products import Product
 

@@ -1,6 +1,6 @@
 """Errors as RFC 9457 problem documents, and the one place where foreign errors become problems."""
 
-import logging
+import re
 from collections.abc import Callable, Iterable
 from http import HTTPStatus
 from typing import Any
@@ -9,26 +9,22 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from starlette.exceptions import HTTPException
-from starlette.routing import compile_path
+from starlette.routing import Match
 
 from transientcam.wire import PROBLEM_MEDIA_TYPE
-from transientcam_driver import (
-    DriverError,
-)
+from transientcam_driver import DriverError
 from transientcam_moments import ParameterError
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem, kinds
 from transientcam_server.errors.kinds import ProblemKind
 from transientcam_server.errors.translation import (
     ProblemDocument,
-    _plain,
-    _shortened,
+    plain,
     problem_document,
     problem_of,
+    shortened,
 )
 from transientcam_server.logs import request_id
 
-_log = logging.getLogger(__name__)
 _KIND_OF_STATUS = {
     kind.status: kind
     for kind in (kinds.BAD_REQUEST, kinds.NOT_FOUND, kinds.METHOD_NOT_ALLOWED, kinds.TOO_LARGE)
@@ -130,24 +126,23 @@ def _of_http(error: HTTPException, request: Request) -> Problem:
         status = HTTPStatus(error.status_code)
         kind = ProblemKind(status.phrase.lower().replace(" ", "-"), status, status.phrase, "")
     if kind is kinds.NOT_FOUND:
-        return Problem(kind, f"Nothing is at {_shortened(request.url.path)}.")
+        return Problem(kind, f"Nothing is at {shortened(request.url.path)}.")
     if kind is kinds.METHOD_NOT_ALLOWED:
-        detail = f"{_shortened(request.url.path)} does not answer {request.method}."
+        detail = f"{shortened(request.url.path)} does not answer {request.method}."
         return Problem(kind, detail)
     return Problem(kind, str(error.detail))
 
 
 def _allowed(request: Request) -> str:
-    """Return every method a path answers; the framework knows only those of one route of it."""
+    """Return every method of a path; the framework names only those of the first route."""
     app: FastAPI = request.app
-    methods = {
-        allowed
-        for template, operations in app.openapi()["paths"].items()
-        if compile_path(template)[0].match(request.url.path)
-        for method in operations
-        for allowed in (["GET", "HEAD"] if method == "get" else [method.upper()])
-    }
-    return ", ".join(sorted(methods))
+
+    def answered(method: str) -> bool:
+        scope = {**request.scope, "method": method}
+        return any(route.matches(scope)[0] is Match.FULL for route in app.routes)
+
+    methods = {method for method in ("DELETE", "GET", "PATCH", "POST", "PUT") if answered(method)}
+    return ", ".join(sorted(methods | ({"HEAD"} if "GET" in methods else set())))
 
 
 def _of_validation(error: RequestValidationError) -> Problem:
@@ -159,39 +154,33 @@ def _of_validation(error: RequestValidationError) -> Problem:
 
 
 def _mistake(each: dict[str, Any]) -> dict[str, Any]:
+    if each["type"] == "json_invalid":  # its place is that of a character
+        return {"field": "body", "value": None, "limit": _limit(each)}
     # the first part of the place says only whether it was body, query or path
     parts = [str(part) for part in each["loc"][1:]] or [str(each["loc"][0])]
-    kind, context = each["type"], each.get("ctx") or {}
-    limits = {
-        "missing": "given",
-        "extra_forbidden": "left out",
-        "json_invalid": f"valid JSON ({context.get('error', '')})",
-        "model_attributes_type": "a JSON object",
-        "finite_number": "a finite number",
-        "literal_error": str(context.get("expected")),
-        "greater_than_equal": f"at least {context.get('ge')}",
-        "greater_than": f"greater than {context.get('gt')}",
-        "less_than_equal": f"at most {context.get('le')}",
-        "less_than": f"less than {context.get('lt')}",
-        "too_long": f"at most {context.get('max_length')} items",
-        "string_too_long": f"at most {context.get('max_length')} characters",
-        "string_too_short": f"at least {context.get('min_length')} characters",
-        "string_type": "text",
-        "value_error": str(context.get("error")).removeprefix("must be "),
-        "int_parsing": "an integer",
-        "int_type": "an integer",
-        "int_from_float": "an integer",
-        "float_parsing": "a number",
-        "float_type": "a number",
-        "bool_type": "true or false",
-        "bool_parsing": "true or false",
-    }
-    value = None if kind == "missing" else _plain(each.get("input"))
-    if kind == "json_invalid":
-        parts, value = ["body"], None
-    limit = limits.get(kind) or str(each["msg"]).removeprefix("Input should be ")
-    return {"field": ".".join(parts), "value": value, "limit": limit}
+    value = None if each["type"] == "missing" else plain(each.get("input"))
+    return {"field": ".".join(parts), "value": value, "limit": _limit(each)}
+
+
+def _limit(each: dict[str, Any]) -> str:
+    """Return what a value must be, in pydantic's words; they are to follow "must be"."""
+    message = str(each.get("msg", ""))
+    match each["type"]:
+        case "missing":
+            return "given"
+        case "extra_forbidden":
+            return "left out"
+        case "model_attributes_type":
+            return "a JSON object"
+        case "json_invalid":
+            return f"valid JSON ({(each.get('ctx') or {}).get('error', '')})"
+        case "value_error":
+            return message.removeprefix("Value error, ").removeprefix("must be ")
+    limit = re.sub(r"^Input should be |^\w+ should have ", "", message)
+    return limit.replace("greater than or equal to", "at least").replace(
+        "less than or equal to", "at most"
+    )
 
 
 def _shown(value: object) -> str:
-    return "missing" if value is None else _shortened(repr(value))
+    return "missing" if value is None else shortened(repr(value))

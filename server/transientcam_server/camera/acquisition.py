@@ -24,7 +24,7 @@ from transientcam_driver import (
 from transientcam_server.camera.events import Back, Captured, Event, Lost, SequenceChanged
 from transientcam_server.camera.source import Camera
 from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import JobCancelled, Problem
+from transientcam_server.errors.exceptions import JobCancelled, Problem, SequenceConflict
 
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
@@ -119,9 +119,11 @@ class Acquisition:
         self._thread.join()
 
     def configure(
-        self, sequence: Sequence, *, check: Callable[[AppliedSequence], None] | None = None
+        self, sequence: Sequence, *, expected: int | None = None
     ) -> "Future[AppliedSequence]":
-        """Change the sequence, unless ``check`` raises for the one that is running then.
+        """Change the sequence; with ``expected``, only if the running one still has that epoch.
+
+        The future raises `SequenceConflict` where it has another one.
 
         Raises
         ------
@@ -130,7 +132,7 @@ class Acquisition:
         """
         with self._occupied:
             self.require_free()
-            return self.submit(lambda: self._configure(sequence, check))
+            return self.submit(lambda: self._configure(sequence, expected))
 
     def set_running(self, running: bool) -> "Future[None]":
         """Start or stop capturing; stopping also ends what has the camera for itself.
@@ -282,11 +284,10 @@ class Acquisition:
         while len(self._applied) > 8:  # frames of older sequences have long been read
             del self._applied[next(iter(self._applied))]
 
-    def _configure(
-        self, sequence: Sequence, check: Callable[[AppliedSequence], None] | None = None
-    ) -> AppliedSequence:
-        if check is not None:
-            check(self._camera.applied)
+    def _configure(self, sequence: Sequence, expected: int | None = None) -> AppliedSequence:
+        running = self._camera.applied
+        if expected is not None and running.epoch != expected:
+            raise SequenceConflict(running)
         applied = self._camera.configure(sequence)
         self._remember(applied)
         self._arrivals_s.clear()

@@ -1,1 +1,1 @@
-"""Parts."""
+"""The process around the service: settings, socket, connections, signals, systemd, mDNS."""

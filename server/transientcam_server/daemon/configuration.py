@@ -24,8 +24,9 @@ from pydantic_settings import (
     SettingsConfigDict,
 )
 
-from transientcam_server.api.auth.tokens import TokenFile
-from transientcam_server.errors.exceptions import SettingsError, SettingsMistake, TokenFileError
+from transientcam_server.api.auth import TokenFile
+from transientcam_server.errors import SettingsError
+from transientcam_server.errors.exceptions import SettingsMistake, TokenFileError
 from transientcam_server.settings import Settings
 
 ENVIRONMENT_PREFIX: Final = "TRANSIENTCAM_"

@@ -22,7 +22,8 @@ from transientcam.transport.errors import translated
 from transientcam_moments._kernels.cache import cache_directory, digest_of_sources
 from transientcam_server.daemon.configuration import load_settings
 from transientcam_server.daemon.server import listen
-from transientcam_server.errors.exceptions import AddressUnavailable, SettingsError
+from transientcam_server.errors import SettingsError
+from transientcam_server.errors.exceptions import AddressUnavailable
 from transientcam_server.settings import Settings
 
 Reported = tuple[str, str, str, str | None]

@@ -3,31 +3,46 @@
 ::
 
     ServerError
-    ├── SettingsError        a setting cannot be used; says where it was given
+    ├── SettingsError        a setting cannot be used; names where it was given
     ├── AddressUnavailable   the address cannot be listened on
-    ├── MissingExtra         something optional is asked for that is not installed
+    ├── MissingExtra         an optional feature is requested whose packages are not installed
     ├── InputError           a file given to `transientcam reconstruct` cannot be used
     ├── RecordingError       something about a recording
     │   ├── NotARecording    a file cannot be read as one
     │   ├── DamagedFrame     a frame's bytes are not the ones that were written
-    │   └── NotConvertible   the format asked for is none that recordings are converted to
+    │   └── NotConvertible   the format requested is none that recordings are converted to
     ├── TokenFileError       the file of tokens cannot be read or written
     ├── UnknownToken         no token has this id
-    ├── JobCancelled         somebody wants a job to end
+    ├── JobCancelled         a client cancelled a job
+    ├── SequenceConflict     the running sequence is not the one that a change was made for
     └── Problem              a request cannot be answered; see `transientcam_server.api.problems`
 
 Errors of the driver and of the arithmetic become problems in one place,
-`transientcam_server.api.problems.problem_of`.
+`transientcam_server.errors.translation.problem_of`.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
+from transientcam_driver import AppliedSequence
 from transientcam_server.errors.kinds import ProblemKind
 
 
 class ServerError(Exception):
-    """Root of all errors of this package."""
+    """Root of all errors of this package.
+
+    Most are dataclasses of their data; ``_sentence`` is a format string of its fields, and what
+    ``str`` returns.
+    """
+
+    _sentence: ClassVar[str] = ""
+
+    def __post_init__(self) -> None:
+        self.args = tuple(vars(self).values())  # by which it is pickled
+
+    def __str__(self) -> str:
+        return self._sentence.format_map(vars(self)) if self._sentence else super().__str__()
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,131 +57,113 @@ class SettingsMistake:
         return f"{self.place}: {self.reason} (given: {self.value!r})"
 
 
+@dataclass(eq=False, repr=False)
 class SettingsError(ServerError):
     """Settings cannot be used; ``mistakes`` lists every one of them with its place."""
 
-    def __init__(self, mistakes: Sequence[SettingsMistake]) -> None:
-        super().__init__(*mistakes)
-        self.mistakes = tuple(mistakes)
+    mistakes: Sequence[SettingsMistake]
 
     def __str__(self) -> str:
         return "\n".join(str(mistake) for mistake in self.mistakes)
 
 
+@dataclass(eq=False, repr=False)
 class AddressUnavailable(ServerError):  # noqa: N818 - says what is wrong
     """The address cannot be listened on."""
 
-    def __init__(self, host: str, port: int, reason: str) -> None:
-        super().__init__(host, port, reason)
-        self.host = host
-        self.port = port
-        self.reason = reason
-
-    def __str__(self) -> str:
-        return f"cannot listen on {self.host}, port {self.port}: {self.reason}"
+    host: str
+    port: int
+    reason: str
+    _sentence = "cannot listen on {host}, port {port}: {reason}"
 
 
+@dataclass(eq=False, repr=False)
 class MissingExtra(ServerError):  # noqa: N818 - says what is wrong
-    """Something optional was asked for whose packages are not installed."""
+    """An optional feature was requested whose packages are not installed."""
 
-    def __init__(self, what: str, module: str, extra: str) -> None:
-        super().__init__(what, module, extra)
-        self.what = what
-        self.module = module
-        self.extra = extra
-
-    def __str__(self) -> str:
-        return f"{self.what} needs {self.module}: pip install 'transientcam[{self.extra}]'"
+    what: str
+    module: str
+    extra: str
+    _sentence = "{what} needs {module}: pip install 'transientcam[{extra}]'"
 
 
+@dataclass(eq=False, repr=False)
 class InputError(ServerError):
     """A measurement cannot be reconstructed: ``key`` of ``file`` is ``found``, not ``expected``."""
 
-    def __init__(self, file: str, key: str, found: str, expected: str) -> None:
-        super().__init__(file, key, found, expected)
-        self.file = file
-        self.key = key
-        self.found = found
-        self.expected = expected
-
-    def __str__(self) -> str:
-        return f"{self.file}: {self.key} is {self.found}, but must be {self.expected}"
+    file: str
+    key: str
+    found: str
+    expected: str
+    _sentence = "{file}: {key} is {found}, but must be {expected}"
 
 
 class RecordingError(ServerError):
     """Something about a recording."""
 
 
+@dataclass(eq=False, repr=False)
 class NotARecording(RecordingError):  # noqa: N818 - says what is wrong
     """A file cannot be read as a recording."""
 
-    def __init__(self, file: str, reason: str) -> None:
-        super().__init__(file, reason)
-        self.file = file
-        self.reason = reason
-
-    def __str__(self) -> str:
-        return f"{self.file} is no recording that can be read: {self.reason}"
+    file: str
+    reason: str
+    _sentence = "{file} is no recording that can be read: {reason}"
 
 
+@dataclass(eq=False, repr=False)
 class DamagedFrame(RecordingError):  # noqa: N818 - says what is wrong
     """The bytes of a frame (counted from 0) are not the ones that were written."""
 
-    def __init__(self, file: str, frame: int, reason: str) -> None:
-        super().__init__(file, frame, reason)
-        self.file = file
-        self.frame = frame
-        self.reason = reason
-
-    def __str__(self) -> str:
-        return f"{self.file}: frame {self.frame} is damaged: {self.reason}"
+    file: str
+    frame: int
+    reason: str
+    _sentence = "{file}: frame {frame} is damaged: {reason}"
 
 
+@dataclass(eq=False, repr=False)
 class NotConvertible(RecordingError):  # noqa: N818 - says what is wrong
     """A file's suffix names no format that recordings are converted to."""
 
-    def __init__(self, file: str, known: Sequence[str]) -> None:
-        super().__init__(file, tuple(known))
-        self.file = file
-        self.known = tuple(known)
+    file: str
+    known: Sequence[str]
 
     def __str__(self) -> str:
         return f"{self.file}: recordings are converted to {', '.join(self.known)}"
 
 
+@dataclass(eq=False, repr=False)
 class TokenFileError(ServerError):
     """The file of tokens cannot be read or written."""
 
-    def __init__(self, file: str, reason: str) -> None:
-        super().__init__(file, reason)
-        self.file = file
-        self.reason = reason
-
-    def __str__(self) -> str:
-        return f"the tokens in {self.file} cannot be used: {self.reason}"
+    file: str
+    reason: str
+    _sentence = "the tokens in {file} cannot be used: {reason}"
 
 
+@dataclass(eq=False, repr=False)
 class UnknownToken(ServerError):  # noqa: N818 - says what is wrong
     """No token has this id."""
 
-    def __init__(self, token_id: str, file: str) -> None:
-        super().__init__(token_id, file)
-        self.token_id = token_id
-        self.file = file
-
-    def __str__(self) -> str:
-        return f"{self.file} has no token {self.token_id}"
+    token_id: str
+    file: str
+    _sentence = "{file} has no token {token_id}"
 
 
+@dataclass(eq=False, repr=False)
 class JobCancelled(ServerError):  # noqa: N818 - says what is wrong
-    """Somebody wants a job to end."""
+    """A client cancelled a job."""
 
-    def __init__(self, job_id: str) -> None:
-        super().__init__(job_id)
-        self.job_id = job_id
+    job_id: str
+    _sentence = "the job {job_id} was cancelled"
 
-    def __str__(self) -> str:
-        return f"the job {self.job_id} was cancelled"
+
+@dataclass(eq=False, repr=False)
+class SequenceConflict(ServerError):  # noqa: N818 - says what is wrong
+    """The sequence was changed since; ``running`` is the one that runs now."""
+
+    running: AppliedSequence
+    _sentence = "the running sequence has epoch {running.epoch}"
 
 
 class Problem(ServerError):  # noqa: N818 - RFC 9457 calls it so

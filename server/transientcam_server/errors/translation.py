@@ -50,7 +50,7 @@ def problem_document(problem: Problem, *, instance: str | None = None) -> dict[s
     }
     if instance is not None:
         document["instance"] = instance
-    return document | {key: _plain(value) for key, value in problem.extensions.items()}
+    return document | {key: plain(value) for key, value in problem.extensions.items()}
 
 
 def problem_of(error: Exception) -> Problem:
@@ -102,7 +102,7 @@ def problem_of(error: Exception) -> Problem:
             return Problem(kinds.INTERNAL_ERROR, "The service failed; its log says more.")
 
 
-def _plain(value: object) -> object:
+def plain(value: object) -> object:
     """Return a value as JSON can carry it: no NaN, nothing long, no foreign type."""
     match value:
         case None | bool() | int():
@@ -110,15 +110,16 @@ def _plain(value: object) -> object:
         case float():
             return value if math.isfinite(value) else str(value)
         case str():
-            return _shortened(value)
+            return shortened(value)
         case dict():
-            return {str(key): _plain(each) for key, each in list(value.items())[:64]}
+            return {str(key): plain(each) for key, each in list(value.items())[:64]}
         case list() | tuple():
-            return [_plain(each) for each in value[:64]]
+            return [plain(each) for each in value[:64]]
         case _:
-            return _shortened(str(value))
+            return shortened(str(value))
 
 
-def _shortened(text: str) -> str:
+def shortened(text: str) -> str:
+    """Return a text of at most 200 characters that can be encoded."""
     text = text.encode("utf-8", "replace").decode()  # JSON may bring half a character
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"

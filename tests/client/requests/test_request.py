@@ -11,7 +11,7 @@ from transientcam.requests import Answer, document
 
 _PROBLEM = {
     "type": "/problems/invalid-sequence",
-    "title": "The camera cannot run this sequence",
+    "title": "Invalid sequence",
     "status": 422,
     "detail": "harmonics is 99, but must be from 1 to 32",
     "field": "harmonics",

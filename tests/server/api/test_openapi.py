@@ -7,6 +7,7 @@ import pytest
 
 from tests.server.contract import find_operation, validate
 from tests.serving import Served
+from transientcam_server.api.documents.document import EXAMPLES
 from transientcam_server.errors.kinds import KINDS
 
 PROBLEM = "application/problem+json"
@@ -126,6 +127,10 @@ def test_every_answer_has_an_example_that_fits(document: dict[str, Any]) -> None
                 assert examples, (name, status)
                 for example in examples:
                     validate(document, schema, example)
+
+
+def test_each_captured_example_is_of_one_described_document(document: dict[str, Any]) -> None:
+    assert EXAMPLES.keys() <= document["components"]["schemas"].keys()
 
 
 def test_every_error_is_described_as_a_problem_with_its_kinds(document: dict[str, Any]) -> None:

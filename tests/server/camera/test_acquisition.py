@@ -24,7 +24,7 @@ from transientcam_driver import (
 from transientcam_server.camera.acquisition import STALLED_MIN_S, Acquisition
 from transientcam_server.camera.events import Back, Captured, Event, Lost, SequenceChanged
 from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import JobCancelled, Problem
+from transientcam_server.errors.exceptions import JobCancelled, Problem, SequenceConflict
 
 PATIENCE_S = 60.0
 APPLIED = AppliedSequence(
@@ -132,6 +132,16 @@ def test_frames_are_reported_with_the_sequence_they_were_captured_with() -> None
     assert changed == SequenceChanged(applied)
     assert isinstance(second, Captured)
     assert second.applied == applied
+
+
+def test_a_change_of_a_sequence_that_was_changed_meanwhile_is_refused() -> None:
+    with running() as one:
+        configure = one.acquisition.configure
+        first = configure(Sequence(harmonics=4), expected=APPLIED.epoch).result(PATIENCE_S)
+        with pytest.raises(SequenceConflict) as late:
+            configure(Sequence(harmonics=5), expected=APPLIED.epoch).result(PATIENCE_S)
+
+        assert late.value.running == first == one.camera.applied
 
 
 def test_a_refused_command_is_answered_to_who_gave_it_and_changes_nothing() -> None:

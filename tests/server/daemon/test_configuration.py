@@ -7,7 +7,7 @@ import pytest
 from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
 from transientcam_server.daemon.configuration import OTHER_VARIABLES, load_settings
 from transientcam_server.daemon.configuration import load as load_with_places
-from transientcam_server.errors.exceptions import SettingsError
+from transientcam_server.errors import SettingsError
 from transientcam_server.settings import Settings
 
 

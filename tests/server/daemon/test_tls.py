@@ -9,7 +9,7 @@ from tests.serving import serving
 from transientcam import Camera
 from transientcam.errors import ServerUnreachable
 from transientcam_server.daemon.configuration import load_settings
-from transientcam_server.errors.exceptions import SettingsError
+from transientcam_server.errors import SettingsError
 
 
 @pytest.fixture(scope="module")

@@ -46,9 +46,9 @@ test("a measurement is followed to its end, and the list read anew then", async 
 
 test("a measurement that failed says why", async () => {
   await calibrations.measure({ name: "", frames: 40, activate: true });
-  answers.push(job("failed", { problem: { title: "The camera is not connected" } }));
+  answers.push(job("failed", { problem: { title: "Camera not connected" } }));
   await vi.advanceTimersByTimeAsync(500);
-  expect(calibrations.outcome.value).toEqual({ good: false, words: "The camera is not connected" });
+  expect(calibrations.outcome.value).toEqual({ good: false, words: "Camera not connected" });
 });
 
 test("a service that cannot be reached for a while loses no measurement; one started anew does", async () => {
@@ -56,7 +56,7 @@ test("a service that cannot be reached for a while loses no measurement; one sta
   answers.push(new RequestError({ title: "The service cannot be reached." }));
   await vi.advanceTimersByTimeAsync(500);
   expect(calibrations.job.value).not.toBeNull();
-  answers.push(new RequestError({ title: "There is no such job", status: 404 }));
+  answers.push(new RequestError({ title: "Unknown job", status: 404 }));
   await vi.advanceTimersByTimeAsync(500);
   expect(calibrations.job.value).toBeNull();
 });

@@ -20,8 +20,8 @@ function camera(answers: (number | RequestError)[]): { api: Api; told: string[] 
   return { api, told };
 }
 
-const early = new RequestError({ type: "/problems/no-frame-yet", title: "There is no such frame yet" });
-const lost = new RequestError({ type: "/problems/camera-lost", title: "The camera is not connected" });
+const early = new RequestError({ type: "/problems/no-frame-yet", title: "No frame yet" });
+const lost = new RequestError({ type: "/problems/camera-lost", title: "Camera not connected" });
 
 test("a single capture is a frame that begins after it was asked for; the camera stands then", async () => {
   const { api, told } = camera([8]);

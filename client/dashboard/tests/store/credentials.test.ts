@@ -35,7 +35,7 @@ test("where nothing is kept, a token holds as long as the page", () => {
 });
 
 test("a token that is refused is said so, until another is shown", async () => {
-  const problem = { type: "/problems/token-refused", title: "This token is not valid here", status: 401 };
+  const problem = { type: "/problems/token-refused", title: "Invalid token", status: 401 };
   const sent: unknown[] = [];
   const api = new Api((_, init) => {
     sent.push((init?.headers as Record<string, string>)["Authorization"]);

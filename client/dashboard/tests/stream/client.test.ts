@@ -169,7 +169,7 @@ describe("between worker and store", () => {
   });
 
   test("a service that lets nobody in without a token makes the page ask for one, and hears of it", () => {
-    const problem = { type: "/problems/token-required", title: "Who are you?", status: 401 };
+    const problem = { type: "/problems/token-required", title: "Authentication required", status: 401 };
     page.receives({ type: "message", message: { type: "error", problem } }, { type: "refused" });
     expect(page.store.status.unreadable.value).toBeNull();
     expect(page.store.status.connection.value).toEqual({ kind: "refused" });

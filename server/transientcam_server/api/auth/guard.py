@@ -11,8 +11,8 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
 from transientcam_server.api.problems import problem_response
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem, TokenFileError
+from transientcam_server.errors import Problem, kinds
+from transientcam_server.errors.exceptions import TokenFileError
 from transientcam_server.settings import Settings
 
 _log = logging.getLogger(__name__)

@@ -16,8 +16,7 @@ from transientcam_server.api.auth.guard import Principal
 from transientcam_server.api.auth.tokens import Role
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.problems import document_problems
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem, kinds
 
 _READS: Final = frozenset(("GET", "HEAD", "OPTIONS"))
 _Endpoint = TypeVar("_Endpoint", bound=Callable[..., Any])

@@ -1,1 +1,1 @@
-"""Parts."""
+"""The documentation that the service serves: OpenAPI pages, AsyncAPI, pages of problems."""

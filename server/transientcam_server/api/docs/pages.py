@@ -10,8 +10,7 @@ from fastapi import Path as PathParameter
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, Response
 
 from transientcam_server.api.docs import asyncapi
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem, kinds
 
 STATIC: Final = Path(__file__).parents[2] / "static"
 

@@ -2,28 +2,12 @@
 
 from typing import Any, Final
 
-from pydantic import ConfigDict, Field, JsonValue
+from pydantic import ConfigDict, Field
 
 from transientcam_driver.calibration.capture import DEFAULT_TAKES
 from transientcam_server.api.documents.document import Document
-from transientcam_server.api.documents.sequence import SEQUENCE_EXAMPLE
 
 MAX_NAME: Final = 200
-_EXAMPLE: Final[dict[str, JsonValue]] = {
-    "id": "SIM-prototype-0-3f9c2a71b04e",
-    "name": "after warm-up",
-    "created_at": 1795161600.25,
-    "age_s": 3600.0,
-    "device": {"model": "simulated", "serial": "SIM-prototype-0", "width": 163, "height": 120},
-    "sequence": SEQUENCE_EXAMPLE,
-    "exposure_s": 0.00192,
-    "temperature_c": 31.5,
-    "bytes": 1466368,
-    "fits": True,
-    "reason": None,
-    "active": True,
-    "drift": {"invalid_share": 0.004, "invalid_share_at_capture": 0.003, "frame": 1204},
-}
 
 
 class DeviceDocument(Document):
@@ -53,8 +37,6 @@ class DriftDocument(Document):
 class CalibrationDocument(Document):
     """A calibration, and whether it is good for what is captured at present."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
-
     id: str
     name: str
     created_at: float
@@ -81,18 +63,6 @@ class CalibrationDocument(Document):
 class ActiveDocument(Document):
     """The calibration that is active, and what frames are really calibrated by."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "id": "SIM-prototype-0-3f9c2a71b04e",
-                    "calibration_id": "nominal",
-                    "reason": "the calibration is for harmonics = 3, not 2",
-                }
-            ]
-        }
-    )
-
     id: str
     """`nominal` for the gains that an ideal modulation would have."""
     calibration_id: str
@@ -103,18 +73,6 @@ class ActiveDocument(Document):
 
 class CalibrationsDocument(Document):
     """All calibrations there are."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "active": "SIM-prototype-0-3f9c2a71b04e",
-                    "directory": "/var/lib/transientcam/calibrations",
-                    "calibrations": [_EXAMPLE],
-                }
-            ]
-        }
-    )
 
     active: str
     """Id of the active one, or `nominal`."""

@@ -10,30 +10,6 @@ from transientcam_server.api.documents.document import Document
 class CameraDocument(Document):
     """The camera: what it can do, and how it is."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "state": "streaming",
-                    "reason": None,
-                    "simulated": True,
-                    "capabilities": {"model": "simulated", "width": 163, "height": 120},
-                    "intrinsics": {
-                        "fx": 223.92,
-                        "fy": 223.92,
-                        "cx": 81.0,
-                        "cy": 59.5,
-                        "width": 163,
-                        "height": 120,
-                        "source": "scene",
-                    },
-                    "status": {"temperature_c": 31.5},
-                    "counters": {"images": 4096, "lost": 0, "corrupt": 0, "resyncs": 0},
-                }
-            ]
-        }
-    )
-
     class IntrinsicsDocument(Document):
         """A pinhole camera, in pixels; whole numbers are the centres of pixels."""
 
@@ -62,21 +38,6 @@ class CameraDocument(Document):
 
 class AcquisitionDocument(Document):
     """Whether frames are captured, and how fast."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "running": True,
-                    "state": "streaming",
-                    "rate_hz": 10.59,
-                    "frames": 1204,
-                    "frame_age_s": 0.031,
-                    "stalled": False,
-                }
-            ]
-        }
-    )
 
     running: bool
     state: Literal["starting", "streaming", "stopped", "calibrating", "lost"]

@@ -1,9 +1,29 @@
 """What all JSON documents of the REST interface have in common."""
 
-from pydantic import BaseModel, ConfigDict
+import json
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+EXAMPLES_FILE: Final = Path(__file__).with_name("examples.json")
+"""What a simulated camera answered; ``python -m benchmarks.examples --write`` writes it."""
+EXAMPLES: Final[dict[str, Any]] = json.loads(EXAMPLES_FILE.read_text(encoding="utf-8"))
+"""An example of each document that is answered, by the name of its model."""
 
 
 class Document(BaseModel):
-    """A JSON document whose fields are described beside them."""
+    """A JSON document whose fields are described beside them, and whose example was captured."""
 
     model_config = ConfigDict(use_attribute_docstrings=True)
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        schema = handler(core_schema)
+        if cls.__name__ in EXAMPLES:
+            handler.resolve_ref_schema(schema)["examples"] = [EXAMPLES[cls.__name__]]
+        return schema

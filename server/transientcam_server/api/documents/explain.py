@@ -2,8 +2,6 @@
 
 from typing import Literal
 
-from pydantic import ConfigDict
-
 from transientcam_server.api.documents.document import Document
 from transientcam_server.api.documents.sequence import SequenceDocument
 
@@ -26,32 +24,6 @@ class EffectDocument(Document):
 
 class ExplanationDocument(Document):
     """What the simulated scene and the present sequence call for."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "scene": "mirrors",
-                    "device": "ideal",
-                    "sequence": {"base_frequency_hz": 23e6, "harmonics": 3},
-                    "noise_floor_dn": 20.5,
-                    "called_above": 0.1,
-                    "effects": [
-                        {
-                            "effect": "shot-noise",
-                            "choice": "auto",
-                            "called_for": True,
-                            "built": True,
-                            "reason": "7612 electrons in a typical pixel",
-                            "size_dn": 19.4,
-                            "relative": 0.95,
-                            "cost_s": 0.0038,
-                        }
-                    ],
-                }
-            ]
-        }
-    )
 
     scene: str
     device: str

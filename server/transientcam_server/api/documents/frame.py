@@ -1,40 +1,6 @@
 """The JSON documents about frames."""
 
-from pydantic import ConfigDict, JsonValue
-
 from transientcam_server.api.documents.document import Document
-
-META_EXAMPLE: dict[str, JsonValue] = {
-    "frame": 1204,
-    "sequence_id": 1,
-    "calibration_id": "nominal",
-    "reconstruction_id": 1,
-    "device_time_s": 113.52,
-    "host_time_s": 1795161600.25,
-    "capture_s": 0.0944,
-    "reconstruct_s": 0.0042,
-    "base_frequency_hz": 23e6,
-    "harmonics": 3,
-    "zeroth": "low-frequency",
-    "exposure_s": 0.00192,
-    "takes": 1,
-    "width": 163,
-    "height": 120,
-    "temperature_c": 31.5,
-    "lost_images": 0,
-    "rejected_images": 0,
-    "pixels": {
-        "total": 19560,
-        "valid": 19498,
-        "biased": 62,
-        "no_signal": 0,
-        "saturated": 0,
-        "non_finite": 0,
-        "degenerate": 0,
-        "replaced": 0,
-    },
-    "predicted_range_std_m": {"median": 0.0105, "p90": 0.0291, "first_order_share": 0.61},
-}
 
 
 class PixelCountsDocument(Document):
@@ -62,8 +28,6 @@ class PredictedStdDocument(Document):
 
 class FrameDocument(Document):
     """What is known of a frame, whatever product of it is fetched."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [META_EXAMPLE]})
 
     frame: int
     """Counted from 1; never resets while the service runs."""
@@ -99,22 +63,6 @@ class FrameDocument(Document):
 
 class HistoryDocument(Document):
     """Which frames can be had, and how many may be kept."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "first": 1099,
-                    "last": 1204,
-                    "count": 106,
-                    "bytes": 66347520,
-                    "seconds": 9.94,
-                    "limit_bytes": 268435456,
-                    "limit_seconds": 10.0,
-                }
-            ]
-        }
-    )
 
     first: int | None = None
     """Null before there is any."""

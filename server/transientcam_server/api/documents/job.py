@@ -1,28 +1,14 @@
 """The JSON documents about jobs."""
 
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
-from pydantic import ConfigDict, Field, JsonValue
+from pydantic import Field
 
 from transientcam_server.api.documents.document import Document
-
-EXAMPLE: Final[dict[str, JsonValue]] = {
-    "id": "5a0c1f6be2d4",
-    "kind": "calibration",
-    "state": "running",
-    "progress": 0.35,
-    "step": "capturing",
-    "result": None,
-    "problem": None,
-    "created_at": 1795161600.25,
-    "finished_at": None,
-}
 
 
 class JobDocument(Document):
     """Long work, and where it stands."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE]})
 
     id: str
     kind: str
@@ -43,8 +29,6 @@ class JobDocument(Document):
 
 class JobsDocument(Document):
     """All jobs that are remembered."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [{"jobs": [EXAMPLE]}]})
 
     jobs: list[JobDocument]
     """The newest first."""

@@ -2,18 +2,10 @@
 
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, JsonValue, StringConstraints
+from pydantic import ConfigDict, Field, StringConstraints
 
 from transientcam_server.api.documents.document import Document
 from transientcam_server.camera.lease import DEFAULT_DURATION_S, MAX_DURATION_S, MIN_DURATION_S
-
-_HELD: dict[str, JsonValue] = {
-    "held": True,
-    "holder": "alignment on bench 2",
-    "expires_in_s": 21.4,
-    "duration_s": 30.0,
-    "on_lapse": "stop",
-}
 
 _Holder = Annotated[
     str,
@@ -26,8 +18,6 @@ _Duration = Annotated[float, Field(ge=MIN_DURATION_S, le=MAX_DURATION_S, allow_i
 
 class LeaseDocument(Document):
     """Who controls the camera."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [_HELD]})
 
     held: bool
     """Whether anybody does; where nobody does, everybody may."""
@@ -43,10 +33,6 @@ class LeaseDocument(Document):
 
 class GrantedLeaseDocument(LeaseDocument):
     """A lease, for the eyes of its holder."""
-
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [_HELD | {"lease_id": "u3Zk1yTq0v8wWlXeGd5J2A"}]}
-    )
 
     lease_id: str
     """To be sent in the header Transientcam-Lease with every change; known to nobody else."""

@@ -1,9 +1,7 @@
 """The JSON documents about one pixel of a frame."""
 
-from pydantic import ConfigDict
-
 from transientcam_server.api.documents.document import Document
-from transientcam_server.api.documents.frame import META_EXAMPLE, FrameDocument
+from transientcam_server.api.documents.frame import FrameDocument
 
 
 class ComplexDocument(Document):
@@ -44,36 +42,6 @@ class BoundsDocument(Document):
 
 class PixelDocument(Document):
     """Everything about one pixel of one frame."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "meta": META_EXAMPLE,
-                    "x": 80,
-                    "y": 60,
-                    "range_m": 1.694,
-                    "direct": 812.1,
-                    "indirect": 402.7,
-                    "brightness": 1219.6,
-                    "uniform": 4.8,
-                    "validity": 0.0041,
-                    "flags": ["biased"],
-                    "moments": [{"re": 1219.6, "im": 0.0}, {"re": -310.2, "im": 844.9}],
-                    "returns": [{"time_s": 1.13e-08, "weight": 812.1}],
-                    "time_s": [0.0, 2.1739e-08],
-                    "density_per_s": [1.1e9, 2.3e10],
-                    "cumulative": [0.0, 640.2],
-                    "bounds": {
-                        "radius": 0.93,
-                        "lower_per_s": [4.1e8, 2.7e9],
-                        "upper_per_s": [8.9e9, 6.0e10],
-                    },
-                    "truth": None,
-                }
-            ]
-        }
-    )
 
     meta: FrameDocument
     x: int

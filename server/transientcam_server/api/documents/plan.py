@@ -2,37 +2,11 @@
 
 from typing import Any
 
-from pydantic import ConfigDict, Field, JsonValue
+from pydantic import ConfigDict, Field
 
 from transientcam_server.api.documents.document import Document
-from transientcam_server.api.documents.frame import META_EXAMPLE, FrameDocument
+from transientcam_server.api.documents.frame import FrameDocument
 from transientcam_server.api.documents.sequence import SequenceDocument
-
-_SEQUENCE: dict[str, JsonValue] = {
-    "base_frequency_hz": 23e6,
-    "harmonics": 3,
-    "zeroth": "estimated",
-    "exposure_s": 0.001652,
-    "takes": 1,
-    "take_order": "sequential",
-    "sub_phases": {"scheme": "arccos", "n": 8},
-}
-_CHOICE: dict[str, JsonValue] = {
-    "sequence": _SEQUENCE,
-    "applied": {**_SEQUENCE, "images": 12, "capture_s": 0.0646, "frame_rate_hz": 14.8},
-    "capture_s": 0.0646,
-    "frame_rate_hz": 14.8,
-    "reconstruct_s": 0.0082,
-    "computing_share": 0.12,
-    "predicted": {
-        "range_std_m": {"median": 0.0098, "low": 0.0091, "high": 0.0105, "p90": 0.0247},
-        "range_bias_m": 1.3e-07,
-        "beyond_scene": False,
-        "first_order_share": 0.48,
-        "bound_width": None,
-        "separation_share": None,
-    },
-}
 
 
 class _Asked(Document):
@@ -161,19 +135,6 @@ class NeighbourDocument(ChoiceDocument):
 class PlanDocument(ChoiceDocument):
     """A recommendation and its neighbours."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    **_CHOICE,
-                    "compared_by": "range_std_m",
-                    "half_time": None,
-                    "twice_accuracy": {**_CHOICE, "time_factor": 1.25, "error_factor": 0.5},
-                }
-            ]
-        }
-    )
-
     compared_by: str
     """The target that neighbours are compared by."""
     half_time: NeighbourDocument | None = None
@@ -202,25 +163,6 @@ class CurrentDocument(Document):
 
 class TradeoffDocument(Document):
     """What accuracy costs on the scene before the camera."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "compared_by": "range_std_m",
-                    "scene_of_frame": 1204,
-                    "current": {
-                        "meta": META_EXAMPLE,
-                        "sequence": _SEQUENCE,
-                        "capture_s": 0.0904,
-                        "frame_rate_hz": 10.6,
-                        "range_error_m": None,
-                    },
-                    "front": [_CHOICE],
-                }
-            ]
-        }
-    )
 
     compared_by: str
     scene_of_frame: int

@@ -5,30 +5,9 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, ConfigDict, Field, JsonValue
 
 from transientcam_server.api.documents.document import Document
-from transientcam_server.api.documents.sequence import APPLIED_EXAMPLE, AppliedDocument
+from transientcam_server.api.documents.sequence import AppliedDocument
 
-_ID_EXAMPLE = "20261120T081500Z-3f9c2a"
 _ANNOTATIONS_EXAMPLE: dict[str, JsonValue] = {"sample": "corner, white paint", "operator": "Åsa"}
-RECORDING_EXAMPLE: dict[str, JsonValue] = {
-    "id": _ID_EXAMPLE,
-    "name": "corner at 3 m",
-    "state": "complete",
-    "frames": 318,
-    "dropped_frames": 0,
-    "size_bytes": 114873344,
-    "started_s": 1795161600.25,
-    "duration_s": 30.02,
-    "reason": "duration",
-    "problem": None,
-    "annotations": _ANNOTATIONS_EXAMPLE,
-    "sequence": APPLIED_EXAMPLE,
-    "camera": {"model": "AMCW lidar (simulated)", "serial": "SIM-mirrors", "scene": "mirrors"},
-    "calibration": {"id": "nominal"},
-    "width": 163,
-    "height": 120,
-    "versions": {"transientcam": "0.1.0"},
-    "limits": None,
-}
 
 
 def _printable(name: str) -> str:
@@ -39,8 +18,6 @@ def _printable(name: str) -> str:
 
 class RecordingDocument(Document):
     """A recording: what is in it, and how it is."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [RECORDING_EXAMPLE]})
 
     id: str
     """What requests call it."""
@@ -86,24 +63,6 @@ class RecordingLimitsDocument(Document):
 class RecordingsDocument(Document):
     """All recordings, the newest first."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "directory": "/var/lib/transientcam/recordings",
-                    "free_bytes": 214748364800,
-                    "active": None,
-                    "limits": {
-                        "max_duration_s": None,
-                        "max_bytes": None,
-                        "min_free_bytes": 1073741824,
-                    },
-                    "recordings": [RECORDING_EXAMPLE],
-                }
-            ]
-        }
-    )
-
     directory: str
     """Where they are kept, on the machine of the service."""
     free_bytes: int | None = None
@@ -116,23 +75,6 @@ class RecordingsDocument(Document):
 
 class TimelineDocument(Document):
     """Which frames a recording has, and when they were captured."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "first": 1,
-                    "last": 4,
-                    "count": 4,
-                    "duration_s": 0.283,
-                    "frame_rate_hz": 10.6,
-                    "host_time_s": 1795161600.25,
-                    "times_s": [0.0, 0.094, 0.189, 0.283],
-                    "times_step": 1,
-                }
-            ]
-        }
-    )
 
     first: int | None = None
     """Recorded frames are counted from 1; null before there is any."""

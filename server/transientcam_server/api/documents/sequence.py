@@ -2,27 +2,9 @@
 
 from typing import Literal
 
-from pydantic import ConfigDict, Field, JsonValue
+from pydantic import Field
 
 from transientcam_server.api.documents.document import Document
-
-SEQUENCE_EXAMPLE: dict[str, JsonValue] = {
-    "base_frequency_hz": 23e6,
-    "harmonics": 3,
-    "zeroth": "low-frequency",
-    "exposure_s": 0.00192,
-    "takes": 1,
-    "take_order": "sequential",
-    "sub_phases": {"scheme": "arccos", "n": 8},
-}
-APPLIED_EXAMPLE: dict[str, JsonValue] = SEQUENCE_EXAMPLE | {
-    "sequence_id": 1,
-    "images": 16,
-    "capture_s": 0.0904,
-    "frame_rate_hz": 10.593220338983052,
-    "unambiguous_range_m": 6.517227,
-    "data_rate_bytes_s": 6641355.93,
-}
 
 
 class SubPhasesDocument(Document):
@@ -36,8 +18,6 @@ class SubPhasesDocument(Document):
 
 class SequenceDocument(Document):
     """What the camera captures for one transient image; what is absent keeps its default."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [SEQUENCE_EXAMPLE]})
 
     base_frequency_hz: float = Field(default=23e6, gt=0)
     """Modulation frequencies are this and its multiples."""
@@ -56,8 +36,6 @@ class SequenceDocument(Document):
 
 class AppliedDocument(SequenceDocument):
     """A sequence as the camera really set it, on the grid of its synthesiser."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [APPLIED_EXAMPLE]})
 
     sequence_id: int
     """Counts the sequences the camera was set to; 0 for one that was only checked."""

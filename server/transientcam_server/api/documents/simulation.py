@@ -2,14 +2,10 @@
 
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, JsonValue
+from pydantic import ConfigDict, Field
 
 from transientcam_server.api.documents.document import Document
 
-_EXAMPLE_SCENES: list[JsonValue] = [
-    {"name": "corner", "description": "Two walls that light each other."},
-    {"name": "mirrors", "description": "Three returns in each pixel."},
-]
 Choice = Literal["auto", "on", "off"]
 
 
@@ -22,20 +18,6 @@ class SceneDocument(Document):
 
 class SimulationDocument(Document):
     """The simulated world before the camera."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "scene": "mirrors",
-                    "effects": {"ambient": "on"},
-                    "scenes": _EXAMPLE_SCENES,
-                    "plugged": True,
-                    "faults": ["unplug", "replug", "corrupt-image", "drop-image"],
-                }
-            ]
-        }
-    )
 
     scene: str
     effects: dict[str, Choice]

@@ -1,1 +1,1 @@
-"""The REST interface, one resource a file."""
+"""The routes, one file a resource; each has a ``router`` that `api.app` includes."""

@@ -4,8 +4,8 @@ import asyncio
 
 from fastapi import APIRouter
 
+from transientcam_server.api.auth import Role
 from transientcam_server.api.auth.permissions import needs
-from transientcam_server.api.auth.tokens import Role
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.camera import AcquisitionDocument, AcquisitionRequest
 from transientcam_server.api.problems import documented

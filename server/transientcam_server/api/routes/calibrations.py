@@ -10,8 +10,8 @@ from fastapi.responses import FileResponse
 from starlette.requests import ClientDisconnect
 
 from transientcam_server.api import downloads
+from transientcam_server.api.auth import Role
 from transientcam_server.api.auth.permissions import needs
-from transientcam_server.api.auth.tokens import Role
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.calibration import (
     MAX_NAME,
@@ -28,8 +28,7 @@ from transientcam_server.api.problems import documented
 from transientcam_server.api.routes import jobs
 from transientcam_server.camera.calibration_store import Stored
 from transientcam_server.camera.calibrator import Drift, Wanted
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem, kinds
 from transientcam_server.service import Service
 
 router = APIRouter(tags=["calibrations"])

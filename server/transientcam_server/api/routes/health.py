@@ -5,8 +5,7 @@ from fastapi import APIRouter
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.service import LivenessDocument, ReadinessDocument
 from transientcam_server.api.problems import documented
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem, kinds
 
 router = APIRouter(tags=["health"])
 

@@ -5,8 +5,8 @@ from typing import Annotated, Final
 from fastapi import APIRouter, Header, Response
 
 from transientcam.wire import LEASE_HEADER
+from transientcam_server.api.auth import Role
 from transientcam_server.api.auth.permissions import PrincipalOf, needs
-from transientcam_server.api.auth.tokens import Role
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.lease import (
     GrantedLeaseDocument,

@@ -1,35 +1,19 @@
 """The parameters: everything that can be set or limits something, described by itself."""
 
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 from fastapi import APIRouter
-from pydantic import ConfigDict, JsonValue
 
 from transientcam_server.api import parameters
 from transientcam_server.api.dependencies import ServiceOf
-from transientcam_server.api.documents.document import Document
+from transientcam_server.api.documents import Document
 from transientcam_server.recording.replay import ReplayCamera
 
 router = APIRouter(tags=["parameters"])
-_EXAMPLE: Final[dict[str, JsonValue]] = {
-    "name": "sequence.exposure_s",
-    "resource": "/api/v1/sequence",
-    "pointer": "/exposure_s",
-    "value": 0.00192,
-    "type": "number",
-    "unit": "s",
-    "min": 1e-06,
-    "max": 0.1,
-    "allowed": None,
-    "access": "read-write",
-    "description": "Of one image.",
-}
 
 
 class ParameterDocument(Document):
     """One value, and what it may be while the others stay as they are."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
 
     name: str
     resource: str
@@ -52,8 +36,6 @@ class ParameterDocument(Document):
 
 class ParametersDocument(Document):
     """All parameters."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [{"parameters": [_EXAMPLE]}]})
 
     parameters: list[ParameterDocument]
 

@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query
 
 from transientcam_driver import Sequence
+from transientcam_server.api.auth import Role
 from transientcam_server.api.auth.permissions import needs
-from transientcam_server.api.auth.tokens import Role
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.plan import PlanDocument, PlanRequest, TradeoffDocument
 from transientcam_server.api.problems import documented

@@ -11,8 +11,7 @@ from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.middleware.requests import asks_for_head
 from transientcam_server.api.problems import documented
 from transientcam_server.broadcast.channel import Channel
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging.encodings.encoding import COLOUR_JPEG
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.service import Service

@@ -1,31 +1,26 @@
 """The reconstruction: how images become moments, and moments become returns."""
 
-from typing import Any
+from typing import Any, Final
 
 from fastapi import APIRouter, Response
 from pydantic import ConfigDict, JsonValue
 
 from transientcam_server.api import etags
 from transientcam_server.api.dependencies import ServiceOf
+from transientcam_server.api.documents.document import EXAMPLES
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.imaging.recipe import SettingsVersion
 from transientcam_server.settings import ReconstructionSettings
 
 router = APIRouter(tags=["reconstruction"])
-_EXAMPLE: dict[str, JsonValue] = {
-    "smoothing_px": 0.6,
-    "bias": 0.004,
-    "return_threshold": 0.1,
-    "estimator": "pisarenko",
-    "minimum_brightness_dn": 0.0,
-}
+_EXAMPLE: Final[dict[str, JsonValue]] = {"examples": [EXAMPLES["ReconstructionDocument"]]}
 
 
 class ReconstructionRequest(ReconstructionSettings):
     """How frames should be computed; what is absent takes the paper's value."""
 
-    model_config = ConfigDict(strict=True, json_schema_extra={"examples": [_EXAMPLE]})
+    model_config = ConfigDict(strict=True, json_schema_extra=_EXAMPLE)
 
     reconstruction_id: int | None = None
     """Ignored, so that a document that was read can be sent back."""
@@ -34,7 +29,7 @@ class ReconstructionRequest(ReconstructionSettings):
 class ReconstructionDocument(ReconstructionSettings):
     """How frames are computed."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE | {"reconstruction_id": 1}]})
+    model_config = ConfigDict(json_schema_extra=_EXAMPLE)
 
     reconstruction_id: int
     """Counts the settings from 1; frames carry it in their metadata."""

@@ -1,27 +1,16 @@
-"""Frames of recordings: what the camera's frames are asked, of any that was recorded."""
+"""Frames of recordings, with the same routes as the camera's frames."""
 
-from typing import Annotated
+from dataclasses import dataclass
+from typing import Annotated, Final
 
-from fastapi import APIRouter, Depends, Path, Query, Response
+from fastapi import APIRouter, Query
 
 from transientcam_server.api.dependencies import ServiceOf
-from transientcam_server.api.documents.frame import FrameDocument
-from transientcam_server.api.documents.pixel import PixelDocument
 from transientcam_server.api.documents.recording import TimelineDocument
-from transientcam_server.api.frame_query import (
-    CSV_RESPONSES,
-    PRODUCT_PROBLEMS,
-    PRODUCT_RESPONSES,
-    FrameName,
-    PixelBins,
-    ProductName,
-    WantedOf,
-    X,
-    Y,
-    pixel_answer,
-    product_answer,
-)
+from transientcam_server.api.frame_query import FrameName
+from transientcam_server.api.frame_routes import add_frame_routes
 from transientcam_server.api.problems import documented
+from transientcam_server.api.routes.recordings import RecordingName
 from transientcam_server.errors import kinds
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.pipeline import Pipeline
@@ -30,7 +19,7 @@ from transientcam_server.service import Service
 
 router = APIRouter(prefix="/recordings/{recording}/frames", tags=["recordings"])
 
-_MISSING = (
+_MISSING: Final = (
     kinds.UNKNOWN_RECORDING,
     kinds.UNKNOWN_FRAME,
     kinds.RECORDING_UNFINISHED,
@@ -38,39 +27,23 @@ _MISSING = (
 )
 
 
-RecordingName = Annotated[
-    str,
-    Path(
-        description="its id, as the list has it",
-        max_length=200,
-        examples=["20261120T081500Z-3f9c2a"],
-    ),
-]
+@dataclass(frozen=True, slots=True)
+class ChosenFrame:
+    """A frame of a recording that a request names."""
 
-
-class Chosen:
-    """Which frame of which recording a request is about."""
-
-    def __init__(
-        self,
-        service: Service,
-        recording: str,
-        frame: str,
-        settings: Settings,
-    ) -> None:
-        self._service = service
-        self._recording = recording
-        self._frame = frame
-        self._settings: Settings = settings
+    service: Service
+    recording: str
+    name: str
+    settings: Settings
 
     async def frame(self) -> Frame:
-        """Read it."""
-        opened = await self._service.recorded_frames.opened(self._recording)
-        return await opened.frame(self._frame, self._settings)
+        """Read it from the recording."""
+        opened = await self.service.recorded_frames.opened(self.recording)
+        return await opened.frame(self.name, self.settings)
 
     async def pipeline(self) -> Pipeline:
-        """Return what computes its products."""
-        return (await self._service.recorded_frames.opened(self._recording)).pipeline
+        """Return the pipeline of the recording."""
+        return (await self.service.recorded_frames.opened(self.recording)).pipeline
 
 
 # async, or FastAPI takes a thread for it
@@ -82,11 +55,8 @@ async def _chosen(
         Settings,
         Query(description="settings it was recorded with, or those the service has now"),
     ] = "recorded",
-) -> Chosen:
-    return Chosen(service, recording, frame, reconstruction)
-
-
-ChosenOf = Annotated[Chosen, Depends(_chosen)]
+) -> ChosenFrame:
+    return ChosenFrame(service, recording, frame, reconstruction)
 
 
 @router.get(
@@ -100,45 +70,18 @@ async def read_frames(service: ServiceOf, recording: RecordingName) -> TimelineD
     return TimelineDocument(**timeline(await opened.host_time_s()))
 
 
-@router.get(
-    "/{frame}",
-    summary="A recorded frame",
-    responses=documented(kinds.INVALID_REQUEST, *_MISSING),
+add_frame_routes(
+    router,
+    _chosen,
+    path="/{frame}",
+    missing=_MISSING,
+    frame=(
+        "A recorded frame",
+        "Say what is known of a recorded frame; recorded frames are counted from 1.",
+    ),
+    pixel="one pixel of a recorded frame",
+    product=(
+        "A product of a recorded frame",
+        "Return what a product of the camera's frames is, of a recorded one.",
+    ),
 )
-async def read_frame(chosen: ChosenOf) -> FrameDocument:
-    """Say what is known of a recorded frame; recorded frames are counted from 1."""
-    return FrameDocument.model_validate((await chosen.frame()).meta())
-
-
-@router.get(
-    "/{frame}/pixel",
-    summary="Everything about one pixel of a recorded frame",
-    response_model=PixelDocument,
-    responses=documented(kinds.INVALID_REQUEST, kinds.PRODUCT_FAILED, *_MISSING),
-)
-async def read_pixel(chosen: ChosenOf, x: X, y: Y, bins: PixelBins = 256) -> Response:
-    """Return range, returns, moments and the whole estimated impulse response of one pixel."""
-    return await pixel_answer(await chosen.frame(), x, y, bins)
-
-
-@router.get(
-    "/{frame}/pixel.csv",
-    summary="The impulse response of one pixel of a recorded frame as a table",
-    response_class=Response,
-    responses=CSV_RESPONSES | documented(kinds.INVALID_REQUEST, kinds.PRODUCT_FAILED, *_MISSING),
-)
-async def read_pixel_csv(chosen: ChosenOf, x: X, y: Y, bins: PixelBins = 256) -> Response:
-    """Return the density, its bounds and the cumulative light of one pixel as CSV."""
-    return await pixel_answer(await chosen.frame(), x, y, bins, as_csv=True)
-
-
-@router.get(
-    "/{frame}/{product}",
-    summary="A product of a recorded frame",
-    response_class=Response,
-    responses=PRODUCT_RESPONSES | documented(*PRODUCT_PROBLEMS, *_MISSING),
-)
-async def read_product(chosen: ChosenOf, product: ProductName, wanted: WantedOf) -> Response:
-    """Return what a product of the camera's frames is, of a recorded one."""
-    pipeline = await chosen.pipeline()
-    return await product_answer(product, wanted, product=pipeline.product, frame=chosen.frame)

@@ -7,8 +7,8 @@ from fastapi import APIRouter, Path, status
 from fastapi.responses import FileResponse
 
 from transientcam_server.api import downloads
+from transientcam_server.api.auth import Role
 from transientcam_server.api.auth.permissions import needs
-from transientcam_server.api.auth.tokens import Role
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.recording import (
     RecordingChange,
@@ -26,7 +26,7 @@ from transientcam_server.recording.recorder import Limits
 router = APIRouter(tags=["recordings"])
 
 HDF5: Final = "application/x-hdf5"
-_Recording = Annotated[
+RecordingName = Annotated[
     str,
     Path(
         description="its id, as the list has it",
@@ -84,7 +84,7 @@ async def start_recording(service: ServiceOf, wanted: RecordingRequest) -> Recor
     summary="A recording",
     responses=documented(kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST),
 )
-async def read_recording(service: ServiceOf, recording: _Recording) -> RecordingDocument:
+async def read_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
     """Describe a recording."""
     return document(await asyncio.to_thread(service.recordings.describe, recording))
 
@@ -102,7 +102,7 @@ async def read_recording(service: ServiceOf, recording: _Recording) -> Recording
 )
 @needs(Role.OPERATOR, lease=False)
 async def annotate_recording(
-    service: ServiceOf, recording: _Recording, change: RecordingChange
+    service: ServiceOf, recording: RecordingName, change: RecordingChange
 ) -> RecordingDocument:
     """Replace what is written about a recording, also while it runs."""
     annotate = service.recordings.annotate
@@ -115,7 +115,7 @@ async def annotate_recording(
     responses=documented(kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST),
 )
 @needs(Role.OPERATOR, lease=False)
-async def stop_recording(service: ServiceOf, recording: _Recording) -> RecordingDocument:
+async def stop_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
     """End a recording and wait until it is on the disk; one that has ended stays as it is."""
     return document(await asyncio.to_thread(service.recordings.stop, recording))
 
@@ -131,7 +131,7 @@ async def stop_recording(service: ServiceOf, recording: _Recording) -> Recording
     ),
 )
 @needs(Role.ADMIN, lease=False)
-async def delete_recording(service: ServiceOf, recording: _Recording) -> RecordingDocument:
+async def delete_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
     """Delete a recording for good; the answer says what it was."""
     return document(await asyncio.to_thread(service.recordings.delete, recording))
 
@@ -150,7 +150,7 @@ async def delete_recording(service: ServiceOf, recording: _Recording) -> Recordi
 )
 async def read_recording_file(
     service: ServiceOf,
-    recording: _Recording,
+    recording: RecordingName,
     wanted: downloads.Range = None,
 ) -> FileResponse:
     """Download a recording as HDF5; h5py, xarray and MATLAB open it."""

@@ -8,13 +8,15 @@ from pydantic import WithJsonSchema
 
 from transientcam_driver import AppliedSequence, Sequence
 from transientcam_server.api import etags
+from transientcam_server.api.auth import Role
 from transientcam_server.api.auth.permissions import needs
-from transientcam_server.api.auth.tokens import Role
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.sequence import AppliedDocument, SequenceDocument
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import SequenceConflict
 from transientcam_server.imaging.recipe import require_harmonics
+from transientcam_server.service import Service
 
 router = APIRouter(tags=["sequence"])
 
@@ -92,13 +94,7 @@ async def change_sequence(
     ignored. Streams are told with a `sequence-changed` notice.
     """
     wanted = Sequence.from_document(sequence)
-
-    def check(running: AppliedSequence) -> None:
-        etags.require(if_match, _tag(running), otherwise=kinds.SEQUENCE_CHANGED)
-        settings = service.pipeline.reconstruction.settings
-        require_harmonics(settings, wanted.harmonics, field="harmonics")
-
-    applied = await asyncio.wrap_future(service.acquisition.configure(wanted, check=check))
+    applied = await _configure(service, wanted, if_match)
     response.headers["ETag"] = _tag(applied)
     return AppliedDocument.model_validate(applied.to_document())
 
@@ -113,6 +109,23 @@ async def validate_sequence(service: ServiceOf, sequence: _Sequence) -> AppliedD
     """Say what the camera would make of a sequence, without touching it."""
     applied = service.camera.validate(Sequence.from_document(sequence))
     return AppliedDocument.model_validate(applied.to_document())
+
+
+async def _configure(service: Service, wanted: Sequence, if_match: str | None) -> AppliedSequence:
+    """Change the sequence if If-Match names the one that the camera runs at that moment."""
+    service.acquisition.require_free()
+    running = service.applied
+    while True:
+        etags.require(if_match, _tag(running), otherwise=kinds.SEQUENCE_CHANGED)
+        settings = service.pipeline.reconstruction.settings
+        require_harmonics(settings, wanted.harmonics, field="harmonics")
+        expected = None if if_match is None else running.epoch
+        try:
+            return await asyncio.wrap_future(
+                service.acquisition.configure(wanted, expected=expected)
+            )
+        except SequenceConflict as conflict:
+            running = conflict.running
 
 
 def _tag(applied: AppliedSequence) -> str:

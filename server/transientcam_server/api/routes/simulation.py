@@ -15,8 +15,7 @@ from transientcam_server.api.documents.simulation import (
     SimulationRequest,
 )
 from transientcam_server.api.problems import documented
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem, kinds
 from transientcam_server.service import Service
 
 router = APIRouter(tags=["simulation"])

@@ -1,1 +1,1 @@
-"""Parts."""
+"""The stream of frames over WebSocket: subscriptions, sending, limits on what a client sends."""

@@ -11,7 +11,7 @@ from transientcam_server.api.metrics import Metrics
 from transientcam_server.api.stream.rate_limit import RateLimiter
 from transientcam_server.broadcast.channel import Channel
 from transientcam_server.broadcast.outbox import Close, Delivery, Outbox
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem
 from transientcam_server.errors.translation import problem_document
 from transientcam_server.imaging.view import View
 

@@ -17,8 +17,7 @@ from transientcam_server.api.stream.sender import Sender
 from transientcam_server.broadcast.channel import UNNUMBERED, Channel
 from transientcam_server.broadcast.hub import Hub
 from transientcam_server.broadcast.outbox import Close, Outbox
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem, kinds
 from transientcam_server.errors.translation import problem_document, problem_of
 from transientcam_server.imaging.encodings.compact import stream_encoding
 from transientcam_server.imaging.view import Crop

@@ -15,9 +15,9 @@ from tests.server.streaming import streaming
 from tests.serving import Served, serving
 from transientcam import Camera, wire
 from transientcam.errors import ProblemError
+from transientcam_server.api.auth import Role, TokenFile
 from transientcam_server.api.auth.guard import ANYBODY, Guard
-from transientcam_server.api.auth.tokens import Role, TokenFile
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem
 from transientcam_server.settings import Settings
 
 NOW = datetime(2030, 1, 1, tzinfo=UTC)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from transientcam_server.api.auth.tokens import Role, TokenFile
+from transientcam_server.api.auth import Role, TokenFile
 from transientcam_server.errors.exceptions import TokenFileError, UnknownToken
 
 NOW = datetime(2030, 1, 1, tzinfo=UTC)

@@ -73,8 +73,8 @@ def test_only_what_one_has_read_is_changed(http: httpx.Client) -> None:
     ("settings", "field", "limit"),
     [
         ({"bias": 1.0}, "bias", "at most 0.99"),
-        ({"bias": "0.1"}, "bias", "a number"),
-        ({"smoothing_px": -1}, "smoothing_px", "at least 0.0"),
+        ({"bias": "0.1"}, "bias", "a valid number"),
+        ({"smoothing_px": -1}, "smoothing_px", "at least 0"),
         ({"estimator": "guess"}, "estimator", "'pisarenko', 'maximum-entropy'"),
         ({"precision": "half"}, "precision", "left out"),
     ],
