@@ -48,7 +48,7 @@ def planned(scene: str) -> Iterator[Planned]:
         noise = noise_of(camera, SensorSettings())
         planner = Planner(camera.capabilities, noise, SETTINGS)
         recipe, (look,) = captured(camera, Sequence(harmonics=6, takes=16, exposure_s=0.0015), 1)
-        predictor = Predictor(planner.statistic(recipe, look, 0.0), noise.sensor, SETTINGS)
+        predictor = Predictor(planner.scene_statistics(recipe, look, 0.0), noise.sensor, SETTINGS)
         for wanted, goal in GOALS.items():
             best = plan(
                 goal, predictor, camera.capabilities, reconstruct_s=lambda _: 1e-3

@@ -34,11 +34,11 @@ from transientcam_server.imaging.lens import Intrinsics, known_intrinsics
 from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.imaging.recipe import SettingsVersion, require_harmonics
 from transientcam_server.imaging.workers import Workers
-from transientcam_server.planning.front import Fronts
+from transientcam_server.planning.front import FrontCache
 from transientcam_server.planning.planner import Planner
 from transientcam_server.recording import Header
-from transientcam_server.recording.frames import RecordedFramesOf
-from transientcam_server.recording.library import Library, Wanted
+from transientcam_server.recording.frames import RecordedFramesCache
+from transientcam_server.recording.library import Library, RecordingOptions
 from transientcam_server.recording.replay import ReplayCamera
 from transientcam_server.settings import ReconstructionSettings, Settings
 
@@ -92,7 +92,9 @@ class Service:
             calibration=_calibration(camera, settings, kept),
             intrinsics=lambda: self.intrinsics,
         )
-        self.fronts = Fronts(self.planner, self.workers, simulated=camera.simulation is not None)
+        self.fronts = FrontCache(
+            self.planner, self.workers, simulated=camera.simulation is not None
+        )
         self._loop: asyncio.AbstractEventLoop | None = None
         self.acquisition = Acquisition(camera, report=self._from_acquisition)
         self.applied: AppliedSequence = camera.applied
@@ -111,7 +113,9 @@ class Service:
         self.recordings = Library(
             settings.recordings, header=self._recording_header, tell=self._tell_from_thread
         )
-        self.recorded_frames = RecordedFramesOf(self.recordings, self.pipeline, lens=settings.lens)
+        self.recorded_frames = RecordedFramesCache(
+            self.recordings, self.pipeline, lens=settings.lens
+        )
         self.identity = {"name": "transientcam", "version": VERSION}
 
     @contextlib.asynccontextmanager
@@ -178,7 +182,7 @@ class Service:
         else:
             self._loop.call_soon_threadsafe(self._happened, event)
 
-    async def record(self, wanted: Wanted, *, history_s: float | None) -> dict[str, Any]:
+    async def record(self, options: RecordingOptions, *, history_s: float | None) -> dict[str, Any]:
         """Start a recording, with the frames of the last seconds if wanted, and describe it.
 
         Raises
@@ -187,12 +191,12 @@ class Service:
             As `Library.start`.
         """
         if history_s is None:
-            return await asyncio.to_thread(self.recordings.start, wanted)
+            return await asyncio.to_thread(self.recordings.start, options)
         # it waits for its past, also if nobody waits for the answer any more
-        return await asyncio.shield(self.workers.start(self._record_past(wanted, history_s)))
+        return await asyncio.shield(self.workers.start(self._record_past(options, history_s)))
 
-    async def _record_past(self, wanted: Wanted, history_s: float) -> dict[str, Any]:
-        described = await asyncio.to_thread(self.recordings.start, replace(wanted, past=True))
+    async def _record_past(self, options: RecordingOptions, history_s: float) -> dict[str, Any]:
+        described = await asyncio.to_thread(self.recordings.start, replace(options, past=True))
         past = [(each.raw, each.recipe.applied) for each in self.history.newest(history_s)]
         count = self.recordings.precede(described["id"], past)
         return described | {"history_frames": count}

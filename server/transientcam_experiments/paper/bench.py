@@ -40,7 +40,7 @@ _CALIBRATION_TAKES = 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shot:
+class ReconstructedShot:
     """One reconstructed capture, and the truth when its last image was taken.
 
     ``time_s`` is the device's time of the first exposure since its warm-up.
@@ -81,7 +81,7 @@ class Bench:
         self.quick = quick
         self.waveform = waveform
         self._calibrations: dict[tuple[Any, ...], Calibration] = {}
-        self._shots: dict[tuple[Any, ...], list[Shot]] = {}
+        self._shots: dict[tuple[Any, ...], list[ReconstructedShot]] = {}
 
     def few(self, full: int, quick: int) -> int:
         """Return how many of something to look at."""
@@ -89,7 +89,7 @@ class Bench:
 
     def shot(
         self, scene: str, sequence: Sequence, *, at_s: float = 0.0, options: Options = NO_OPTIONS
-    ) -> Shot:
+    ) -> ReconstructedShot:
         """Capture once; see `shots`."""
         return self.shots(scene, sequence, at_s=at_s, options=options)[0]
 
@@ -101,7 +101,7 @@ class Bench:
         frames: int = 1,
         at_s: float = 0.0,
         options: Options = NO_OPTIONS,
-    ) -> list[Shot]:
+    ) -> list[ReconstructedShot]:
         """Capture frames one after the other, and reconstruct them as the daemon would.
 
         Parameters
@@ -159,7 +159,7 @@ class Bench:
         frames: int,
         at_s: float,
         options: Options,
-    ) -> list[Shot]:
+    ) -> list[ReconstructedShot]:
         calibration = self.calibration(sequence, options=options)
         shots = []
         with ExitStack() as stack:
@@ -174,7 +174,9 @@ class Bench:
                 frame = camera.read_frame()
                 truth = camera.simulation.truth()
                 found: tm.Reconstruction = recipe.reconstruct(frame)
-                shots.append(Shot(found, truth, applied, frame.device_time_s - WARM_UP_S))
+                shots.append(
+                    ReconstructedShot(found, truth, applied, frame.device_time_s - WARM_UP_S)
+                )
             camera.stop()
         return shots
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import coded_corner, style
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, Shot
+from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
 from transientcam_experiments.paper.contenders import Contender
 from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
 
@@ -101,7 +101,7 @@ def make(bench: Bench) -> Made:
     )
 
 
-def ranged_by(entry: Contender, shot: Shot, step: int) -> Ranged:
+def ranged_by(entry: Contender, shot: ReconstructedShot, step: int) -> Ranged:
     """Let a technique find the range of every ``step``-th pixel both ways."""
     b = np.asarray(shot.found.smoothed)[: entry.m + 1, ::step, ::step].astype(np.complex128)
     phase_rad = entry.estimate(b).first_phase_rad()
@@ -115,7 +115,7 @@ def _coded(entry: Contender, bench: Bench, step: int) -> Ranged:
     return Ranged(entry, captured.range_m(step), captured.truth_m[::step, ::step])
 
 
-def directions(shot: Shot) -> _Array:
+def directions(shot: ReconstructedShot) -> _Array:
     """Return unit vectors (3, H, W) of the pixels' lines of sight: x right, y away, z up."""
     height, width = shot.lit.shape
     pixel = 2 * np.tan(np.radians(_FIELD_OF_VIEW_DEG) / 2) / width
@@ -134,7 +134,7 @@ def _of(ranged: list[Ranged], name: str, m: int) -> Ranged:
     return next(each for each in ranged if (each.entry.name, each.entry.m) == (name, m))
 
 
-def _statements(ranged: list[Ranged], shot: Shot) -> list[Statement]:
+def _statements(ranged: list[Ranged], shot: ReconstructedShot) -> list[Statement]:
     single, godbaz = _of(ranged, "single-frequency", 1), _of(ranged, "godbaz", 4)
     maximum, pisarenko = _of(ranged, "maximum-entropy", 3), _of(ranged, "pisarenko", 4)
     return [

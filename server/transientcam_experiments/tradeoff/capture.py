@@ -45,24 +45,24 @@ QUANTITIES: Final[dict[str, str]] = {
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shot:
+class FrameWithTruth:
     """A frame, and the truth when its last image was taken."""
 
     frame: RawFrame
     truth: Truth
 
 
-def capture(camera: Camera, frames: int) -> list[Shot]:
+def capture(camera: Camera, frames: int) -> list[FrameWithTruth]:
     """Take frames with the sequence that is set."""
     assert camera.simulation is not None  # noqa: S101 - only simulated cameras are measured
     camera.start()
-    taken = [Shot(camera.read_frame(), camera.simulation.truth()) for _ in range(frames)]
+    taken = [FrameWithTruth(camera.read_frame(), camera.simulation.truth()) for _ in range(frames)]
     camera.stop()
     return taken
 
 
 def accuracy(
-    shots: list[Shot],
+    shots: list[FrameWithTruth],
     sample_of: Callable[[Truth], Sample],
     applied: AppliedSequence,
     *,
@@ -114,7 +114,9 @@ def repeatability(ranges: _Array) -> float | None:
     return float(np.median(difference) / (math.sqrt(2) * MEDIAN_OF_NORMAL))
 
 
-def _of_shot(shot: Shot, sample: Sample, recipe: Recipe) -> tuple[_Array, dict[str, float]]:
+def _of_shot(
+    shot: FrameWithTruth, sample: Sample, recipe: Recipe
+) -> tuple[_Array, dict[str, float]]:
     found: tm.Reconstruction = recipe.reconstruct(shot.frame)
     truth = shot.truth
     f_hz = recipe.base_frequency_hz

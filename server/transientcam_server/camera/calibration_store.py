@@ -29,7 +29,7 @@ _ABANDONED_S: Final = 24 * 3600.0
 
 
 @dataclass(frozen=True, slots=True)
-class Stored:
+class StoredCalibration:
     """A calibration that is there, without its images.
 
     Attributes
@@ -76,20 +76,20 @@ class CalibrationStore:
         self._unix_s = unix_s
         self._given = given
         self._lock = threading.Lock()
-        self._known: dict[Path, tuple[tuple[int, int], Stored | None]] = {}
+        self._known: dict[Path, tuple[tuple[int, int], StoredCalibration | None]] = {}
 
     @property
     def directory(self) -> Path:
         """Where they are kept."""
         return self._settings.directory
 
-    def all(self) -> list[Stored]:
+    def all(self) -> list[StoredCalibration]:
         """Return every calibration that can be read, the newest first."""
         with self._lock:
             found = {each.id: each for path in self._paths() if (each := self._stored(path))}
         return sorted(found.values(), key=lambda each: each.captured_unix_s, reverse=True)
 
-    def get(self, calibration_id: str) -> Stored:
+    def get(self, calibration_id: str) -> StoredCalibration:
         """Return a calibration.
 
         Raises
@@ -108,7 +108,7 @@ class CalibrationStore:
             value=shown,
         )
 
-    def add(self, capture: CalibrationCapture) -> Stored:
+    def add(self, capture: CalibrationCapture) -> StoredCalibration:
         """Keep a measurement.
 
         Raises
@@ -124,7 +124,7 @@ class CalibrationStore:
                 raise self.not_stored(error) from error
             return self._take(part, capture)
 
-    def take_in(self, part: Path) -> Stored:
+    def take_in(self, part: Path) -> StoredCalibration:
         """Keep a file that was received; one that is here already stays as it is.
 
         Raises
@@ -148,7 +148,7 @@ class CalibrationStore:
         self.require_room()
         return self._take(part, capture)
 
-    def delete(self, calibration_id: str) -> Stored:
+    def delete(self, calibration_id: str) -> StoredCalibration:
         """Delete a calibration for good.
 
         Raises
@@ -246,7 +246,7 @@ class CalibrationStore:
                 if part.stat().st_mtime < self._unix_s() - _ABANDONED_S:
                     part.unlink()
 
-    def _take(self, part: Path, capture: CalibrationCapture) -> Stored:
+    def _take(self, part: Path, capture: CalibrationCapture) -> StoredCalibration:
         path = self.directory / (capture.id + SUFFIX)
         try:
             with part.open("rb") as file:
@@ -264,7 +264,7 @@ class CalibrationStore:
             kept = []
         return kept if self._given is None else [*kept, self._given]
 
-    def _stored(self, path: Path) -> Stored | None:
+    def _stored(self, path: Path) -> StoredCalibration | None:
         try:
             status = path.stat()
         except OSError:  # deleted this moment
@@ -276,13 +276,13 @@ class CalibrationStore:
         return known[1]
 
 
-def _read(path: Path, size_bytes: int) -> Stored | None:
+def _read(path: Path, size_bytes: int) -> StoredCalibration | None:
     try:
         capture = CalibrationCapture.load(path)
     except CalibrationFileError as error:
         _log.warning("%s", error)
         return None
-    return Stored(
+    return StoredCalibration(
         id=capture.id,
         path=path,
         size_bytes=size_bytes,

@@ -20,7 +20,7 @@ from transientcam_driver import (
 )
 from transientcam_driver.calibration.capture import DEFAULT_TAKES
 from transientcam_server.camera.acquisition import Acquisition
-from transientcam_server.camera.calibration_store import CalibrationStore, Stored
+from transientcam_server.camera.calibration_store import CalibrationStore, StoredCalibration
 from transientcam_server.camera.jobs import Job, Jobs
 from transientcam_server.camera.source import Camera
 from transientcam_server.errors import kinds
@@ -50,8 +50,8 @@ _EVALUATING: Final = 0.95  # of the work is done when all is captured
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What somebody wants measured: ``frames`` of each kind, to be used at once or not."""
+class CalibrationOptions:
+    """What to measure: ``frames`` of each kind; ``activate`` uses the result at once."""
 
     name: str = ""
     frames: int = DEFAULT_TAKES
@@ -138,7 +138,9 @@ class Calibrator:
             "reason": None if misfit is None else str(misfit),
         }
 
-    def misfit(self, stored: Stored, applied: AppliedSequence) -> CalibrationMismatch | None:
+    def misfit(
+        self, stored: StoredCalibration, applied: AppliedSequence
+    ) -> CalibrationMismatch | None:
         """Say why a calibration is not good for a sequence of this camera."""
         return stored.subject.misfit(applied, self._camera.capabilities)
 
@@ -164,7 +166,7 @@ class Calibrator:
             self._tell(self.notice(applied()))
         await asyncio.to_thread(self.kept.remember_active, wanted_id)
 
-    async def delete(self, unwanted_id: str) -> Stored:
+    async def delete(self, unwanted_id: str) -> StoredCalibration:
         """Delete a calibration that is not active.
 
         Raises
@@ -181,7 +183,7 @@ class Calibrator:
             )
         return await asyncio.to_thread(self.kept.delete, unwanted_id)
 
-    def measure(self, wanted: Wanted, applied: Callable[[], AppliedSequence]) -> Job:
+    def measure(self, options: CalibrationOptions, applied: Callable[[], AppliedSequence]) -> Job:
         """Start measuring with the present sequence; the job's result is the calibration.
 
         Raises
@@ -193,12 +195,12 @@ class Calibrator:
         self._acquisition.require_free()
         once = self._camera.validate(replace(applied().sequence, takes=1, take_order="sequential"))
         most = MAX_CAPTURE_BYTES // (once.images * self._camera.capabilities.image_bytes)
-        if wanted.frames > most:
+        if options.frames > most:
             raise Problem(
                 kinds.INVALID_REQUEST,
-                f"{wanted.frames} frames of this sequence do not go into memory.",
+                f"{options.frames} frames of this sequence do not go into memory.",
                 field="frames",
-                value=wanted.frames,
+                value=options.frames,
                 limit=f"at most {most}",
             )
 
@@ -206,7 +208,7 @@ class Calibrator:
             await asyncio.to_thread(self.kept.require_room)  # said before anything is captured
             takes = _Takes()
             measuring = self._acquisition.occupy(
-                job.id, lambda camera, go_on: _capture(camera, job, wanted, takes, go_on)
+                job.id, lambda camera, go_on: _capture(camera, job, options, takes, go_on)
             )
             capture = await asyncio.wrap_future(measuring)
             job.report(_EVALUATING, "evaluating")
@@ -214,9 +216,9 @@ class Calibrator:
             share, _ = await self._pipeline.workers.run_long(
                 self._share_of_takes, calibration, takes, once
             )
-            notes = {"name": wanted.name, "invalid_share": share}
+            notes = {"name": options.name, "invalid_share": share}
             stored = await asyncio.to_thread(self.kept.add, replace(capture, notes=notes))
-            if wanted.activate:
+            if options.activate:
                 await self.activate(stored.id, applied)
             return {
                 "calibration": stored.id,
@@ -310,7 +312,7 @@ class _Takes:
 
 
 def _capture(
-    camera: Camera, job: Job, wanted: Wanted, takes: _Takes, go_on: Callable[[], None]
+    camera: Camera, job: Job, options: CalibrationOptions, takes: _Takes, go_on: Callable[[], None]
 ) -> CalibrationCapture:
     def progress(done: int, total: int) -> None:
         job.report(_EVALUATING * done / total, "capturing")
@@ -321,4 +323,4 @@ def _capture(
         go_on()
         return takes.average(of_one_image)
 
-    return capture_calibration(camera, takes=wanted.frames, average=average, progress=progress)
+    return capture_calibration(camera, takes=options.frames, average=average, progress=progress)

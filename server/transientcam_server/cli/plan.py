@@ -74,7 +74,7 @@ def plan(
     from transientcam_server.errors.exceptions import Problem
     from transientcam_server.planning import Goal
     from transientcam_server.planning.planner import Planner
-    from transientcam_server.planning.scene import given
+    from transientcam_server.planning.scene import uniform_scene
     from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
     document = _fields(fixed or [])
@@ -99,9 +99,9 @@ def plan(
                 tm.kernels.compile()  # what is to be timed is the daemon's speed
         with console.status("looking at the scene"):
             if brightness_dn_per_s is None:
-                scene = planner.statistic(*_captured(opened), ambient_dn_per_s)
+                scene = planner.scene_statistics(*_captured(opened), ambient_dn_per_s)
             else:
-                scene = given(
+                scene = uniform_scene(
                     brightness_dn_per_s,
                     [_return(text) for text in returns or ["2"]],
                     ambient_dn_per_s=ambient_dn_per_s,

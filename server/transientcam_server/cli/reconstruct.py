@@ -14,7 +14,7 @@ from transientcam.cli.options import JsonOption
 from transientcam_server.cli.progress import progress_bar, progress_bars
 
 if TYPE_CHECKING:
-    from transientcam_server.offline.measurement import Measurement, Reconstruction
+    from transientcam_server.offline.measurement import Measurement, TransientCube
     from transientcam_server.settings import ReconstructionSettings
 
 Background = Literal["none", "median"]
@@ -106,7 +106,7 @@ def reconstruct(
         _tell(console, _document(measurement, result, output))
 
 
-def _document(measurement: "Measurement", result: "Reconstruction", output: Path) -> dict[str, Any]:
+def _document(measurement: "Measurement", result: "TransientCube", output: Path) -> dict[str, Any]:
     import numpy as np
 
     import transientcam_moments as tm
@@ -162,9 +162,9 @@ def _reconstruct_recording(
         if name not in offline.KNOWN_PRODUCTS:
             known = ", ".join(offline.KNOWN_PRODUCTS)
             raise typer.BadParameter(f"{name!r} is none of {known}", param_hint="--product")
-    what = offline.Wanted(wanted, settings, bins)
+    options = offline.BatchOptions(wanted, settings, bins)
     with Recording(recording) as opened, progress_bar("reconstructing") as advance:
-        before = offline.reconstruct(opened, output, what, progress=advance)
+        before = offline.reconstruct(opened, output, options, progress=advance)
         frames = opened.frames
     if as_json:
         document = {"file": str(output), "products": wanted, "frames": frames, "before": before}

@@ -41,7 +41,7 @@ class Measurement:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reconstruction:
+class TransientCube:
     """What `reconstruct` finds; the fields are the arrays of the file it is written to.
 
     Attributes
@@ -130,7 +130,7 @@ def reconstruct(
     bins: int,
     settings: ReconstructionSettings,
     progress: Callable[[int, int], None] = lambda done, total: None,
-) -> Reconstruction:
+) -> TransientCube:
     """Reconstruct every pixel, in blocks of pixels; ``progress`` is told how many are done."""
     rad_s = 2.0 * np.pi * measurement.base_frequency_hz
     time_s = 2.0 * np.pi * np.arange(bins) / (bins * rad_s)
@@ -152,7 +152,7 @@ def reconstruct(
             image[block] = getattr(found, name)
         progress(block.stop, pixels)
     shape = (height, width)
-    return Reconstruction(
+    return TransientCube(
         time_s=time_s,
         density=density.reshape(bins, *shape),
         cumulative=cumulative.reshape(bins, *shape),
@@ -160,12 +160,12 @@ def reconstruct(
     )
 
 
-def save(path: Path, result: Reconstruction) -> None:
+def save(path: Path, result: TransientCube) -> None:
     """Write a reconstruction as ``.npz``, whole or not at all."""
     part = path.with_name(path.name + ".part")
     try:
         with part.open("wb") as file:
-            np.savez(file, **{name: getattr(result, name) for name in Reconstruction.__slots__})
+            np.savez(file, **{name: getattr(result, name) for name in TransientCube.__slots__})
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_server.errors.exceptions import MissingExtra
-from transientcam_server.offline.measurement import Reconstruction
+from transientcam_server.offline.measurement import TransientCube
 
 _FRAMES: Final = 6
 
@@ -26,7 +26,7 @@ def require() -> None:
         raise MissingExtra("--plot", "matplotlib", "plot") from error
 
 
-def save_picture(path: Path, result: Reconstruction) -> None:
+def save_picture(path: Path, result: TransientCube) -> None:
     """Draw range, direct, indirect and moments of light in flight; one pixel as curves."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -40,7 +40,7 @@ def save_picture(path: Path, result: Reconstruction) -> None:
     figure.savefig(path, dpi=120, format="png")
 
 
-def _draw_pixel(figure: Any, result: Reconstruction) -> None:
+def _draw_pixel(figure: Any, result: TransientCube) -> None:
     upper, lower = figure.subplots(2, 1, sharex=True)
     time_ns = result.time_s * 1e9
     upper.plot(time_ns, result.density[:, 0, 0])
@@ -52,7 +52,7 @@ def _draw_pixel(figure: Any, result: Reconstruction) -> None:
         axes.grid(alpha=0.3)
 
 
-def _draw_images(figure: Any, result: Reconstruction) -> None:
+def _draw_images(figure: Any, result: TransientCube) -> None:
     axes = figure.subplots(2, 1 + _FRAMES // 2)
     images = (
         ("range / m", result.range_m, "viridis"),
@@ -72,7 +72,7 @@ def _draw_images(figure: Any, result: Reconstruction) -> None:
         panel.set_yticks([])
 
 
-def _moments_of_flight(result: Reconstruction) -> NDArray[np.intp]:
+def _moments_of_flight(result: TransientCube) -> NDArray[np.intp]:
     """Return indices of times spread evenly over the light that arrives."""
     total = result.density.sum(axis=0)
     with np.errstate(all="ignore"):  # pixels without light count for nothing

@@ -24,7 +24,7 @@ class _Known:
     choices: list[Choice]
 
 
-class Fronts:
+class FrontCache:
     """Predicts what the scene's frames could cost; on the event loop, computing on workers."""
 
     def __init__(
@@ -64,7 +64,7 @@ class Fronts:
 
     async def _predicted(self, frame: Frame, by: str) -> list[Choice]:
         found = await frame.reconstruction("returns")
-        scene, _ = await self._workers.run(self._planner.statistic, frame.recipe, found, 0.0)
+        scene, _ = await self._workers.run(self._planner.scene_statistics, frame.recipe, found, 0.0)
         goal = Goal(
             base=frame.recipe.applied.sequence,
             bound_width=_WIDE_BOUNDS if by == "bound_width" else None,

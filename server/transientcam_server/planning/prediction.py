@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_server.imaging.noise import MEDIAN_OF_NORMAL
-from transientcam_server.planning.scene import SceneStatistic
+from transientcam_server.planning.scene import SceneStatistics
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
@@ -66,7 +66,7 @@ class Predictor:
 
     def __init__(
         self,
-        scene: SceneStatistic,
+        scene: SceneStatistics,
         sensor: tm.noise.Sensor,
         settings: ReconstructionSettings,
         *,

@@ -16,7 +16,7 @@ _DEPTH: Final = 1000.0
 """Brightness of the images that are reconstructed, in DN."""
 
 
-class ComputingTime:
+class ReconstructionTimer:
     """Seconds from images to range, by number of harmonics and takes.
 
     Parameters

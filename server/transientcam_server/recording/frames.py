@@ -32,7 +32,7 @@ from transientcam_server.settings import LensSettings, ReconstructionSettings
 LATEST: Final = "latest"
 MAX_TIMES: Final = 4096
 """So many times, at most, are told of one recording."""
-Settings = Literal["recorded", "current"]
+SettingsChoice = Literal["recorded", "current"]
 Find = Callable[[], Path]
 """Says where the file is now: it gets its name when it is finished."""
 _OPENED: Final = 2
@@ -62,7 +62,7 @@ class RecordedFrames:
         self._lens = lens
         self._frames: OrderedDict[tuple[int, int], asyncio.Task[Frame]] = OrderedDict()
 
-    async def frame(self, name: str, settings: Settings = "recorded") -> Frame:
+    async def frame(self, name: str, settings: SettingsChoice = "recorded") -> Frame:
         """Return a frame by its number, or the last one that was written.
 
         Raises
@@ -92,7 +92,7 @@ class RecordedFrames:
         recipe = recorded_recipe(self._header, reconstruction, lens=self._lens)
         return self.pipeline.recorded_frame(number, raw, recipe, past=True)
 
-    def _reconstruction(self, settings: Settings) -> SettingsVersion:
+    def _reconstruction(self, settings: SettingsChoice) -> SettingsVersion:
         """Return the settings it was recorded with, if this version knows them all, or today's."""
         if settings == "recorded":
             with contextlib.suppress(ValidationError):
@@ -101,7 +101,7 @@ class RecordedFrames:
         return self._camera_pipeline.reconstruction
 
 
-class RecordedFramesOf:
+class RecordedFramesCache:
     """The frames of the recordings of a library; those asked for last are at hand."""
 
     def __init__(self, library: Library, pipeline: Pipeline, *, lens: LensSettings) -> None:

@@ -35,8 +35,8 @@ Tell = Callable[[str, Mapping[str, Any]], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What somebody wants recorded; ``past`` for frames that have passed, see `Library.precede`."""
+class RecordingOptions:
+    """What to record; ``past`` waits for frames from the history, see `Library.precede`."""
 
     name: str | None = None
     limits: Limits = field(default_factory=Limits)
@@ -141,7 +141,7 @@ class Library:
         if recorder is not None:
             recorder.offer(raw, applied)
 
-    def start(self, wanted: Wanted) -> dict[str, Any]:
+    def start(self, options: RecordingOptions) -> dict[str, Any]:
         """Start a recording and describe it.
 
         Raises
@@ -150,7 +150,7 @@ class Library:
             ``recording-runs`` when there is one already, ``recording-not-stored`` where no file
             can be made.
         """
-        require_annotations(wanted.annotations or {})
+        require_annotations(options.annotations or {})
         with self._starting:
             if self._active is not None and not self._active.progress.finished:
                 running = self._active.header.recording_id
@@ -158,7 +158,7 @@ class Library:
                     kinds.RECORDING_RUNS, f"{running} is being recorded.", recording=running
                 )
             started_s = self._unix_s()
-            recorder = self._recorder(wanted, started_s)
+            recorder = self._recorder(options, started_s)
             self._active = recorder
             recorder.start()
         document = self._describe_active(recorder)
@@ -266,27 +266,27 @@ class Library:
 
     # -- inside --------------------------------------------------------------------------------
 
-    def _recorder(self, wanted: Wanted, started_s: float) -> Recorder:
+    def _recorder(self, options: RecordingOptions, started_s: float) -> Recorder:
         moment = datetime.fromtimestamp(started_s, UTC)
         recording_id = f"{moment:%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
-        name = wanted.name or f"Recording of {moment:%Y-%m-%d %H:%M:%S} UTC"
+        name = options.name or f"Recording of {moment:%Y-%m-%d %H:%M:%S} UTC"
         header = self._header(recording_id, name, started_s)
         try:
             self._directory.make()
             self._require_room()
             path = self._directory.new(recording_id)
-            writer = RecordingWriter(path, header, annotations=wanted.annotations)
+            writer = RecordingWriter(path, header, annotations=options.annotations)
         except OSError as error:
             raise not_stored(self.directory, error) from error
         return Recorder(
             writer,
             header,
-            limits=self._limits(wanted.limits),
+            limits=self._limits(options.limits),
             queue_frames=self._queue_frames(header),
             free_bytes=self._directory.free_bytes,
             on_dropped=self._dropped,
             on_end=self._ended,
-            awaits_past=wanted.past,
+            awaits_past=options.past,
             unix_s=self._unix_s,
         )
 

@@ -9,7 +9,7 @@ import pytest
 
 from transientcam.cli import run
 from transientcam_moments import kernels
-from transientcam_server.offline.measurement import Reconstruction
+from transientcam_server.offline.measurement import TransientCube
 
 F_HZ = 23e6
 
@@ -34,7 +34,7 @@ def test_a_measurement_becomes_a_file_of_everything(
 
     assert code == 0
     with np.load(out) as file:
-        assert set(file) == set(Reconstruction.__slots__)
+        assert set(file) == set(TransientCube.__slots__)
         assert file["density"].shape == (40, 6, 5)
         np.testing.assert_allclose(file["range_m"], 299_792_458.0 * 10e-9 / 2.0, rtol=1e-8)
         np.testing.assert_allclose(file["direct"], 2.0, rtol=1e-8)

@@ -13,10 +13,10 @@ from tests.serving import serving
 from transientcam import Camera
 from transientcam_driver import AppliedSequence, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_experiments.tradeoff.capture import Shot, capture
+from transientcam_experiments.tradeoff.capture import FrameWithTruth, capture
 from transientcam_moments.comparisons import sra_table
 from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.planning.timing import ComputingTime
+from transientcam_server.planning.timing import ReconstructionTimer
 from transientcam_server.settings import Estimator, ReconstructionSettings
 
 PATH = "/api/v1/reconstruction"
@@ -34,7 +34,7 @@ def test_the_daemon_offers_the_techniques_that_compute_all_pixels_at_once() -> N
 
 
 @cache
-def captured(m: int) -> tuple[AppliedSequence, Shot]:
+def captured(m: int) -> tuple[AppliedSequence, FrameWithTruth]:
     """A frame of a corner, which indirect light makes continuous."""
     base_frequency_hz = 23e6 if m < 5 else 11.5e6
     with open_camera("sim:corner?noise=off", clock=VirtualClock()) as camera:
@@ -128,7 +128,7 @@ def test_a_daemon_that_starts_with_too_few_harmonics_says_so_with_the_range_alon
 def test_computing_time_is_that_of_sequences_which_the_estimator_takes() -> None:
     settings = ReconstructionSettings(estimator="spumic")
     with open_camera("sim:mirrors", clock=VirtualClock()) as camera:
-        seconds = ComputingTime(camera.capabilities, settings)
+        seconds = ReconstructionTimer(camera.capabilities, settings)
 
         once, often = (seconds(Sequence(harmonics=6, takes=takes)) for takes in (1, 20))
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from transientcam_server.errors.exceptions import InputError
 from transientcam_server.offline.measurement import (
     Measurement,
-    Reconstruction,
+    TransientCube,
     load,
     moments_of,
     reconstruct,
@@ -278,7 +278,7 @@ def test_what_is_saved_is_complete_and_leaves_no_part_behind(tmp_path: Path) -> 
 
     assert [each.name for each in tmp_path.iterdir()] == ["out.npz"]
     with np.load(tmp_path / "out.npz") as file:
-        assert set(file) == set(Reconstruction.__slots__)
+        assert set(file) == set(TransientCube.__slots__)
         assert file["density"].shape == file["cumulative"].shape == (10, 2, 3)
         assert file["time_s"].shape == (10,)
         for name in ("range_m", "direct", "indirect", "uniform", "flags"):

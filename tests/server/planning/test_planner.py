@@ -20,10 +20,10 @@ from transientcam_server.cli import plan as plan_verb
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.planning import Goal, plan
-from transientcam_server.planning import scene as scene_statistic
 from transientcam_server.planning.planner import Planner
 from transientcam_server.planning.prediction import Deviation, Predictor, both_found
-from transientcam_server.planning.timing import ComputingTime
+from transientcam_server.planning.scene import scene_of_frame, uniform_scene
+from transientcam_server.planning.timing import ReconstructionTimer
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
 Array = NDArray[Any]
@@ -51,7 +51,7 @@ class ClosedForm:
     least_harmonics = 1
 
     def __init__(self, *, far_m: float = 2.0) -> None:
-        self.scene = scene_statistic.given(1e6, [(far_m, 1.0)])
+        self.scene = uniform_scene(1e6, [(far_m, 1.0)])
 
     def longest_exposure_s(self) -> float:
         return 0.004
@@ -235,7 +235,7 @@ def test_a_goal_that_cannot_be_meant_is_refused(goal: Goal, capabilities: Capabi
 
 
 def test_a_given_scene_has_the_moments_of_its_returns() -> None:
-    scene = scene_statistic.given(1e6, [(1.5, 3.0), (3.0, 1.0)])
+    scene = uniform_scene(1e6, [(1.5, 3.0), (3.0, 1.0)])
     period_m = tm.SPEED_OF_LIGHT_M_S / (2 * FREQUENCY_HZ)
 
     b = scene.relative_moments(2, FREQUENCY_HZ)
@@ -256,7 +256,7 @@ def test_the_scene_of_a_frame_is_what_its_moments_hold() -> None:
     found = tm.reconstruct(frame, SETTINGS.for_moments(base_frequency_hz=FREQUENCY_HZ))
     noise = tm.noise.MomentNoise(np.full((4, 12, 10), 4.0))
 
-    scene = scene_statistic.of_frame(found, noise, exposure_s=0.001, base_frequency_hz=FREQUENCY_HZ)
+    scene = scene_of_frame(found, noise, exposure_s=0.001, base_frequency_hz=FREQUENCY_HZ)
 
     assert scene is not None
     np.testing.assert_allclose(scene.brightness_dn_per_s, 910e3, rtol=1e-4)
@@ -275,10 +275,7 @@ def test_a_dark_frame_is_no_scene() -> None:
 
     noise = tm.noise.MomentNoise(np.ones((3, 5, 5)))
 
-    assert (
-        scene_statistic.of_frame(found, noise, exposure_s=0.001, base_frequency_hz=FREQUENCY_HZ)
-        is None
-    )
+    assert scene_of_frame(found, noise, exposure_s=0.001, base_frequency_hz=FREQUENCY_HZ) is None
 
 
 # -- prediction ---------------------------------------------------------------------------------
@@ -286,7 +283,7 @@ def test_a_dark_frame_is_no_scene() -> None:
 
 def test_deviation_of_one_return_at_one_frequency_is_the_closed_form() -> None:
     sensor = tm.noise.Sensor()
-    predictor = Predictor(scene_statistic.given(4e5, [(2.0, 1.0)]), sensor, SETTINGS)
+    predictor = Predictor(uniform_scene(4e5, [(2.0, 1.0)]), sensor, SETTINGS)
     sequence = Sequence(harmonics=1, exposure_s=0.001, takes=2, zeroth="estimated")
 
     predicted = predictor.range_std(sequence)
@@ -324,7 +321,7 @@ def predictor(camera: Camera) -> Predictor:
     planner = Planner(camera.capabilities, noise, SETTINGS)
     (found,) = captured(camera, sequence, 1)
     recipe = Recipe(camera.applied, SETTINGS, 4095.0)
-    return Predictor(planner.statistic(recipe, found, 0.0), noise.sensor, SETTINGS)
+    return Predictor(planner.scene_statistics(recipe, found, 0.0), noise.sensor, SETTINGS)
 
 
 PINNED = frozenset({"base_frequency_hz"})
@@ -381,7 +378,7 @@ def test_frames_say_their_own_deviation(camera: Camera) -> None:
 def test_computing_time_is_measured_once_and_grows_with_takes(capabilities: Capabilities) -> None:
     ticks = iter(range(10_000))
     small = dataclasses.replace(capabilities, width=8, height=6)
-    seconds = ComputingTime(small, SETTINGS, clock=lambda: float(next(ticks)))
+    seconds = ReconstructionTimer(small, SETTINGS, clock=lambda: float(next(ticks)))
 
     first = seconds(Sequence(harmonics=3))
     used = next(ticks)

@@ -14,9 +14,9 @@ from transientcam_server.api.frame_query import (
     PRODUCT_PROBLEMS,
     PRODUCT_RESPONSES,
     FrameName,
+    FrameQueryOf,
     PixelBins,
     ProductName,
-    WantedOf,
     X,
     Y,
     invalid,
@@ -39,7 +39,7 @@ _MISSING = (
 )
 
 
-class Chosen:
+class LiveFrameChoice:
     """Which frame a request is about; asked for when it is needed."""
 
     def __init__(self, service: Service, name: str, wait_s: float, after: int) -> None:
@@ -89,11 +89,11 @@ async def _chosen(
             description="of `latest`: only a frame with a greater number will do",
         ),
     ] = 0,
-) -> Chosen:
-    return Chosen(service, frame, wait_s, after)
+) -> LiveFrameChoice:
+    return LiveFrameChoice(service, frame, wait_s, after)
 
 
-ChosenOf = Annotated[Chosen, Depends(_chosen)]
+ChosenOf = Annotated[LiveFrameChoice, Depends(_chosen)]
 
 
 @router.get("/frames", summary="Which frames can be had")
@@ -144,7 +144,7 @@ async def read_pixel_csv(chosen: ChosenOf, x: X, y: Y, bins: PixelBins = 256) ->
     responses=PRODUCT_RESPONSES | documented(*PRODUCT_PROBLEMS, *_MISSING),
 )
 async def read_product(
-    service: ServiceOf, chosen: ChosenOf, product: ProductName, wanted: WantedOf
+    service: ServiceOf, chosen: ChosenOf, product: ProductName, wanted: FrameQueryOf
 ) -> Response:
     """Return a product of a frame as msgpack, npy, npz, PNG, TIFF, PLY or CSV, whichever fits it.
 

@@ -13,9 +13,9 @@ from transientcam_server.api.frame_query import (
     PRODUCT_PROBLEMS,
     PRODUCT_RESPONSES,
     FrameName,
+    FrameQueryOf,
     PixelBins,
     ProductName,
-    WantedOf,
     X,
     Y,
     pixel_answer,
@@ -25,7 +25,7 @@ from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.recording.frames import Settings, timeline
+from transientcam_server.recording.frames import SettingsChoice, timeline
 from transientcam_server.service import Service
 
 router = APIRouter(prefix="/recordings/{recording}/frames", tags=["recordings"])
@@ -48,7 +48,7 @@ RecordingName = Annotated[
 ]
 
 
-class Chosen:
+class RecordedFrameChoice:
     """Which frame of which recording a request is about."""
 
     def __init__(
@@ -56,12 +56,12 @@ class Chosen:
         service: Service,
         recording: str,
         frame: str,
-        settings: Settings,
+        settings: SettingsChoice,
     ) -> None:
         self._service = service
         self._recording = recording
         self._frame = frame
-        self._settings: Settings = settings
+        self._settings: SettingsChoice = settings
 
     async def frame(self) -> Frame:
         """Read it."""
@@ -79,14 +79,14 @@ async def _chosen(
     recording: RecordingName,
     frame: FrameName,
     reconstruction: Annotated[
-        Settings,
+        SettingsChoice,
         Query(description="settings it was recorded with, or those the service has now"),
     ] = "recorded",
-) -> Chosen:
-    return Chosen(service, recording, frame, reconstruction)
+) -> RecordedFrameChoice:
+    return RecordedFrameChoice(service, recording, frame, reconstruction)
 
 
-ChosenOf = Annotated[Chosen, Depends(_chosen)]
+ChosenOf = Annotated[RecordedFrameChoice, Depends(_chosen)]
 
 
 @router.get(
@@ -138,7 +138,7 @@ async def read_pixel_csv(chosen: ChosenOf, x: X, y: Y, bins: PixelBins = 256) ->
     response_class=Response,
     responses=PRODUCT_RESPONSES | documented(*PRODUCT_PROBLEMS, *_MISSING),
 )
-async def read_product(chosen: ChosenOf, product: ProductName, wanted: WantedOf) -> Response:
+async def read_product(chosen: ChosenOf, product: ProductName, wanted: FrameQueryOf) -> Response:
     """Return what a product of the camera's frames is, of a recorded one."""
     pipeline = await chosen.pipeline()
     return await product_answer(product, wanted, product=pipeline.product, frame=chosen.frame)
