@@ -11,9 +11,8 @@ from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.capture import repeatability
 from transientcam_experiments.tradeoff.measuring import spec_of
 from transientcam_server.camera.source import noise_of
-from transientcam_server.planning import Goal, plan
-from transientcam_server.planning.planner import Planner
-from transientcam_server.planning.prediction import Predictor
+from transientcam_server.planning import Goal, Planner, Predictor
+from transientcam_server.planning.plan import plan
 from transientcam_server.settings import SensorSettings
 
 

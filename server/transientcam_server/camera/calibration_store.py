@@ -1,7 +1,6 @@
 """The calibrations of a service: one directory of files, and which of them is active.
 
-What clients call a calibration never becomes a path: they name it by its id, which is looked up
-among the files that are there.
+An id from a client never becomes a path: it is looked up among the files that exist.
 """
 
 import json
@@ -30,18 +29,18 @@ _ABANDONED_S: Final = 24 * 3600.0
 
 @dataclass(frozen=True, slots=True)
 class StoredCalibration:
-    """A calibration that is there, without its images.
+    """A calibration on disk, without its images.
 
     Attributes
     ----------
     path
         Its file.
     subject
-        What it is good for.
+        Device and sequence that it fits.
     captured_unix_s
         When its last image arrived.
     notes
-        ``name``, and what else is kept with it.
+        ``name``, and what else is stored with it.
     """
 
     id: str
@@ -55,14 +54,14 @@ class StoredCalibration:
 
 
 class CalibrationStore:
-    """The calibrations that are there. Reads and writes files, so call it on a worker.
+    """The stored calibrations. Reads and writes files, so call it on a worker.
 
     Parameters
     ----------
     settings
-        Where they are kept, how many and how large.
+        Directory, largest number and size.
     given
-        One that the service was started with, wherever it is.
+        File that the service was started with, in any directory.
     """
 
     def __init__(
@@ -80,7 +79,7 @@ class CalibrationStore:
 
     @property
     def directory(self) -> Path:
-        """Where they are kept."""
+        """Directory of the files."""
         return self._settings.directory
 
     def all(self) -> list[StoredCalibration]:
@@ -109,7 +108,7 @@ class CalibrationStore:
         )
 
     def add(self, capture: CalibrationCapture) -> StoredCalibration:
-        """Keep a measurement.
+        """Store a measurement.
 
         Raises
         ------
@@ -125,7 +124,7 @@ class CalibrationStore:
             return self._take(part, capture)
 
     def take_in(self, part: Path) -> StoredCalibration:
-        """Keep a file that was received; one that is here already stays as it is.
+        """Store a file that was received; a calibration that exists stays as it is.
 
         Raises
         ------
@@ -149,13 +148,13 @@ class CalibrationStore:
         return self._take(part, capture)
 
     def delete(self, calibration_id: str) -> StoredCalibration:
-        """Delete a calibration for good.
+        """Delete a calibration permanently.
 
         Raises
         ------
         Problem
             ``unknown-calibration``, ``calibration-in-use`` for the one that the service was
-            started with, ``calibration-not-stored`` where the disk does not let it.
+            started with, ``calibration-not-stored`` where the disk refuses.
         """
         stored = self.get(calibration_id)
         if stored.path == self._given:
@@ -173,7 +172,7 @@ class CalibrationStore:
 
     @property
     def active_id(self) -> str:
-        """Which one was active when the service was here last."""
+        """The calibration that was active when the service last ran."""
         try:
             document = json.loads((self.directory / _ACTIVE).read_text(encoding="utf-8"))
             return str(document["id"])
@@ -184,7 +183,7 @@ class CalibrationStore:
             return NOMINAL_ID
 
     def remember_active(self, calibration_id: str) -> None:
-        """Let the next start of the service know; a disk that does not take it is no problem."""
+        """Keep it for the next start of the service; a failure of the disk is only logged."""
         try:
             with self._part() as part:
                 part.write_text(json.dumps({"id": calibration_id}), encoding="utf-8")
@@ -193,7 +192,7 @@ class CalibrationStore:
             _log.warning("the next start will not know the active calibration: %s", error)
 
     def require_room(self) -> None:
-        """Refuse one more calibration where there are many.
+        """Refuse one more calibration where the limit is reached.
 
         Raises
         ------
@@ -217,7 +216,7 @@ class CalibrationStore:
             part.unlink(missing_ok=True)
 
     def new_part(self) -> Path:
-        """Make a file in the directory for what is not complete yet; who asks removes it.
+        """Create a file for a calibration that is not complete yet; the caller removes it.
 
         Raises
         ------
@@ -234,15 +233,15 @@ class CalibrationStore:
         return Path(name)
 
     def not_stored(self, error: OSError) -> Problem:
-        """Say that the disk does not take a calibration, and log where."""
+        """Return the problem of a failed write, and log the directory."""
         _log.warning("storing a calibration in %s failed: %s", self.directory, error)
         reason = error.strerror or "no reason is given"
-        return Problem(kinds.CALIBRATION_NOT_STORED, f"The disk does not take it: {reason}.")
+        return Problem(kinds.CALIBRATION_NOT_STORED, f"It could not be written: {reason}.")
 
     def _sweep(self) -> None:
-        """Remove what a service left behind that died while it received something."""
+        """Remove files that a service left when it died while it received them."""
         for part in self.directory.glob("*.part"):
-            with suppress(FileNotFoundError):  # its owner was quicker
+            with suppress(FileNotFoundError):  # its owner removed it first
                 if part.stat().st_mtime < self._unix_s() - _ABANDONED_S:
                     part.unlink()
 

@@ -1,6 +1,6 @@
 """Products of every frame of a recording, into a file that an interruption does not spoil.
 
-What is done stays: run again, it goes on after the last frame that is in the file.
+A second run goes on after the last frame that is in the file.
 """
 
 import json
@@ -33,7 +33,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, slots=True)
 class BatchOptions:
-    """What to compute, and how; ``bins`` times of flight for products over time."""
+    """Products and settings; ``bins`` times of flight for products over time."""
 
     products: tuple[str, ...] = DEFAULT_PRODUCTS
     settings: ReconstructionSettings = field(default_factory=ReconstructionSettings)
@@ -66,7 +66,7 @@ class BatchReconstructor:
         }
 
 
-def reconstruct(
+def reconstruct_recording(
     recording: Recording,
     output: Path,
     options: BatchOptions,
@@ -75,18 +75,18 @@ def reconstruct(
 ) -> int:
     """Compute products of all frames into ``output``; return how many were there already.
 
-    Until it is whole it is called ``<output>.part``.
+    Until it is complete the file is called ``<output>.part``.
 
     Raises
     ------
     InputError
-        If what was begun was another recording, or with other settings.
+        If the unfinished file is of another recording, or made with other settings.
     DamagedFrame
         If a frame is not what was recorded; those before it stay done.
     FileExistsError
         If the output is there already.
     OSError
-        If the disk does not take it.
+        If the output cannot be written.
     """
     if output.exists():
         raise FileExistsError(17, "it is there already", str(output))
@@ -119,7 +119,7 @@ def reconstruct(
 
 
 def _document(recording: Recording, options: BatchOptions) -> dict[str, str]:
-    """Return what has to agree for a file to be gone on with."""
+    """Return the attributes that must agree for an unfinished file to be continued."""
     header = recording.header
     return {
         "format": "transientcam products",
@@ -162,7 +162,7 @@ def _lay_out(
 
 
 def _resumed(part: Path, document: Mapping[str, str]) -> swmr.File:
-    """Return the file that was begun, made whole first."""
+    """Open an unfinished file to append to, repaired first."""
     scratch = part.with_name(part.name + ".resuming")
     try:
         with swmr.open_file(part, "r", libver="latest", swmr=True) as begun:

@@ -28,7 +28,7 @@ class Planner:
     noise
         Of its sensor.
     settings
-        How images become range.
+        Of the reconstruction.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class Planner:
         self.reconstruct_with(settings)
 
     def reconstruct_with(self, settings: ReconstructionSettings) -> None:
-        """Predict from now on what images become with other settings."""
+        """Predict with other settings of the reconstruction from now on."""
         self._settings = settings
         self._computing = ReconstructionTimer(self._capabilities, settings)
 

@@ -1,4 +1,4 @@
-"""What a scene is to a prediction: how bright its pixels are, and what light they send back."""
+"""The scene as predictions see it: brightness and returns of typical pixels."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -32,11 +32,11 @@ class SceneStatistics:
     ambient_dn_per_s
         Light that is not the camera's, in DN an image for each second of exposure.
     harmonics
-        How many the scene was seen with; None where it is given and all is known.
+        Number of harmonics of the frame that shows it; None where the scene is given exactly.
     relative_noise
-        Deviation of a typical pixel's moments over its brightness when it was seen.
+        Deviation of a typical pixel's moments over its brightness, in that frame.
     range_std_m
-        Deviation of a typical pixel's range when it was seen.
+        Deviation of a typical pixel's range in that frame.
     """
 
     brightness_dn_per_s: _Array

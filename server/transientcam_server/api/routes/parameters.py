@@ -8,7 +8,7 @@ from pydantic import ConfigDict, JsonValue
 from transientcam_server.api import parameters
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.document import Document
-from transientcam_server.recording.replay import ReplayCamera
+from transientcam_server.recording import ReplayCamera
 
 router = APIRouter(tags=["parameters"])
 _EXAMPLE: Final[dict[str, JsonValue]] = {

@@ -11,8 +11,7 @@ from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.plan import PlanDocument, PlanRequest, TradeoffDocument
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
-from transientcam_server.planning import Goal
-from transientcam_server.planning.scene import SceneStatistics, uniform_scene
+from transientcam_server.planning import Goal, SceneStatistics, uniform_scene
 from transientcam_server.service import Service
 
 router = APIRouter(tags=["accuracy"])

@@ -20,8 +20,7 @@ from transientcam_server.api.documents.recording import (
 )
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
-from transientcam_server.recording.library import RecordingOptions
-from transientcam_server.recording.recorder import Limits
+from transientcam_server.recording import Limits, RecordingOptions
 
 router = APIRouter(tags=["recordings"])
 
