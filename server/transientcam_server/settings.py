@@ -194,7 +194,7 @@ class Settings(_Group):
     tokens_file: Path = Field(
         default_factory=lambda: user_config_path("transientcam") / "tokens.json"
     )
-    """File in which `transientcam token` keeps hashes of the tokens."""
+    """File in which `transientcam token` keeps names and hashes of the tokens."""
     require_token: bool = False
     """Require a token even if only this machine reaches the service, as behind a proxy."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"

@@ -26,10 +26,10 @@ from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
 Options = Mapping[str, str]
-"""Of a simulated camera's name."""
+"""Options in the name of a simulated camera."""
 NO_OPTIONS: Final[Options] = MappingProxyType({})
 WITHOUT_OUTLIERS: Final[Options] = MappingProxyType({"outliers": "off"})
-"""For single takes: there is nothing to tell outliers by, and the paper shows none in its."""
+"""For single takes, in which outliers cannot be detected; the paper shows none in its own."""
 DEVICE: Final = "prototype"
 """The make of camera: the paper's, as far as its figures are known."""
 WARM_UP_S: Final = 1800.0
@@ -84,7 +84,7 @@ class Bench:
         self._shots: dict[tuple[Any, ...], list[ReconstructedShot]] = {}
 
     def few(self, full: int, quick: int) -> int:
-        """Return how many of something to look at."""
+        """Return the number of points to look at: ``full``, or ``quick`` for a first look."""
         return quick if self.quick else full
 
     def shot(
@@ -109,7 +109,7 @@ class Bench:
         scene
             A name, or the path of a .toml.
         sequence
-            What to capture; fewer takes of it where it has to be quick.
+            What to capture; with fewer takes for a first look.
         frames
             How many.
         at_s
@@ -124,7 +124,7 @@ class Bench:
         return self._shots[key]
 
     def sequence(self, sequence: Sequence) -> Sequence:
-        """Return what is captured in the place of a sequence: with few takes where it is quick."""
+        """Return the sequence that is really captured: with fewer takes for a first look."""
         takes = sequence.takes
         return replace(sequence, takes=min(takes, _QUICK_TAKES) if self.quick else takes)
 

@@ -82,7 +82,7 @@ def _heights(shot: ReconstructedShot) -> _Array:
 def _separated(shot: ReconstructedShot, *, threshold: float = 0.0) -> float:
     """Return the share of pixels with three returns whose density peaks near each of them.
 
-    However low, without a threshold relative to the highest: the height of a peak tells of its
+    However low, without a threshold relative to the highest: the height of a peak depends on its
     sharpness more than of its light.
     """
     where = thrice(shot)
@@ -237,7 +237,7 @@ def _statements(captures: dict[str, list[ReconstructedShot]]) -> list[Statement]
 
 
 def _remarks(captures: dict[str, list[ReconstructedShot]]) -> list[str]:
-    """Say what other measures would say."""
+    """Return remarks on other measures."""
     first = {name: captures[name][0] for name in SEQUENCES}
     shares = ", ".join(
         f"{_separated(shot, threshold=0.1):.0%} in ({name})" for name, shot in first.items()

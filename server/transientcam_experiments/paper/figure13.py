@@ -17,7 +17,7 @@ _TIMES_S: Final = (9.9e-9, 13.8e-9, 24.2e-9)
 _LONG_S: Final = 0.00192
 _NEAR_S: Final = 1e-9
 _FOUND: Final = 0.1
-"""Returns below this share of a pixel's light are not asked for."""
+"""Returns below this share of a pixel's light need not be found."""
 
 
 def make(bench: Bench) -> Made:
@@ -70,9 +70,9 @@ def _complete(shot: ReconstructedShot) -> float:
     phase = tm.peaks(shot.found.coefficients, threshold=0.0).phase_rad
     complete = shot.lit.copy()
     for delay_s, weight in zip(shot.truth.delay_s, shot.truth.weight, strict=True):
-        asked = weight > _FOUND * shot.truth.brightness
+        required = weight > _FOUND * shot.truth.brightness
         near = (np.abs(phase - turn * delay_s) < turn * _NEAR_S).any(axis=0)
-        complete &= near | ~asked
+        complete &= near | ~required
     return float(complete[shot.lit].mean())
 
 

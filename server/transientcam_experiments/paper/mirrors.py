@@ -29,7 +29,7 @@ def shots(bench: Bench, sequence: Sequence, *, frames: int = 1) -> list[Reconstr
 
 
 def title(name: str) -> str:
-    """Return what a row of Figures 8 and 9 was captured with."""
+    """Return the title of a row of Figures 8 and 9: how it was captured."""
     sequence = SEQUENCES[name]
     takes = "1 take" if sequence.takes == 1 else f"{sequence.takes} takes"
     return (

@@ -17,7 +17,7 @@ MOMENTS_S: Final = (4.8, 7.6, 17.0)
 
 
 def video(bench: Bench) -> dict[float, list[ReconstructedShot]]:
-    """Return two successive frames at each moment, or at the first two where it has to be quick.
+    """Return two successive frames at each moment, or at the first two for a first look.
 
     The paper fills what outliers took with the frame before; ours are taken without outliers.
     """
@@ -28,7 +28,7 @@ def video(bench: Bench) -> dict[float, list[ReconstructedShot]]:
 
 
 def parts(shot: ReconstructedShot) -> dict[str, _Array]:
-    """Tell the pixels (H, W) of the actor, of the wall, and of the wall with light over mirrors."""
+    """Return the pixels (H, W) of the actor, of the wall, and of the wall lit over mirrors."""
     first = shot.truth.delay_s[0]
     actor = shot.lit & (first < 12.8e-9)
     later = (np.nan_to_num(shot.truth.delay_s[1:], nan=0.0) > 20e-9).any(axis=0)

@@ -189,7 +189,7 @@ class CalibrationStore:
                 part.write_text(json.dumps({"id": calibration_id}), encoding="utf-8")
                 part.replace(self.directory / _ACTIVE)
         except (Problem, OSError) as error:
-            _log.warning("the next start will not know the active calibration: %s", error)
+            _log.warning("the active calibration could not be saved for the next start: %s", error)
 
     def require_room(self) -> None:
         """Refuse one more calibration where the limit is reached.

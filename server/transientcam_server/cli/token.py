@@ -97,7 +97,7 @@ def revoke(
     tokens_file: _File = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a token invalid; its open connections are closed."""
+    """Make a token invalid; its open streams are closed."""
     from transientcam_server.api.auth.tokens import TokenFile
 
     token = TokenFile(_path(config, tokens_file)).revoke(token_id)

@@ -13,7 +13,7 @@ _FRAMES: Final = 6
 
 
 def require() -> None:
-    """Check that pictures can be made, before hours of work that should end in one.
+    """Check that pictures can be made, before the hours that a reconstruction may take.
 
     Raises
     ------

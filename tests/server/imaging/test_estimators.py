@@ -40,8 +40,8 @@ def captured(m: int) -> tuple[AppliedSequence, FrameWithTruth]:
     base_frequency_hz = 23e6 if m < 5 else 11.5e6
     with open_camera("sim:corner?noise=off", clock=VirtualClock()) as camera:
         applied = camera.configure(Sequence(harmonics=m, base_frequency_hz=base_frequency_hz))
-        (shot,) = capture(camera, 1)
-    return applied, shot
+        (frame,) = capture(camera, 1)
+    return applied, frame
 
 
 @pytest.fixture(autouse=True)
@@ -53,12 +53,12 @@ def coarse_table(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("estimator", get_args(Estimator))
 def test_every_estimator_gives_range_and_light_of_captured_frames(estimator: Estimator) -> None:
     settings = ReconstructionSettings(estimator=estimator)
-    applied, shot = captured(max(3, settings.least_harmonics))
+    applied, frame = captured(max(3, settings.least_harmonics))
     recipe = Recipe(applied, settings, 4095.0)
 
-    found = recipe.reconstruct(shot.frame)
+    found = recipe.reconstruct(frame.raw)
 
-    truth_m = shot.truth.range_m
+    truth_m = frame.truth.range_m
     assert found.range_m.shape == truth_m.shape
     seen = np.isfinite(found.range_m) & np.isfinite(truth_m)
     assert seen.mean() > 0.5
