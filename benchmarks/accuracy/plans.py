@@ -11,9 +11,8 @@ from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.capture import repeatability
 from transientcam_experiments.tradeoff.measuring import spec_of
 from transientcam_server.camera.source import noise_of
-from transientcam_server.planning import Goal, plan
-from transientcam_server.planning.planner import Planner
-from transientcam_server.planning.prediction import Predictor
+from transientcam_server.planning import Goal, Planner, Predictor
+from transientcam_server.planning.plan import plan
 from transientcam_server.settings import SensorSettings
 
 
@@ -48,7 +47,7 @@ def planned(scene: str) -> Iterator[Planned]:
         noise = noise_of(camera, SensorSettings())
         planner = Planner(camera.capabilities, noise, SETTINGS)
         recipe, (look,) = captured(camera, Sequence(harmonics=6, takes=16, exposure_s=0.0015), 1)
-        predictor = Predictor(planner.statistic(recipe, look, 0.0), noise.sensor, SETTINGS)
+        predictor = Predictor(planner.scene_statistics(recipe, look, 0.0), noise.sensor, SETTINGS)
         for wanted, goal in GOALS.items():
             best = plan(
                 goal, predictor, camera.capabilities, reconstruct_s=lambda _: 1e-3

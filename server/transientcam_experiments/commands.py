@@ -1,4 +1,7 @@
-"""The verbs ``paper`` and ``tradeoff`` of the ``transientcam`` command."""
+"""The verbs ``paper`` and ``tradeoff`` of the ``transientcam`` command.
+
+What is heavy is imported when a verb runs, so that ``transientcam --help`` stays quick.
+"""
 
 import json
 import time
@@ -8,10 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import (
-    Progress,
-    TaskID,
-)
+from rich.progress import Progress, TaskID
 
 from transientcam_server.cli.progress import progress_bars
 
@@ -69,7 +69,7 @@ def paper(
         typer.echo(json.dumps(documents, ensure_ascii=False))
     else:
         for document in documents:
-            _tell(console, document)
+            _print_statements(console, document)
         console.print(f"See {page.path}", soft_wrap=True)
 
 
@@ -78,7 +78,7 @@ def _made(number: int, bench: Any, page: "Page") -> dict[str, Any]:
     from transientcam_experiments.paper.page import document_of
 
     figure = FIGURES[number]
-    begin_s = time.process_time()  # whatever else the machine does
+    begin_s = time.process_time()  # independent of other load on the machine
     made = figure.make(bench)
     picture = style.png(made.picture)
     seconds = time.process_time() - begin_s
@@ -87,7 +87,7 @@ def _made(number: int, bench: Any, page: "Page") -> dict[str, Any]:
     return document
 
 
-def _tell(console: Console, document: dict[str, Any]) -> None:
+def _print_statements(console: Console, document: dict[str, Any]) -> None:
     statements = document["statements"]
     hold = sum(each["passes"] for each in statements)
     heading = f"Figure {document['figure']}, {document['title']}"
@@ -129,21 +129,21 @@ def tradeoff(
 ) -> None:
     """Measure what accuracy costs in time on scenes whose truth is known.
 
-    An interrupted run loses nothing: tables, plots and page are made of what is there, and the
-    same command goes on where it stopped.
+    An interrupted run loses nothing: tables, plots and page show what was measured so far, and
+    the same command goes on where it stopped.
     """
     import transientcam_moments as tm
-    from transientcam_experiments import tradeoff as measuring
+    from transientcam_experiments import tradeoff as experiment
     from transientcam_experiments.tradeoff import plots
 
     plots.require()
-    grid = measuring.load_grid(sequence_grid)
+    grid = experiment.load_grid(sequence_grid)
     scenes = scene or ["mirrors"]
     points = {
-        name: measuring.points_of(grid, scene=name, repetitions=repetitions, seed=seed)
+        name: experiment.points_of(grid, scene=name, repetitions=repetitions, seed=seed)
         for name in scenes
     }
-    records = measuring.Records(output)
+    records = experiment.Records(output)
     console = Console(stderr=True)
     interrupted = False
     with progress_bars(console=console, counted=True) as progress:
@@ -159,7 +159,7 @@ def tradeoff(
         try:
             for name, each in points.items():
                 task = progress.add_task(name, total=len(each))
-                measuring.measure(
+                experiment.measure(
                     each,
                     records,
                     scene=name,
@@ -168,7 +168,7 @@ def tradeoff(
                 )
         except KeyboardInterrupt:
             interrupted = True
-        written = measuring.report(output, records) if len(records) else []
+        written = experiment.report(output, records) if len(records) else []
     if as_json:
         document = {"points": len(records), "written": [str(path) for path in written]}
         typer.echo(json.dumps(document))

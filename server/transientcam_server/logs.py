@@ -1,4 +1,4 @@
-"""Logs: for eyes on a terminal, JSON for everything else; each line names its request."""
+"""Logs: text on a terminal, JSON elsewhere; each line names its request."""
 
 import logging
 import sys
@@ -13,16 +13,16 @@ request_id: Final[ContextVar[str | None]] = ContextVar("request_id", default=Non
 """The id of the request that is being answered; None outside of any."""
 
 _NOISY: Final = ("websockets", "asyncio", "multipart", "PIL", "numba", "h5py")
-"""Libraries that tell their own debugging at `debug`, some of it headers."""
+"""Libraries whose own messages at `debug` are left out; some of them contain headers."""
 
-_OF_CLIENTS: Final = frozenset(
+_CLIENT_MISTAKES: Final = frozenset(
     (
         "Invalid UTF-8 sequence received from client.",
         "ASGI callable returned without completing handshake.",
     )
 )
-"""What uvicorn calls errors, one with a traceback, although somebody else made the mistake and has
-been told: text that is none, and a stream that was refused."""
+"""Messages that uvicorn logs as errors, although the client made the mistake and was notified:
+invalid text, and a stream that was refused."""
 
 
 def configure(*, level: str, form: LogFormat, stream: TextIO = sys.stderr) -> None:
@@ -30,14 +30,14 @@ def configure(*, level: str, form: LogFormat, stream: TextIO = sys.stderr) -> No
     handler = logging.StreamHandler(stream)
     handler.setFormatter(formatter(form if form != "auto" else _form_for(stream)))
     handler.addFilter(_add_request_id)
-    handler.addFilter(_blame_clients)
+    handler.addFilter(_as_client_mistake)
     logging.basicConfig(level=level.upper(), handlers=[handler], force=True)
     for name in _NOISY:
         logging.getLogger(name).setLevel(max(logging.INFO, logging.getLevelName(level.upper())))
 
 
 def formatter(form: Literal["text", "json"]) -> logging.Formatter:
-    """Return what makes lines of records."""
+    """Return the formatter of a log format."""
     if form == "text":
         return logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s")
     return JsonFormatter(
@@ -58,8 +58,8 @@ def _add_request_id(record: logging.LogRecord) -> bool:
     return True
 
 
-def _blame_clients(record: logging.LogRecord) -> bool:
-    if record.name != "uvicorn.error" or record.msg not in _OF_CLIENTS:
+def _as_client_mistake(record: logging.LogRecord) -> bool:
+    if record.name != "uvicorn.error" or record.msg not in _CLIENT_MISTAKES:
         return True
     record.levelno, record.levelname, record.exc_info = logging.INFO, "INFO", None
     return logging.getLogger().isEnabledFor(logging.INFO)

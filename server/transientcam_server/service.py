@@ -15,13 +15,18 @@ from transientcam_driver import AppliedSequence, CalibrationError
 from transientcam_driver.calibration.file import DEVICE_FIELDS
 from transientcam_server.broadcast.channel import Channel
 from transientcam_server.broadcast.hub import Hub
-from transientcam_server.camera.acquisition import Acquisition
-from transientcam_server.camera.calibration_store import CalibrationStore
-from transientcam_server.camera.calibrator import Calibrator
+from transientcam_server.camera import (
+    Acquisition,
+    CalibrationStore,
+    Calibrator,
+    Camera,
+    Jobs,
+    LeaseManager,
+)
 from transientcam_server.camera.events import Back, Captured, Event, Lost, SequenceChanged
-from transientcam_server.camera.jobs import Job, Jobs
-from transientcam_server.camera.lease import Alarm, Change, Lease, LeaseManager
-from transientcam_server.camera.source import Camera, noise_of
+from transientcam_server.camera.jobs import Job
+from transientcam_server.camera.lease import Change, Lease, Timer
+from transientcam_server.camera.source import noise_of
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import (
     NOMINAL_ID,
@@ -34,12 +39,9 @@ from transientcam_server.imaging.lens import Intrinsics, known_intrinsics
 from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.imaging.recipe import SettingsVersion, require_harmonics
 from transientcam_server.imaging.workers import Workers
-from transientcam_server.planning.front import Fronts
-from transientcam_server.planning.planner import Planner
-from transientcam_server.recording import Header
-from transientcam_server.recording.frames import RecordedFramesOf
-from transientcam_server.recording.library import Library, Wanted
-from transientcam_server.recording.replay import ReplayCamera
+from transientcam_server.planning import FrontCache, Planner
+from transientcam_server.recording import Header, Library, RecordingOptions, ReplayCamera
+from transientcam_server.recording.frames import RecordedFramesCache
 from transientcam_server.settings import ReconstructionSettings, Settings
 
 _log = logging.getLogger(__name__)
@@ -92,7 +94,9 @@ class Service:
             calibration=_calibration(camera, settings, kept),
             intrinsics=lambda: self.intrinsics,
         )
-        self.fronts = Fronts(self.planner, self.workers, simulated=camera.simulation is not None)
+        self.fronts = FrontCache(
+            self.planner, self.workers, simulated=camera.simulation is not None
+        )
         self._loop: asyncio.AbstractEventLoop | None = None
         self.acquisition = Acquisition(camera, report=self._from_acquisition)
         self.applied: AppliedSequence = camera.applied
@@ -105,13 +109,15 @@ class Service:
             noise=noise,
             jobs=self.jobs,
             history=self.history,
-            tell=partial(self.hub.tell, "calibration-changed"),
+            notify=partial(self.hub.notify, "calibration-changed"),
         )
-        self.lease = LeaseManager(report=self._lease_changed, alarm=self._alarm)
+        self.lease = LeaseManager(report=self._lease_changed, call_later=self._call_later)
         self.recordings = Library(
-            settings.recordings, header=self._recording_header, tell=self._tell_from_thread
+            settings.recordings, header=self._recording_header, notify=self._notify_from_thread
         )
-        self.recorded_frames = RecordedFramesOf(self.recordings, self.pipeline, lens=settings.lens)
+        self.recorded_frames = RecordedFramesCache(
+            self.recordings, self.pipeline, lens=settings.lens
+        )
         self.identity = {"name": "transientcam", "version": VERSION}
 
     @contextlib.asynccontextmanager
@@ -178,7 +184,7 @@ class Service:
         else:
             self._loop.call_soon_threadsafe(self._happened, event)
 
-    async def record(self, wanted: Wanted, *, history_s: float | None) -> dict[str, Any]:
+    async def record(self, options: RecordingOptions, *, history_s: float | None) -> dict[str, Any]:
         """Start a recording, with the frames of the last seconds if wanted, and describe it.
 
         Raises
@@ -187,19 +193,19 @@ class Service:
             As `Library.start`.
         """
         if history_s is None:
-            return await asyncio.to_thread(self.recordings.start, wanted)
+            return await asyncio.to_thread(self.recordings.start, options)
         # it waits for its past, also where the client is gone
-        return await asyncio.shield(self.workers.start(self._record_past(wanted, history_s)))
+        return await asyncio.shield(self.workers.start(self._record_past(options, history_s)))
 
-    async def _record_past(self, wanted: Wanted, history_s: float) -> dict[str, Any]:
-        described = await asyncio.to_thread(self.recordings.start, replace(wanted, past=True))
+    async def _record_past(self, options: RecordingOptions, history_s: float) -> dict[str, Any]:
+        described = await asyncio.to_thread(self.recordings.start, replace(options, past=True))
         past = [(each.raw, each.recipe.applied) for each in self.history.newest(history_s)]
         count = self.recordings.precede(described["id"], past)
         return described | {"history_frames": count}
 
-    def _tell_from_thread(self, kind: str, details: Mapping[str, Any]) -> None:
+    def _notify_from_thread(self, kind: str, details: Mapping[str, Any]) -> None:
         assert self._loop is not None  # noqa: S101 - nothing is recorded before it is set
-        self._loop.call_soon_threadsafe(self.hub.tell, kind, details)
+        self._loop.call_soon_threadsafe(self.hub.notify, kind, details)
 
     def _recording_header(self, recording_id: str, name: str, started_s: float) -> Header:
         """Return what a recording that starts now has to know to be evaluated alone."""
@@ -236,7 +242,7 @@ class Service:
         now = self.pipeline.reconstruction = before.followed_by(settings)
         if now is not before:
             self.planner.reconstruct_with(settings)
-            self.hub.tell("reconstruction-changed", {"reconstruction": now.to_document()})
+            self.hub.notify("reconstruction-changed", {"reconstruction": now.to_document()})
         return now
 
     def _happened(self, event: Event) -> None:
@@ -251,16 +257,16 @@ class Service:
                 self.history.append(frame)
                 self.hub.publish(frame)
             case Lost(reason):
-                self.hub.tell("camera-lost", {"reason": reason})
+                self.hub.notify("camera-lost", {"reason": reason})
             case Back():
-                self.hub.tell("camera-back", {})
+                self.hub.notify("camera-back", {})
             case SequenceChanged(applied):
                 before, self.applied = self.applied, applied
-                self._tell_sequence_changed()
-                self._tell_calibration(before)
+                self._notify_sequence_changed()
+                self._notify_calibration(before)
 
-    def _alarm(self, delay_s: float, ring: Callable[[], None]) -> Alarm:
-        return asyncio.get_running_loop().call_later(delay_s, ring)
+    def _call_later(self, delay_s: float, callback: Callable[[], None]) -> Timer:
+        return asyncio.get_running_loop().call_later(delay_s, callback)
 
     def _lease_changed(self, change: Change, lease: Lease, former: Lease | None) -> None:
         if former is not None:
@@ -276,28 +282,28 @@ class Service:
         else:
             _log.info("the lease of %r (%s) was %s", lease.holder, lease.by, change)
         details = {"change": change, "holder": lease.holder}
-        self.hub.tell("lease-changed", details | ({"from": former.holder} if former else {}))
+        self.hub.notify("lease-changed", details | ({"from": former.holder} if former else {}))
         if change == "lapsed" and lease.on_lapse == "stop":
             self.acquisition.set_running(False).add_done_callback(_log_failure)
 
     def _job_changed(self, job: Job) -> None:
-        self.hub.tell("job-changed", {"job": job.to_document()})
+        self.hub.notify("job-changed", {"job": job.to_document()})
 
-    def _tell_sequence_changed(self) -> None:
+    def _notify_sequence_changed(self) -> None:
         sequence = self.applied.to_document()
         for outbox in self.hub.subscribers:
             channels = [each.to_document() for each in self.channel_table(outbox.channels)]
             notice = wire.Notice("sequence-changed", {"sequence": sequence, "channels": channels})
             outbox.put(notice)
 
-    def _tell_calibration(self, before: AppliedSequence) -> None:
-        """Tell when frames from now on are calibrated in another way."""
+    def _notify_calibration(self, before: AppliedSequence) -> None:
+        """Notify clients when frames from now on are calibrated in another way."""
         fitted, fits = (self.pipeline.misfit(each) is None for each in (before, self.applied))
         if fitted != fits:
             notice = self.calibrations.notice(self.applied)
             if not fits:
                 _log.warning("%s; using nominal gains", notice["reason"])
-            self.hub.tell("calibration-changed", notice)
+            self.hub.notify("calibration-changed", notice)
 
 
 def _log_failure(stopped: Future[None]) -> None:

@@ -1,15 +1,16 @@
-"""What can be set; `transientcam_server.daemon.configuration` reads it."""
+"""The settings of the service; `transientcam_server.daemon.configuration` reads them."""
 
 import os
 from ipaddress import ip_address
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from platformdirs import user_config_path, user_data_path
 from pydantic import BaseModel, ConfigDict, Field
 
 import transientcam_moments as tm
 from transientcam.wire import FIRST_MESSAGE_WITHIN_S, MAX_SUBSCRIPTIONS
+from transientcam_moments.reconstruction import ESTIMATORS
 
 _DEFAULTS = tm.Settings()  # the paper's
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -19,20 +20,14 @@ class _Group(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
 
-# those whose computation keeps up with a camera; the others are for recordings, through the library
-Estimator = Literal[
-    "pisarenko",
-    "maximum-entropy",
-    "single-frequency",
-    "inverse-fourier",
-    "godbaz",
-    "spumic",
-    "sra-table",
-    "matrix-pencil",
-    "matching-pursuit",
-    "frequency-domain",
-    "high-frequency",
-]
+if TYPE_CHECKING:
+    Estimator = str
+else:
+    # a closed set for pydantic and OpenAPI: those that keep up with a camera, all pixels at once;
+    # the others are for recordings, through the library
+    Estimator = Literal[
+        tuple(name for name in ESTIMATORS if tm.comparisons.TECHNIQUES[name].planar)
+    ]
 
 
 class ReconstructionSettings(_Group):
@@ -55,7 +50,7 @@ class ReconstructionSettings(_Group):
         return tm.comparisons.TECHNIQUES[self.estimator].least_harmonics
 
     def for_moments(self, **others: Any) -> tm.Settings:
-        """Return these settings as the arithmetic calls them, together with its other ones."""
+        """Return these settings as `tm.Settings`, together with its other ones."""
         return tm.Settings(
             epsilon=self.bias,
             smoothing_sigma_px=self.smoothing_px,
@@ -80,7 +75,7 @@ class SensorSettings(_Group):
 
 
 class LensSettings(_Group):
-    """Where the pixels look, where the camera does not say it itself; point clouds rest on it."""
+    """Where the pixels look, if the camera does not report it; point clouds rest on it."""
 
     field_of_view_deg: _Finite | None = Field(default=None, gt=0.0, lt=180.0)
     """Horizontal, for square pixels around the axis."""
@@ -95,10 +90,10 @@ class LensSettings(_Group):
 
 
 class StreamSettings(_Group):
-    """How many clients may look, and how far one may fall behind."""
+    """How many clients may connect, and how far one may fall behind."""
 
     max_clients: int = Field(default=256, ge=1, le=100_000)
-    """Streams open at the same time; one more is told to try again later."""
+    """Streams open at the same time; one more is refused, to try again later."""
     queue_frames: int = Field(default=2, ge=1, le=16)
     """Frames that wait for one client before the oldest is dropped."""
     first_message_s: _Finite = Field(default=FIRST_MESSAGE_WITHIN_S, gt=0.0, le=300.0)
@@ -107,11 +102,11 @@ class StreamSettings(_Group):
     """Products that one client may have at the same time."""
     max_messages_hz: _Finite = Field(default=50.0, ge=1.0, le=100_000.0)
     """Messages a second that are read of one client, beside one for each frame it was sent; those
-    of two seconds may come at once. Who sends more is sent away."""
+    of two seconds may come at once. A client that sends more is disconnected."""
 
 
 class HistorySettings(_Group):
-    """How much of what was captured can still be had; the least of both limits counts."""
+    """How many captured frames are kept; the smaller of both limits counts."""
 
     seconds: _Finite = Field(default=10.0, ge=0.0, le=3600.0)
     """Raw frames are kept for so long; 0 keeps the latest alone."""
@@ -120,13 +115,13 @@ class HistorySettings(_Group):
 
 
 def default_state_directory() -> Path:
-    """Return where things are kept: the service manager's place for state, or the user's."""
+    """Return the state directory: the service manager's, or the user's."""
     state = os.environ.get("STATE_DIRECTORY", "").partition(":")[0]  # systemd
     return Path(state) if state else user_data_path("transientcam")
 
 
 def default_recordings_directory() -> Path:
-    """Return where recordings are kept."""
+    """Return the directory of recordings below the state directory."""
     return default_state_directory() / "recordings"
 
 
@@ -157,7 +152,7 @@ class RecordingSettings(_Group):
 
 
 class LimitSettings(_Group):
-    """What one client may take of the service, so that something is left for the others."""
+    """What one client may use of the service, so that the others are served, too."""
 
     max_connections: int = Field(default=512, ge=1, le=100_000)
     """Connections open at the same time, streams included."""
@@ -170,7 +165,7 @@ class LimitSettings(_Group):
     stalled_s: _Finite = Field(default=20.0, gt=0.0, le=3600.0)
     """Time for a client to take anything of what waits for it; then its connection is cut."""
     head_bytes: int = Field(default=128 * 1024, ge=1024, le=16 * 1024 * 1024)
-    """Length of request line and headers; the line alone may have 64 KiB whatever this says."""
+    """Length of request line and headers; the line alone may have 64 KiB whatever this is."""
 
 
 class Settings(_Group):
@@ -184,10 +179,10 @@ class Settings(_Group):
     port: int = Field(default=8000, ge=0, le=65535)
     """TCP port to listen on; 0 takes any free one."""
     announce: Literal["auto", "on", "off"] = "auto"
-    """Tell the local network where the service is (mDNS); ``auto``: where others may come in, and
+    """Announce the service on the local network (mDNS); ``auto``: if other machines reach it, and
     not from a container."""
     insecure: bool = False
-    """Serve other machines although anybody who reaches the port controls the camera."""
+    """Serve other machines although any client that reaches the port controls the camera."""
     allowed_hosts: tuple[str, ...] = ()
     """Names, beside the address listened on, that clients may call this service by."""
     allowed_origins: tuple[str, ...] = ()
@@ -199,9 +194,9 @@ class Settings(_Group):
     tokens_file: Path = Field(
         default_factory=lambda: user_config_path("transientcam") / "tokens.json"
     )
-    """Where `transientcam token` keeps what it keeps of the tokens."""
+    """File in which `transientcam token` keeps names and hashes of the tokens."""
     require_token: bool = False
-    """Ask for a token also where only this machine reaches the service, as behind a proxy."""
+    """Require a token even if only this machine reaches the service, as behind a proxy."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     """The least important messages to log."""
     calibration: Path | None = None
@@ -209,7 +204,7 @@ class Settings(_Group):
     log_format: Literal["auto", "text", "json"] = "auto"
     """``auto`` is text on a terminal and JSON elsewhere."""
     workers: int = Field(default_factory=lambda: max(2, os.cpu_count() or 2), ge=2, le=256)
-    """Threads that reconstruct and encode; at least 2, so that one long answer delays nobody."""
+    """Threads that reconstruct and encode; at least 2, so that one long answer delays no other."""
     reconstruction: ReconstructionSettings = ReconstructionSettings()
     sensor: SensorSettings = SensorSettings()
     lens: LensSettings = LensSettings()
@@ -221,7 +216,7 @@ class Settings(_Group):
 
     @property
     def needs_token(self) -> bool:
-        """Whether nobody gets in without a token."""
+        """Whether clients need a token."""
         return self.require_token or not (self.on_loopback or self.insecure)
 
     @property

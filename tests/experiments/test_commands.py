@@ -1,4 +1,4 @@
-"""`transientcam paper`, through the command line of the client."""
+"""The verbs `transientcam paper` and `transientcam tradeoff`."""
 
 import json
 from pathlib import Path
@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from transientcam.cli import run
+from transientcam_experiments import commands, tradeoff
 
 
 def test_figures_are_made_checked_and_put_on_a_page(
@@ -75,3 +76,18 @@ def test_a_file_that_is_no_waveform_is_refused_in_a_sentence(
 
     assert code == 1
     assert "waveform.npy" in " ".join(capfd.readouterr().err.split())
+
+
+def test_the_command_measures_reports_and_says_so_as_json(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    grid = tmp_path / "grid.toml"
+    grid.write_text("harmonics = []\n[[sequence]]\nharmonics = 2\n")
+    output = tmp_path / "results"
+
+    commands.tradeoff(output=output, sequence_grid=str(grid), repetitions=2, as_json=True)
+
+    said = json.loads(capsys.readouterr().out)
+    assert said["points"] == len(tradeoff.Records(output))
+    assert all(Path(name).is_file() for name in said["written"])
+    assert str(output / "index.html") in said["written"]

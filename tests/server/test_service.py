@@ -4,7 +4,7 @@ import pytest
 
 from tests.serving import Served
 from transientcam_server.broadcast.channel import Channel
-from transientcam_server.camera.acquisition import AcquisitionStatus
+from transientcam_server.camera import AcquisitionStatus
 
 HEALTHY: dict[str, Any] = {
     "state": "streaming",

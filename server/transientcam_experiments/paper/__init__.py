@@ -1,6 +1,7 @@
-"""The paper's figures, made by this software, each with what the paper says about it.
+"""The paper's figures, made by this software and checked against the paper's sentences.
 
-One file a figure; all have the shape of `PaperFigure`.
+One file a figure, each a `PaperFigure`: it captures on a `Bench` (the simulated camera), and
+returns a picture, `Statement` by `Statement` what holds, and tables. `FIGURES` lists them.
 """
 
 from typing import Final

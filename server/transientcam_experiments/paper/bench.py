@@ -26,10 +26,10 @@ from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
 Options = Mapping[str, str]
-"""Of a simulated camera's name."""
+"""Options in the name of a simulated camera."""
 NO_OPTIONS: Final[Options] = MappingProxyType({})
 WITHOUT_OUTLIERS: Final[Options] = MappingProxyType({"outliers": "off"})
-"""For single takes: there is nothing to tell outliers by, and the paper shows none in its."""
+"""For single takes, in which outliers cannot be detected; the paper shows none in its own."""
 DEVICE: Final = "prototype"
 """The make of camera: the paper's, as far as its figures are known."""
 WARM_UP_S: Final = 1800.0
@@ -40,7 +40,7 @@ _CALIBRATION_TAKES = 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shot:
+class ReconstructedShot:
     """One reconstructed capture, and the truth when its last image was taken.
 
     ``time_s`` is the device's time of the first exposure since its warm-up.
@@ -81,15 +81,15 @@ class Bench:
         self.quick = quick
         self.waveform = waveform
         self._calibrations: dict[tuple[Any, ...], Calibration] = {}
-        self._shots: dict[tuple[Any, ...], list[Shot]] = {}
+        self._shots: dict[tuple[Any, ...], list[ReconstructedShot]] = {}
 
     def few(self, full: int, quick: int) -> int:
-        """Return how many of something to look at."""
+        """Return the number of points to look at: ``full``, or ``quick`` for a first look."""
         return quick if self.quick else full
 
     def shot(
         self, scene: str, sequence: Sequence, *, at_s: float = 0.0, options: Options = NO_OPTIONS
-    ) -> Shot:
+    ) -> ReconstructedShot:
         """Capture once; see `shots`."""
         return self.shots(scene, sequence, at_s=at_s, options=options)[0]
 
@@ -101,7 +101,7 @@ class Bench:
         frames: int = 1,
         at_s: float = 0.0,
         options: Options = NO_OPTIONS,
-    ) -> list[Shot]:
+    ) -> list[ReconstructedShot]:
         """Capture frames one after the other, and reconstruct them as the daemon would.
 
         Parameters
@@ -109,7 +109,7 @@ class Bench:
         scene
             A name, or the path of a .toml.
         sequence
-            What to capture; fewer takes of it where it has to be quick.
+            What to capture; with fewer takes for a first look.
         frames
             How many.
         at_s
@@ -124,7 +124,7 @@ class Bench:
         return self._shots[key]
 
     def sequence(self, sequence: Sequence) -> Sequence:
-        """Return what is captured in the place of a sequence: with few takes where it is quick."""
+        """Return the sequence that is really captured: with fewer takes for a first look."""
         takes = sequence.takes
         return replace(sequence, takes=min(takes, _QUICK_TAKES) if self.quick else takes)
 
@@ -159,7 +159,7 @@ class Bench:
         frames: int,
         at_s: float,
         options: Options,
-    ) -> list[Shot]:
+    ) -> list[ReconstructedShot]:
         calibration = self.calibration(sequence, options=options)
         shots = []
         with ExitStack() as stack:
@@ -174,7 +174,9 @@ class Bench:
                 frame = camera.read_frame()
                 truth = camera.simulation.truth()
                 found: tm.Reconstruction = recipe.reconstruct(frame)
-                shots.append(Shot(found, truth, applied, frame.device_time_s - WARM_UP_S))
+                shots.append(
+                    ReconstructedShot(found, truth, applied, frame.device_time_s - WARM_UP_S)
+                )
             camera.stop()
         return shots
 

@@ -29,7 +29,7 @@ class Contender:
 
     @property
     def technique(self) -> Technique:
-        """Its statement."""
+        """Its entry in the registry."""
         return TECHNIQUES[self.name]
 
     @property
@@ -39,7 +39,7 @@ class Contender:
 
     @property
     def frequencies(self) -> str:
-        """Frequencies in MHz, in words."""
+        """Frequencies in MHz, as text."""
         if self.technique.measures == "code":
             return f"{self.base_frequency_hz / 1e6:g}, coded"
         multiples = self.technique.harmonics(self.m)
@@ -76,7 +76,7 @@ CONTENDERS: Final = (
     Contender("frequency-domain", _HALF, 8, {"returns": 3}),
     Contender("coded", _F, 1),
 )
-"""At the frequencies of the paper's Figure 11 where it says them, else at those they need."""
+"""At the frequencies of the paper's Figure 11 where it prints them, else at those they need."""
 
 
 def samples(
@@ -87,7 +87,7 @@ def samples(
     Parameters
     ----------
     contender
-        Says at which frequencies.
+        Technique and frequencies.
     response
         The light.
     noise

@@ -1,4 +1,4 @@
-"""The shape that all figures of the paper share: what is drawn, measured and held against it."""
+"""The types that all figures share: pictures, statements of the paper, and tables."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -17,15 +17,15 @@ class Statement:
     Attributes
     ----------
     source
-        Where the paper says it.
+        Section or figure of the paper.
     says
-        What it says.
+        The sentence.
     measure
-        What was measured to see whether it holds.
+        The quantity measured to check it.
     value
         The measure's value.
     shown
-        The same, to be read.
+        The same as text.
     criterion
         What the value has to be for the statement to hold.
     passes
@@ -59,7 +59,7 @@ def check(
     form: str = "{:.3g}",
     otherwise: str = "",
 ) -> Statement:
-    """Hold a value against limits.
+    """Check a value against limits.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def check(
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Figures beside a figure; cells are words, numbers, or None where there is no value."""
+    """Numbers beside a figure; cells are text, numbers, or None where there is no value."""
 
     title: str
     columns: Sequence[str]
@@ -112,7 +112,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Made:
-    """What became of a figure: its picture, and the numbers beside it."""
+    """A figure as made here: its picture, and the numbers beside it."""
 
     picture: "Picture"
     statements: Sequence[Statement]

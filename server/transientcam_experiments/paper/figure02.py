@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench, Shot
+from transientcam_experiments.paper.bench import Bench, ReconstructedShot
 from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
 
 _Array = NDArray[Any]
@@ -35,7 +35,7 @@ def make(bench: Bench) -> Made:
     )
 
 
-def _pixel(shot: Shot) -> tuple[int, int]:
+def _pixel(shot: ReconstructedShot) -> tuple[int, int]:
     """Return the pixel that has three returns, the weakest of which is the strongest of all."""
     third = shot.truth.weight[:3].min(axis=0) / shot.truth.brightness
     y, x = np.unravel_index(int(np.argmax(third)), third.shape)
@@ -105,7 +105,7 @@ def _table(b: _Array, density: _Array, phase: _Array) -> Table:
     return Table("Density over its mean, median of all pixels, m = 7", columns, rows)
 
 
-def _moments(shot: Shot, y: int, x: int) -> Table:
+def _moments(shot: ReconstructedShot, y: int, x: int) -> Table:
     b = shot.found.moments[:, y, x]
     rows = [
         (j, float(abs(value) / b[0].real), float(np.degrees(np.angle(value))))
@@ -114,7 +114,7 @@ def _moments(shot: Shot, y: int, x: int) -> Table:
     return Table("Moments of the pixel", ("j", "modulus over b_0", "phase in degrees"), rows)
 
 
-def _draw(shot: Shot, y: int, x: int, phase: _Array) -> Any:
+def _draw(shot: ReconstructedShot, y: int, x: int, phase: _Array) -> Any:
     with style.style():
         picture = style.new(11.0, 6.6)
         halves: Any = picture.subfigures(2, 1, height_ratios=(1.0, 1.05))
@@ -127,7 +127,7 @@ def _draw(shot: Shot, y: int, x: int, phase: _Array) -> Any:
     return picture
 
 
-def _draw_scene(part: Any, shot: Shot, y: int, x: int) -> None:
+def _draw_scene(part: Any, shot: ReconstructedShot, y: int, x: int) -> None:
     axes = part.subplots()
     frame = shot.found.density(np.array([_FRAME_S]))[0]
     style.show(axes, frame * 1e-9, f"(a, e) reconstruction, τ = {_FRAME_S * 1e9:.1f} ns")
@@ -135,7 +135,7 @@ def _draw_scene(part: Any, shot: Shot, y: int, x: int) -> None:
     style.scale(part, axes, "density / (DN/ns)")
 
 
-def _draw_signal(part: Any, shot: Shot, y: int, x: int, phase: _Array) -> None:
+def _draw_signal(part: Any, shot: ReconstructedShot, y: int, x: int, phase: _Array) -> None:
     response, modulation = part.subplots(2, 1, sharex=True)
     turn = 2 * np.pi * shot.base_frequency_hz
     there = shot.truth.weight[:, y, x] > 0
@@ -150,7 +150,7 @@ def _draw_signal(part: Any, shot: Shot, y: int, x: int, phase: _Array) -> None:
     modulation.legend(loc="upper right", ncols=3)
 
 
-def _draw_reconstruction(part: Any, shot: Shot, y: int, x: int, phase: _Array) -> None:
+def _draw_reconstruction(part: Any, shot: ReconstructedShot, y: int, x: int, phase: _Array) -> None:
     upper, lower = part.subplots(2, 1, sharex=True)
     b = tm.bias(shot.found.moments[:, y, x].astype(np.complex128)).moments
     h = tm.density(tm.levinson(b), phase)
@@ -168,7 +168,7 @@ def _draw_reconstruction(part: Any, shot: Shot, y: int, x: int, phase: _Array) -
     lower.set(ylabel="1 / h, relative", xlim=(0, 2 * np.pi))
 
 
-def _draw_moments(part: Any, shot: Shot, y: int, x: int) -> None:
+def _draw_moments(part: Any, shot: ReconstructedShot, y: int, x: int) -> None:
     panels = part.subplots(2, 4)
     part.suptitle("(c) trigonometric moment images: real parts", fontsize=9.5)
     b = shot.found.moments

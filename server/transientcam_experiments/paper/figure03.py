@@ -195,7 +195,7 @@ def _statements(curves: dict[str, dict[Steps, _Array]]) -> list[Statement]:
 
 
 def _remarks(curves: dict[str, dict[Steps, _Array]]) -> list[str]:
-    """Say where the rival is better."""
+    """Return a remark on where the rival is better."""
     remarks = []
     for name, each in curves.items():
         ours = _distortion(each[Steps("arccos", 8)])

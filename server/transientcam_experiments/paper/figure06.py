@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench, Shot
+from transientcam_experiments.paper.bench import Bench, ReconstructedShot
 from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.mirrors import shots, thrice
 
@@ -37,7 +37,7 @@ def make(bench: Bench) -> Made:
     )
 
 
-def _strongest(shot: Shot) -> tuple[_Array, _Array]:
+def _strongest(shot: ReconstructedShot) -> tuple[_Array, _Array]:
     """Return times in s and weights (3, H, W) of the three strongest returns, by strength."""
     returns = shot.found.returns
     order = np.argsort(-returns.weight, axis=0)[:3]
@@ -46,13 +46,13 @@ def _strongest(shot: Shot) -> tuple[_Array, _Array]:
     return phase / (2 * np.pi * shot.base_frequency_hz), weight
 
 
-def _ranked_truth(shot: Shot) -> tuple[_Array, _Array]:
+def _ranked_truth(shot: ReconstructedShot) -> tuple[_Array, _Array]:
     order = np.argsort(-shot.truth.weight, axis=0)[:3]
     delay_s = np.take_along_axis(shot.truth.delay_s, order, axis=0)
     return delay_s, np.take_along_axis(shot.truth.weight, order, axis=0)
 
 
-def _errors(shot: Shot, k: int) -> tuple[_Array, _Array]:
+def _errors(shot: ReconstructedShot, k: int) -> tuple[_Array, _Array]:
     """Return errors (H, W) of time in s and of strength: of the return nearest the true k-th."""
     delay_s, true_weight = _ranked_truth(shot)
     time_s, weight = _strongest(shot)
@@ -64,7 +64,7 @@ def _errors(shot: Shot, k: int) -> tuple[_Array, _Array]:
     return of_time, of_weight
 
 
-def _noise(one: Shot, other: Shot, k: int) -> float:
+def _noise(one: ReconstructedShot, other: ReconstructedShot, k: int) -> float:
     """Return the deviation of the time of the k-th true return between captures, in s: typical."""
     difference = (_errors(one, k)[0] - _errors(other, k)[0])[thrice(one)]
     typical = np.median(np.abs(difference[np.isfinite(difference)]))
@@ -72,7 +72,7 @@ def _noise(one: Shot, other: Shot, k: int) -> float:
 
 
 def _statements(
-    shot: Shot, where: _Array, errors: list[tuple[_Array, _Array]], noise: list[float]
+    shot: ReconstructedShot, where: _Array, errors: list[tuple[_Array, _Array]], noise: list[float]
 ) -> list[Statement]:
     near = np.all([np.abs(each[0]) < _NEAR_S for each in errors], axis=0)
     _, weight = _strongest(shot)
@@ -109,7 +109,7 @@ def _statements(
 
 
 def _table(
-    shot: Shot, where: _Array, errors: list[tuple[_Array, _Array]], noise: list[float]
+    shot: ReconstructedShot, where: _Array, errors: list[tuple[_Array, _Array]], noise: list[float]
 ) -> Table:
     rows = [
         (

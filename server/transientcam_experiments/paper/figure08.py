@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench, Options, Shot
+from transientcam_experiments.paper.bench import Bench, Options, ReconstructedShot
 from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.mirrors import (
     SEQUENCES,
@@ -54,17 +54,17 @@ def _biased_with(bench: Bench, name: str) -> dict[str, float]:
     return shares
 
 
-def _biased(b: _Array, shot: Shot) -> float:
+def _biased(b: _Array, shot: ReconstructedShot) -> float:
     least = shot.found.settings.epsilon * b[0].real
     return float((tm.smallest_eigenvalue(b) < least)[shot.lit].mean())
 
 
-def _density(shot: Shot) -> _Array:
+def _density(shot: ReconstructedShot) -> _Array:
     """Return the density (3, H, W) in DN/ns."""
     return np.asarray(shot.found.density(np.array(TIMES_S))) * 1e-9
 
 
-def _noise(pair: list[Shot]) -> float:
+def _noise(pair: list[ReconstructedShot]) -> float:
     """Return the typical relative difference of two captures where the frames have light."""
     one, other = (_density(shot) for shot in pair)
     bright = one + other > np.percentile(one + other, 75, axis=(1, 2), keepdims=True)
@@ -72,17 +72,17 @@ def _noise(pair: list[Shot]) -> float:
     return float(np.median(relative[bright]))
 
 
-def _heights(shot: Shot) -> _Array:
+def _heights(shot: ReconstructedShot) -> _Array:
     """Return the density (P) of each pixel's highest peak over its brightness, in 1/ns."""
     highest = shot.found.peaks.density.max(axis=0) / shot.found.brightness
     height: _Array = highest[shot.lit] * 2 * np.pi * shot.base_frequency_hz * 1e-9
     return height
 
 
-def _separated(shot: Shot, *, threshold: float = 0.0) -> float:
+def _separated(shot: ReconstructedShot, *, threshold: float = 0.0) -> float:
     """Return the share of pixels with three returns whose density peaks near each of them.
 
-    However low, without a threshold relative to the highest: the height of a peak tells of its
+    However low, without a threshold relative to the highest: the height of a peak depends on its
     sharpness more than of its light.
     """
     where = thrice(shot)
@@ -94,7 +94,7 @@ def _separated(shot: Shot, *, threshold: float = 0.0) -> float:
     return float(np.all(near, axis=0).mean())
 
 
-def _stray(shot: Shot) -> float:
+def _stray(shot: ReconstructedShot) -> float:
     """Return the share of the light of all frames in pixels without a return within 1 ns."""
     light = _density(shot)
     apart = np.abs(shot.truth.delay_s - np.array(TIMES_S)[:, None, None, None])
@@ -102,7 +102,7 @@ def _stray(shot: Shot) -> float:
     return float(light[empty].sum() / light.sum())
 
 
-def _shadow_of_two(shot: Shot) -> float:
+def _shadow_of_two(shot: ReconstructedShot) -> float:
     """Return how much brighter than around it the shadow of the 2 is at 11.3 ns, light by light.
 
     Over pixels that get direct light near that time: density over direct light, where the second
@@ -121,7 +121,7 @@ def _shadow_of_two(shot: Shot) -> float:
     return float(np.median(share[missing]) / np.median(share[there]))
 
 
-def _statements(captures: dict[str, list[Shot]]) -> list[Statement]:
+def _statements(captures: dict[str, list[ReconstructedShot]]) -> list[Statement]:
     first = {name: pair[0] for name, pair in captures.items()}
     heights = {name: float(np.median(_heights(first[name]))) for name in SEQUENCES}
     noise = {name: _noise(pair) for name, pair in captures.items()}
@@ -236,8 +236,8 @@ def _statements(captures: dict[str, list[Shot]]) -> list[Statement]:
     ]
 
 
-def _remarks(captures: dict[str, list[Shot]]) -> list[str]:
-    """Say what other measures would say."""
+def _remarks(captures: dict[str, list[ReconstructedShot]]) -> list[str]:
+    """Return remarks on other measures."""
     first = {name: captures[name][0] for name in SEQUENCES}
     shares = ", ".join(
         f"{_separated(shot, threshold=0.1):.0%} in ({name})" for name, shot in first.items()
@@ -252,12 +252,12 @@ def _remarks(captures: dict[str, list[Shot]]) -> list[str]:
     ]
 
 
-def _share(shot: Shot) -> float:
+def _share(shot: ReconstructedShot) -> float:
     flags = np.asarray(shot.found.flags)[shot.lit]
     return float(((flags & int(tm.Flags.BIASED)) != 0).mean())
 
 
-def _table(captures: dict[str, list[Shot]]) -> Table:
+def _table(captures: dict[str, list[ReconstructedShot]]) -> Table:
     rows = []
     for name, pair in captures.items():
         shot = pair[0]
@@ -300,7 +300,7 @@ def _why_biased(plain: dict[str, dict[str, float]]) -> Table:
     )
 
 
-def _draw(first: dict[str, Shot]) -> Any:
+def _draw(first: dict[str, ReconstructedShot]) -> Any:
     with style.style():
         picture = style.new(10.0, 7.6)
         rows: Any = picture.subfigures(3, 1)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench, Shot
+from transientcam_experiments.paper.bench import Bench, ReconstructedShot
 from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.mirrors import (
     SEQUENCES,
@@ -43,7 +43,7 @@ class _Errors:
     return.
     """
 
-    def __init__(self, shot: Shot, times_s: _Array) -> None:
+    def __init__(self, shot: ReconstructedShot, times_s: _Array) -> None:
         where = thrice(shot)
         found = np.asarray(shot.found.cumulative(times_s))[:, where]
         delay_s = shot.truth.delay_s[:3][:, where]
@@ -63,7 +63,7 @@ class _Errors:
         return errors
 
 
-def _noise(pair: list[Shot], *, cumulative: bool) -> float:
+def _noise(pair: list[ReconstructedShot], *, cumulative: bool) -> float:
     """Return the typical relative difference of two captures behind the first wave."""
     time_s = np.array([TIMES_S[0], 15e-9])
     one, other = (
@@ -76,7 +76,7 @@ def _noise(pair: list[Shot], *, cumulative: bool) -> float:
     return float(np.median(2 * np.abs(one - other)[bright] / (one + other)[bright]))
 
 
-def _quadrature_error(shot: Shot) -> float:
+def _quadrature_error(shot: ReconstructedShot) -> float:
     """Return the distance of the closed form from the paper's quadrature, over the brightness."""
     y, x = np.nonzero(shot.lit)
     chosen = np.linspace(0, y.size - 1, 12).astype(int)
@@ -90,7 +90,9 @@ def _quadrature_error(shot: Shot) -> float:
     return float(np.abs((closed - summed[at - 1]) / b[0].real).max())
 
 
-def _statements(captures: dict[str, list[Shot]], errors: dict[str, _Errors]) -> list[Statement]:
+def _statements(
+    captures: dict[str, list[ReconstructedShot]], errors: dict[str, _Errors]
+) -> list[Statement]:
     typical = {name: float(np.median(np.abs(each.waves))) for name, each in errors.items()}
     worst = {name: float(np.percentile(np.abs(each.waves), 95)) for name, each in errors.items()}
     front = {name: float(np.median(np.abs(each.fronts))) for name, each in errors.items()}
@@ -141,7 +143,7 @@ def _statements(captures: dict[str, list[Shot]], errors: dict[str, _Errors]) -> 
     ]
 
 
-def _table(captures: dict[str, list[Shot]], errors: dict[str, _Errors]) -> Table:
+def _table(captures: dict[str, list[ReconstructedShot]], errors: dict[str, _Errors]) -> Table:
     rows = [
         (
             title(name),
@@ -164,7 +166,7 @@ def _table(captures: dict[str, list[Shot]], errors: dict[str, _Errors]) -> Table
     return Table("Median error of the cumulative density in % of the brightness", columns, rows)
 
 
-def _draw(first: dict[str, Shot]) -> Any:
+def _draw(first: dict[str, ReconstructedShot]) -> Any:
     with style.style():
         picture = style.new(10.0, 7.6)
         rows: Any = picture.subfigures(3, 1)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench, Shot
+from transientcam_experiments.paper.bench import Bench, ReconstructedShot
 from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
 from transientcam_experiments.tradeoff.truth import Sample, cumulative
 
@@ -26,7 +26,7 @@ def make(bench: Bench) -> Made:
     return Made(_draw(shot, walls), _statements(shot, walls), (_table(walls),))
 
 
-def _walls(shot: Shot) -> dict[str, _Array]:
+def _walls(shot: ReconstructedShot) -> dict[str, _Array]:
     """Return the pixels of each wall, without those near the edge between them."""
     column = np.arange(shot.lit.shape[1]) / shot.lit.shape[1]
     left = np.broadcast_to(column < 0.45, shot.lit.shape)
@@ -37,7 +37,9 @@ def _walls(shot: Shot) -> dict[str, _Array]:
 class _Wall:
     """What is measured of one wall: sharpness of peaks, and errors of sampled pixels."""
 
-    def __init__(self, shot: Shot, estimated: _Array, where: _Array, bench: Bench) -> None:
+    def __init__(
+        self, shot: ReconstructedShot, estimated: _Array, where: _Array, bench: Bench
+    ) -> None:
         turn = 2 * np.pi * shot.base_frequency_hz
         y, x = np.nonzero(where)
         chosen = np.linspace(0, y.size - 1, bench.few(300, 40)).astype(int)
@@ -88,7 +90,7 @@ def _spread(time_s: _Array, share: _Array) -> float:
     return float(time_s[last] - time_s[first])
 
 
-def _statements(shot: Shot, walls: dict[str, _Wall]) -> list[Statement]:
+def _statements(shot: ReconstructedShot, walls: dict[str, _Wall]) -> list[Statement]:
     left, right = walls["left wall"], walls["right wall"]
     reason = (
         f"the smallest eigenvalue of the true response is {right.true_eigenvalue:.3%} of b_0 on "
@@ -176,7 +178,7 @@ def _table(walls: dict[str, _Wall]) -> Table:
     )
 
 
-def _draw(shot: Shot, walls: dict[str, _Wall]) -> Any:
+def _draw(shot: ReconstructedShot, walls: dict[str, _Wall]) -> Any:
     frames = np.asarray(shot.found.density(np.array(_TIMES_S))) * 1e-9
     with style.style():
         picture = style.new(11.0, 5.6)
@@ -197,7 +199,7 @@ def _draw(shot: Shot, walls: dict[str, _Wall]) -> Any:
     return picture
 
 
-def _draw_pixel(axes: Any, shot: Shot, name: str, wall: _Wall) -> None:
+def _draw_pixel(axes: Any, shot: ReconstructedShot, name: str, wall: _Wall) -> None:
     """Draw the cumulative density of the wall's middle pixel."""
     middle = len(wall.y) // 2
     y, x = int(wall.y[middle]), int(wall.x[middle])

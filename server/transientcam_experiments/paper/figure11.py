@@ -22,7 +22,7 @@ _Outcomes = dict[tuple[str, str], Outcome]
 
 
 def make(bench: Bench) -> Made:
-    """Let every technique reconstruct both responses, without noise and at 70 : 1."""
+    """Reconstruct both responses by every technique, without noise and at 70 : 1."""
     outcomes = {
         (contender.name, case.name): outcome(
             contender,
@@ -118,7 +118,7 @@ def _remarks(outcomes: _Outcomes) -> list[str]:
 
 
 def ranked(title: str, errors: dict[str, float]) -> str:
-    """Say which rivals are better than the paper's methods."""
+    """Return a remark on the rivals that are better than the paper's methods."""
     labels = {each.name: f"{each.label} ({each.frequencies} MHz)" for each in CONTENDERS}
     rivals = sorted((name for name in errors if name not in OURS), key=lambda name: errors[name])
     best = min(OURS, key=lambda name: errors[name])
@@ -129,19 +129,19 @@ def ranked(title: str, errors: dict[str, float]) -> str:
         for name in rivals
         if name not in better and errors[name] < max(errors[own] for own in OURS)
     ]
-    told = (
+    text = (
         f"**{title}**: the better of the paper's methods is {labels[best]} with {errors[best]:.2%}"
     )
-    told += (
+    text += (
         "; no rival is better"
         if not better
         else "; better: " + ", ".join(f"{labels[name]} {errors[name]:.2%}" for name in better)
     )
     if also:
         other = next(own for own in OURS if own != best)
-        told += f". {labels[other]}, at {errors[other]:.2%}, is beaten by: "
-        told += ", ".join(f"{labels[name]} {errors[name]:.2%}" for name in also)
-    return f"{told}."
+        text += f". {labels[other]}, at {errors[other]:.2%}, is beaten by: "
+        text += ", ".join(f"{labels[name]} {errors[name]:.2%}" for name in also)
+    return f"{text}."
 
 
 def _draw(outcomes: _Outcomes) -> Any:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import coded_corner, style
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, Shot
+from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
 from transientcam_experiments.paper.contenders import Contender
 from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
 
@@ -82,7 +82,7 @@ class Ranged:
 
 
 def make(bench: Bench) -> Made:
-    """Capture the corner twice, and let every technique find its ranges."""
+    """Capture the corner twice, and find its ranges by every technique."""
     step = bench.few(4, 16)
     shots = {
         sequence.base_frequency_hz: bench.shot("corner", sequence, options=WITHOUT_OUTLIERS)
@@ -101,8 +101,8 @@ def make(bench: Bench) -> Made:
     )
 
 
-def ranged_by(entry: Contender, shot: Shot, step: int) -> Ranged:
-    """Let a technique find the range of every ``step``-th pixel both ways."""
+def ranged_by(entry: Contender, shot: ReconstructedShot, step: int) -> Ranged:
+    """Return the range of every ``step``-th pixel both ways by a technique."""
     b = np.asarray(shot.found.smoothed)[: entry.m + 1, ::step, ::step].astype(np.complex128)
     phase_rad = entry.estimate(b).first_phase_rad()
     range_m = tm.range_m(phase_rad, shot.base_frequency_hz)
@@ -110,12 +110,12 @@ def ranged_by(entry: Contender, shot: Shot, step: int) -> Ranged:
 
 
 def _coded(entry: Contender, bench: Bench, step: int) -> Ranged:
-    """Let the technique capture in its own way."""
+    """Capture as the technique requires."""
     captured = coded_corner.capture(bench)
     return Ranged(entry, captured.range_m(step), captured.truth_m[::step, ::step])
 
 
-def directions(shot: Shot) -> _Array:
+def directions(shot: ReconstructedShot) -> _Array:
     """Return unit vectors (3, H, W) of the pixels' lines of sight: x right, y away, z up."""
     height, width = shot.lit.shape
     pixel = 2 * np.tan(np.radians(_FIELD_OF_VIEW_DEG) / 2) / width
@@ -134,7 +134,7 @@ def _of(ranged: list[Ranged], name: str, m: int) -> Ranged:
     return next(each for each in ranged if (each.entry.name, each.entry.m) == (name, m))
 
 
-def _statements(ranged: list[Ranged], shot: Shot) -> list[Statement]:
+def _statements(ranged: list[Ranged], shot: ReconstructedShot) -> list[Statement]:
     single, godbaz = _of(ranged, "single-frequency", 1), _of(ranged, "godbaz", 4)
     maximum, pisarenko = _of(ranged, "maximum-entropy", 3), _of(ranged, "pisarenko", 4)
     return [
@@ -265,9 +265,9 @@ def _name(each: Ranged) -> str:
 
 
 def _beaten(title: str, among: list[Ranged], best: Ranged) -> str:
-    """Say which rivals have a smaller error than one of the paper's methods."""
+    """Return a remark on the rivals with a smaller error than a method of the paper."""
     rivals = sorted((each for each in among if not _own(each)), key=lambda each: each.rms_m)
-    told = f"**{title}**: {_name(best)} has an RMS error of {1e3 * best.rms_m:.1f} mm"
+    text = f"**{title}**: {_name(best)} has an RMS error of {1e3 * best.rms_m:.1f} mm"
     better = [
         f"{_name(each)} with {1e3 * each.rms_m:.1f} mm"
         for each in rivals
@@ -278,10 +278,10 @@ def _beaten(title: str, among: list[Ranged], best: Ranged) -> str:
         for each in rivals
         if each.median_m < best.median_m
     ]
-    told += "; better: " + ", ".join(better) if better else "; no rival is better"
-    told += f". Its median absolute error is {1e3 * best.median_m:.1f} mm"
-    told += "; smaller: " + ", ".join(median) if median else "; no rival's is smaller"
-    return f"{told}."
+    text += "; better: " + ", ".join(better) if better else "; no rival is better"
+    text += f". Its median absolute error is {1e3 * best.median_m:.1f} mm"
+    text += "; smaller: " + ", ".join(median) if median else "; no rival's is smaller"
+    return f"{text}."
 
 
 def _draw(ranged: list[Ranged], direction: _Array) -> Any:

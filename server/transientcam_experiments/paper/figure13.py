@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, Shot
+from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
 from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.visitor import MOMENTS_S, VIDEO, VIDEO_HZ, parts, video
 
@@ -17,7 +17,7 @@ _TIMES_S: Final = (9.9e-9, 13.8e-9, 24.2e-9)
 _LONG_S: Final = 0.00192
 _NEAR_S: Final = 1e-9
 _FOUND: Final = 0.1
-"""Returns below this share of a pixel's light are not asked for."""
+"""Returns below this share of a pixel's light need not be found."""
 
 
 def make(bench: Bench) -> Made:
@@ -32,11 +32,11 @@ def make(bench: Bench) -> Made:
     )
 
 
-def _density(shot: Shot) -> _Array:
+def _density(shot: ReconstructedShot) -> _Array:
     return np.asarray(shot.found.density(np.array(_TIMES_S))) * 1e-9
 
 
-def _noise(pair: list[Shot]) -> float:
+def _noise(pair: list[ReconstructedShot]) -> float:
     """Return the typical relative difference of the direct wave in two frames, on the wall."""
     wall = parts(pair[0])["wall"] & parts(pair[1])["wall"]
     one, other = (_density(shot)[1][wall] for shot in pair)
@@ -44,7 +44,7 @@ def _noise(pair: list[Shot]) -> float:
     return float(np.median(2 * np.abs(one - other)[bright] / (one + other)[bright]))
 
 
-def _arrivals_ns(shot: Shot) -> dict[str, tuple[float, float]]:
+def _arrivals_ns(shot: ReconstructedShot) -> dict[str, tuple[float, float]]:
     """Return typical times in ns of the light of each part, and the true ones."""
     turn = 2 * np.pi * shot.base_frequency_hz
     phase = tm.peaks(shot.found.coefficients, threshold=0.0).phase_rad / turn
@@ -64,19 +64,21 @@ def _arrivals_ns(shot: Shot) -> dict[str, tuple[float, float]]:
     return arrivals
 
 
-def _complete(shot: Shot) -> float:
+def _complete(shot: ReconstructedShot) -> float:
     """Return the share of lit pixels whose density peaks near every true return."""
     turn = 2 * np.pi * shot.base_frequency_hz
     phase = tm.peaks(shot.found.coefficients, threshold=0.0).phase_rad
     complete = shot.lit.copy()
     for delay_s, weight in zip(shot.truth.delay_s, shot.truth.weight, strict=True):
-        asked = weight > _FOUND * shot.truth.brightness
+        required = weight > _FOUND * shot.truth.brightness
         near = (np.abs(phase - turn * delay_s) < turn * _NEAR_S).any(axis=0)
-        complete &= near | ~asked
+        complete &= near | ~required
     return float(complete[shot.lit].mean())
 
 
-def _statements(frames: dict[float, list[Shot]], bright: list[Shot]) -> list[Statement]:
+def _statements(
+    frames: dict[float, list[ReconstructedShot]], bright: list[ReconstructedShot]
+) -> list[Statement]:
     pairs = list(frames.values())
     interval_s = float(np.mean([pair[1].time_s - pair[0].time_s for pair in pairs]))
     arrivals = [_arrivals_ns(pair[0]) for pair in pairs]
@@ -132,7 +134,7 @@ def _statements(frames: dict[float, list[Shot]], bright: list[Shot]) -> list[Sta
     ]
 
 
-def _table(frames: dict[float, list[Shot]]) -> Table:
+def _table(frames: dict[float, list[ReconstructedShot]]) -> Table:
     rows = []
     for at_s, pair in frames.items():
         arrivals = _arrivals_ns(pair[0])
@@ -152,7 +154,7 @@ def _table(frames: dict[float, list[Shot]]) -> Table:
     return Table("When light comes back, by part of the scene", columns, rows)
 
 
-def _draw(frames: dict[float, Shot]) -> Any:
+def _draw(frames: dict[float, ReconstructedShot]) -> Any:
     with style.style():
         picture = style.new(11.0, 2.3 * len(frames))
         panels = picture.subplots(len(frames), 3)

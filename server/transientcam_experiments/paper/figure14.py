@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, Shot
+from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
 from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.visitor import MOMENTS_S, VIDEO, parts, video
 
@@ -25,12 +25,12 @@ def make(bench: Bench) -> Made:
     return Made(_draw(frames), _statements(list(frames.values()), daylight), (_table(frames),))
 
 
-def _mirrored(shot: Shot) -> _Array:
+def _mirrored(shot: ReconstructedShot) -> _Array:
     """Return the pixels of the wall with light over both mirrors."""
     return parts(shot)["wall over two mirrors"]
 
 
-def _wrong(shot: Shot) -> _Array:
+def _wrong(shot: ReconstructedShot) -> _Array:
     """Return the error (H, W) of the indirect light over the brightness."""
     true = shot.truth.brightness - shot.truth.direct
     error: _Array = (np.asarray(shot.found.indirect) - true) / np.maximum(
@@ -39,12 +39,12 @@ def _wrong(shot: Shot) -> _Array:
     return error
 
 
-def _outliers(shot: Shot) -> float:
+def _outliers(shot: ReconstructedShot) -> float:
     """Return the share of lit pixels with much light on the wrong side."""
     return float((np.abs(_wrong(shot))[shot.lit] > _OUTLIER).mean())
 
 
-def _time_errors_s(shot: Shot) -> tuple[_Array, _Array]:
+def _time_errors_s(shot: ReconstructedShot) -> tuple[_Array, _Array]:
     """Return the errors (H, W) of the time of the direct return: Pisarenko's, one frequency's."""
     turn = 2 * np.pi * shot.base_frequency_hz
     single = np.remainder(np.angle(shot.found.moments[1]), 2 * np.pi)
@@ -52,7 +52,7 @@ def _time_errors_s(shot: Shot) -> tuple[_Array, _Array]:
     return ours, single / turn - shot.truth.delay_s[0]
 
 
-def _statements(shots: list[Shot], daylight: Shot) -> list[Statement]:
+def _statements(shots: list[ReconstructedShot], daylight: ReconstructedShot) -> list[Statement]:
     mirrored = [_mirrored(shot) for shot in shots]
     wrong = np.concatenate(
         [np.abs(_wrong(shot))[where] for shot, where in zip(shots, mirrored, strict=True)]
@@ -127,7 +127,7 @@ def _statements(shots: list[Shot], daylight: Shot) -> list[Statement]:
     ]
 
 
-def _table(frames: dict[float, Shot]) -> Table:
+def _table(frames: dict[float, ReconstructedShot]) -> Table:
     rows = []
     for at_s, shot in frames.items():
         where = _mirrored(shot)
@@ -151,8 +151,8 @@ def _table(frames: dict[float, Shot]) -> Table:
     return Table("Pixels with light over both mirrors (outliers: all lit pixels)", columns, rows)
 
 
-def _draw(frames: dict[float, Shot]) -> Any:
-    rows: tuple[tuple[str, Callable[[Shot], Any]], ...] = (
+def _draw(frames: dict[float, ReconstructedShot]) -> Any:
+    rows: tuple[tuple[str, Callable[[ReconstructedShot], Any]], ...] = (
         ("direct and indirect", lambda shot: shot.found.direct + shot.found.indirect),
         ("direct", lambda shot: shot.found.direct),
         ("indirect", lambda shot: shot.found.indirect),
@@ -177,7 +177,7 @@ def _draw(frames: dict[float, Shot]) -> Any:
     return picture
 
 
-def _time_ns(shot: Shot) -> _Array:
+def _time_ns(shot: ReconstructedShot) -> _Array:
     time_ns: _Array = np.asarray(shot.found.phase_rad) / (2 * np.pi * shot.base_frequency_hz) * 1e9
     return time_ns
 

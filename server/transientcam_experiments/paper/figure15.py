@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench, Shot
+from transientcam_experiments.paper.bench import Bench, ReconstructedShot
 from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.mirrors import SEQUENCES, shots, thrice
 
@@ -57,29 +57,29 @@ def make(bench: Bench) -> Made:
     )
 
 
-def _scanline(shot: Shot) -> int:
+def _scanline(shot: ReconstructedShot) -> int:
     """Return the middle row, which crosses the shadows of all three digits."""
     return int(shot.lit.shape[0] // 2)
 
 
-def _line(shot: Shot, row: int) -> tm.Coefficients:
+def _line(shot: ReconstructedShot, row: int) -> tm.Coefficients:
     coefficients = shot.found.coefficients
     return tm.Coefficients(
         coefficients.error[row], coefficients.polynomial[:, row], coefficients.reflection[:, row]
     )
 
 
-def _phase(shot: Shot) -> _Array:
+def _phase(shot: ReconstructedShot) -> _Array:
     phase: _Array = 2 * np.pi * shot.base_frequency_hz * _TIMES_S
     return phase
 
 
-def _closest_s(shot: Shot, row: int) -> float:
+def _closest_s(shot: ReconstructedShot, row: int) -> float:
     gaps = np.diff(shot.truth.delay_s[:, row], axis=0)
     return float(np.nanmin(gaps))
 
 
-def _widths_ns(shot: Shot, row: int, streak: _Array) -> tuple[_Array, _Array]:
+def _widths_ns(shot: ReconstructedShot, row: int, streak: _Array) -> tuple[_Array, _Array]:
     """Return weight and full width at half maximum in ns of the peaks at the true returns."""
     weights, widths = [], []
     for x in np.flatnonzero(thrice(shot)[row]):
@@ -96,7 +96,7 @@ def _widths_ns(shot: Shot, row: int, streak: _Array) -> tuple[_Array, _Array]:
     return np.array(weights), np.array(widths)
 
 
-def _pairs(bench: Bench) -> Shot:
+def _pairs(bench: Bench) -> ReconstructedShot:
     """Capture pairs of returns of 2 : 1, further apart in each column of the sensor."""
     columns = np.arange(_WIDTH)
     h = np.zeros((1, _WIDTH, _BINS), dtype=np.float32)
@@ -114,7 +114,7 @@ def _pairs(bench: Bench) -> Shot:
         return bench.shot(str(scene), SEQUENCES["b"])
 
 
-def _merging(pairs: Shot) -> list[tuple[float, float]]:
+def _merging(pairs: ReconstructedShot) -> list[tuple[float, float]]:
     """Return distances in ns, and the share in % of the pixels in which both returns peak."""
     found = tm.peaks(pairs.found.coefficients, threshold=0.0).phase_rad
     turn = 2 * np.pi * pairs.base_frequency_hz
@@ -129,7 +129,7 @@ def _merging(pairs: Shot) -> list[tuple[float, float]]:
 
 
 def _statements(
-    shot: Shot, row: int, streak: _Array, merging: list[tuple[float, float]]
+    shot: ReconstructedShot, row: int, streak: _Array, merging: list[tuple[float, float]]
 ) -> list[Statement]:
     weight, width = _widths_ns(shot, row, streak)
     weak, strong = width[weight < 0.2], width[weight > 0.5]
@@ -163,7 +163,7 @@ def _statements(
     ]
 
 
-def _draw(shot: Shot, row: int, streak: _Array, pairs: Shot) -> Any:
+def _draw(shot: ReconstructedShot, row: int, streak: _Array, pairs: ReconstructedShot) -> Any:
     middle = _scanline(pairs)
     turn = 2 * np.pi * pairs.base_frequency_hz
     closing = turn * np.asarray(tm.density(_line(pairs, middle), _phase(pairs))) * 1e-9

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import Sequence
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, Shot
+from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
 
 _Array = NDArray[Any]
 TIMES_S: Final = (11.3e-9, 19.3e-9, 26.7e-9)
@@ -21,7 +21,7 @@ SINGLE_TAKE: Final = Sequence(harmonics=4, base_frequency_hz=23e6, takes=1)
 """Of Figure 1."""
 
 
-def shots(bench: Bench, sequence: Sequence, *, frames: int = 1) -> list[Shot]:
+def shots(bench: Bench, sequence: Sequence, *, frames: int = 1) -> list[ReconstructedShot]:
     """Capture the mirrors, single takes without outliers."""
     if sequence.takes == 1:
         return bench.shots("mirrors", sequence, frames=frames, options=WITHOUT_OUTLIERS)
@@ -29,7 +29,7 @@ def shots(bench: Bench, sequence: Sequence, *, frames: int = 1) -> list[Shot]:
 
 
 def title(name: str) -> str:
-    """Return what a row of Figures 8 and 9 was captured with."""
+    """Return the title of a row of Figures 8 and 9: how it was captured."""
     sequence = SEQUENCES[name]
     takes = "1 take" if sequence.takes == 1 else f"{sequence.takes} takes"
     return (
@@ -37,13 +37,13 @@ def title(name: str) -> str:
     )
 
 
-def thrice(shot: Shot) -> _Array:
+def thrice(shot: ReconstructedShot) -> _Array:
     """Return the pixels (H, W) with three returns, each of a tenth of the strongest at least."""
     weight = shot.truth.weight[:3]
     return np.asarray((weight > 0.1 * weight.max(axis=0)).all(axis=0) & shot.lit)
 
 
-def returned(shot: Shot, time_s: _Array) -> _Array:
+def returned(shot: ReconstructedShot, time_s: _Array) -> _Array:
     """Return the light that is really back at each pixel's time (H, W), in DN."""
     back = np.nan_to_num(shot.truth.delay_s, nan=np.inf) <= time_s
     light: _Array = np.where(back, shot.truth.weight, 0).sum(axis=0)

@@ -1,4 +1,4 @@
-"""What a technique makes of a known response, without noise and with it."""
+"""The result of a technique for a known response, without noise and with it."""
 
 from dataclasses import dataclass
 from typing import Any, Final
@@ -59,7 +59,7 @@ class Outcome:
 def outcome(
     contender: Contender, response: Response, *, draws: int, rng: np.random.Generator
 ) -> Outcome:
-    """Let a technique reconstruct a response, without noise and ``draws`` times at 70 : 1."""
+    """Reconstruct a response by a technique, without noise and ``draws`` times at 70 : 1."""
     # between the points of any round grid, so that no step falls on one
     time_s = (np.arange(_TIMES) + 0.5) * (END_S / _TIMES)
     phase = 2 * np.pi * contender.base_frequency_hz * time_s

@@ -1,4 +1,4 @@
-"""What was made of the figures: pictures, one JSON document, and a page in Markdown."""
+"""The output for all figures: pictures, one JSON document, and a page in Markdown."""
 
 import json
 from collections.abc import Iterator
@@ -11,12 +11,12 @@ PAGE: Final = "paper.md"
 FOLDER: Final = Path("figures") / "paper"
 DOCUMENT: Final = "paper.json"
 _NOTHING: Final = 1e-9
-"""What is not more is rounding, and shown as 0."""
+"""Smaller values are rounding errors, and shown as 0."""
 _PAPER: Final = "https://doi.org/10.1145/2816795.2818103"
 
 
 def picture_name(number: int) -> str:
-    """Return what a figure's picture is called in `FOLDER`."""
+    """Return the name of a figure's picture in `FOLDER`."""
     return f"figure-{number:02d}.png"
 
 

@@ -167,7 +167,7 @@ def drawn(rng: np.random.Generator) -> Response:
 
 
 def study(bench: Bench, sparse: _Outcomes) -> _Study:
-    """Let the techniques that the paper shows reconstruct many random responses."""
+    """Reconstruct many random responses by the techniques that the paper shows."""
     rng = np.random.default_rng([bench.seed, 11])
     contenders = [each for each in CONTENDERS if each.name in PRINTED]
     found = []
@@ -190,7 +190,7 @@ def _share(claim: Claim, others: _Study, sparse: _Outcomes) -> float:
 def statements(
     response: Response, found: _Outcomes, sparse: _Outcomes, others: _Study
 ) -> list[Statement]:
-    """Hold all claims against one response, and say how it is with the others where one fails."""
+    """Check all claims on one response; where one fails, add how it does on the others."""
     return [
         claim.statement(
             response,

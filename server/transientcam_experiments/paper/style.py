@@ -1,4 +1,4 @@
-"""How all pictures of the paper's figures look: one set of sizes, colours and labels."""
+"""The style of all pictures: one set of sizes, colours and labels."""
 
 from collections.abc import Sequence
 from io import BytesIO
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 _Array = NDArray[Any]
 TRUTH: Final = "#0072B2"
-"""Of what is really there; colours are Okabe and Ito's, which colour-blind people tell apart."""
+"""Of the truth; colours are Okabe and Ito's, which colour-blind people can distinguish."""
 OURS: Final = "#D55E00"
 OTHER: Final = "#009E73"
 FOURTH: Final = "#CC79A7"

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import Sequence
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, Shot
+from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
 
 _Array = NDArray[Any]
 VIDEO: Final = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005)
@@ -16,8 +16,8 @@ MOMENTS_S: Final = (4.8, 7.6, 17.0)
 """When our actor enters, waves and leaves; the paper shows 4.8 s, 7.6 s and 13 s of its actor."""
 
 
-def video(bench: Bench) -> dict[float, list[Shot]]:
-    """Return two successive frames at each moment, or at the first two where it has to be quick.
+def video(bench: Bench) -> dict[float, list[ReconstructedShot]]:
+    """Return two successive frames at each moment, or at the first two for a first look.
 
     The paper fills what outliers took with the frame before; ours are taken without outliers.
     """
@@ -27,8 +27,8 @@ def video(bench: Bench) -> dict[float, list[Shot]]:
     }
 
 
-def parts(shot: Shot) -> dict[str, _Array]:
-    """Tell the pixels (H, W) of the actor, of the wall, and of the wall with light over mirrors."""
+def parts(shot: ReconstructedShot) -> dict[str, _Array]:
+    """Return the pixels (H, W) of the actor, of the wall, and of the wall lit over mirrors."""
     first = shot.truth.delay_s[0]
     actor = shot.lit & (first < 12.8e-9)
     later = (np.nan_to_num(shot.truth.delay_s[1:], nan=0.0) > 20e-9).any(axis=0)

@@ -3,24 +3,12 @@
 Measured on simulated scenes, whose truth is known, by the same stages that the daemon runs, from
 images that come over the emulated USB. `measure` goes through a `Grid` point by point and writes
 each result into the output folder before it begins the next; `report` makes tables, plots and a
-page of what is there.
+page of the results so far.
 """
 
-from transientcam_experiments.tradeoff.grid import GRIDS, Grid, load_grid
+from transientcam_experiments.tradeoff.grid import Grid, load_grid
 from transientcam_experiments.tradeoff.measuring import Point, measure, points_of
 from transientcam_experiments.tradeoff.records import Record, Records
 from transientcam_experiments.tradeoff.report import report
-from transientcam_server.planning.pareto import front
 
-__all__ = [
-    "GRIDS",
-    "Grid",
-    "Point",
-    "Record",
-    "Records",
-    "front",
-    "load_grid",
-    "measure",
-    "points_of",
-    "report",
-]
+__all__ = ["Grid", "Point", "Record", "Records", "load_grid", "measure", "points_of", "report"]

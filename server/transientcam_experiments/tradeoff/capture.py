@@ -1,4 +1,4 @@
-"""Capture time against accuracy: one sequence on a scene, held against the scene's truth."""
+"""Capture time against accuracy: one sequence on a scene, compared with the scene's truth."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -41,28 +41,28 @@ QUANTITIES: Final[dict[str, str]] = {
     "biased": "share of pixels that had to be biased",
     "saturated": "share of pixels at the end of the scale",
 }
-"""What is measured, in words."""
+"""What is measured, for the page."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shot:
+class FrameWithTruth:
     """A frame, and the truth when its last image was taken."""
 
-    frame: RawFrame
+    raw: RawFrame
     truth: Truth
 
 
-def capture(camera: Camera, frames: int) -> list[Shot]:
-    """Take frames with the sequence that is set."""
+def capture(camera: Camera, frames: int) -> list[FrameWithTruth]:
+    """Capture frames with the sequence that is set, each with its truth."""
     assert camera.simulation is not None  # noqa: S101 - only simulated cameras are measured
     camera.start()
-    taken = [Shot(camera.read_frame(), camera.simulation.truth()) for _ in range(frames)]
+    taken = [FrameWithTruth(camera.read_frame(), camera.simulation.truth()) for _ in range(frames)]
     camera.stop()
     return taken
 
 
 def accuracy(
-    shots: list[Shot],
+    frames: list[FrameWithTruth],
     sample_of: Callable[[Truth], Sample],
     applied: AppliedSequence,
     *,
@@ -75,8 +75,8 @@ def accuracy(
     """
     recipe = Recipe(applied, settings, 2.0**bits - 1.0)
     ranges, each = [], []
-    for shot in shots:
-        range_m, values = _of_shot(shot, sample_of(shot.truth), recipe)
+    for frame in frames:
+        range_m, values = _of_frame(frame, sample_of(frame.truth), recipe)
         ranges.append(range_m)
         each.append(values)
     means, spreads = summarised(each)
@@ -88,7 +88,7 @@ def accuracy(
 def summarised(
     each: list[dict[str, float]],
 ) -> tuple[dict[str, float | None], dict[str, float | None]]:
-    """Return mean and deviation of repetitions; None for what is no number or has none."""
+    """Return mean and deviation over repetitions; None where not finite, or of one alone."""
     means: dict[str, float | None] = {}
     spreads: dict[str, float | None] = {}
     for name in each[0]:
@@ -104,7 +104,7 @@ def repeatability(ranges: _Array) -> float | None:
 
     The median, over pixels and pairs of successive repetitions, of their absolute difference, as
     the standard deviation of the normal variable that has the same. Where few values stray far, as
-    where an estimate splits a return, a standard deviation itself would tell of those alone.
+    where an estimate splits a return, a standard deviation itself would measure those alone.
     None with less than two repetitions.
     """
     difference = np.abs(np.diff(ranges, axis=0))
@@ -114,9 +114,11 @@ def repeatability(ranges: _Array) -> float | None:
     return float(np.median(difference) / (math.sqrt(2) * MEDIAN_OF_NORMAL))
 
 
-def _of_shot(shot: Shot, sample: Sample, recipe: Recipe) -> tuple[_Array, dict[str, float]]:
-    found: tm.Reconstruction = recipe.reconstruct(shot.frame)
-    truth = shot.truth
+def _of_frame(
+    frame: FrameWithTruth, sample: Sample, recipe: Recipe
+) -> tuple[_Array, dict[str, float]]:
+    found: tm.Reconstruction = recipe.reconstruct(frame.raw)
+    truth = frame.truth
     f_hz = recipe.base_frequency_hz
     lit = np.isfinite(truth.range_m) & (truth.brightness > 0)
     seen = lit & np.asarray(found.has_range)

@@ -95,16 +95,16 @@ def measure(
     task: Task, b: _Array, *, repetitions: int, clock: _Clock = time.perf_counter
 ) -> tuple[dict[str, float | None], dict[str, float | None]]:
     """Return median and spread of the time of a task, and its error."""
-    wanted = b if task.point["dtype"] == "float64" else b.astype(np.complex64)
-    result = task.run(wanted)  # compiles what it needs, and fills caches
+    typed = b if task.point["dtype"] == "float64" else b.astype(np.complex64)
+    result = task.run(typed)  # compiles what it needs, and fills caches
     times = []
     for _ in range(repetitions):
         begin = clock()
-        task.run(wanted)
+        task.run(typed)
         times.append(clock() - begin)
     some = b.reshape((b.shape[0], -1))[:, :: max(1, b[0].size // 400)]
     exact = task.exact(some)
-    ours = task.run(some if wanted is b else some.astype(np.complex64))[..., : exact.shape[-1]]
+    ours = task.run(some if typed is b else some.astype(np.complex64))[..., : exact.shape[-1]]
     error = _error(ours, exact, turns=task.point["task"] == "range")
     values: dict[str, float | None] = {
         "seconds": float(np.median(times)),
@@ -121,16 +121,16 @@ def _error(ours: _Array, exact: _Array, *, turns: bool) -> _Array:
     """Return each pixel's largest error, over its largest value; of phases, in radian."""
     if turns:
         off = np.abs(np.angle(np.exp(1j * (ours.astype(float) - exact))))
-        wanted: _Array = off[np.isfinite(off)]
-        return wanted
+        turned: _Array = off[np.isfinite(off)]
+        return turned
     off = np.abs(ours - exact).max(axis=0) / np.abs(exact).max(axis=0)
     finite: _Array = off[np.isfinite(off)]
     return finite
 
 
 def _as(dtype: str, run: Callable[[_Array], _Array]) -> Callable[[_Array], _Array]:
-    wanted = np.complex64 if dtype == "float32" else np.complex128
-    return lambda b: run(b if b.dtype == wanted else b.astype(wanted))
+    kind = np.complex64 if dtype == "float32" else np.complex128
+    return lambda b: run(b if b.dtype == kind else b.astype(kind))
 
 
 def _pisarenko(b: _Array) -> _Array:

@@ -15,9 +15,9 @@ from transientcam_moments.comparisons import TECHNIQUES, Technique
 _Array = NDArray[Any]
 _Clock = Callable[[], float]
 SAMPLE_PIXELS: Final = 96
-"""Pixels whose range is held against the truth; all that slow techniques are timed with."""
+"""Pixels whose range is compared with the truth; slow techniques are timed on them alone."""
 ENOUGH_S: Final = 0.5
-"""What takes longer is timed once."""
+"""Techniques that take longer are timed once."""
 
 QUANTITIES: Final[dict[str, str]] = {
     "seconds": "computing time of one frame, median; of techniques that go pixel by pixel, "
@@ -27,12 +27,12 @@ QUANTITIES: Final[dict[str, str]] = {
     "range_outliers": f"share of them off by more than {OUTLIER_M:g} m",
     "range_missing": "share of them without a range",
 }
-"""What is measured, in words."""
+"""What is measured, for the page."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """What a camera measured, and where it should have seen something.
+    """The moments of a frame, and its true range.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ def measure(
     seed: int,
     clock: _Clock = time.perf_counter,
 ) -> tuple[dict[str, float | None], dict[str, float | None]]:
-    """Return what `QUANTITIES` says of a technique, and the spread of its time.
+    """Return the `QUANTITIES` of a technique, and the spread of its time.
 
     A technique that looks at neighbours has none in the sample.
     """

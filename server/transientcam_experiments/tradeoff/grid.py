@@ -1,4 +1,4 @@
-"""Which settings are measured."""
+"""The grids of settings that are measured."""
 
 import itertools
 import tomllib
@@ -92,7 +92,7 @@ def load_grid(name: str) -> Grid:
     Raises
     ------
     InputError
-        Naming what of the file cannot be used.
+        Naming the part of the file that cannot be used.
     SequenceError
         Naming the field of a sequence.
     """

@@ -28,7 +28,7 @@ _Summary = tuple[dict[str, float | None], dict[str, float | None]]
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One thing to measure: what it is, and how."""
+    """One measurement: its settings, and how it runs."""
 
     kind: str
     scene: str
@@ -38,12 +38,12 @@ class Point:
 
     @property
     def key(self) -> str:
-        """As of the record that it becomes."""
+        """The key of its record."""
         return key_of(self.kind, self.scene, self.point, self.conditions)
 
 
 def points_of(grid: Grid, *, scene: str, repetitions: int, seed: int) -> list[Point]:
-    """Return everything that a grid asks for on a scene."""
+    """Return every point of a grid on a scene."""
     conditions = {"repetitions": repetitions, "seed": seed}
 
     def point(kind: str, settings: Mapping[str, Any], run: Callable[["_Bench"], _Summary]) -> Point:
@@ -103,7 +103,7 @@ def measure(
     progress: Callable[[str], None],
     clock: Callable[[], float] = time.perf_counter,
 ) -> None:
-    """Measure what is not in the records yet.
+    """Measure the points that are not in the records yet.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def measure(
     scene, seed
         Which world, and its chance.
     progress
-        Is told the kind of each point when it is done, also of those that were there already.
+        Called with the kind of each finished point, also of those that were measured before.
     clock
         Of the machine, for how long each point takes.
 
@@ -200,12 +200,12 @@ class _Bench:
                     Sequence(harmonics=harmonics), base_frequency_hz=min(23e6, most_hz)
                 )
                 applied = camera.configure(sequence)
-                (shot,) = capture.capture(camera, 1)
+                (frame,) = capture.capture(camera, 1)
                 recipe = Recipe(applied, self._settings, 2.0**camera.capabilities.bits - 1.0)
-            b = recipe.reconstruct(shot.frame).moments.astype(np.complex128)
-            # rounding to single precision took from what biasing had given
+            b = recipe.reconstruct(frame.raw).moments.astype(np.complex128)
+            # rounding to single precision reduced the bias that was added
             biased = tm.bias(b, self._settings.bias).moments
-            truth = shot.truth
+            truth = frame.truth
             truth_m = np.where(truth.brightness > 0, truth.range_m, np.nan)
             base_hz = applied.sequence.base_frequency_hz
             self._scenes[harmonics] = estimating.Scene(biased, base_hz, truth_m)

@@ -1,4 +1,4 @@
-"""One HTML page of all that was measured: no other file, no other host."""
+"""One HTML page of all results: no other file, no other host."""
 
 import html
 import json
@@ -79,7 +79,7 @@ def page(records: Iterable[Record], plots: Mapping[tuple[str, str], bytes]) -> s
     Parameters
     ----------
     records
-        What was measured.
+        The results.
     plots
         SVG by scene and name of the plot.
     """
@@ -142,7 +142,7 @@ def _inline(svg: bytes, prefix: str, records: list[Record]) -> str:
 
 
 def _what(record: Record) -> str:
-    """Say what a point is."""
+    """Return the settings of a point as text."""
     point = dict(record.point)
     if record.kind != "capture":
         return ", ".join(_setting(name, value) for name, value in point.items())

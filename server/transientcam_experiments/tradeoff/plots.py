@@ -104,7 +104,7 @@ PLOTS: Final[dict[str, Axes]] = {
 
 
 def require() -> None:
-    """Check that plots can be made, before minutes of work that should end in some.
+    """Check that plots can be made, before the minutes that a measurement takes.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Results on disk: one line each, appended as it is measured, so that an end costs nothing."""
+"""Results on disk: one line each, appended once measured, so that an interruption loses none."""
 
 import csv
 import json
@@ -13,18 +13,18 @@ FILE: Final = "points.jsonl"
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What was measured at one point.
+    """The results at one point.
 
     Attributes
     ----------
     kind
-        "capture", "computing" or "transport": which price.
+        "capture", "computing", "estimating" or "transport".
     scene
-        Where.
+        Name of the scene.
     point
-        The settings; with the scene and the conditions they say all of how it was measured.
+        The settings; scene and conditions complete them.
     conditions
-        Seed, repetitions and the like: what else a repetition would need.
+        Seed, repetitions and the like: what else is needed to repeat it.
     values, spread
         Mean and standard deviation over the repetitions, by quantity; None where it has none.
     took_s
@@ -46,7 +46,7 @@ class Record:
 
 
 def key_of(kind: str, scene: str, point: Mapping[str, Any], conditions: Mapping[str, Any]) -> str:
-    """Return what tells one measurement from another."""
+    """Return the text that identifies a measurement."""
     return json.dumps([kind, scene, point, conditions], sort_keys=True)
 
 
@@ -70,7 +70,7 @@ class Records:
             for line in content[:whole].splitlines():
                 record = Record(**json.loads(line))
                 self._records[record.key] = record
-            # what a kill left of a line is measured again
+            # a line cut short by a kill is dropped and measured again
             with self._path.open("r+b") as file:
                 file.truncate(whole)
 
@@ -84,7 +84,7 @@ class Records:
         return key in self._records
 
     def append(self, record: Record) -> None:
-        """Keep a result; when this returns it is on the disk."""
+        """Store a result; when this returns it is on the disk."""
         line = {name: getattr(record, name) for name in Record.__slots__}
         with self._path.open("ab") as file:
             file.write(json.dumps(line, allow_nan=False).encode() + b"\n")

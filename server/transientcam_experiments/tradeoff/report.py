@@ -1,4 +1,4 @@
-"""Tables, plots and the page of what was measured so far."""
+"""Tables, plots and the page of the results so far."""
 
 from pathlib import Path
 
@@ -30,6 +30,6 @@ def report(folder: Path, records: Records) -> list[Path]:
 
 
 def file_name(scene: str) -> str:
-    """Return what of a scene's name a file can be called by."""
+    """Return a scene's name as part of a file's."""
     stem = Path(scene.partition("?")[0]).stem
     return "".join(each if each.isalnum() or each in "-_" else "-" for each in stem)

@@ -1,4 +1,4 @@
-"""What a simulated scene really holds, in the terms that are measured."""
+"""The truth of a simulated scene, in the quantities that are measured."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -35,7 +35,7 @@ from transientcam_server.api.routes import (
     metrics as metrics_route,
 )
 from transientcam_server.api.stream import websocket
-from transientcam_server.camera.source import Camera
+from transientcam_server.camera import Camera
 from transientcam_server.service import VERSION, Service
 from transientcam_server.settings import Settings
 

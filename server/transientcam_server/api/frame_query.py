@@ -55,8 +55,8 @@ PixelBins = Annotated[int, Query(ge=1, le=MAX_BINS, description="times of flight
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What a request says of the product it wants."""
+class FrameQuery:
+    """Which part of a product a request selects, and in which format."""
 
     time_s: list[float] | None
     bins: int | None
@@ -108,7 +108,7 @@ class Wanted:
 
 
 # async, or FastAPI takes a thread for it
-async def _wanted(
+async def _frame_query(
     request: Request,
     time_s: Annotated[
         list[FiniteFloat] | None,
@@ -136,16 +136,16 @@ async def _wanted(
         Literal["colour"] | None,
         Query(description="a PNG for eyes: 8 bits, coloured, without values"),
     ] = None,
-) -> Wanted:
+) -> FrameQuery:
     accept = request.headers.get("accept")
-    return Wanted(time_s, bins, y, region, decimation, view, accept)
+    return FrameQuery(time_s, bins, y, region, decimation, view, accept)
 
 
-WantedOf = Annotated[Wanted, Depends(_wanted)]
-"""What the request wants of a product."""
+FrameQueryOf = Annotated[FrameQuery, Depends(_frame_query)]
+"""The part and the format that the request selects."""
 
 
-def choose(product: Product, suffix: str | None, wanted: Wanted) -> Encoding:
+def choose(product: Product, suffix: str | None, wanted: FrameQuery) -> Encoding:
     """Return the format that a request wants a product in.
 
     Raises
@@ -159,7 +159,7 @@ def choose(product: Product, suffix: str | None, wanted: Wanted) -> Encoding:
 
 async def product_answer(
     name: str,
-    wanted: Wanted,
+    wanted: FrameQuery,
     *,
     product: Callable[[str], Product],
     frame: Callable[[], Awaitable[Frame]],

@@ -15,7 +15,7 @@ from prometheus_client.registry import Collector
 import transientcam_moments as tm
 from transientcam_server.camera.events import Back, Captured, Event, Lost
 from transientcam_server.imaging.calibration import NOMINAL_ID
-from transientcam_server.recording.library import Library
+from transientcam_server.recording import Library
 from transientcam_server.service import Service
 
 CONTENT_TYPE: Final = prometheus.CONTENT_TYPE_LATEST

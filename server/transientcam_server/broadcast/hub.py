@@ -78,10 +78,10 @@ class Hub:
         for outbox in self._outboxes:
             self.dropped += outbox.put_frame(frame)
         if frame.raw.lost_images:
-            self.tell("lost-images", {"count": frame.raw.lost_images, "frame": frame.number})
+            self.notify("lost-images", {"count": frame.raw.lost_images, "frame": frame.number})
 
-    def tell(self, kind: str, details: Mapping[str, Any]) -> None:
-        """Put a notice into the outboxes of all subscribers."""
+    def notify(self, kind: str, details: Mapping[str, Any]) -> None:
+        """Send a notice to every subscriber."""
         for outbox in self.subscribers:
             outbox.put(wire.Notice(kind, details))
 

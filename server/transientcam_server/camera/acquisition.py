@@ -1,7 +1,7 @@
-"""The one thread that owns the camera: reads frames, runs commands, outlives an unplug.
+"""The one thread that owns the camera: reads frames, runs commands, survives an unplug.
 
-What happens is reported through ``report``, called on this thread; commands come from any thread
-and are answered through futures.
+Events are reported through ``report``, called on this thread; commands come from any thread, and
+their results are futures.
 """
 
 import logging
@@ -11,8 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
-from typing import Any, Final, Literal, TypeVar
+from typing import Any, Final, TypeVar
 
 from transientcam_driver import (
     AppliedSequence,
@@ -23,6 +22,7 @@ from transientcam_driver import (
 )
 from transientcam_server.camera.events import Back, Captured, Event, Lost, SequenceChanged
 from transientcam_server.camera.source import Camera
+from transientcam_server.camera.status import AcquisitionStatus, State
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import JobCancelled, Problem, SequenceConflict
 
@@ -30,48 +30,14 @@ _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
 
 READ_TIMEOUT_S: Final = 0.1
-"""How long a command may have to wait for the camera to say nothing."""
+"""How long a read, and so a command behind it, may wait for a frame."""
 IDLE_S: Final = 0.5
-"""How often a camera that captures nothing is asked whether it is there."""
+"""Interval at which a camera that captures nothing is checked for an unplug."""
 BACKOFF_S: Final = (0.1, 0.2, 0.5, 1.0)
 """Pauses between attempts to find a lost camera; the last one repeats."""
 STALLED_PERIODS: Final = 5.0
 STALLED_MIN_S: Final = 2.0
 _RATE_FRAMES = 32
-
-State = Literal["starting", "streaming", "stopped", "calibrating", "lost"]
-
-
-@dataclass(frozen=True, slots=True)
-class AcquisitionStatus:
-    """How the acquisition is doing.
-
-    Attributes
-    ----------
-    state
-        ``streaming`` also before the first frame; ``stopped`` because somebody asked for it;
-        ``calibrating`` while a calibration has the camera for itself.
-    running
-        Whether frames are wanted.
-    rate_hz
-        Measured over the last frames; None before there are two.
-    frames
-        Captured since the start of the service.
-    frame_age_s
-        Since the last frame, or since the start where there was none.
-    reason
-        Why the camera is lost.
-    stalled
-        Whether frames are wanted and the camera is there, but has delivered none for too long.
-    """
-
-    state: State
-    running: bool
-    rate_hz: float | None
-    frames: int
-    frame_age_s: float
-    reason: str | None
-    stalled: bool
 
 
 class Acquisition:
@@ -128,19 +94,19 @@ class Acquisition:
         Raises
         ------
         Problem
-            ``camera-busy`` while something has the camera for itself.
+            ``camera-busy`` while a job has exclusive use of the camera.
         """
         with self._occupied:
             self.require_free()
             return self.submit(lambda: self._configure(sequence, expected))
 
     def set_running(self, running: bool) -> "Future[None]":
-        """Start or stop capturing; stopping also ends what has the camera for itself.
+        """Start or stop capturing; stopping also interrupts a job that has the camera.
 
         Raises
         ------
         Problem
-            ``camera-busy`` where it should start while something has the camera for itself.
+            ``camera-busy`` if it is to start while a job has exclusive use of the camera.
         """
         with self._occupied:
             if running:
@@ -149,35 +115,36 @@ class Acquisition:
             return self.submit(lambda: self._set_running(running))
 
     def safe_off(self) -> "Future[None]":
-        """Stop capturing and switch the light off, by what the camera always honours."""
+        """Stop capturing and switch the light off, by the request that no state refuses."""
         self._interrupted.set()
         return self.submit(self._safe_off)
 
     def device_status(self) -> "Future[Status]":
-        """Ask the device how it is."""
+        """Read the status of the device."""
         return self.submit(self._camera.status)
 
     def occupy(self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T]) -> "Future[_T]":
-        """Hand the camera to ``work``, which has it for itself until it returns.
+        """Run ``work`` with exclusive use of the camera until it returns.
 
-        No frames are reported meanwhile. It leaves the sequence as it was, and calls its second
-        argument several times a second, which raises `JobCancelled` where the light is to go off.
+        No frames are reported meanwhile, and the sequence is restored afterwards. ``work`` must
+        call its second argument several times a second; it raises `JobCancelled` once the light
+        has to go off.
 
         Raises
         ------
         Problem
-            ``camera-busy`` if something has it already.
+            ``camera-busy`` if another job has it.
         """
         with self._occupied:
             self.require_free()
             self._occupant = job_id
             self._interrupted.clear()
             occupied = self.submit(lambda: self._occupy(job_id, work))
-        occupied.add_done_callback(self._occupied_no_more)  # also where it was taken back
+        occupied.add_done_callback(self._occupied_done)  # also where it was taken back
         return occupied
 
     def require_free(self) -> None:
-        """Refuse what would disturb somebody who has the camera for itself.
+        """Refuse what would disturb a job with exclusive use of the camera.
 
         Raises
         ------
@@ -206,7 +173,7 @@ class Acquisition:
         return future
 
     def status(self) -> AcquisitionStatus:
-        """Return how the acquisition is doing; never waits."""
+        """Return the present status; never waits."""
         arrivals_s = list(self._arrivals_s)
         rate_hz = None
         if len(arrivals_s) > 1 and arrivals_s[-1] > arrivals_s[0]:
@@ -246,8 +213,8 @@ class Acquisition:
             except CameraError as error:
                 self._camera_lost(str(error))
             except Exception:
-                # nothing that goes wrong with one frame may end the acquisition
-                _log.exception("the acquisition failed; it carries on")
+                # no failure with one frame may end the acquisition
+                _log.exception("the acquisition failed and is continued")
                 self._run_commands(wait_s=BACKOFF_S[-1])
         self._shut_down()
 
@@ -259,7 +226,7 @@ class Acquisition:
             self._restored = None
         elif not self._running:
             self._run_commands(wait_s=IDLE_S)
-            self._camera.status()  # an unplug is noticed also while nothing is read
+            self._camera.status()  # detects an unplug while nothing is read
             self._camera_works()
         elif not self._started:
             self._camera.start()
@@ -304,7 +271,7 @@ class Acquisition:
                 self._started = False
                 self._camera.stop()
 
-    def _occupied_no_more(self, occupied: "Future[Any]") -> None:
+    def _occupied_done(self, occupied: "Future[Any]") -> None:
         if occupied.cancelled():
             self._occupant = None
 
@@ -312,7 +279,7 @@ class Acquisition:
         def go_on() -> None:
             if self._interrupted.is_set():
                 raise JobCancelled(job_id)
-            self._run_commands(wait_s=0.0)  # such as disturb nobody, or end this
+            self._run_commands(wait_s=0.0)  # those that do not need the camera, or cancel this job
 
         before = self._camera.applied
         try:
@@ -328,13 +295,13 @@ class Acquisition:
             self._moved_s = self._clock()
             applied = self._camera.applied
             if applied.sequence != before.sequence:
-                self._restored = before.sequence  # once it can be reached
+                self._restored = before.sequence  # once the camera is reachable
             elif applied.epoch != before.epoch:
                 self._remember(applied)
                 self._report(SequenceChanged(applied))
 
     def _safe_off(self) -> None:
-        # whatever the camera answers, nothing here starts it again
+        # first, so that it is not started again even if the request fails
         self._running = False
         self._started = False
         self._arrivals_s.clear()
@@ -366,14 +333,14 @@ class Acquisition:
             self._report(SequenceChanged(applied))
 
     def _camera_works(self) -> None:
-        """Believe that a lost camera is back only once it does what it should."""
+        """Report a lost camera as back only once it has completed a request."""
         if self._lost is not None:
             _log.info("the camera is back after %d attempts", self._attempts)
             self._lost = None
             self._report(Back())
 
     def _run_commands(self, *, wait_s: float) -> None:
-        """Run all commands that wait; with none, wait up to ``wait_s`` for one."""
+        """Run all queued commands; with none, wait up to ``wait_s`` for one."""
         try:
             command = self._commands.get(timeout=wait_s) if wait_s else self._commands.get_nowait()
             while True:
@@ -388,4 +355,4 @@ class Acquisition:
             self._camera.safe_off()
         except CameraError as error:
             # it is unplugged, or its heartbeat ends and it turns its light off by itself
-            _log.info("the camera could not be told to stop: %s", error)
+            _log.info("the camera could not be stopped: %s", error)

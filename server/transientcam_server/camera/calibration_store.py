@@ -1,7 +1,6 @@
 """The calibrations of a service: one directory of files, and which of them is active.
 
-What clients call a calibration never becomes a path: they name it by its id, which is looked up
-among the files that are there.
+An id from a client never becomes a path: it is looked up among the files that exist.
 """
 
 import json
@@ -29,19 +28,19 @@ _ABANDONED_S: Final = 24 * 3600.0
 
 
 @dataclass(frozen=True, slots=True)
-class Stored:
-    """A calibration that is there, without its images.
+class StoredCalibration:
+    """A calibration on disk, without its images.
 
     Attributes
     ----------
     path
         Its file.
     subject
-        What it is good for.
+        Device and sequence that it fits.
     captured_unix_s
         When its last image arrived.
     notes
-        ``name``, and what else is kept with it.
+        ``name``, and what else is stored with it.
     """
 
     id: str
@@ -55,14 +54,14 @@ class Stored:
 
 
 class CalibrationStore:
-    """The calibrations that are there. Reads and writes files, so call it on a worker.
+    """The stored calibrations. Reads and writes files, so call it on a worker.
 
     Parameters
     ----------
     settings
-        Where they are kept, how many and how large.
+        Directory, largest number and size.
     given
-        One that the service was started with, wherever it is.
+        File that the service was started with, in any directory.
     """
 
     def __init__(
@@ -76,20 +75,20 @@ class CalibrationStore:
         self._unix_s = unix_s
         self._given = given
         self._lock = threading.Lock()
-        self._known: dict[Path, tuple[tuple[int, int], Stored | None]] = {}
+        self._known: dict[Path, tuple[tuple[int, int], StoredCalibration | None]] = {}
 
     @property
     def directory(self) -> Path:
-        """Where they are kept."""
+        """Directory of the files."""
         return self._settings.directory
 
-    def all(self) -> list[Stored]:
+    def all(self) -> list[StoredCalibration]:
         """Return every calibration that can be read, the newest first."""
         with self._lock:
             found = {each.id: each for path in self._paths() if (each := self._stored(path))}
         return sorted(found.values(), key=lambda each: each.captured_unix_s, reverse=True)
 
-    def get(self, calibration_id: str) -> Stored:
+    def get(self, calibration_id: str) -> StoredCalibration:
         """Return a calibration.
 
         Raises
@@ -108,8 +107,8 @@ class CalibrationStore:
             value=shown,
         )
 
-    def add(self, capture: CalibrationCapture) -> Stored:
-        """Keep a measurement.
+    def add(self, capture: CalibrationCapture) -> StoredCalibration:
+        """Store a measurement.
 
         Raises
         ------
@@ -124,8 +123,8 @@ class CalibrationStore:
                 raise self.not_stored(error) from error
             return self._take(part, capture)
 
-    def take_in(self, part: Path) -> Stored:
-        """Keep a file that was received; one that is here already stays as it is.
+    def take_in(self, part: Path) -> StoredCalibration:
+        """Store a file that was received; a calibration that exists stays as it is.
 
         Raises
         ------
@@ -148,14 +147,14 @@ class CalibrationStore:
         self.require_room()
         return self._take(part, capture)
 
-    def delete(self, calibration_id: str) -> Stored:
-        """Delete a calibration for good.
+    def delete(self, calibration_id: str) -> StoredCalibration:
+        """Delete a calibration permanently.
 
         Raises
         ------
         Problem
             ``unknown-calibration``, ``calibration-in-use`` for the one that the service was
-            started with, ``calibration-not-stored`` where the disk does not let it.
+            started with, ``calibration-not-stored`` where the disk refuses.
         """
         stored = self.get(calibration_id)
         if stored.path == self._given:
@@ -173,7 +172,7 @@ class CalibrationStore:
 
     @property
     def active_id(self) -> str:
-        """Which one was active when the service was here last."""
+        """The calibration that was active when the service last ran."""
         try:
             document = json.loads((self.directory / _ACTIVE).read_text(encoding="utf-8"))
             return str(document["id"])
@@ -184,16 +183,16 @@ class CalibrationStore:
             return NOMINAL_ID
 
     def remember_active(self, calibration_id: str) -> None:
-        """Let the next start of the service know; a disk that does not take it is no problem."""
+        """Keep it for the next start of the service; a failure of the disk is only logged."""
         try:
             with self._part() as part:
                 part.write_text(json.dumps({"id": calibration_id}), encoding="utf-8")
                 part.replace(self.directory / _ACTIVE)
         except (Problem, OSError) as error:
-            _log.warning("the next start will not know the active calibration: %s", error)
+            _log.warning("the active calibration could not be saved for the next start: %s", error)
 
     def require_room(self) -> None:
-        """Refuse one more calibration where there are many.
+        """Refuse one more calibration where the limit is reached.
 
         Raises
         ------
@@ -217,7 +216,7 @@ class CalibrationStore:
             part.unlink(missing_ok=True)
 
     def new_part(self) -> Path:
-        """Make a file in the directory for what is not complete yet; who asks removes it.
+        """Create a file for a calibration that is not complete yet; the caller removes it.
 
         Raises
         ------
@@ -234,19 +233,19 @@ class CalibrationStore:
         return Path(name)
 
     def not_stored(self, error: OSError) -> Problem:
-        """Say that the disk does not take a calibration, and log where."""
+        """Return the problem of a failed write, and log the directory."""
         _log.warning("storing a calibration in %s failed: %s", self.directory, error)
         reason = error.strerror or "no reason is given"
-        return Problem(kinds.CALIBRATION_NOT_STORED, f"The disk does not take it: {reason}.")
+        return Problem(kinds.CALIBRATION_NOT_STORED, f"It could not be written: {reason}.")
 
     def _sweep(self) -> None:
-        """Remove what a service left behind that died while it received something."""
+        """Remove files that a service left when it died while it received them."""
         for part in self.directory.glob("*.part"):
-            with suppress(FileNotFoundError):  # its owner was quicker
+            with suppress(FileNotFoundError):  # its owner removed it first
                 if part.stat().st_mtime < self._unix_s() - _ABANDONED_S:
                     part.unlink()
 
-    def _take(self, part: Path, capture: CalibrationCapture) -> Stored:
+    def _take(self, part: Path, capture: CalibrationCapture) -> StoredCalibration:
         path = self.directory / (capture.id + SUFFIX)
         try:
             with part.open("rb") as file:
@@ -264,7 +263,7 @@ class CalibrationStore:
             kept = []
         return kept if self._given is None else [*kept, self._given]
 
-    def _stored(self, path: Path) -> Stored | None:
+    def _stored(self, path: Path) -> StoredCalibration | None:
         try:
             status = path.stat()
         except OSError:  # deleted this moment
@@ -276,13 +275,13 @@ class CalibrationStore:
         return known[1]
 
 
-def _read(path: Path, size_bytes: int) -> Stored | None:
+def _read(path: Path, size_bytes: int) -> StoredCalibration | None:
     try:
         capture = CalibrationCapture.load(path)
     except CalibrationFileError as error:
         _log.warning("%s", error)
         return None
-    return Stored(
+    return StoredCalibration(
         id=capture.id,
         path=path,
         size_bytes=size_bytes,

@@ -1,4 +1,4 @@
-"""Measuring calibrations with the service's own camera, activating them, watching them drift."""
+"""Measures calibrations with the service's camera, activates them, and watches their drift."""
 
 import asyncio
 import logging
@@ -20,7 +20,7 @@ from transientcam_driver import (
 )
 from transientcam_driver.calibration.capture import DEFAULT_TAKES
 from transientcam_server.camera.acquisition import Acquisition
-from transientcam_server.camera.calibration_store import CalibrationStore, Stored
+from transientcam_server.camera.calibration_store import CalibrationStore, StoredCalibration
 from transientcam_server.camera.jobs import Job, Jobs
 from transientcam_server.camera.source import Camera
 from transientcam_server.errors import kinds
@@ -41,7 +41,7 @@ from transientcam_server.imaging.recipe import Recipe
 _log = logging.getLogger(__name__)
 _Array = NDArray[Any]
 MAX_CAPTURE_BYTES: Final = 2 * 1024**3
-"""Of the raw images of one measurement, which stand in memory until they are averaged."""
+"""Of the raw images of one measurement, which are kept in memory until they are averaged."""
 JUDGED_FRAMES: Final = 8
 """Frames whose invalid pixels are counted. The best of them stands for the calibration: an image
 that lost its synchronisation spoils one frame, and drift all of them."""
@@ -50,8 +50,8 @@ _EVALUATING: Final = 0.95  # of the work is done when all is captured
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What somebody wants measured: ``frames`` of each kind, to be used at once or not."""
+class CalibrationOptions:
+    """What to measure: ``frames`` of each kind; ``activate`` uses the result at once."""
 
     name: str = ""
     frames: int = DEFAULT_TAKES
@@ -67,7 +67,7 @@ class Drift:
     frame: int
 
     def to_document(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the drift as JSON."""
         return {
             "invalid_share": self.invalid_share,
             "invalid_share_at_capture": self.invalid_share_at_capture,
@@ -76,14 +76,14 @@ class Drift:
 
 
 class Calibrator:
-    """Where calibrations are asked for; on the event loop, everything slow on workers.
+    """Measures, activates and deletes calibrations; on the event loop, slow work on workers.
 
     Parameters
     ----------
     kept
-        The calibrations there are.
-    tell
-        Called when other gains are used, with what a ``calibration-changed`` notice says.
+        The stored calibrations.
+    notify
+        Called when other gains are used, with the details of a ``calibration-changed`` notice.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Calibrator:
         noise: NoiseModel,
         jobs: Jobs,
         history: History,
-        tell: Callable[[Mapping[str, Any]], None],
+        notify: Callable[[Mapping[str, Any]], None],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.kept = kept
@@ -106,7 +106,7 @@ class Calibrator:
         self._noise = noise
         self._jobs = jobs
         self._history = history
-        self._tell = tell
+        self._notify = notify
         self._clock = clock
         self._drift: Drift | None = None
         self._drift_of = NOMINAL_ID
@@ -115,7 +115,7 @@ class Calibrator:
 
     @property
     def active_id(self) -> str:
-        """The calibration that is used wherever it is good for the sequence."""
+        """The calibration that is used wherever it fits the sequence."""
         calibration = self._pipeline.calibration
         return calibration_id(None if calibration is None else calibration.gains)
 
@@ -127,7 +127,7 @@ class Calibrator:
 
     @property
     def known_drift(self) -> Drift | None:
-        """What `drift` has found last."""
+        """The last result of `drift`, if it is of the active calibration."""
         return self._drift if self._drift_of == self.active_id else None
 
     def notice(self, applied: AppliedSequence) -> dict[str, Any]:
@@ -138,11 +138,13 @@ class Calibrator:
             "reason": None if misfit is None else str(misfit),
         }
 
-    def misfit(self, stored: Stored, applied: AppliedSequence) -> CalibrationMismatch | None:
-        """Say why a calibration is not good for a sequence of this camera."""
+    def misfit(
+        self, stored: StoredCalibration, applied: AppliedSequence
+    ) -> CalibrationMismatch | None:
+        """Return why a calibration does not fit a sequence of this camera; None where it does."""
         return stored.subject.misfit(applied, self._camera.capabilities)
 
-    async def activate(self, wanted_id: str, applied: Callable[[], AppliedSequence]) -> None:
+    async def activate(self, new_id: str, applied: Callable[[], AppliedSequence]) -> None:
         """Use a calibration, or the nominal gains, from the next frame on.
 
         Raises
@@ -151,20 +153,20 @@ class Calibrator:
             ``unknown-calibration``, ``calibration-misfit``.
         """
         calibration = None
-        if wanted_id != NOMINAL_ID:
-            stored = await asyncio.to_thread(self.kept.get, wanted_id)
+        if new_id != NOMINAL_ID:
+            stored = await asyncio.to_thread(self.kept.get, new_id)
             self._require_fit(self.misfit(stored, applied()))
             loaded, _ = await self._pipeline.workers.run_long(load_calibration, stored.path)
             # the sequence may be another one by now
             loaded.capture.require_fit(applied(), self._camera.capabilities)
             calibration = loaded
-        if self.active_id != wanted_id:
-            _log.info("frames are calibrated by %s", wanted_id)
+        if self.active_id != new_id:
+            _log.info("frames are calibrated by %s", new_id)
             self._pipeline.calibration = calibration
-            self._tell(self.notice(applied()))
-        await asyncio.to_thread(self.kept.remember_active, wanted_id)
+            self._notify(self.notice(applied()))
+        await asyncio.to_thread(self.kept.remember_active, new_id)
 
-    async def delete(self, unwanted_id: str) -> Stored:
+    async def delete(self, deleted_id: str) -> StoredCalibration:
         """Delete a calibration that is not active.
 
         Raises
@@ -172,41 +174,41 @@ class Calibrator:
         Problem
             ``unknown-calibration``, ``calibration-in-use``, ``calibration-not-stored``.
         """
-        if unwanted_id == self.active_id != NOMINAL_ID:
+        if deleted_id == self.active_id != NOMINAL_ID:
             raise Problem(
                 kinds.CALIBRATION_IN_USE,
                 "Frames are calibrated by it.",
                 field="calibration",
-                value=unwanted_id,
+                value=deleted_id,
             )
-        return await asyncio.to_thread(self.kept.delete, unwanted_id)
+        return await asyncio.to_thread(self.kept.delete, deleted_id)
 
-    def measure(self, wanted: Wanted, applied: Callable[[], AppliedSequence]) -> Job:
+    def measure(self, options: CalibrationOptions, applied: Callable[[], AppliedSequence]) -> Job:
         """Start measuring with the present sequence; the job's result is the calibration.
 
         Raises
         ------
         Problem
             ``camera-busy``, ``too-many-jobs``, ``calibration-not-stored``, ``invalid-request``
-            where the images would not go into memory.
+            where the images would not fit into memory.
         """
         self._acquisition.require_free()
         once = self._camera.validate(replace(applied().sequence, takes=1, take_order="sequential"))
         most = MAX_CAPTURE_BYTES // (once.images * self._camera.capabilities.image_bytes)
-        if wanted.frames > most:
+        if options.frames > most:
             raise Problem(
                 kinds.INVALID_REQUEST,
-                f"{wanted.frames} frames of this sequence do not go into memory.",
+                f"{options.frames} frames of this sequence do not fit into memory.",
                 field="frames",
-                value=wanted.frames,
+                value=options.frames,
                 limit=f"at most {most}",
             )
 
         async def work(job: Job) -> dict[str, Any]:
-            await asyncio.to_thread(self.kept.require_room)  # said before anything is captured
+            await asyncio.to_thread(self.kept.require_room)  # checked before anything is captured
             takes = _Takes()
             measuring = self._acquisition.occupy(
-                job.id, lambda camera, go_on: _capture(camera, job, wanted, takes, go_on)
+                job.id, lambda camera, go_on: _capture(camera, job, options, takes, go_on)
             )
             capture = await asyncio.wrap_future(measuring)
             job.report(_EVALUATING, "evaluating")
@@ -214,9 +216,9 @@ class Calibrator:
             share, _ = await self._pipeline.workers.run_long(
                 self._share_of_takes, calibration, takes, once
             )
-            notes = {"name": wanted.name, "invalid_share": share}
+            notes = {"name": options.name, "invalid_share": share}
             stored = await asyncio.to_thread(self.kept.add, replace(capture, notes=notes))
-            if wanted.activate:
+            if options.activate:
                 await self.activate(stored.id, applied)
             return {
                 "calibration": stored.id,
@@ -229,7 +231,7 @@ class Calibrator:
         return self._jobs.start("calibration", work)
 
     async def drift(self) -> Drift | None:
-        """Return how the active calibration does; None without one, or without frames of it."""
+        """Return the drift of the active calibration; None without one, or without frames of it."""
         async with self._judging:
             if self._drift_of != self.active_id or self._clock() > self._drift_until_s:
                 self._drift = await self._judged()
@@ -260,7 +262,7 @@ class Calibrator:
         try:
             found = await frame.reconstruction("moments")
             share, _ = await self._pipeline.workers.run(self._share, frame.recipe, found)
-        except Exception:  # one frame that cannot be computed says nothing of the calibration
+        except Exception:  # a frame that cannot be computed is no sign of drift
             _log.exception("frame %d: counting its invalid pixels failed", frame.number)
             return None
         return share
@@ -288,13 +290,13 @@ class Calibrator:
 
 
 def _share_in(notes: Mapping[str, Any]) -> float | None:
-    """Return the share that notes hold, which may come from anywhere."""
+    """Return the share in the notes, which an imported file may fill with anything."""
     share = notes.get("invalid_share")
     return float(share) if isinstance(share, int | float) and 0 <= share <= 1 else None
 
 
 class _Takes:
-    """Averages takes, and keeps some of them by themselves."""
+    """Averages takes, and keeps the last few of each image."""
 
     def __init__(self) -> None:
         self._kept: list[_Array] = []
@@ -310,7 +312,7 @@ class _Takes:
 
 
 def _capture(
-    camera: Camera, job: Job, wanted: Wanted, takes: _Takes, go_on: Callable[[], None]
+    camera: Camera, job: Job, options: CalibrationOptions, takes: _Takes, go_on: Callable[[], None]
 ) -> CalibrationCapture:
     def progress(done: int, total: int) -> None:
         job.report(_EVALUATING * done / total, "capturing")
@@ -321,4 +323,4 @@ def _capture(
         go_on()
         return takes.average(of_one_image)
 
-    return capture_calibration(camera, takes=wanted.frames, average=average, progress=progress)
+    return capture_calibration(camera, takes=options.frames, average=average, progress=progress)

@@ -15,14 +15,14 @@ class Captured:
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """The camera is gone, or does not answer."""
+    """The camera is unplugged or does not respond."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class Back:
-    """The camera is there again."""
+    """A lost camera works again."""
 
 
 @dataclass(frozen=True, slots=True)

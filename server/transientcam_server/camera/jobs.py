@@ -1,6 +1,6 @@
-"""Long work that somebody started and does not wait for: where it stands, and how to end it.
+"""Long work that a client starts and does not wait for: its progress, and how to cancel it.
 
-Jobs live on the event loop, one task each, and run in the order they were started in, one at a
+Jobs run on the event loop, one task each, in the order they were started in, one at a
 time. A job reports its progress from any thread.
 """
 
@@ -22,27 +22,27 @@ _log = logging.getLogger(__name__)
 MAX_UNFINISHED: Final = 8
 """Jobs that run or wait; one more is refused."""
 REMEMBERED: Final = 64
-"""Jobs that have ended and can still be asked for."""
+"""Finished jobs whose result is kept."""
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]
 
 
 @dataclass(slots=True, eq=False)
 class Job:
-    """Long work, and where it stands.
+    """Long work, and its progress.
 
     Attributes
     ----------
     progress
         From 0 to 1.
     step
-        What is being done, in a word or two.
+        The present step, in a word or two.
     result
         A document, once it is done.
     problem
         Why it failed.
     cancelled, ended
-        Set when somebody wants it to end, and when it has.
+        Set when it is to be cancelled, and when it has ended.
     """
 
     id: str
@@ -59,23 +59,23 @@ class Job:
 
     @property
     def finished(self) -> bool:
-        """Whether nothing more will happen."""
+        """Whether it has ended."""
         return self.finished_at is not None
 
     def report(self, progress: float, step: str) -> None:
-        """Say how far the work is; from any thread.
+        """Report the progress of the work; from any thread.
 
         Raises
         ------
         JobCancelled
-            If somebody wants it to end.
+            If it was cancelled.
         """
         if self.cancelled.is_set():
             raise JobCancelled(self.id)
         self.progress, self.step = progress, step
 
     def to_document(self) -> dict[str, Any]:
-        """Return where it stands, as JSON has it."""
+        """Return the job as JSON."""
         return {
             "id": self.id,
             "kind": self.kind,
@@ -94,7 +94,7 @@ Work = Callable[[Job], Awaitable[dict[str, Any]]]
 
 
 class Jobs:
-    """Where jobs are started, looked after and cancelled.
+    """Starts, remembers and cancels jobs.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class Jobs:
             ) from None
 
     def start(self, kind: str, work: Work) -> Job:
-        """Begin something that takes long, after what was begun before.
+        """Queue a job; it runs after those that were started before.
 
         Raises
         ------
@@ -158,7 +158,7 @@ class Jobs:
         return job
 
     def cancel(self, job_id: str) -> Job:
-        """Let a job end as soon as it can; one that has ended stays as it is.
+        """Cancel a job; one that has ended stays as it is.
 
         Raises
         ------
@@ -178,7 +178,7 @@ class Jobs:
                 await job.ended.wait()
 
     def cancel_all(self) -> None:
-        """Let every job end as soon as it can."""
+        """Cancel every job that has not ended."""
         for job in self._jobs.values():
             if not job.finished:
                 self.cancel(job.id)

@@ -1,6 +1,6 @@
-"""One controller, many watchers: who may change things, and until when.
+"""The lease: which client may change the camera, and until when; all others only watch.
 
-Everything here lives on the event loop. Time and its alarms are arguments.
+Everything here runs on the event loop. The clock and its timers are arguments.
 """
 
 import secrets
@@ -22,22 +22,22 @@ Change = Literal["granted", "released", "lapsed", "taken-over"]
 
 @dataclass(frozen=True, slots=True)
 class Lease:
-    """Leave to change things, for somebody who shows its ``id``.
+    """Permission to change the camera, for the client that presents its ``id``.
 
     Attributes
     ----------
     id
-        The secret that its holder shows with every change.
+        The secret that its holder sends with every change.
     holder
-        What the holder calls itself.
+        Name that the holder gave itself.
     by
-        Who has shown to be asking.
+        Authenticated identity of the holder.
     rank
-        The rank of whoever took it; nobody of a lower rank takes it over.
+        Rank of the holder; a client of a lower rank cannot take it over.
     on_lapse
-        Whether the capture, and with it the light, ends when nobody renews it in time.
+        Whether the capture, and with it the light, stops when it is not renewed in time.
     expires_s
-        By the desk's clock.
+        By the manager's clock.
     """
 
     id: str = field(repr=False)
@@ -49,49 +49,49 @@ class Lease:
     expires_s: float
 
 
-class Alarm(Protocol):
-    """Something that will happen, unless it is cancelled."""
+class Timer(Protocol):
+    """A call that is scheduled, as an `asyncio.TimerHandle`."""
 
     def cancel(self) -> None:
-        """Let it not happen."""
+        """Drop the scheduled call."""
 
 
 Report = Callable[[Change, Lease, Lease | None], None]
-"""Told of every change: what, the lease it is about, and the one that this one replaced."""
+"""Called with each change: its kind, the lease, and the lease that this one replaced."""
 
 
 class LeaseManager:
-    """Where the lease is asked for, renewed and given back.
+    """Grants, renews and ends the lease; at most one exists at a time.
 
     Parameters
     ----------
     report
-        Called with every change; renewals are none.
-    alarm
-        Calls a function after so many seconds.
+        Called with every change; a renewal is not one.
+    call_later
+        Schedules a call after a delay in seconds.
     """
 
     def __init__(
         self,
         *,
         report: Report,
-        alarm: Callable[[float, Callable[[], None]], Alarm],
+        call_later: Callable[[float, Callable[[], None]], Timer],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._report = report
-        self._set_alarm = alarm
+        self._call_later = call_later
         self._clock = clock
         self._lease: Lease | None = None
-        self._alarm: Alarm | None = None
+        self._timer: Timer | None = None
 
     @property
     def current(self) -> Lease | None:
-        """The lease that holds now."""
+        """The lease that is valid now."""
         self._expire()
         return self._lease
 
     def remaining_s(self, lease: Lease) -> float:
-        """Return how long a lease lasts if nobody renews it."""
+        """Return how long a lease lasts unless it is renewed."""
         return max(0.0, lease.expires_s - self._clock())
 
     def grant(
@@ -104,16 +104,16 @@ class LeaseManager:
         on_lapse: OnLapse,
         takeover: bool,
     ) -> Lease:
-        """Give the lease to somebody.
+        """Grant the lease to a client.
 
         Raises
         ------
         Problem
-            ``lease-held`` if somebody has it, and it was not to be taken over or may not be.
+            ``lease-held`` if another client has it, and ``takeover`` is false or the rank too low.
         """
         former = self.current
         if former is not None and not (takeover and rank >= former.rank):
-            raise self._held(former)
+            raise self._held_problem(former)
         lease = Lease(secrets.token_urlsafe(16), holder, by, rank, duration_s, on_lapse, 0.0)
         lease = self._keep(lease)
         self._report("granted" if former is None else "taken-over", lease, former)
@@ -122,14 +122,14 @@ class LeaseManager:
     def renew(
         self, lease_id: str | None, *, duration_s: float | None, on_lapse: OnLapse | None
     ) -> Lease:
-        """Let the lease last from now on, on its former terms where none are given.
+        """Restart the lease's duration, on its former terms where none are given.
 
         Raises
         ------
         Problem
-            ``lease-lost`` if it is not the one that holds.
+            ``lease-lost`` if it is not the current one.
         """
-        lease = self._held_as(lease_id)
+        lease = self._require_current(lease_id)
         return self._keep(
             replace(
                 lease,
@@ -139,49 +139,49 @@ class LeaseManager:
         )
 
     def release(self, lease_id: str | None) -> None:
-        """Give the lease back; the camera goes on as its holder left it.
+        """End the lease; the camera goes on as its holder left it.
 
         Raises
         ------
         Problem
-            ``lease-lost`` if it is not the one that holds.
+            ``lease-lost`` if it is not the current one.
         """
-        lease = self._held_as(lease_id)
+        lease = self._require_current(lease_id)
         self._forget()
         self._report("released", lease, None)
 
     def check(self, lease_id: str | None) -> None:
-        """Let a change pass that is made under this lease, or under none while nobody holds one.
+        """Allow a change under this lease, or under none while no client holds one.
 
         Raises
         ------
         Problem
-            ``lease-held`` if somebody else has the lease, ``lease-lost`` if it is no more.
+            ``lease-held`` if another client has the lease, ``lease-lost`` if it has ended.
         """
         lease = self.current
         if lease_id is not None:
-            # who believes to be alone in control must hear that this is over
-            self._held_as(lease_id)
+            # a client that relies on its lease must be notified that it has ended
+            self._require_current(lease_id)
         elif lease is not None:
-            raise self._held(lease)
+            raise self._held_problem(lease)
 
     def close(self) -> None:
-        """Forget the lease and its alarm; nobody is told."""
+        """Drop the lease and its timer without a report."""
         self._forget()
 
-    def _held_as(self, lease_id: str | None) -> Lease:
+    def _require_current(self, lease_id: str | None) -> Lease:
         lease = self.current
         if lease is not None and secrets.compare_digest(lease.id.encode(), _bytes(lease_id)):
             return lease
         if lease is not None:
             raise Problem(
                 kinds.LEASE_LOST,
-                f"This lease is over; {lease.holder} has one.",
+                f"This lease has ended; {lease.holder} holds the current one.",
                 **self._extensions(lease),
             )
-        raise Problem(kinds.LEASE_LOST, "This lease is over; nobody has one.", holder=None)
+        raise Problem(kinds.LEASE_LOST, "This lease has ended; no client holds one.", holder=None)
 
-    def _held(self, lease: Lease) -> Problem:
+    def _held_problem(self, lease: Lease) -> Problem:
         return Problem(
             kinds.LEASE_HELD,
             f"{lease.holder} controls the camera, for {self.remaining_s(lease):.1f} s unless it "
@@ -195,14 +195,14 @@ class LeaseManager:
     def _keep(self, lease: Lease) -> Lease:
         self._forget()
         self._lease = replace(lease, expires_s=self._clock() + lease.duration_s)
-        self._alarm = self._set_alarm(lease.duration_s, self._ring)
+        self._timer = self._call_later(lease.duration_s, self._timer_fired)
         return self._lease
 
     def _forget(self) -> None:
         self._lease = None
-        if self._alarm is not None:
-            self._alarm.cancel()
-            self._alarm = None
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
 
     def _expire(self) -> None:
         lease = self._lease
@@ -210,10 +210,10 @@ class LeaseManager:
             self._forget()
             self._report("lapsed", lease, None)
 
-    def _ring(self) -> None:
+    def _timer_fired(self) -> None:
         self._expire()
-        if self._lease is not None:  # an alarm may ring a little early by another clock
-            self._alarm = self._set_alarm(self.remaining_s(self._lease), self._ring)
+        if self._lease is not None:  # the timer runs by another clock and may be early
+            self._timer = self._call_later(self.remaining_s(self._lease), self._timer_fired)
 
 
 def _bytes(text: str | None) -> bytes:

@@ -19,23 +19,27 @@ from transientcam_server.settings import SensorSettings
 
 
 class Camera(Protocol):
-    """What the service needs of a camera; `transientcam_driver.Camera` has it and says more."""
+    """What the service requires of a camera; `transientcam_driver.Camera` documents the methods."""
 
-    simulation: Simulation | None
     counters: Counters
 
     @property
+    def simulation(self) -> Simulation | None:
+        """The handle of a simulated camera, None of any other."""
+        ...
+
+    @property
     def capabilities(self) -> Capabilities:
-        """What it can do."""
+        """Limits and size of the device."""
         ...
 
     @property
     def applied(self) -> AppliedSequence:
-        """What is really set."""
+        """The sequence as the camera really runs it."""
         ...
 
     def validate(self, sequence: Sequence) -> AppliedSequence:
-        """Say what would be set."""
+        """Return what `configure` would set."""
         ...
 
     def configure(self, sequence: Sequence) -> AppliedSequence:
@@ -51,11 +55,11 @@ class Camera(Protocol):
         ...
 
     def safe_off(self) -> None:
-        """Switch the light off, whatever else."""
+        """Stop and switch the light off, in any state."""
         ...
 
     def status(self) -> Status:
-        """Ask the device how it is."""
+        """Read the status of the device."""
         ...
 
     def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
@@ -63,11 +67,11 @@ class Camera(Protocol):
         ...
 
     def reconnect(self) -> None:
-        """Find a lost camera again."""
+        """Open a lost camera again."""
         ...
 
     def close(self) -> None:
-        """Give it back."""
+        """Release the camera."""
         ...
 
     def __enter__(self) -> Self: ...
@@ -81,13 +85,13 @@ class Camera(Protocol):
 
 
 def noise_of(camera: Camera, sensor: SensorSettings) -> NoiseModel:
-    """Return the noise of a camera: a simulated one has its sensor, a real one the settings'."""
+    """Return the noise model: of the simulated sensor, or of ``sensor`` for a real camera."""
     model = sensor if camera.simulation is None else camera.simulation.sensor
     return NoiseModel(model, bits=camera.capabilities.bits)
 
 
 def open_camera(spec: str) -> Camera:
-    """Open what ``--camera`` names: also ``recording:PATH[?speed=original|fast|2.0&loop=on]``.
+    """Open a camera by name, also ``recording:PATH[?speed=original|fast|2.0&loop=on]``.
 
     Raises
     ------

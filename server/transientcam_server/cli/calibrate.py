@@ -41,34 +41,36 @@ def calibrate(
             "'{\"harmonics\": 4}', or a file of it.  [default: what the daemon starts with]"
         ),
     ] = None,
-    name: Annotated[str, typer.Option(help="What the daemon should call it.")] = "",
+    name: Annotated[str, typer.Option(help="Name of the calibration in the daemon.")] = "",
     activate: Annotated[
-        bool, typer.Option("--activate", help="Let the daemon use it at once.")
+        bool, typer.Option("--activate", help="Use it in the daemon at once.")
     ] = False,
     token: TokenOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Measure each pixel's gain and phase, while the light shines at the sensor (Sec. 4.2).
 
-    Put filter and diffusor before the lens first. A daemon measures with its present sequence, and
-    keeps what it measures; without one, the file is good for `serve --calibration FILE`.
+    Put filter and diffusor before the lens first. A daemon measures with its present sequence and
+    stores the result; without one, the file is meant for `serve --calibration FILE`.
     """
-    if output is not None and not output.parent.is_dir():  # said before anything is captured
+    if output is not None and not output.parent.is_dir():  # checked before anything is captured
         raise typer.BadParameter(f"there is no folder {output.parent}", param_hint="--output")
     if url is None:
         _refuse({"--name": name, "--activate": activate}, "needs the URL of a daemon")
         if output is None:
             raise typer.BadParameter("names the file to write", param_hint="--output")
-        result = _captured(camera or "usb", takes, sequence, output)
+        result = _measured_here(camera or "usb", takes, sequence, output)
     else:
         _refuse({"--camera": camera, "--sequence": sequence}, "is the daemon's, if there is one")
-        result = _asked(url, {"name": name, "frames": takes, "activate": activate}, output, token)
+        result = _measured_by_daemon(
+            url, {"name": name, "frames": takes, "activate": activate}, output, token
+        )
     if as_json:
         typer.echo(json.dumps(result, indent=2))
     elif url is None:
-        _tell(result)
+        _print_capture(result)
     else:
-        _tell_asked(result)
+        _print_measured(result)
 
 
 def _refuse(options: dict[str, Any], reason: str) -> None:
@@ -77,10 +79,10 @@ def _refuse(options: dict[str, Any], reason: str) -> None:
             raise typer.BadParameter(reason, param_hint=hint)
 
 
-def _asked(
-    url: str, wanted: dict[str, Any], output: Path | None, token: str | None
+def _measured_by_daemon(
+    url: str, options: dict[str, Any], output: Path | None, token: str | None
 ) -> dict[str, Any]:
-    """Let a daemon measure, and return what came of it; Ctrl-C ends it there, too."""
+    """Measure in a daemon and return its result; Ctrl-C cancels the job there, too."""
     from rich.progress import Progress
 
     from transientcam import Camera
@@ -88,16 +90,16 @@ def _asked(
     with Camera(url, token=token) as camera, Progress(console=Console(stderr=True)) as shown:
         task = shown.add_task("waiting", total=1.0)
 
-        def tell(job: Mapping[str, Any]) -> None:
+        def show(job: Mapping[str, Any]) -> None:
             shown.update(task, description=job["step"], completed=job["progress"])
 
-        job = camera.calibrations.measure(**wanted)
+        job = camera.calibrations.measure(**options)
         try:
-            job = camera.wait_for(job["id"], on_progress=tell)
+            job = camera.wait_for(job["id"], on_progress=show)
         except KeyboardInterrupt:
             camera.jobs.cancel(job["id"])
             raise
-        tell(job)
+        show(job)
         if job["state"] == "cancelled":
             raise typer.Exit(code=1)
         identity = job["result"]["calibration"]
@@ -110,30 +112,13 @@ def _asked(
         }
 
 
-def _tell_asked(result: dict[str, Any]) -> None:
-    calibration, measured = result["calibration"], result["measured"]
-    device, name = calibration["device"], calibration["name"]
-    lines = [
-        calibration["id"] + (f" ({name})" if name else ""),
-        f"  {device['width']} x {device['height']} pixels of {device['serial']} "
-        f"at {calibration['temperature_c']:.1f} °C, {measured['bad_pixels']} of them bad",
-        f"  {measured['rejected_images']} of {measured['images']} images left out as outliers",
-    ]
-    if calibration["active"]:
-        lines.append("  in use")
-    if result["file"] is not None:
-        lines.append(f"  downloaded into {result['file']}")
-    for line in lines:
-        typer.echo(line)
-
-
-def _captured(camera: str, takes: int, sequence: str | None, output: Path) -> dict[str, Any]:
+def _measured_here(camera: str, takes: int, sequence: str | None, output: Path) -> dict[str, Any]:
     from transientcam_driver import Sequence, open_camera
 
-    wanted = Sequence.from_document(_document(sequence)) if sequence is not None else None
+    requested = Sequence.from_document(_document(sequence)) if sequence is not None else None
     with open_camera(camera) as opened:
-        if wanted is not None:
-            opened.configure(wanted)
+        if requested is not None:
+            opened.configure(requested)
         measured = _measure(opened, takes)
     measured.capture.save(output)
     return _result(measured, output)
@@ -187,7 +172,7 @@ def _result(measured: "Calibration", output: Path) -> dict[str, Any]:
     }
 
 
-def _tell(result: dict[str, Any]) -> None:
+def _print_capture(result: dict[str, Any]) -> None:
     captured = result["images"] * result["takes"]
     lines = (
         f"{result['file']}: {result['calibration_id']}",
@@ -195,5 +180,22 @@ def _tell(result: dict[str, Any]) -> None:
         f"at {result['temperature_c']:.1f} °C, {result['bad_pixels']} of them bad",
         f"  {result['rejected_images']} of {captured} images left out as outliers",
     )
+    for line in lines:
+        typer.echo(line)
+
+
+def _print_measured(result: dict[str, Any]) -> None:
+    calibration, measured = result["calibration"], result["measured"]
+    device, name = calibration["device"], calibration["name"]
+    lines = [
+        calibration["id"] + (f" ({name})" if name else ""),
+        f"  {device['width']} x {device['height']} pixels of {device['serial']} "
+        f"at {calibration['temperature_c']:.1f} °C, {measured['bad_pixels']} of them bad",
+        f"  {measured['rejected_images']} of {measured['images']} images left out as outliers",
+    ]
+    if calibration["active"]:
+        lines.append("  in use")
+    if result["file"] is not None:
+        lines.append(f"  downloaded into {result['file']}")
     for line in lines:
         typer.echo(line)

@@ -1,4 +1,7 @@
-"""The verb ``compile`` of the ``transientcam`` command."""
+"""The verb ``compile`` of the ``transientcam`` command.
+
+What is heavy is imported when the verb runs, so that ``transientcam --help`` stays quick.
+"""
 
 import json
 from typing import Annotated
@@ -16,7 +19,7 @@ def compile_kernels(
     ] = [3, 4, 8],  # noqa: B006 - typer copies it
     as_json: JsonOption = False,
 ) -> None:
-    """Compile the kernels of the reconstruction now, for images and packages."""
+    """Compile the kernels of the reconstruction now, as when an image or a package is built."""
     import transientcam_moments as tm
 
     if not tm.kernels.state()["enabled"]:

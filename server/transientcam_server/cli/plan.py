@@ -1,7 +1,9 @@
-"""The verbs ``tradeoff`` and ``plan`` of the ``transientcam`` command."""
+"""The verb ``plan`` of the ``transientcam`` command.
+
+What is heavy is imported when the verb runs, so that ``transientcam --help`` stays quick.
+"""
 
 import json
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -64,17 +66,15 @@ def plan(
     ] = 0.0,
     as_json: JsonOption = False,
 ) -> None:
-    """Find the sequence for a target accuracy or a budget of time, and say what it will cost.
+    """Find the sequence for a target accuracy or a budget of time, and predict what it costs.
 
-    The exit code is 1, with the best that can be achieved, where the target is out of reach.
+    Where the target is out of reach the best that is possible is printed, and the exit code is 1.
     """
     import transientcam_moments as tm
     from transientcam_driver import Sequence, open_camera
     from transientcam_server.camera.source import noise_of
     from transientcam_server.errors.exceptions import Problem
-    from transientcam_server.planning import Goal
-    from transientcam_server.planning.planner import Planner
-    from transientcam_server.planning.scene import given
+    from transientcam_server.planning import Goal, Planner, uniform_scene
     from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
     document = _fields(fixed or [])
@@ -96,12 +96,12 @@ def plan(
         )
         if computing_share is not None:
             with console.status("compiling kernels"):
-                tm.kernels.compile()  # what is to be timed is the daemon's speed
+                tm.kernels.compile()  # the daemon's speed is timed
         with console.status("looking at the scene"):
             if brightness_dn_per_s is None:
-                scene = planner.statistic(*_captured(opened), ambient_dn_per_s)
+                scene = planner.scene_statistics(*_captured(opened), ambient_dn_per_s)
             else:
-                scene = given(
+                scene = uniform_scene(
                     brightness_dn_per_s,
                     [_return(text) for text in returns or ["2"]],
                     ambient_dn_per_s=ambient_dn_per_s,
@@ -118,12 +118,11 @@ def plan(
     if as_json:
         typer.echo(json.dumps(made.to_document()))
     else:
-        for line in _lines(made.to_document(), computing=computing_share is not None):
-            typer.echo(line)
+        _print_plan(made.to_document(), computing=computing_share is not None)
 
 
 def _captured(camera: "Camera") -> tuple["Recipe", "tm.Reconstruction"]:
-    """Capture the scene with as many harmonics as matter and little noise."""
+    """Capture the scene with many harmonics and little noise, to describe it by."""
     from transientcam_driver import Sequence
     from transientcam_server.imaging.recipe import Recipe
     from transientcam_server.settings import ReconstructionSettings
@@ -164,34 +163,35 @@ def _return(text: str) -> tuple[float, float]:
     return parts
 
 
-def _lines(document: dict[str, Any], *, computing: bool) -> Iterator[str]:
+def _print_plan(document: dict[str, Any], *, computing: bool) -> None:
     std = document["predicted"]["range_std_m"]
-    yield json.dumps(document["sequence"])
+    typer.echo(json.dumps(document["sequence"]))
     time_ms, rate_hz = document["capture_s"] * 1e3, document["frame_rate_hz"]
-    yield f"captures in {time_ms:.1f} ms ({rate_hz:.1f} Hz back to back)"
+    typer.echo(f"captures in {time_ms:.1f} ms ({rate_hz:.1f} Hz back to back)")
     if computing:
-        yield (
+        typer.echo(
             f"reconstructs in {document['reconstruct_s'] * 1e3:.1f} ms, "
             f"{document['computing_share']:.1%} of the time"
         )
-    yield (
+    typer.echo(
         f"range to {std['median'] * 1e3:.2f} mm ({std['low'] * 1e3:.2f} to "
         f"{std['high'] * 1e3:.2f}), 90 % of the pixels to {std['p90'] * 1e3:.2f} mm"
     )
     if document["predicted"]["beyond_scene"]:
-        yield "at best: this sees more of the scene than it was judged by"
+        typer.echo("at best: this resolves more of the scene than the capture it is predicted from")
     if document["predicted"]["separation_share"] is not None:
-        yield f"finds both returns in {document['predicted']['separation_share']:.0%} of captures"
+        share = document["predicted"]["separation_share"]
+        typer.echo(f"finds both returns in {share:.0%} of captures")
     if document["predicted"]["bound_width"] is not None:
-        yield f"bounds {document['predicted']['bound_width']:.3g} times the mean density apart"
+        width = document["predicted"]["bound_width"]
+        typer.echo(f"bounds {width:.3g} times the mean density apart")
     for name, what in (("half_time", "half the time"), ("twice_accuracy", "twice the accuracy")):
         other = document[name]
         if other is None:
-            yield f"{what}: nothing does"
+            typer.echo(f"{what}: no sequence does")
             continue
         errors = (
             "" if other["error_factor"] is None else f"{other['error_factor']:.2g} x the error, "
         )
-        yield f"{what}: {errors}{other['time_factor']:.2g} x the time: " + json.dumps(
-            other["sequence"]
-        )
+        sequence = json.dumps(other["sequence"])
+        typer.echo(f"{what}: {errors}{other['time_factor']:.2g} x the time: {sequence}")

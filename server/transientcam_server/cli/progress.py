@@ -29,7 +29,7 @@ def progress_bars(*, console: Console | None = None, counted: bool = False) -> P
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
-    """Show one bar; its value is called with how much is done, and of how much."""
+    """Show one bar; the caller reports progress to its value as (done, total)."""
     with progress_bars() as progress:
         task = progress.add_task(what, total=None)
         yield lambda done, total: progress.update(task, completed=done, total=total)

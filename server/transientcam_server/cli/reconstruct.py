@@ -1,6 +1,6 @@
 """The verb ``reconstruct`` of the ``transientcam`` command.
 
-What is heavy is imported when a verb runs, so that ``transientcam --help`` stays quick.
+What is heavy is imported when the verb runs, so that ``transientcam --help`` stays quick.
 """
 
 import json
@@ -14,7 +14,7 @@ from transientcam.cli.options import JsonOption
 from transientcam_server.cli.progress import progress_bar, progress_bars
 
 if TYPE_CHECKING:
-    from transientcam_server.offline.measurement import Measurement, Reconstruction
+    from transientcam_server.offline import Measurement, TransientCube
     from transientcam_server.settings import ReconstructionSettings
 
 Background = Literal["none", "median"]
@@ -62,11 +62,11 @@ def reconstruct(
 ) -> None:
     """Reconstruct a measurement in a file: density, cumulative density, range, direct, indirect.
 
-    Of a recording every frame is reconstructed; run again, it goes on where it stopped.
+    Of a recording every frame is reconstructed; a second run goes on where the first stopped.
     """
     from pydantic import ValidationError
 
-    from transientcam_server.offline import measurement as offline
+    from transientcam_server import offline
     from transientcam_server.offline import plot as pictures
     from transientcam_server.settings import ReconstructionSettings
 
@@ -84,7 +84,7 @@ def reconstruct(
             input, output, products=product, settings=settings, bins=bins, as_json=as_json
         )
         return
-    measurement = offline.load(
+    measurement = offline.load_measurement(
         input, frequency_hz=frequency_hz, harmonics=harmonics, background=background
     )
     console = Console(stderr=True)
@@ -94,26 +94,28 @@ def reconstruct(
         def advance(done: int, total: int) -> None:
             progress.update(task, completed=done, total=total)
 
-        result = offline.reconstruct(measurement, bins=bins, settings=settings, progress=advance)
+        cube = offline.reconstruct_measurement(
+            measurement, bins=bins, settings=settings, progress=advance
+        )
         progress.update(task, description="writing")
-        offline.save(output, result)
+        offline.save_cube(output, cube)
         if plot is not None:
             progress.update(task, description="drawing")
-            pictures.save_picture(plot, result)
+            pictures.save_picture(plot, cube)
     if as_json:
-        typer.echo(json.dumps(_document(measurement, result, output)))
+        typer.echo(json.dumps(_document(measurement, cube, output)))
     else:
-        _tell(console, _document(measurement, result, output))
+        _print_cube(console, _document(measurement, cube, output))
 
 
-def _document(measurement: "Measurement", result: "Reconstruction", output: Path) -> dict[str, Any]:
+def _document(measurement: "Measurement", cube: "TransientCube", output: Path) -> dict[str, Any]:
     import numpy as np
 
     import transientcam_moments as tm
 
-    height, width = result.flags.shape
+    height, width = cube.flags.shape
     counts = {
-        str(flag.name).lower(): int(np.count_nonzero(result.flags & flag.value))
+        str(flag.name).lower(): int(np.count_nonzero(cube.flags & flag.value))
         for flag in filter(None, tm.Flags)
     }
     return {
@@ -122,12 +124,12 @@ def _document(measurement: "Measurement", result: "Reconstruction", output: Path
         "height": height,
         "harmonics": measurement.harmonics,
         "base_frequency_hz": measurement.base_frequency_hz,
-        "times": result.time_s.size,
+        "times": cube.time_s.size,
         "flagged": counts,
     }
 
 
-def _tell(console: Console, document: dict[str, Any]) -> None:
+def _print_cube(console: Console, document: dict[str, Any]) -> None:
     console.print(
         "{file}: {width} x {height} pixels, m = {harmonics} at ".format(**document)
         + f"{document['base_frequency_hz'] / 1e6:g} MHz, {document['times']} times of flight",
@@ -153,24 +155,25 @@ def _reconstruct_recording(
     bins: int,
     as_json: bool = False,
 ) -> None:
-    """Reconstruct every frame of a recording, going on where an earlier run stopped."""
-    from transientcam_server.offline import recording as offline
+    """Reconstruct every frame of a recording, continuing an interrupted run."""
+    from transientcam_server.offline import BatchOptions, reconstruct_recording
+    from transientcam_server.offline.recording import DEFAULT_PRODUCTS, KNOWN_PRODUCTS
     from transientcam_server.recording import Recording
 
-    wanted = tuple(dict.fromkeys(products or offline.DEFAULT_PRODUCTS))
-    for name in wanted:
-        if name not in offline.KNOWN_PRODUCTS:
-            known = ", ".join(offline.KNOWN_PRODUCTS)
+    names = tuple(dict.fromkeys(products or DEFAULT_PRODUCTS))
+    for name in names:
+        if name not in KNOWN_PRODUCTS:
+            known = ", ".join(KNOWN_PRODUCTS)
             raise typer.BadParameter(f"{name!r} is none of {known}", param_hint="--product")
-    what = offline.Wanted(wanted, settings, bins)
+    options = BatchOptions(names, settings, bins)
     with Recording(recording) as opened, progress_bar("reconstructing") as advance:
-        before = offline.reconstruct(opened, output, what, progress=advance)
+        before = reconstruct_recording(opened, output, options, progress=advance)
         frames = opened.frames
     if as_json:
-        document = {"file": str(output), "products": wanted, "frames": frames, "before": before}
+        document = {"file": str(output), "products": names, "frames": frames, "before": before}
         typer.echo(json.dumps(document))
         return
     resumed = f", {before} of them before" if before else ""
     Console(stderr=True).print(
-        f"{output}: {', '.join(wanted)} of {frames} frames{resumed}", soft_wrap=True
+        f"{output}: {', '.join(names)} of {frames} frames{resumed}", soft_wrap=True
     )

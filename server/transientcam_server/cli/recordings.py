@@ -26,11 +26,11 @@ def recover(
     ],
     as_json: JsonOption = False,
 ) -> None:
-    """Make recordings of what a service left that was killed; it does so itself when it starts."""
+    """Recover the unfinished recordings of a killed service; its next start does the same."""
     from transientcam_server.recording import recovery
 
     directory = path if path.is_dir() else path.parent
-    with _nobody_writing(directory), Console(stderr=True).status("recovering"):
+    with _exclusive(directory), Console(stderr=True).status("recovering"):
         if path.is_dir():
             parts = recovery.unfinished(path)
             recovered = recovery.recover_all(path)
@@ -48,15 +48,15 @@ def recover(
 
 
 @contextmanager
-def _nobody_writing(directory: Path) -> Iterator[None]:
-    """Refuse while a service uses the directory: what is unfinished there may be alive."""
+def _exclusive(directory: Path) -> Iterator[None]:
+    """Refuse while a service uses the directory: it may still write the unfinished files."""
     descriptor = os.open(directory, os.O_RDONLY)
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise OSError(
-                16, "a service records there; it recovers by itself when it starts", str(directory)
+                16, "a service records there; it recovers them when it starts", str(directory)
             ) from None
         yield
     finally:
@@ -71,11 +71,11 @@ def convert(
     as_json: JsonOption = False,
 ) -> None:
     """Convert a recording: .npz (NumPy), .nc (netCDF), .zarr (Dask), .mcap (Foxglove, ROS)."""
-    from transientcam_server.offline import convert as converting
+    from transientcam_server.offline import convert_recording
     from transientcam_server.recording import Recording
 
     with Recording(recording) as opened, progress_bar("converting") as advance:
-        converting.convert(opened, output, progress=advance)
+        convert_recording(opened, output, progress=advance)
         frames = opened.frames
     if as_json:
         typer.echo(json.dumps({"file": str(output), "frames": frames}))

@@ -38,11 +38,13 @@ def serve(
     ] = None,
     announce: Annotated[
         bool | None,
-        typer.Option(help="Tell the local network where it is.  [default: if others may come in]"),
+        typer.Option(
+            help="Announce it on the local network (mDNS).  [default: if other machines reach it]"
+        ),
     ] = None,
     insecure: Annotated[
         bool,
-        typer.Option("--insecure", help="Let anybody who reaches the port control the camera."),
+        typer.Option("--insecure", help="Let any client that reaches the port control the camera."),
     ] = False,
     tls_certificate: Annotated[
         Path | None, typer.Option(help="Certificate chain in PEM: serve https and wss.")
@@ -53,7 +55,7 @@ def serve(
     log_level: Annotated[str | None, typer.Option(help="debug, info, warning or error.")] = None,
     check: Annotated[
         bool,
-        typer.Option("--check", help="Only say which settings hold, and where each was given."),
+        typer.Option("--check", help="Only print the settings in effect, and where each was set."),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -78,11 +80,11 @@ def serve(
 
     import transientcam_moments as tm
     from transientcam_server.api.app import build_app
-    from transientcam_server.camera.source import open_camera
+    from transientcam_server.camera import open_camera
     from transientcam_server.daemon import server
 
     server.configure_logging(settings)
-    # the address first: where another daemon has it, the camera is not touched
+    # the address first: if another daemon has it, the camera stays untouched
     with (
         server.exit_without_joining() as leave,
         server.listen(settings.host, settings.port) as listener,
@@ -132,7 +134,7 @@ def _check(command_line: dict[str, Any], config: Path | None, *, as_json: bool) 
 
 def _announce(url: str, camera: str, *, as_json: bool) -> None:
     if as_json:
-        # whoever waits for the line reads it from a pipe
+        # flushed, since the caller reads the line from a pipe
         print(json.dumps({"url": url, "camera": camera, "pid": os.getpid()}), flush=True)  # noqa: T201
         return
     console = Console()

@@ -1,4 +1,7 @@
-"""The verbs ``token create``, ``token list`` and ``token revoke``."""
+"""The verbs ``token create``, ``token list`` and ``token revoke``.
+
+What is heavy is imported when a verb runs, so that ``transientcam --help`` stays quick.
+"""
 
 import json
 import os
@@ -13,22 +16,25 @@ from rich.table import Table
 
 from transientcam.cli.options import JsonOption
 
-app = typer.Typer(no_args_is_help=True, help="Make and revoke tokens: who may use this camera.")
+app = typer.Typer(
+    no_args_is_help=True, help="Create and revoke the tokens that give access to this camera."
+)
 
 _Config = Annotated[
     Path | None, typer.Option(help="Settings in TOML.  [default: ./transientcam.toml]")
 ]
 _File = Annotated[
-    Path | None, typer.Option("--tokens-file", help="Where the tokens are kept, if elsewhere.")
+    Path | None,
+    typer.Option("--tokens-file", help="File of the tokens, if not the configured one."),
 ]
 
 
 @app.command()
 def create(
-    name: Annotated[str, typer.Argument(help="Who or what it is for, such as bench-2.")],
+    name: Annotated[str, typer.Argument(help="Whom or what it is for, such as bench-2.")],
     role: Annotated[
         Literal["viewer", "operator", "admin"],
-        typer.Option(help="viewer looks, operator controls, admin takes over from anybody."),
+        typer.Option(help="viewer reads, operator controls, admin also takes over any lease."),
     ] = "viewer",
     days: Annotated[
         float | None, typer.Option(min=0.0, help="How long it is valid.  [default: for ever]")
@@ -37,7 +43,7 @@ def create(
     tokens_file: _File = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a token and print it, this once."""
+    """Create a token and print it; it cannot be printed again."""
     from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
 
     if not 1 <= len(name) <= 80 or not name.isprintable():
@@ -51,7 +57,7 @@ def create(
         return
     typer.echo(text)
     Console(stderr=True).print(
-        f"Token {token.id}, {role}, for {name}. It is shown only now; a running service accepts "
+        f"Token {token.id}, {role}, for {name}. It is shown only once; a running service accepts "
         "it at once.",
         soft_wrap=True,
         markup=False,
@@ -63,7 +69,7 @@ def create(
 def list_tokens(
     config: _Config = None, tokens_file: _File = None, as_json: JsonOption = False
 ) -> None:
-    """List the tokens there are, not what they are."""
+    """List the tokens: ids, names, roles and ends, not the secrets."""
     from transientcam_server.api.auth.tokens import TokenFile, utc_now
 
     file = TokenFile(_path(config, tokens_file))
@@ -91,7 +97,7 @@ def revoke(
     tokens_file: _File = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a token invalid; whoever uses it is sent away."""
+    """Make a token invalid; its open streams are closed."""
     from transientcam_server.api.auth.tokens import TokenFile
 
     token = TokenFile(_path(config, tokens_file)).revoke(token_id)

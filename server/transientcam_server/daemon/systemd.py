@@ -14,7 +14,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Final, Self
 
-from transientcam_server.camera.acquisition import Acquisition, AcquisitionStatus
+from transientcam_server.camera import Acquisition, AcquisitionStatus
 
 _log = logging.getLogger(__name__)
 

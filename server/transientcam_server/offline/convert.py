@@ -1,4 +1,4 @@
-"""A recording as other programs like it: NumPy's .npz, netCDF's .nc, a .zarr store, an .mcap.
+"""A recording in other formats: NumPy's .npz, netCDF's .nc, a .zarr store, an .mcap.
 
 Images go from file to file one frame at a time, so that a recording may be larger than memory.
 """
@@ -27,7 +27,7 @@ Table = Mapping[str, tuple[tuple[str, ...], NDArray[Any], Mapping[str, str]]]
 AXES: Final = ("frame", "image", "y", "x")
 
 
-def convert(
+def convert_recording(
     recording: Recording, output: Path, *, progress: Progress = lambda done, total: None
 ) -> None:
     """Write a recording into ``output``, in the format of its suffix.
@@ -43,7 +43,7 @@ def convert(
     FileExistsError
         If the output is there already.
     OSError
-        If the disk does not take it.
+        If the output cannot be written.
     """
     sink = _SINKS.get(output.suffix.lower())
     if sink is None:
@@ -117,11 +117,11 @@ def _npz(
         with archive.open("raw.npy", "w", force_zip64=True) as member:
             described = {"descr": "<u2", "fortran_order": False, "shape": recording.shape}
             np.lib.format.write_array_header_1_0(member, described)
-            yield lambda _, images: _drop(member.write(images.astype("<u2").tobytes()))
 
+            def put(_: int, images: NDArray[np.uint16]) -> None:
+                member.write(images.astype("<u2").tobytes())
 
-def _drop(written: int) -> None:
-    """Take what nobody asked for."""
+            yield put
 
 
 @contextmanager

@@ -25,6 +25,7 @@ DEFAULT_FREQUENCY_HZ: Final = 23e6
 DEFAULT_HARMONICS: Final = 4
 MAX_HARMONICS: Final = 32
 BLOCK_PIXELS: Final = 8192
+_IMAGES: Final = ("range_m", "direct", "indirect", "uniform")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,8 +42,8 @@ class Measurement:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reconstruction:
-    """What `reconstruct` finds; the fields are the arrays of the file it is written to.
+class TransientCube:
+    """The result of `reconstruct_measurement`; its fields are the arrays of the file.
 
     Attributes
     ----------
@@ -70,7 +71,7 @@ class Reconstruction:
     flags: _Array
 
 
-def load(
+def load_measurement(
     path: Path,
     *,
     frequency_hz: float | None = None,
@@ -124,14 +125,14 @@ def moments_of(response: _Array, time_s: _Array, *, frequency_hz: float, harmoni
     return np.ascontiguousarray(np.moveaxis(np.stack(rows), -1, 0))
 
 
-def reconstruct(
+def reconstruct_measurement(
     measurement: Measurement,
     *,
     bins: int,
     settings: ReconstructionSettings,
     progress: Callable[[int, int], None] = lambda done, total: None,
-) -> Reconstruction:
-    """Reconstruct every pixel, in blocks of pixels; ``progress`` is told how many are done."""
+) -> TransientCube:
+    """Reconstruct every pixel, block by block; ``progress`` takes pixels done and in all."""
     rad_s = 2.0 * np.pi * measurement.base_frequency_hz
     time_s = 2.0 * np.pi * np.arange(bins) / (bins * rad_s)
     chosen = settings.for_moments(base_frequency_hz=measurement.base_frequency_hz)
@@ -152,7 +153,7 @@ def reconstruct(
             image[block] = getattr(found, name)
         progress(block.stop, pixels)
     shape = (height, width)
-    return Reconstruction(
+    return TransientCube(
         time_s=time_s,
         density=density.reshape(bins, *shape),
         cumulative=cumulative.reshape(bins, *shape),
@@ -160,18 +161,15 @@ def reconstruct(
     )
 
 
-def save(path: Path, result: Reconstruction) -> None:
-    """Write a reconstruction as ``.npz``, whole or not at all."""
+def save_cube(path: Path, cube: TransientCube) -> None:
+    """Write a cube as ``.npz``, whole or not at all."""
     part = path.with_name(path.name + ".part")
     try:
         with part.open("wb") as file:
-            np.savez(file, **{name: getattr(result, name) for name in Reconstruction.__slots__})
+            np.savez(file, **{name: getattr(cube, name) for name in TransientCube.__slots__})
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
-
-
-_IMAGES = ("range_m", "direct", "indirect", "uniform")
 
 
 def _blocks(pixels: int, bins: int) -> Iterator[slice]:

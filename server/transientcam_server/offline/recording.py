@@ -1,6 +1,6 @@
 """Products of every frame of a recording, into a file that an interruption does not spoil.
 
-What is done stays: run again, it goes on after the last frame that is in the file.
+A second run goes on after the last frame that is in the file.
 """
 
 import json
@@ -32,23 +32,23 @@ Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What to compute, and how; ``bins`` times of flight for products over time."""
+class BatchOptions:
+    """Products and settings; ``bins`` times of flight for products over time."""
 
     products: tuple[str, ...] = DEFAULT_PRODUCTS
     settings: ReconstructionSettings = field(default_factory=ReconstructionSettings)
     bins: int = 256
 
 
-class Reconstructor:
+class BatchReconstructor:
     """Computes products of frames, each stage once a frame."""
 
-    def __init__(self, recording: Recording, wanted: Wanted) -> None:
+    def __init__(self, recording: Recording, options: BatchOptions) -> None:
         capabilities = recording.header.capabilities
-        self._recipe = recorded_recipe(recording.header, SettingsVersion(1, wanted.settings))
+        self._recipe = recorded_recipe(recording.header, SettingsVersion(1, options.settings))
         self._size = capabilities.height, capabilities.width
-        self.products = [PRODUCTS[name] for name in wanted.products]
-        self.time_s = np.arange(wanted.bins) / (wanted.bins * self._recipe.base_frequency_hz)
+        self.products = [PRODUCTS[name] for name in options.products]
+        self.time_s = np.arange(options.bins) / (options.bins * self._recipe.base_frequency_hz)
 
     def shape(self, product: Product) -> tuple[int, ...]:
         """Shape of a product of one frame."""
@@ -66,39 +66,39 @@ class Reconstructor:
         }
 
 
-def reconstruct(
+def reconstruct_recording(
     recording: Recording,
     output: Path,
-    wanted: Wanted,
+    options: BatchOptions,
     *,
     progress: Progress = lambda done, total: None,
 ) -> int:
     """Compute products of all frames into ``output``; return how many were there already.
 
-    Until it is whole it is called ``<output>.part``.
+    Until it is complete the file is called ``<output>.part``.
 
     Raises
     ------
     InputError
-        If what was begun was another recording, or with other settings.
+        If the unfinished file is of another recording, or made with other settings.
     DamagedFrame
         If a frame is not what was recorded; those before it stay done.
     FileExistsError
         If the output is there already.
     OSError
-        If the disk does not take it.
+        If the output cannot be written.
     """
     if output.exists():
         raise FileExistsError(17, "it is there already", str(output))
-    reconstructor = Reconstructor(recording, wanted)
+    reconstructor = BatchReconstructor(recording, options)
     part = output.with_name(output.name + ".part")
-    document = _document(recording, wanted)
+    document = _document(recording, options)
     if part.exists():
         file = _resumed(part, document)
     else:
         file = swmr.open_file(part, "x", libver=swmr.LIBVER)
         _lay_out(file, recording, reconstructor, document)
-    rows = swmr.Appender(file, list(wanted.products), list(_SERIES))
+    rows = swmr.Appender(file, list(options.products), list(_SERIES))
     done = rows.rows
     try:
         for index in range(done, recording.frames):
@@ -118,8 +118,8 @@ def reconstruct(
     return done
 
 
-def _document(recording: Recording, wanted: Wanted) -> dict[str, str]:
-    """Return what has to agree for a file to be gone on with."""
+def _document(recording: Recording, options: BatchOptions) -> dict[str, str]:
+    """Return the attributes that must agree for an unfinished file to be continued."""
     header = recording.header
     return {
         "format": "transientcam products",
@@ -127,14 +127,17 @@ def _document(recording: Recording, wanted: Wanted) -> dict[str, str]:
         "title": header.name,
         "Conventions": "CF-1.11",
         "sequence": json.dumps(header.applied.to_document()),
-        "reconstruction": json.dumps(wanted.settings.model_dump(), sort_keys=True),
+        "reconstruction": json.dumps(options.settings.model_dump(), sort_keys=True),
         "calibration": json.dumps(dict(header.calibration)),
-        "products": json.dumps([*wanted.products, wanted.bins]),
+        "products": json.dumps([*options.products, options.bins]),
     }
 
 
 def _lay_out(
-    file: swmr.File, recording: Recording, reconstructor: Reconstructor, document: Mapping[str, str]
+    file: swmr.File,
+    recording: Recording,
+    reconstructor: BatchReconstructor,
+    document: Mapping[str, str],
 ) -> None:
     file.attrs.update(document)
     file.attrs["versions"] = json.dumps(dict(recording.header.versions))
@@ -159,7 +162,7 @@ def _lay_out(
 
 
 def _resumed(part: Path, document: Mapping[str, str]) -> swmr.File:
-    """Return the file that was begun, made whole first."""
+    """Open an unfinished file to append to, repaired first."""
     scratch = part.with_name(part.name + ".resuming")
     try:
         with swmr.open_file(part, "r", libver="latest", swmr=True) as begun:

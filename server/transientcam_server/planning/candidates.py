@@ -25,7 +25,7 @@ EXPOSURES: Final = 12
 SHORTEST_EXPOSURE_S: Final = 2e-4
 """Shorter ones save nothing beside a read-out of 4 ms."""
 RESOLVED_M: Final = 1e-3
-"""Less bias than that is none."""
+"""A smaller bias counts as none."""
 MARGIN: Final = 0.9
 """Of the exposure that saturates bright pixels."""
 
@@ -43,7 +43,7 @@ def candidates(
     are there.
     """
     longest_s = predictor.longest_exposure_s() * MARGIN
-    # what noise made of the scene's own ranges is no bias
+    # noise in the scene's own ranges is no bias
     known_m = 2 * predictor.scene.range_std_m
     chosen = []
     for sequence in _grid(goal, capabilities, longest_s):
@@ -81,7 +81,7 @@ def candidates(
             best=None,
         )
     resolving = [choice for choice in chosen if choice.resolves]
-    # a fixed number of harmonics is what the caller wants, whatever it cannot tell apart
+    # a fixed number of harmonics is kept, even if it cannot resolve the returns
     return resolving if resolving and "harmonics" not in goal.fixed else chosen
 
 
@@ -103,7 +103,7 @@ def _grid(goal: Goal, capabilities: Capabilities, longest_s: float) -> Iterator[
     for name in goal.fixed & choices.keys():
         choices[name] = (getattr(base, name),)
     if goal.bound_width is None:
-        # how b_0 is measured tells nothing of returns: the cheapest way is always on the front
+        # the way b_0 is measured does not affect returns: the cheapest one is always on the front
         choices["zeroth"] = choices["zeroth"][:1]
     for values in itertools.product(*choices.values()):
         yield replace(base, **dict(zip(choices, values, strict=True)))

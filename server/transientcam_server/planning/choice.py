@@ -1,4 +1,4 @@
-"""One sequence that might be taken, and what is predicted of it."""
+"""One sequence of the grid, with its predicted accuracy and cost."""
 
 import math
 from collections.abc import Callable
@@ -10,12 +10,12 @@ from transientcam_server.planning.pareto import front
 from transientcam_server.planning.prediction import Deviation
 
 TARGETS: Final = ("range_std_m", "separation_m", "bound_width")
-"""Accuracies that can be asked for, the one that choices are compared by first."""
+"""Accuracies that a goal may limit; choices are compared by the first by default."""
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A sequence and what is predicted of it.
+    """A sequence and its predicted accuracy and cost.
 
     Attributes
     ----------
@@ -30,12 +30,12 @@ class Choice:
     resolves
         Whether noise is what limits the range, and not returns that are taken for one.
     beyond_scene
-        Whether it sees more than what the scene was judged by, so that the prediction is a bound
-        on how good it can be.
+        Whether it resolves more than the frame that describes the scene, so that the prediction
+        is a lower bound of the error.
     range_std_interval
-        Gives where that of a typical pixel lies with 95 %; computed when it is asked for.
+        Returns the 95 % interval of that of a typical pixel; computed on demand.
     bound_width, separation_share
-        Predicted where they were asked for.
+        Predicted where the goal has them.
     """
 
     applied: AppliedSequence
@@ -54,7 +54,7 @@ class Choice:
         return self.reconstruct_s * self.applied.frame_rate_hz
 
     def error(self, target: str) -> float:
-        """Return the error that a target limits, the less the better."""
+        """Return the error that a target limits."""
         if target == "bound_width":
             return math.inf if self.bound_width is None else self.bound_width
         if target == "separation_m":
@@ -62,7 +62,7 @@ class Choice:
         return self.range_std.median_m
 
     def to_document(self) -> dict[str, Any]:
-        """Return the choice as JSON has it; ``sequence`` is the body of a PUT."""
+        """Return the choice as JSON; ``sequence`` is the body of a PUT."""
         document = self.applied.to_document()
         del document["sequence_id"]
         std = self.range_std

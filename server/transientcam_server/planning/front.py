@@ -1,4 +1,4 @@
-"""The Pareto front of the scene before the camera, remembered for a while."""
+"""The Pareto front of the scene before the camera, kept for ten seconds."""
 
 import asyncio
 import time
@@ -9,23 +9,24 @@ from typing import Any, Final
 from transientcam_driver import AppliedSequence
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.workers import Workers
-from transientcam_server.planning import Choice, Goal
+from transientcam_server.planning.choice import Choice
+from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.planner import Planner, range_error
 
-REMEMBERED_S: Final = 10.0
-_WIDE_BOUNDS: Final = 1e9  # a target that anything reaches: it only has the bounds predicted
+KEPT_S: Final = 10.0
+_WIDE_BOUNDS: Final = 1e9  # a target that every sequence reaches: it only requests the prediction
 
 
 @dataclass(frozen=True, slots=True)
-class _Known:
+class _CachedFront:
     made_with: tuple[int, int]
     frame: int
     until_s: float
     choices: list[Choice]
 
 
-class Fronts:
-    """Predicts what the scene's frames could cost; on the event loop, computing on workers."""
+class FrontCache:
+    """Pareto fronts of the present scene; on the event loop, computed on workers."""
 
     def __init__(
         self,
@@ -39,32 +40,32 @@ class Fronts:
         self._workers = workers
         self._simulated = simulated
         self._clock = clock
-        self._known: dict[str, _Known] = {}
-        self._asking = asyncio.Lock()
+        self._cached: dict[str, _CachedFront] = {}
+        self._predicting = asyncio.Lock()
 
     async def of(self, frame: Frame, by: str) -> dict[str, Any]:
-        """Return the front and the frame's own place, as JSON has them."""
-        async with self._asking:
-            known = self._known.get(by)
+        """Return the front compared by target ``by``, and the frame's own place, as JSON."""
+        async with self._predicting:
+            cached = self._cached.get(by)
             made_with = frame.raw.epoch, frame.recipe.settings_version
-            if known is None or known.made_with != made_with or self._clock() > known.until_s:
+            if cached is None or cached.made_with != made_with or self._clock() > cached.until_s:
                 choices = await self._predicted(frame, by)
-                known = _Known(made_with, frame.number, self._clock() + REMEMBERED_S, choices)
-                self._known[by] = known
+                cached = _CachedFront(made_with, frame.number, self._clock() + KEPT_S, choices)
+                self._cached[by] = cached
         return {
             "compared_by": by,
-            "scene_of_frame": known.frame,
+            "scene_of_frame": cached.frame,
             "current": await self._current(frame),
-            "front": [choice.to_document() for choice in known.choices],
+            "front": [choice.to_document() for choice in cached.choices],
         }
 
     def forget(self) -> None:
-        """Predict anew when asked next: the scene is another one."""
-        self._known.clear()
+        """Drop the fronts, as when the scene is another one."""
+        self._cached.clear()
 
     async def _predicted(self, frame: Frame, by: str) -> list[Choice]:
         found = await frame.reconstruction("returns")
-        scene, _ = await self._workers.run(self._planner.statistic, frame.recipe, found, 0.0)
+        scene, _ = await self._workers.run(self._planner.scene_statistics, frame.recipe, found, 0.0)
         goal = Goal(
             base=frame.recipe.applied.sequence,
             bound_width=_WIDE_BOUNDS if by == "bound_width" else None,

@@ -1,4 +1,4 @@
-"""What is wanted of a sequence: targets of accuracy, budgets of time."""
+"""The goal of a plan: targets of accuracy, budgets of time."""
 
 import math
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ BUDGETS: Final = ("capture_s", "frame_rate_hz", "computing_share")
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What is wanted.
+    """Targets and budgets of a sequence.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Goal:
     base
         Sequence whose base frequency, or half of it, is used, and its sub-phases.
     fixed
-        Names of its fields that are not to be chosen either.
+        Names of further fields of it that must stay.
     """
 
     range_std_m: float | None = None
@@ -80,7 +80,7 @@ class Goal:
         )
 
     def require_sensible(self) -> None:
-        """Refuse a goal that asks for nothing, or for what cannot be meant.
+        """Refuse a goal without target or budget, or with a value out of bounds.
 
         Raises
         ------

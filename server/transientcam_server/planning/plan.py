@@ -80,17 +80,17 @@ def plan(
     Raises
     ------
     Problem
-        ``invalid-request`` where nothing is asked for or a value cannot be meant;
+        ``invalid-request`` where the goal is empty or a value is out of bounds;
         ``target-unreachable`` with the best that can be achieved.
     """
     goal.require_sensible()
     choices = candidates(goal, predictor, capabilities, reconstruct_s=reconstruct_s)
     affordable = [choice for choice in choices if goal.affords(choice)]
     if not affordable:
-        raise unaffordable(goal, choices)
+        raise _unaffordable(goal, choices)
     reached = [choice for choice in affordable if goal.reached_by(choice)]
     if not reached:
-        raise unreachable(goal, affordable)
+        raise _unreachable(goal, affordable)
     leading = goal.leading
     if any(getattr(goal, name) is not None for name in TARGETS):
         best = min(reached, key=lambda each: (each.applied.capture_s, each.error(leading)))
@@ -115,8 +115,8 @@ def _neighbours(
     )
 
 
-def unaffordable(goal: Goal, choices: list[Choice]) -> Problem:
-    """Say which budget is too small, and the least there is."""
+def _unaffordable(goal: Goal, choices: list[Choice]) -> Problem:
+    """Return the problem of the budget that is too small, with the least that is possible."""
     quickest = min(choices, key=lambda choice: choice.applied.capture_s)
     lightest = min(choices, key=lambda choice: choice.computing_share)
     least = {
@@ -125,25 +125,25 @@ def unaffordable(goal: Goal, choices: list[Choice]) -> Problem:
         "computing_share": (lightest, lightest.computing_share),
     }
     for budget, (best, value) in least.items():
-        wanted = getattr(goal, budget)
-        if wanted is not None and not Goal(**{budget: wanted}).affords(best):
-            return _refusal(budget, wanted, value, best)
+        limit = getattr(goal, budget)
+        if limit is not None and not Goal(**{budget: limit}).affords(best):
+            return _refusal(budget, limit, value, best)
     # each by itself is enough, but no sequence keeps all of them
     budget = next(name for name in BUDGETS if getattr(goal, name) is not None)
     best, value = least[budget]
     return _refusal(budget, getattr(goal, budget), value, best, together=True)
 
 
-def unreachable(goal: Goal, affordable: list[Choice]) -> Problem:
-    """Say which target is out of reach, and the best that the budgets allow."""
+def _unreachable(goal: Goal, affordable: list[Choice]) -> Problem:
+    """Return the problem of the target out of reach, with the best that the budgets allow."""
     for target in TARGETS:
-        wanted = getattr(goal, target)
-        if wanted is None:
+        limit = getattr(goal, target)
+        if limit is None:
             continue
         best = min(affordable, key=lambda each, target=target: each.error(target))  # type: ignore[misc] # mypy cannot infer a lambda with a default
         if best.error(target) > goal.limit(target):
             value = best.separation_share if target == "separation_m" else best.error(target)
-            return _refusal(target, wanted, value, best)
+            return _refusal(target, limit, value, best)
     # each by itself is in reach, but none reaches all of them
     best = min(affordable, key=lambda each: each.error(goal.leading))
     return _refusal(
@@ -152,16 +152,16 @@ def unreachable(goal: Goal, affordable: list[Choice]) -> Problem:
 
 
 def _refusal(
-    field: str, wanted: Any, achieved: Any, best: Choice, *, together: bool = False
+    field: str, limit: Any, achieved: Any, best: Choice, *, together: bool = False
 ) -> Problem:
     what = "Together with the others this" if together else "This"
     named = "share of captures that find both" if field == "separation_m" else field
     return Problem(
         kinds.TARGET_UNREACHABLE,
-        f"{what} cannot be reached on this scene: {field} = {wanted:g}. "
+        f"{what} cannot be reached on this scene: {field} = {limit:g}. "
         f"The best {named} is {achieved:.4g}.",
         field=field,
-        value=wanted,
+        value=limit,
         limit=achieved,
         best=best.to_document(),
     )

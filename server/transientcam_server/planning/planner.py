@@ -13,8 +13,8 @@ from transientcam_server.planning.choice import Choice, choices_on_front
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.plan import Plan, plan
 from transientcam_server.planning.prediction import Predictor
-from transientcam_server.planning.scene import SceneStatistic, of_frame
-from transientcam_server.planning.timing import ComputingTime
+from transientcam_server.planning.scene import SceneStatistics, scene_of_frame
+from transientcam_server.planning.timing import ReconstructionTimer
 from transientcam_server.settings import ReconstructionSettings
 
 
@@ -28,7 +28,7 @@ class Planner:
     noise
         Of its sensor.
     settings
-        How images become range.
+        Of the reconstruction.
     """
 
     def __init__(
@@ -39,13 +39,13 @@ class Planner:
         self.reconstruct_with(settings)
 
     def reconstruct_with(self, settings: ReconstructionSettings) -> None:
-        """Predict from now on what images become with other settings."""
+        """Predict with other settings of the reconstruction from now on."""
         self._settings = settings
-        self._computing = ComputingTime(self._capabilities, settings)
+        self._computing = ReconstructionTimer(self._capabilities, settings)
 
-    def statistic(
+    def scene_statistics(
         self, recipe: Recipe, found: tm.Reconstruction, ambient_dn_per_s: float
-    ) -> SceneStatistic:
+    ) -> SceneStatistics:
         """Describe the scene of a frame.
 
         Raises
@@ -53,14 +53,14 @@ class Planner:
         Problem
             ``target-unreachable`` where the frame shows no light.
         """
-        statistic = of_frame(
+        statistics = scene_of_frame(
             found,
             self._noise.of_moments(recipe, found),
             exposure_s=recipe.applied.sequence.exposure_s,
             base_frequency_hz=recipe.base_frequency_hz,
             ambient_dn_per_s=ambient_dn_per_s,
         )
-        if statistic is None:
+        if statistics is None:
             raise Problem(
                 kinds.TARGET_UNREACHABLE,
                 "The current frame shows no pixel with light that does not saturate; give a scene.",
@@ -68,20 +68,20 @@ class Planner:
                 value=None,
                 best=None,
             )
-        return statistic
+        return statistics
 
-    def plan(self, goal: Goal, scene: SceneStatistic) -> Plan:
+    def plan(self, goal: Goal, scene: SceneStatistics) -> Plan:
         """Recommend a sequence; see `planning.plan`."""
         return plan(goal, self._predictor(scene), self._capabilities, reconstruct_s=self._computing)
 
-    def front(self, goal: Goal, scene: SceneStatistic) -> list[Choice]:
+    def front(self, goal: Goal, scene: SceneStatistics) -> list[Choice]:
         """Return all sequences that no other beats, by rising time."""
         choices = candidates(
             goal, self._predictor(scene), self._capabilities, reconstruct_s=self._computing
         )
         return choices_on_front(choices, goal.leading)
 
-    def _predictor(self, scene: SceneStatistic) -> Predictor:
+    def _predictor(self, scene: SceneStatistics) -> Predictor:
         return Predictor(scene, self._noise.sensor, self._settings)
 
 

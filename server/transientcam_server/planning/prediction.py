@@ -1,6 +1,6 @@
 """What accuracy a sequence will have on a scene, before it is captured.
 
-Where first order holds the noise model itself says it. Where it does not, because returns merge,
+Where first order holds, the noise model gives it. Where it does not, because returns merge,
 hide in noise or are fewer than harmonics, noisy moments are drawn and go through the estimator.
 Both depend on a pixel only by its relative noise, so that a table over that serves every exposure
 and number of takes.
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_server.imaging.noise import MEDIAN_OF_NORMAL
-from transientcam_server.planning.scene import SceneStatistic
+from transientcam_server.planning.scene import SceneStatistics
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
@@ -57,16 +57,16 @@ class Predictor:
     scene
         Of typical pixels.
     sensor
-        What turns light into numbers.
+        Of the camera.
     settings
-        How moments become range.
+        Of the reconstruction.
     seed
-        Of all draws: the same question gets the same answer.
+        Of all draws: the same arguments give the same result.
     """
 
     def __init__(
         self,
-        scene: SceneStatistic,
+        scene: SceneStatistics,
         sensor: tm.noise.Sensor,
         settings: ReconstructionSettings,
         *,
@@ -93,9 +93,9 @@ class Predictor:
         return Deviation(_typical(each), float(np.quantile(each, 0.9)), float((holds > 0.5).mean()))
 
     def range_std_interval(self, sequence: Sequence) -> tuple[float, float]:
-        """Say where the typical pixel's deviation lies with 95 %, in m.
+        """Return the 95 % interval of the typical pixel's deviation, in m.
 
-        As the pixels that stand for the scene and the draws tell (bootstrap over the pixels).
+        By a bootstrap over the pixels that stand for the scene.
         """
         each, _ = self._deviations(sequence)
         picks = np.random.default_rng(self._seed).integers(0, each.size, (_RESAMPLED, each.size))
@@ -115,13 +115,13 @@ class Predictor:
     def range_bias_m(self, sequence: Sequence) -> float:
         """Predict by how much the range of the median pixel is off without any noise.
 
-        That is where it has more returns than the estimator can tell apart.
+        It is not 0 where the pixel has more returns than the estimator resolves.
         """
         key = (sequence.harmonics, sequence.base_frequency_hz, self._zeroth_of(sequence))
         return self._biases(*key)
 
     def beyond_scene(self, sequence: Sequence) -> bool:
-        """Whether a sequence would see more of the scene than what it was judged by."""
+        """Whether a sequence resolves more than the frame that describes the scene."""
         scene = self.scene
         if scene.harmonics is None:
             return False
@@ -246,7 +246,7 @@ class Predictor:
 
 
 def both_found(returns: tm.Returns, phase_rad: _Array, *, threshold: float) -> _Array:
-    """Say in which pixels (...) two true returns are both found, each by itself.
+    """Return in which pixels (...) two true returns are both found, each by itself.
 
     Found is one with a return of at least ``threshold`` times the strongest one within a quarter
     of the distance between the two.

@@ -1,4 +1,4 @@
-"""What a scene is to a prediction: how bright its pixels are, and what light they send back."""
+"""The scene as predictions see it: brightness and returns of typical pixels."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ BRIGHT_SHARE: Final = 0.99
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SceneStatistic:
+class SceneStatistics:
     """Typical pixels of a scene, P of them.
 
     Attributes
@@ -32,11 +32,11 @@ class SceneStatistic:
     ambient_dn_per_s
         Light that is not the camera's, in DN an image for each second of exposure.
     harmonics
-        How many the scene was seen with; None where it is given and all is known.
+        Number of harmonics of the frame that shows it; None where the scene is given exactly.
     relative_noise
-        Deviation of a typical pixel's moments over its brightness when it was seen.
+        Deviation of a typical pixel's moments over its brightness, in that frame.
     range_std_m
-        Deviation of a typical pixel's range when it was seen.
+        Deviation of a typical pixel's range in that frame.
     """
 
     brightness_dn_per_s: _Array
@@ -68,12 +68,12 @@ class SceneStatistic:
         return moments
 
 
-def given(
+def uniform_scene(
     brightness_dn_per_s: float,
     returns: Iterable[tuple[float, float]],
     *,
     ambient_dn_per_s: float = 0.0,
-) -> SceneStatistic:
+) -> SceneStatistics:
     """Describe a scene of equal pixels.
 
     Parameters
@@ -83,13 +83,13 @@ def given(
     returns
         Range in m and relative weight of each.
     ambient_dn_per_s
-        As in `SceneStatistic`.
+        As in `SceneStatistics`.
     """
     range_m, weight = np.array(list(returns), dtype=float).T
     repeated = (len(range_m), PIXELS)
     delay_s = np.broadcast_to(2 * range_m[:, None] / tm.SPEED_OF_LIGHT_M_S, repeated)
     share = np.broadcast_to(weight[:, None] / weight.sum(), repeated)
-    return SceneStatistic(
+    return SceneStatistics(
         np.full(PIXELS, brightness_dn_per_s),
         brightness_dn_per_s,
         delay_s,
@@ -98,14 +98,14 @@ def given(
     )
 
 
-def of_frame(
+def scene_of_frame(
     found: tm.Reconstruction,
     noise: tm.noise.MomentNoise,
     *,
     exposure_s: float,
     base_frequency_hz: float,
     ambient_dn_per_s: float = 0.0,
-) -> SceneStatistic | None:
+) -> SceneStatistics | None:
     """Describe the scene that a frame shows, as far as the frame resolves it.
 
     Parameters
@@ -117,11 +117,11 @@ def of_frame(
     exposure_s, base_frequency_hz
         What the frame was captured with.
     ambient_dn_per_s
-        As in `SceneStatistic`.
+        As in `SceneStatistics`.
 
     Returns
     -------
-    SceneStatistic or None
+    SceneStatistics or None
         None where no pixel has light.
 
     Notes
@@ -142,7 +142,7 @@ def of_frame(
     phase = np.asarray(found.returns.phase_rad, dtype=float).reshape((m, -1))[:, chosen]
     variance = noise.variance.reshape((m + 1, -1))[:, chosen]
     total = np.maximum(brightness[chosen], weight.sum(axis=0))
-    return SceneStatistic(
+    return SceneStatistics(
         total / exposure_s,
         float(np.quantile(brightness[there], BRIGHT_SHARE)) / exposure_s,
         np.where(weight > 0, phase / (2 * np.pi * base_frequency_hz), np.nan),

@@ -1,4 +1,4 @@
-"""How long this machine reconstructs a frame, measured when it is first asked."""
+"""How long this machine reconstructs a frame, measured on first use."""
 
 import time
 from collections.abc import Callable
@@ -16,15 +16,15 @@ _DEPTH: Final = 1000.0
 """Brightness of the images that are reconstructed, in DN."""
 
 
-class ComputingTime:
+class ReconstructionTimer:
     """Seconds from images to range, by number of harmonics and takes.
 
     Parameters
     ----------
     capabilities
-        Of the camera, whose images have the size that matters.
+        Of the camera: the size of its images.
     settings
-        How images become range.
+        Of the reconstruction.
     clock
         Of the machine.
     """
@@ -54,7 +54,7 @@ class ComputingTime:
         return once + averaging * 4 * sequence.harmonics * sequence.takes
 
     def _measured(self, harmonics: int, takes: int) -> float:
-        # kernels that were compiled meanwhile make another machine of it
+        # times change once kernels are compiled
         key = (harmonics, takes, str(sorted(map(str, tm.kernels.state().items()))))
         if key not in self._known:
             images = _images(harmonics, takes, self._shape)

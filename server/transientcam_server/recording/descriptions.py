@@ -1,4 +1,4 @@
-"""What the service says of a recording: of one that runs, and of a file."""
+"""Documents that describe a recording: one that runs, or a file."""
 
 import os
 from collections.abc import Set
@@ -12,9 +12,27 @@ from transientcam_server.recording.layout import Header
 from transientcam_server.recording.reader import Recording
 from transientcam_server.recording.recorder import Recorder
 
+_UNREADABLE: Final[dict[str, Any]] = {
+    "name": "",
+    "started_s": None,
+    "frames": 0,
+    "dropped_frames": 0,
+    "duration_s": 0.0,
+    "reason": None,
+    "annotations": {},
+    "sequence": None,
+    "camera": {},
+    "calibration": {},
+    "width": None,
+    "height": None,
+    "versions": {},
+    "limits": None,
+}
+"""The fields of a file that cannot be read."""
+
 
 class Descriptions:
-    """Describes files, and reads each only once as long as it stays the same."""
+    """Describes files; a file is read again only when it has changed."""
 
     def __init__(self) -> None:
         self._known: dict[Path, tuple[tuple[int, int], dict[str, Any]]] = {}
@@ -24,7 +42,7 @@ class Descriptions:
         return len(self._known)
 
     def of_file(self, path: Path) -> dict[str, Any] | None:
-        """Describe a file; None where there is none any more."""
+        """Describe a file; None where it no longer exists."""
         try:
             status = path.stat()
         except FileNotFoundError:  # deleted, or recovered, this moment
@@ -46,7 +64,7 @@ class Descriptions:
 
 
 def of_recorder(recorder: Recorder, part: Path) -> dict[str, Any]:
-    """Describe a recording that runs, and is written into ``part``."""
+    """Describe a recording that runs and is written into ``part``."""
     progress = recorder.progress
     document = _of_header(recorder.header) | {
         "state": "recording" if progress.reason is None else "finishing",
@@ -87,7 +105,6 @@ def _of_header(header: Header) -> dict[str, Any]:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """Describe a file."""
     unfinished = path.name.endswith(".part")
     try:
         with Recording(path) as recording:
@@ -104,22 +121,4 @@ def _read(path: Path) -> dict[str, Any]:
                 "annotations": recording.annotations,
             }
     except (NotARecording, OSError) as error:
-        return {"id": id_of(path), "state": "damaged", "problem": str(error)} | _NOTHING
-
-
-_NOTHING: Final[dict[str, Any]] = {
-    "name": "",
-    "started_s": None,
-    "frames": 0,
-    "dropped_frames": 0,
-    "duration_s": 0.0,
-    "reason": None,
-    "annotations": {},
-    "sequence": None,
-    "camera": {},
-    "calibration": {},
-    "width": None,
-    "height": None,
-    "versions": {},
-    "limits": None,
-}
+        return {"id": id_of(path), "state": "damaged", "problem": str(error)} | _UNREADABLE

@@ -1,4 +1,4 @@
-"""The directory that recordings are kept in: what is there, what room there is, and whose it is."""
+"""The directory of the recordings: its files, its free space, and the lock that marks it in use."""
 
 import fcntl
 import logging
@@ -22,32 +22,32 @@ class Directory:
         self._lock: int | None = None
 
     def make(self) -> None:
-        """Make it, and keep others from taking what is written in it for abandoned.
+        """Create it, and lock it so that no other service recovers what is written in it.
 
         Raises
         ------
         OSError
-            If it cannot be made.
+            If it cannot be created.
         """
         self.path.mkdir(parents=True, exist_ok=True)
         self.share()
 
     def free_bytes(self) -> int:
-        """Return what its disk has left.
+        """Return the free space of its disk.
 
         Raises
         ------
         OSError
-            If it is not there yet.
+            If it does not exist yet.
         """
         return shutil.disk_usage(self.path).free
 
     def new(self, recording_id: str) -> Path:
-        """Return where a recording is to be written."""
+        """Return the path of a new recording."""
         return self.path / (recording_id + layout.SUFFIX)
 
     def files(self) -> list[Path]:
-        """Return the files that are recordings by their names, whole or not."""
+        """Return the files named like recordings, finished or not."""
         try:
             entries = list(self.path.iterdir())
         except OSError:
@@ -67,12 +67,12 @@ class Directory:
         return {id_of(path) for path in self.files()}
 
     def find(self, recording_id: str) -> Path | None:
-        """Return the file of a recording, found among those that are there."""
+        """Return the file of a recording, found among those that exist."""
         found = [path for path in self.files() if id_of(path) == recording_id]
-        return min(found, key=lambda path: len(path.name), default=None)  # the whole one first
+        return min(found, key=lambda path: len(path.name), default=None)  # the finished one first
 
     def is_ours_alone(self) -> bool:
-        """Return whether no other service records here; else what is unfinished may be alive."""
+        """Return whether no other service records here; one that does may still write its files."""
         try:
             descriptor = os.open(self.path, os.O_RDONLY)
         except OSError as error:
@@ -88,16 +88,16 @@ class Directory:
         return True
 
     def share(self) -> None:
-        """Keep others from taking what is written here for abandoned."""
+        """Lock it, so that no other service takes a file being written for abandoned."""
         if self._lock is None:
             try:
                 self._lock = os.open(self.path, os.O_RDONLY)
                 fcntl.flock(self._lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            except OSError as error:  # some file systems know no locks
+            except OSError as error:  # some file systems have no locks
                 _log.info("%s cannot be locked: %s", self.path, error)
 
     def close(self) -> None:
-        """Let others have it."""
+        """Release the lock."""
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None

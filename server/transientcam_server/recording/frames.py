@@ -1,7 +1,7 @@
 """Frames of recordings, computed as those of the camera are, also while one is being recorded.
 
-Everything here lives on the event loop; files are read on workers. A file is open only while it
-is read: one that stayed open would be in the way of whoever finishes or annotates it.
+Everything here runs on the event loop; files are read on workers. A file is open only while it
+is read, since an open file could not be renamed, recovered or annotated.
 """
 
 import asyncio
@@ -31,26 +31,26 @@ from transientcam_server.settings import LensSettings, ReconstructionSettings
 
 LATEST: Final = "latest"
 MAX_TIMES: Final = 4096
-"""So many times, at most, are told of one recording."""
-Settings = Literal["recorded", "current"]
+"""Largest number of times in the timeline of a recording."""
+SettingsChoice = Literal["recorded", "current"]
 Find = Callable[[], Path]
-"""Says where the file is now: it gets its name when it is finished."""
+"""Returns the present path of the file, which is renamed when it is finished."""
 _OPENED: Final = 2
 _FRAMES: Final = 2
 _RECORDED_ID: Final = 0
-"""What the metadata call settings that were not this service's."""
+"""Id, in the metadata, of settings that were not this service's."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedCamera:
-    """What a pipeline asks of a camera."""
+    """What a pipeline requires of a camera."""
 
     capabilities: Capabilities
     simulation: None = None
 
 
 class RecordedFrames:
-    """The frames of one recording, counted from 1, and what was computed of the last few."""
+    """The frames of one recording, counted from 1, with results kept for the last few."""
 
     def __init__(
         self, find: Find, header: Header, pipeline: Pipeline, *, lens: LensSettings
@@ -62,7 +62,7 @@ class RecordedFrames:
         self._lens = lens
         self._frames: OrderedDict[tuple[int, int], asyncio.Task[Frame]] = OrderedDict()
 
-    async def frame(self, name: str, settings: Settings = "recorded") -> Frame:
+    async def frame(self, name: str, settings: SettingsChoice = "recorded") -> Frame:
         """Return a frame by its number, or the last one that was written.
 
         Raises
@@ -74,7 +74,7 @@ class RecordedFrames:
         reconstruction = self._reconstruction(settings)
         key = number, reconstruction.id
         task = self._frames.get(key)
-        if task is None or _failed(task):  # one that is not there yet may be there next time
+        if task is None or _failed(task):  # a frame not yet written may exist next time
             task = self.pipeline.workers.start(self._read(number, reconstruction))
             self._frames[key] = task
         self._frames.move_to_end(key)
@@ -92,8 +92,8 @@ class RecordedFrames:
         recipe = recorded_recipe(self._header, reconstruction, lens=self._lens)
         return self.pipeline.recorded_frame(number, raw, recipe, past=True)
 
-    def _reconstruction(self, settings: Settings) -> SettingsVersion:
-        """Return the settings it was recorded with, if this version knows them all, or today's."""
+    def _reconstruction(self, settings: SettingsChoice) -> SettingsVersion:
+        """Return the recorded settings, if this version has them all, or the present ones."""
         if settings == "recorded":
             with contextlib.suppress(ValidationError):
                 recorded = ReconstructionSettings.model_validate(dict(self._header.reconstruction))
@@ -101,8 +101,8 @@ class RecordedFrames:
         return self._camera_pipeline.reconstruction
 
 
-class RecordedFramesOf:
-    """The frames of the recordings of a library; those asked for last are at hand."""
+class RecordedFramesCache:
+    """The frames of a library's recordings; those of the last few recordings are kept."""
 
     def __init__(self, library: Library, pipeline: Pipeline, *, lens: LensSettings) -> None:
         self._library = library
@@ -120,7 +120,7 @@ class RecordedFramesOf:
             ``recording-damaged``.
         """
         find = partial(self._library.find, recording_id)
-        await self._pipeline.workers.run(find)  # it may have been deleted since
+        await self._pipeline.workers.run(find)  # raises if it was deleted since
         found = self._opened.get(recording_id)
         if found is None:
             header, _ = await self._pipeline.workers.run(_read_header, find)
@@ -137,7 +137,7 @@ def _failed(task: "asyncio.Task[Frame]") -> bool:
 
 
 def timeline(host_time_s: NDArray[Any]) -> dict[str, Any]:
-    """Return when the frames of a recording came, in no more than `MAX_TIMES` numbers."""
+    """Return when the frames of a recording arrived, in at most `MAX_TIMES` numbers."""
     count = len(host_time_s)
     since_s = host_time_s - host_time_s[0] if count else host_time_s
     duration_s = float(since_s[-1]) if count else 0.0

@@ -1,6 +1,6 @@
 """What a recording holds and where: raw images, their labels, one series a property of a frame.
 
-docs/recordings.md describes the same for those who open the file with something else.
+docs/recordings.md describes the same for other programs.
 """
 
 import json
@@ -39,6 +39,7 @@ SERIES: Final[dict[str, tuple[str, dict[str, str]]]] = {
 ROW_AXIS: Final = "frame"
 _AXES: Final = ("frame", "image", "y", "x")
 _LABELS: Final = {each.name: each.type for each in fields(ImageLabel)}
+_LABEL_DTYPES: Final[dict[object, str]] = {int: "<i4", float: "<f8", bool: "|u1"}
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Header:
     Attributes
     ----------
     recording_id, name
-        What the service calls it, and what people do.
+        Its id in the service, and its name for people.
     started_s
         Unix time.
     applied
@@ -58,7 +59,7 @@ class Header:
     camera
         How it was opened, and which scene it simulates.
     calibration
-        Of the moments: its id and whatever else is known of it.
+        Of the moments: its id, and further properties where known.
     calibration_planes
         complex (m+1,) or (m+1, H, W): what moments are divided by; None for the nominal gains.
     calibration_bad
@@ -145,11 +146,8 @@ def _create_calibration(
             file["calibration_bad"].dims[axis].attach_scale(file[name])
 
 
-_LABEL_DTYPES: Final[dict[object, str]] = {int: "<i4", float: "<f8", bool: "|u1"}
-
-
 def _scale(file: swmr.File) -> None:
-    """Name the axes, so that xarray and netCDF know them."""
+    """Attach the axes as HDF5 dimension scales, which xarray and netCDF read."""
     for axis, name in enumerate(_AXES):
         file["raw"].dims[axis].attach_scale(file[name])
     for name in SERIES.keys() - {ROW_AXIS}:

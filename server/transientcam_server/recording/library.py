@@ -1,7 +1,6 @@
 """The recordings of a service: one directory of files, and the one that is being written.
 
-What clients call a recording never becomes a path: they name it by its id, which is looked up
-among the files that are there.
+An id from a client never becomes a path: it is looked up among the files that exist.
 """
 
 import secrets
@@ -31,12 +30,12 @@ from transientcam_server.recording.writer import RecordingWriter, annotate
 from transientcam_server.settings import RecordingSettings
 
 _STOP_WITHIN_S: Final = 60.0
-Tell = Callable[[str, Mapping[str, Any]], None]
+Notify = Callable[[str, Mapping[str, Any]], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What somebody wants recorded; ``past`` for frames that have passed, see `Library.precede`."""
+class RecordingOptions:
+    """What to record; ``past`` waits for frames from the history, see `Library.precede`."""
 
     name: str | None = None
     limits: Limits = field(default_factory=Limits)
@@ -45,15 +44,15 @@ class Wanted:
 
 
 class Library:
-    """Records, lists, and keeps recordings; methods from any thread, and they wait for the disk.
+    """Makes, lists and deletes recordings; its methods run on any thread and wait for the disk.
 
     Parameters
     ----------
     header
-        Makes the header of a new recording from its id, name and time of start.
-    tell
-        Told of ``recording-started``, ``recording-dropped`` and ``recording-stopped``, on
-        whichever thread it happens.
+        Returns the header of a new recording for its id, name and time of start.
+    notify
+        Called for ``recording-started``, ``recording-dropped`` and ``recording-stopped``, on the
+        thread on which it happens.
     """
 
     def __init__(
@@ -61,13 +60,13 @@ class Library:
         settings: RecordingSettings,
         *,
         header: Callable[[str, str, float], Header],
-        tell: Tell = lambda kind, details: None,
+        notify: Notify = lambda kind, details: None,
         unix_s: Callable[[], float] = time.time,
     ) -> None:
         self._settings = settings
         self._directory = Directory(settings.directory)
         self._header = header
-        self._tell = tell
+        self._notify = notify
         self._unix_s = unix_s
         self._starting = threading.Lock()
         self._active: Recorder | None = None
@@ -81,7 +80,7 @@ class Library:
     # -- life ----------------------------------------------------------------------------------
 
     def open(self) -> None:
-        """Recover, on a thread of its own, what the last service left unfinished."""
+        """Recover unfinished recordings of an earlier service, on a thread of its own."""
         directory = self._directory
         if not directory.path.is_dir():
             return
@@ -95,7 +94,7 @@ class Library:
             self._recovery.start()
 
     def close(self) -> None:
-        """Finish the recording that runs, and wait for everything."""
+        """Finish the recording that runs, and wait for it and for the recovery."""
         self._closing.set()
         recorder = self._active
         if recorder is not None:
@@ -109,19 +108,19 @@ class Library:
 
     @property
     def directory(self) -> Path:
-        """Where recordings are kept; made with the first one."""
+        """Directory of the recordings; created with the first one."""
         return self._directory.path
 
     @property
     def active_id(self) -> str | None:
-        """The recording that runs."""
+        """Id of the recording that runs, None without one."""
         recorder = self._active
         if recorder is None or recorder.progress.finished:
             return None
         return recorder.header.recording_id
 
     def free_bytes(self) -> int | None:
-        """Return what the disk has left; None where there is no directory yet."""
+        """Return the free space of the disk; None where there is no directory yet."""
         try:
             return self._directory.free_bytes()
         except OSError:
@@ -129,7 +128,7 @@ class Library:
 
     @property
     def totals(self) -> Totals:
-        """What was recorded since the service started, with what is being recorded."""
+        """Totals since the service started, with the recording that runs."""
         recorder, (totals, last) = self._active, self._counted
         if recorder is None or recorder is last:
             return totals
@@ -141,7 +140,7 @@ class Library:
         if recorder is not None:
             recorder.offer(raw, applied)
 
-    def start(self, wanted: Wanted) -> dict[str, Any]:
+    def start(self, options: RecordingOptions) -> dict[str, Any]:
         """Start a recording and describe it.
 
         Raises
@@ -150,7 +149,7 @@ class Library:
             ``recording-runs`` when there is one already, ``recording-not-stored`` where no file
             can be made.
         """
-        require_annotations(wanted.annotations or {})
+        require_annotations(options.annotations or {})
         with self._starting:
             if self._active is not None and not self._active.progress.finished:
                 running = self._active.header.recording_id
@@ -158,17 +157,17 @@ class Library:
                     kinds.RECORDING_RUNS, f"{running} is being recorded.", recording=running
                 )
             started_s = self._unix_s()
-            recorder = self._recorder(wanted, started_s)
+            recorder = self._recorder(options, started_s)
             self._active = recorder
             recorder.start()
         document = self._describe_active(recorder)
-        self._tell("recording-started", {"recording": recorder.header.recording_id})
+        self._notify("recording-started", {"recording": recorder.header.recording_id})
         return document
 
     def precede(self, recording_id: str, past: Sequence[tuple[RawFrame, AppliedSequence]]) -> int:
-        """Let a recording begin with frames that have passed; return how many those are.
+        """Put frames of the history before a recording's own; return how many were taken.
 
-        One that wants them waits for this call, which itself never waits.
+        A recording started with ``past`` writes nothing before this call, which never waits.
         """
         recorder = self._recorder_of(recording_id)
         return 0 if recorder is None else recorder.precede(past)
@@ -266,37 +265,37 @@ class Library:
 
     # -- inside --------------------------------------------------------------------------------
 
-    def _recorder(self, wanted: Wanted, started_s: float) -> Recorder:
+    def _recorder(self, options: RecordingOptions, started_s: float) -> Recorder:
         moment = datetime.fromtimestamp(started_s, UTC)
         recording_id = f"{moment:%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
-        name = wanted.name or f"Recording of {moment:%Y-%m-%d %H:%M:%S} UTC"
+        name = options.name or f"Recording of {moment:%Y-%m-%d %H:%M:%S} UTC"
         header = self._header(recording_id, name, started_s)
         try:
             self._directory.make()
             self._require_room()
             path = self._directory.new(recording_id)
-            writer = RecordingWriter(path, header, annotations=wanted.annotations)
+            writer = RecordingWriter(path, header, annotations=options.annotations)
         except OSError as error:
             raise not_stored(self.directory, error) from error
         return Recorder(
             writer,
             header,
-            limits=self._limits(wanted.limits),
+            limits=self._limits(options.limits),
             queue_frames=self._queue_frames(header),
             free_bytes=self._directory.free_bytes,
             on_dropped=self._dropped,
             on_end=self._ended,
-            awaits_past=wanted.past,
+            awaits_past=options.past,
             unix_s=self._unix_s,
         )
 
-    def _limits(self, wanted: Limits) -> Limits:
+    def _limits(self, requested: Limits) -> Limits:
         settings = self._settings
         return Limits(
-            duration_s=_least(wanted.duration_s, settings.max_duration_s),
-            size_bytes=_least(wanted.size_bytes, settings.max_bytes),
-            frames=wanted.frames,
-            free_bytes=max(wanted.free_bytes, settings.min_free_bytes),
+            duration_s=_least(requested.duration_s, settings.max_duration_s),
+            size_bytes=_least(requested.size_bytes, settings.max_bytes),
+            frames=requested.frames,
+            free_bytes=max(requested.free_bytes, settings.min_free_bytes),
         )
 
     def _queue_frames(self, header: Header) -> int:
@@ -309,7 +308,7 @@ class Library:
             raise OSError(28, f"{free} bytes are free, {least} have to stay so")
 
     def _dropped(self, count: int, total: int) -> None:
-        self._tell("recording-dropped", {"count": count, "total": total})
+        self._notify("recording-dropped", {"count": count, "total": total})
 
     def _ended(self, recorder: Recorder) -> None:
         progress, recording_id = recorder.progress, recorder.header.recording_id
@@ -323,7 +322,7 @@ class Library:
             "frames": progress.frames,
             "dropped_frames": progress.dropped_frames,
         }
-        self._tell("recording-stopped", details)
+        self._notify("recording-stopped", details)
 
     def _recorder_of(self, recording_id: str) -> Recorder | None:
         """Return the recorder of a recording that has not ended."""
@@ -356,6 +355,6 @@ class Library:
             self._recovering -= {id_of(part)}
 
 
-def _least(wanted: Any, allowed: Any) -> Any:
-    given = [each for each in (wanted, allowed) if each is not None]
+def _least(requested: Any, allowed: Any) -> Any:
+    given = [each for each in (requested, allowed) if each is not None]
     return min(given, default=None)

@@ -1,4 +1,4 @@
-"""What is answered where a recording cannot be had, changed or stored."""
+"""The problems of recordings: unknown, unfinished, not stored, or wrongly annotated."""
 
 import json
 import logging
@@ -15,7 +15,7 @@ _log = logging.getLogger(__name__)
 
 
 def unknown(recording_id: str) -> Problem:
-    """Say that there is no such recording."""
+    """Return the problem of an id without a recording."""
     shown = recording_id[:64]
     return Problem(
         kinds.UNKNOWN_RECORDING, f"There is no recording {shown!r}.", field="recording", value=shown
@@ -23,20 +23,20 @@ def unknown(recording_id: str) -> Problem:
 
 
 def unfinished(recording_id: str) -> Problem:
-    """Say that it is still being written, or recovered."""
+    """Return the problem of a recording that is still being written or recovered."""
     return Problem(
         kinds.RECORDING_UNFINISHED, f"{recording_id} is not finished.", recording=recording_id
     )
 
 
 def not_stored(place: Path, error: OSError) -> Problem:
-    """Say that the disk does not take it, and log where."""
+    """Return the problem of a failed write, and log the directory."""
     _log.warning("recording into %s failed: %s", place, error)
-    return Problem(kinds.RECORDING_NOT_STORED, f"The disk does not take it: {in_words(error)}.")
+    return Problem(kinds.RECORDING_NOT_STORED, f"It could not be written: {in_words(error)}.")
 
 
 def require_annotations(annotations: Mapping[str, Any]) -> None:
-    """Refuse annotations that have no place in the file, or no JSON.
+    """Refuse annotations that are too long or cannot be written as JSON.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def require_annotations(annotations: Mapping[str, Any]) -> None:
     except (ValueError, RecursionError):
         raise Problem(
             kinds.INVALID_REQUEST,
-            "The annotations hold something that JSON has not: NaN, or half a character.",
+            "The annotations hold a value that JSON lacks, such as NaN or half a character.",
             field="annotations",
             limit="JSON",
         ) from None

@@ -31,9 +31,9 @@ class Recording:
     def __init__(self, path: Path) -> None:
         self.path = path
         with path.open("rb"):
-            pass  # says what is wrong better than h5py
+            pass  # its errors are clearer than h5py's
         try:
-            # the writer of an unfinished one may be alive or dead: only SWMR readers may look
+            # the writer of an unfinished one may still run: only SWMR readers may open it
             self._file = swmr.open_file(
                 path, "r", libver="latest", swmr=path.name.endswith(".part")
             )
@@ -64,7 +64,7 @@ class Recording:
 
     @property
     def annotations(self) -> dict[str, Any]:
-        """What people wrote about it."""
+        """Its annotations, as JSON."""
         return layout.read_document(self._file, "annotations")
 
     @property
@@ -141,7 +141,7 @@ class Recording:
 
 
 def _reason(error: Exception) -> str:
-    """Return what matters of a message of HDF5: ``Unable to ... (the reason, and numbers)``."""
+    """Return the reason in a message of HDF5: ``Unable to ... (the reason, and numbers)``."""
     text = str(error).partition("\n")[0]
     _, opened, inner = text.partition("(")
     return (inner.rstrip(")").partition(",")[0] if opened else text) or type(error).__name__

@@ -10,7 +10,7 @@ from transientcam_server.settings import LensSettings
 def recorded_recipe(
     header: Header, reconstruction: SettingsVersion, *, lens: LensSettings | None = None
 ) -> Recipe:
-    """Return what a reconstruction of a recording's frames has to know beside them."""
+    """Return the recipe that reconstructs a recording's frames."""
     capabilities, planes = header.capabilities, header.calibration_planes
     gains = None
     if planes is not None:

@@ -1,4 +1,4 @@
-"""One recording while it runs: a thread that writes, and a short queue that the camera fills.
+"""One recording while it runs: a thread that writes, and a short queue that the camera's fills.
 
 The camera's thread never waits: a frame that finds the queue full is dropped and counted.
 """
@@ -17,9 +17,9 @@ from transientcam_server.recording.swmr import in_words
 from transientcam_server.recording.writer import RecordingWriter
 
 _log = logging.getLogger(__name__)
-LOOK_S: Final = 0.2
-"""How often limits are looked at while no frame comes."""
-_LOOK_AT_DISK_S: Final = 1.0
+CHECK_S: Final = 0.2
+"""Interval at which limits are checked while no frame comes."""
+_CHECK_DISK_S: Final = 1.0
 
 Reason = Literal[
     "stopped", "duration", "size", "frames", "disk-space", "sequence-changed", "failed", "shutdown"
@@ -41,7 +41,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a recording is; ``reason`` and ``problem`` once it has ended."""
+    """Size of a recording so far; ``reason`` and ``problem`` once it has ended."""
 
     frames: int
     dropped_frames: int
@@ -52,17 +52,42 @@ class Progress:
     finished: bool
 
 
+@dataclass(frozen=True, slots=True)
+class Totals:
+    """Frames and bytes of all recordings; ``ended`` counts recordings by why they ended."""
+
+    frames: int = 0
+    dropped_frames: int = 0
+    size_bytes: int = 0
+    ended: Mapping[str, int] = field(default_factory=lambda: dict.fromkeys(get_args(Reason), 0))
+
+    def with_running(self, progress: Progress) -> "Totals":
+        """Return the totals together with a recording that has not ended."""
+        return replace(
+            self,
+            frames=self.frames + progress.frames,
+            dropped_frames=self.dropped_frames + progress.dropped_frames,
+            size_bytes=self.size_bytes + progress.size_bytes,
+        )
+
+    def after(self, progress: Progress) -> "Totals":
+        """Return the totals after a recording has ended."""
+        reason = progress.reason or "failed"
+        ended = {**self.ended, reason: self.ended[reason] + 1}
+        return replace(self.with_running(progress), ended=ended)
+
+
 class Recorder:
-    """Writes what is offered until a limit is reached or somebody stops it.
+    """Writes what is offered until a limit is reached or it is stopped.
 
     Parameters
     ----------
     writer
-        Owned from now on.
+        Closed by the recorder.
     queue_frames
         How many frames may wait for the disk.
     free_bytes
-        Says how much the disk has left.
+        Returns the free space of the disk.
     on_dropped
         Called on the writing thread, at most once a second, with how many frames were dropped
         since the call before, and in all.
@@ -105,10 +130,10 @@ class Recorder:
         self._problem: str | None = None
         self._dropped = 0
         self._dropped_before_next = 0
-        self._told_dropped = 0
+        self._reported_dropped = 0
         self._began_s = clock()
         self._ended_s: float | None = None
-        self._looked_s = -float("inf")
+        self._checked_s = -float("inf")
         self._size_bytes = writer.bytes_written
         self._finished = threading.Event()
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
@@ -120,9 +145,9 @@ class Recorder:
         self._thread.start()
 
     def precede(self, past: Sequence[tuple[RawFrame, AppliedSequence]]) -> int:
-        """Let frames that were captured before it began come first; return how many.
+        """Write frames that were captured before it began first; return how many were taken.
 
-        Of these, oldest first, are taken those of the recording's sequence that were not offered.
+        ``past`` is oldest first; frames of another sequence and those already offered are left out.
         """
         with self._changed:
             offered = {id(raw) for raw, _ in self._waiting}
@@ -155,13 +180,13 @@ class Recorder:
             self._changed.notify()
 
     def stop(self, reason: Reason = "stopped") -> None:
-        """Take no more frames; what waits is still written."""
+        """Take no more frames; those in the queue are still written."""
         with self._changed:
             self._reason = self._reason or reason
             self._changed.notify()
 
     def annotate(self, annotations: Mapping[str, Any]) -> bool:
-        """Replace the annotations soon; false when it has ended already."""
+        """Replace the annotations on the writing thread; false when it has ended already."""
         with self._changed:
             if self._reason is not None:
                 return False
@@ -179,7 +204,7 @@ class Recorder:
 
     @property
     def progress(self) -> Progress:
-        """How far it is; never waits."""
+        """Its present progress; never waits."""
         until_s = self._clock() if self._ended_s is None else self._ended_s
         return Progress(
             frames=self._writer.frames,
@@ -204,18 +229,18 @@ class Recorder:
             self._writer.close(self._end())
         except Exception as error:
             self._fail(error)
-        self._tell_dropped()
+        self._report_dropped()
         try:
             self._on_end(self)
         finally:
             self._finished.set()
 
     def _step(self) -> bool:
-        """Write what is next; false once there is nothing more to come."""
+        """Write the next frame; false once there are no more to come."""
         with self._changed:
             idle = self._awaits_past or not (self._past or self._waiting)
             if idle and not (self._work or self._reason):
-                self._changed.wait(LOOK_S)
+                self._changed.wait(CHECK_S)
             work = list(self._work)
             self._work.clear()
             ending = self._reason is not None
@@ -224,7 +249,7 @@ class Recorder:
             each()
         if frame is not None:
             self._writer.append(frame[0], dropped_frames=frame[1])
-        self._look()
+        self._check_limits()
         return frame is not None or not ending
 
     def _next(self) -> tuple[RawFrame, int] | None:
@@ -239,15 +264,15 @@ class Recorder:
             ours.low_frequency_hz,
         )
 
-    def _look(self) -> None:
-        """Bring it to the disk, and hold it to its limits."""
+    def _check_limits(self) -> None:
+        """Flush to the disk, and stop at the limits."""
         now_s = self._clock()
-        # HDF5 gives back some of what it took, which nobody need know
+        # HDF5 releases some space again; the reported size never shrinks
         self._size_bytes = max(self._size_bytes, self._writer.bytes_written)
-        if now_s - self._looked_s >= _LOOK_AT_DISK_S:
-            self._looked_s = now_s
+        if now_s - self._checked_s >= _CHECK_DISK_S:
+            self._checked_s = now_s
             self._writer.synchronise(now_s)
-            self._tell_dropped()
+            self._report_dropped()
             if self._free_bytes() < self.limits.free_bytes:
                 self._end_at_once("disk-space")
         limits = self.limits
@@ -266,7 +291,7 @@ class Recorder:
             self._waiting.clear()
 
     def _fail(self, error: Exception) -> None:
-        # the first failure says why; that of closing afterwards follows from it
+        # the first failure is the cause; one while closing follows from it
         if self._problem is None:
             _log.error("recording %s failed: %s", self.header.recording_id, error)
             self._problem = in_words(error)
@@ -275,11 +300,11 @@ class Recorder:
             self._past.clear()
             self._waiting.clear()
 
-    def _tell_dropped(self) -> None:
+    def _report_dropped(self) -> None:
         total = self._dropped
-        if total > self._told_dropped:
-            self._on_dropped(total - self._told_dropped, total)
-            self._told_dropped = total
+        if total > self._reported_dropped:
+            self._on_dropped(total - self._reported_dropped, total)
+            self._reported_dropped = total
 
     def _end(self) -> dict[str, Any]:
         return {
@@ -290,28 +315,3 @@ class Recorder:
             "frames": self._writer.frames,
             "dropped_frames": self._dropped,
         }
-
-
-@dataclass(frozen=True, slots=True)
-class Totals:
-    """Frames and bytes of all recordings; ``ended`` counts recordings by why they ended."""
-
-    frames: int = 0
-    dropped_frames: int = 0
-    size_bytes: int = 0
-    ended: Mapping[str, int] = field(default_factory=lambda: dict.fromkeys(get_args(Reason), 0))
-
-    def with_running(self, progress: Progress) -> "Totals":
-        """Return the totals together with a recording that has not ended."""
-        return replace(
-            self,
-            frames=self.frames + progress.frames,
-            dropped_frames=self.dropped_frames + progress.dropped_frames,
-            size_bytes=self.size_bytes + progress.size_bytes,
-        )
-
-    def after(self, progress: Progress) -> "Totals":
-        """Return the totals after a recording has ended."""
-        reason = progress.reason or "failed"
-        ended = {**self.ended, reason: self.ended[reason] + 1}
-        return replace(self.with_running(progress), ended=ended)

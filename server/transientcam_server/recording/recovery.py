@@ -1,4 +1,4 @@
-"""Makes recordings of what a writer left when it died: killed, or by a power cut."""
+"""Recovers recordings whose writer died: killed, or by a power cut."""
 
 import logging
 import shutil
@@ -14,7 +14,7 @@ _log = logging.getLogger(__name__)
 
 
 def recover(part: Path, *, target: Path | None = None) -> Path:
-    """Make a whole recording of an unfinished one, which is deleted then; return its path.
+    """Turn an unfinished recording into a finished one, delete the former, return the path.
 
     Frames are kept up to the first that is torn; a writer's death tears at most the last, which
     was not acknowledged.
@@ -24,7 +24,7 @@ def recover(part: Path, *, target: Path | None = None) -> Path:
     NotARecording
         If nothing can be read of it; it stays where it is.
     OSError
-        If the disk does not take the copy; it stays where it is.
+        If the copy cannot be written; it stays where it is.
     """
     path = target or part.with_name(part.name.removesuffix(".part"))
     if path == part:
@@ -66,7 +66,7 @@ def whole_frames(recording: Recording) -> int:
 def recover_all(
     directory: Path, *, parts: list[Path] | None = None, stop: Callable[[], bool] = lambda: False
 ) -> list[Path]:
-    """Recover every unfinished recording of a directory; what cannot be is logged and stays."""
+    """Recover every unfinished recording of a directory; one that fails is logged and stays."""
     recovered = []
     for part in unfinished(directory) if parts is None else parts:
         if stop():

@@ -20,7 +20,6 @@ from transientcam_driver import (
     RawFrame,
     Sequence,
     SequenceError,
-    Simulation,
     SpecError,
     Status,
 )
@@ -38,7 +37,7 @@ _OPTIONS: Final = ("speed", "loop")
 
 @dataclass(frozen=True, slots=True)
 class ReplaySpec:
-    """A replay's name, taken apart: ``speed`` is a factor, inf for as fast as it can be read."""
+    """The parts of a replay's name: ``speed`` is a factor, inf for as fast as it can be read."""
 
     path: Path
     speed: float = 1.0
@@ -46,12 +45,12 @@ class ReplaySpec:
 
 
 def parse_replay(spec: str) -> ReplaySpec:
-    """Take ``recording:PATH[?speed=original|fast|2.0&loop=on|off]`` apart.
+    """Parse ``recording:PATH[?speed=original|fast|2.0&loop=on|off]``.
 
     Raises
     ------
     SpecError
-        Saying what cannot be read.
+        Naming what cannot be parsed.
     """
     path, _, query = spec.removeprefix(PREFIX).partition("?")
     if not path:
@@ -91,7 +90,7 @@ class ReplayCamera:
         If the file cannot be replayed.
     """
 
-    simulation: Simulation | None = None
+    simulation: None = None
 
     def __init__(
         self, path: Path, *, speed: float = 1.0, loop: bool = False, clock: Clock | None = None
@@ -117,12 +116,12 @@ class ReplayCamera:
 
     @property
     def intrinsics(self) -> Mapping[str, Any] | None:
-        """Where the pixels of that camera look, if the recording says so."""
+        """Where the pixels of that camera look, if it was recorded."""
         return self._recording.header.camera.get("intrinsics")
 
     @property
     def state(self) -> CameraState:
-        """Where the replay stands."""
+        """The state of the replay."""
         return self._state
 
     @property
@@ -131,7 +130,7 @@ class ReplayCamera:
         return self._recording.header.applied
 
     def validate(self, sequence: Sequence) -> AppliedSequence:
-        """Return the sequence that was recorded, if it is the one asked for.
+        """Return the sequence that was recorded, if it is the requested one.
 
         Raises
         ------
@@ -139,11 +138,11 @@ class ReplayCamera:
             Naming the first field that differs.
         """
         applied = self.capabilities.apply(sequence)
-        recorded, wanted = self.applied.sequence.to_document(), applied.sequence.to_document()
+        recorded, requested = self.applied.sequence.to_document(), applied.sequence.to_document()
         for field, value in recorded.items():
-            if wanted[field] != value:
+            if requested[field] != value:
                 limit = f"{value!r}: the sequence of a recording cannot be changed"
-                raise SequenceError(field, wanted[field], limit)
+                raise SequenceError(field, requested[field], limit)
         return replace(applied, epoch=0)
 
     def configure(self, sequence: Sequence) -> AppliedSequence:
@@ -169,7 +168,7 @@ class ReplayCamera:
         self.stop()
 
     def status(self) -> Status:
-        """Describe the replay as a device describes itself.
+        """Return the status that a device would report.
 
         Raises
         ------
@@ -300,13 +299,13 @@ class ReplayCamera:
         return found
 
     def _advance(self, now_s: float) -> None:
-        """Go to the next frame, and say when it is due."""
+        """Move to the next frame and compute when it is due."""
         before_s = self.device_time_s()
         self._index += 1
         if self._index >= self._recording.frames and self._loop:
             self._index = 0
             self._round += 1
-        # by schedule, so that the rate is the original's; anew when nobody took them in time,
+        # by schedule, so that the rate is the original's; anew when they were not read in time,
         # or the device began to count anew
         between_s = max(0.0, self.device_time_s() - before_s) / self._speed
         late = now_s - self._due_s > between_s

@@ -1,7 +1,7 @@
 """Append-only HDF5 files that survive the death of their writer, and can be read meanwhile.
 
 HDF5 in its single-writer multiple-reader mode (SWMR) orders what it writes so that the file is
-consistent at any moment. What it asks for, measured (docs/decisions/0601): every dataset and
+consistent at any moment. What it requires, measured (docs/decisions/0601): every dataset and
 attribute exists before the mode is switched on, appended is along the first axis only, and the
 series whose length counts the rows is written last. The format is that of HDF5 1.10, never the
 newest one, which older readers refuse.
@@ -22,19 +22,18 @@ from numpy.typing import NDArray
 
 File: TypeAlias = Any
 """An open h5py.File."""
-
-
 Dataset: TypeAlias = Any
 """An h5py.Dataset."""
-
-
 open_file: Final[Callable[..., Any]] = h5py.File
-
+"""Opens a file; h5py has no types, so that files and datasets are `Any`."""
 
 LIBVER: Final = ("v110", "v110")
 _SERIES_CHUNK: Final = 1024
 _LEVEL: Final = 1
 _FSYNC_EVERY_S: Final = 1.0
+_SCALE_ATTRIBUTES: Final = frozenset(
+    ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid")
+)
 
 
 def compressed(block: NDArray[Any]) -> bytes:
@@ -63,7 +62,7 @@ def expanded(chunk: bytes, shape: Sequence[int], dtype: np.dtype[Any]) -> NDArra
 
 
 def in_words(error: Exception) -> str:
-    """Return what the system said; HDF5 tells with it where it was and at what address."""
+    """Return the system's message, without the place and the address that HDF5 adds."""
     if isinstance(error, OSError) and error.errno is not None:
         own = error.strerror or ""
         return os.strerror(error.errno) if "errno =" in own else own
@@ -114,7 +113,7 @@ class Appender:
         self._count = file[series[-1]]
         self.rows: int = self._count.shape[0]
         file.swmr_mode = True
-        # any descriptor of the file will do to bring it to the disk
+        # fsync takes any descriptor of the file
         self._descriptor = os.open(file.filename, os.O_RDONLY)
         self._synchronised_s: float | None = None
 
@@ -124,7 +123,7 @@ class Appender:
         Raises
         ------
         OSError
-            If the disk does not take it.
+            If it cannot be written.
         """
         row = self.rows
         for name, dataset in self._blocks.items():
@@ -139,7 +138,7 @@ class Appender:
         self.rows = row + 1
 
     def synchronise(self, now_s: float) -> None:
-        """Bring the file to the disk, if that was not done within the last second."""
+        """Flush the file to the disk, unless that was done within the last second."""
         if self._synchronised_s is None or now_s - self._synchronised_s >= _FSYNC_EVERY_S:
             os.fsync(self._descriptor)
             self._synchronised_s = now_s
@@ -164,7 +163,7 @@ class Appender:
 
 
 def salvage(source: File, target: Path, rows: int, *, row_axis: str) -> None:
-    """Copy what is consistent of an unfinished file into a new one that anything can open.
+    """Copy what is consistent of an unfinished file into a new one that any HDF5 reader opens.
 
     Chunks are copied as they are. ``row_axis`` is the series whose length counts the rows; every
     dataset that can grow is cut to ``rows``. Copying whole groups or repairing in place
@@ -197,11 +196,6 @@ def _copy_rows(dataset: Dataset, copy: File, rows: int) -> None:
         place = (row, *(0,) * (dataset.ndim - 1))
         mask, chunk = dataset.id.read_direct_chunk(place)
         blocks.id.write_direct_chunk(place, chunk, filter_mask=mask)
-
-
-_SCALE_ATTRIBUTES: Final = frozenset(
-    ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid")
-)
 
 
 def _copy_attributes(dataset: Dataset, copy: Dataset) -> None:

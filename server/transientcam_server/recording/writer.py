@@ -1,4 +1,4 @@
-"""Writes one recording: ``<file>.part`` while it grows, ``<file>`` once it is whole."""
+"""Writes one recording: ``<file>.part`` while it grows, ``<file>`` once it is finished."""
 
 import contextlib
 import os
@@ -59,7 +59,7 @@ class RecordingWriter:
         Raises
         ------
         OSError
-            If the disk does not take it; frames before are safe.
+            If it cannot be written; the frames before are safe.
         """
         row = layout.row(raw, dropped_frames=dropped_frames)
         self._rows.append({"raw": raw.images}, row)
@@ -91,19 +91,10 @@ class RecordingWriter:
         synchronise_directory(self.path.parent)
 
 
-def synchronise_directory(directory: Path) -> None:
-    """Bring the names in a directory to the disk."""
-    descriptor = os.open(directory, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
 def annotate(path: Path, annotations: Mapping[str, Any]) -> None:
-    """Replace the annotations, in place.
+    """Replace the annotations of a finished recording, in place.
 
-    HDF5 is not asked to: a file it has open for writing is lost if this process dies meanwhile.
+    HDF5 is not used: a file that it has open for writing is lost if this process dies meanwhile.
     The annotations have a fixed place and size, so that their bytes can be replaced without it;
     the worst is then that the annotations themselves are torn.
 
@@ -124,6 +115,15 @@ def annotate(path: Path, annotations: Mapping[str, Any]) -> None:
     descriptor = os.open(path, os.O_WRONLY)
     try:
         os.pwrite(descriptor, data.ljust(layout.ANNOTATIONS_BYTES, b"\0"), offset)
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def synchronise_directory(directory: Path) -> None:
+    """Bring the names in a directory to the disk."""
+    descriptor = os.open(directory, os.O_RDONLY)
+    try:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)

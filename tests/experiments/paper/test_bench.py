@@ -5,17 +5,19 @@ import pytest
 
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import Bench
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Shot
+from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, ReconstructedShot
 
 SEQUENCE = Sequence(harmonics=3, takes=20)
 
 
 @pytest.fixture(scope="module")
-def wall(bench: Bench) -> Shot:
+def wall(bench: Bench) -> ReconstructedShot:
     return bench.shot("wall", SEQUENCE)
 
 
-def test_the_device_has_a_pattern_that_the_calibration_removes(bench: Bench, wall: Shot) -> None:
+def test_the_device_has_a_pattern_that_the_calibration_removes(
+    bench: Bench, wall: ReconstructedShot
+) -> None:
     error_m = np.abs(wall.found.range_m - wall.truth.range_m)[wall.lit]
     gains = bench.calibration(wall.applied.sequence).gains.planes
 
@@ -32,7 +34,7 @@ def test_a_capture_is_made_once_and_a_calibration_once_for_all_takes(bench: Benc
     assert bench.calibration(SEQUENCE, options=WITHOUT_OUTLIERS) is not calibration
 
 
-def test_quick_means_few_takes(bench: Bench, wall: Shot) -> None:
+def test_quick_means_few_takes(bench: Bench, wall: ReconstructedShot) -> None:
     assert (bench.few(100, 3), Bench().few(100, 3)) == (3, 100)
     assert wall.applied.sequence.takes == 3
 

@@ -43,7 +43,7 @@ def test_the_papers_frequencies_are_the_papers() -> None:
     assert set(OURS) < set(PRINTED)
 
 
-def test_frequencies_are_told_in_a_few_words() -> None:
+def test_frequencies_are_named_in_a_few_words() -> None:
     assert Contender("sra", 23e6, 3).frequencies == "23, 46, 69"
     assert Contender("spumic", 11.5e6, 6).frequencies == "11.5, 23 .. 69"
 

@@ -83,11 +83,11 @@ def test_figure_11_says_which_rivals_are_better() -> None:
     errors = dict.fromkeys((each.name for each in CONTENDERS), 0.5)
     errors |= {"maximum-entropy": 0.02, "pisarenko": 0.03, "spumic": 0.01, "sra": 0.025}
 
-    told = figure11.ranked("Some case", errors)
+    text = figure11.ranked("Some case", errors)
 
-    assert "maximum entropy (0, 23 .. 69 MHz) with 2.00%" in told
-    assert "better: after Kirmani et al. 2013 (SPUMIC)" in told
-    assert "is beaten by: after Freedman et al. 2014 (SRA) (23, 46, 69 MHz) 2.50%" in told
+    assert "maximum entropy (0, 23 .. 69 MHz) with 2.00%" in text
+    assert "better: after Kirmani et al. 2013 (SPUMIC)" in text
+    assert "is beaten by: after Freedman et al. 2014 (SRA) (23, 46, 69 MHz) 2.50%" in text
 
 
 def test_figure_12_counts_missing_ranges_as_outliers_but_not_in_the_error() -> None:

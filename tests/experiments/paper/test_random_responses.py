@@ -42,10 +42,10 @@ def test_a_statement_that_fails_says_how_often_it_holds_elsewhere() -> None:
     dimmer, right = found(0.5), found(1.001)
     others = [(CONTINUOUS, right), (CONTINUOUS, right), (CONTINUOUS, right), (CONTINUOUS, dimmer)]
 
-    told = random_responses.statements(CONTINUOUS, right, right, others)
+    stated = random_responses.statements(CONTINUOUS, right, right, others)
 
-    assert len(told) == len(CLAIMS)
-    (bias,) = (each for each in told if "less overall brightness" in each.says)
+    assert len(stated) == len(CLAIMS)
+    (bias,) = (each for each in stated if "less overall brightness" in each.says)
     assert not bias.passes
     assert bias.value == pytest.approx(1.0, abs=0.01)
     assert bias.reason.endswith("it holds in 25%")

@@ -33,7 +33,7 @@ def test_frames_of_a_coded_light_are_deconvolved_into_the_mirrors_returns(tmp_pa
 
     lit = np.flatnonzero(shot.truth.brightness.ravel() > 0)
     chosen = np.random.default_rng(0).permutation(lit)[:PIXELS]
-    images = shot.frame.images.reshape((8, 4, -1))[:, :, chosen].astype(float)
+    images = shot.raw.images.reshape((8, 4, -1))[:, :, chosen].astype(float)
     # opposite phases: what is left are the code's odd harmonics, at 0 and 90 degrees
     samples = (images[:, :2] - images[:, 2:]).reshape((16, PIXELS))
     odd = np.where(np.arange(1, HIGHEST + 1) % 2, contents, 0)

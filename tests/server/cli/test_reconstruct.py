@@ -9,7 +9,7 @@ import pytest
 
 from transientcam.cli import run
 from transientcam_moments import kernels
-from transientcam_server.offline.measurement import Reconstruction
+from transientcam_server.offline import TransientCube
 
 F_HZ = 23e6
 
@@ -34,7 +34,7 @@ def test_a_measurement_becomes_a_file_of_everything(
 
     assert code == 0
     with np.load(out) as file:
-        assert set(file) == set(Reconstruction.__slots__)
+        assert set(file) == set(TransientCube.__slots__)
         assert file["density"].shape == (40, 6, 5)
         np.testing.assert_allclose(file["range_m"], 299_792_458.0 * 10e-9 / 2.0, rtol=1e-8)
         np.testing.assert_allclose(file["direct"], 2.0, rtol=1e-8)
@@ -55,7 +55,7 @@ def test_a_picture_is_drawn_where_one_is_asked_for(measurement: Path, tmp_path: 
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_flagged_pixels_are_told(
+def test_flagged_pixels_are_counted(
     measurement: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with np.load(measurement) as file:
@@ -132,7 +132,7 @@ def test_an_output_that_cannot_be_written_is_named_and_leaves_no_part(
     assert [each.name for each in tmp_path.iterdir()] == ["in.npz"]
 
 
-def test_compiling_tells_what_is_ready(
+def test_compiling_reports_what_is_ready(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     asked: list[Any] = []

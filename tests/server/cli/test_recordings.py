@@ -88,9 +88,9 @@ def test_replay_serves_a_recording(tmp_path: Path) -> None:
     ) as daemon:
         assert daemon.stdout is not None
         try:
-            told = json.loads(daemon.stdout.readline())
-            assert told["pid"] == daemon.pid
-            url = told["url"]
+            announced = json.loads(daemon.stdout.readline())
+            assert announced["pid"] == daemon.pid
+            url = announced["url"]
             answer = httpx.get(f"{url}/api/v1/frames/latest", params={"wait_s": 10}, timeout=30)
             assert answer.json()["width"] == 16
         finally:

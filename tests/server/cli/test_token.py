@@ -49,7 +49,7 @@ def test_a_token_has_the_role_and_the_end_asked_for(
     assert "sha256" not in document
 
 
-def test_a_list_tells_everything_but_the_tokens(
+def test_a_list_shows_everything_but_the_tokens(
     capsys: pytest.CaptureFixture[str], file: TokenFile
 ) -> None:
     made = [create(capsys, "a"), create(capsys, "[b]", "--days", "0")]

@@ -16,7 +16,8 @@ import httpx
 import pytest
 
 from tests.server.daemon.test_server import environment
-from transientcam_server.camera.acquisition import Acquisition, AcquisitionStatus, State
+from transientcam_server.camera import Acquisition, AcquisitionStatus
+from transientcam_server.camera.status import State
 from transientcam_server.daemon.systemd import ServiceManager, status_line, supervised
 
 PATIENCE_S = 60.0

@@ -13,10 +13,10 @@ from tests.serving import serving
 from transientcam import Camera
 from transientcam_driver import AppliedSequence, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_experiments.tradeoff.capture import Shot, capture
+from transientcam_experiments.tradeoff.capture import FrameWithTruth, capture
 from transientcam_moments.comparisons import sra_table
 from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.planning.timing import ComputingTime
+from transientcam_server.planning.timing import ReconstructionTimer
 from transientcam_server.settings import Estimator, ReconstructionSettings
 
 PATH = "/api/v1/reconstruction"
@@ -29,18 +29,19 @@ def test_the_daemon_offers_the_techniques_that_compute_all_pixels_at_once() -> N
         if technique.planar and technique.measures == "moments"
     }
 
-    assert set(get_args(Estimator)) == planar
-    assert get_args(Estimator)[:3] == ("pisarenko", "maximum-entropy", "single-frequency")
+    offered = ReconstructionSettings.model_json_schema()["properties"]["estimator"]["enum"]
+    assert set(offered) == planar
+    assert offered[:3] == ["pisarenko", "maximum-entropy", "single-frequency"]
 
 
 @cache
-def captured(m: int) -> tuple[AppliedSequence, Shot]:
+def captured(m: int) -> tuple[AppliedSequence, FrameWithTruth]:
     """A frame of a corner, which indirect light makes continuous."""
     base_frequency_hz = 23e6 if m < 5 else 11.5e6
     with open_camera("sim:corner?noise=off", clock=VirtualClock()) as camera:
         applied = camera.configure(Sequence(harmonics=m, base_frequency_hz=base_frequency_hz))
-        (shot,) = capture(camera, 1)
-    return applied, shot
+        (frame,) = capture(camera, 1)
+    return applied, frame
 
 
 @pytest.fixture(autouse=True)
@@ -52,12 +53,12 @@ def coarse_table(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("estimator", get_args(Estimator))
 def test_every_estimator_gives_range_and_light_of_captured_frames(estimator: Estimator) -> None:
     settings = ReconstructionSettings(estimator=estimator)
-    applied, shot = captured(max(3, settings.least_harmonics))
+    applied, frame = captured(max(3, settings.least_harmonics))
     recipe = Recipe(applied, settings, 4095.0)
 
-    found = recipe.reconstruct(shot.frame)
+    found = recipe.reconstruct(frame.raw)
 
-    truth_m = shot.truth.range_m
+    truth_m = frame.truth.range_m
     assert found.range_m.shape == truth_m.shape
     seen = np.isfinite(found.range_m) & np.isfinite(truth_m)
     assert seen.mean() > 0.5
@@ -128,7 +129,7 @@ def test_a_daemon_that_starts_with_too_few_harmonics_says_so_with_the_range_alon
 def test_computing_time_is_that_of_sequences_which_the_estimator_takes() -> None:
     settings = ReconstructionSettings(estimator="spumic")
     with open_camera("sim:mirrors", clock=VirtualClock()) as camera:
-        seconds = ComputingTime(camera.capabilities, settings)
+        seconds = ReconstructionTimer(camera.capabilities, settings)
 
         once, often = (seconds(Sequence(harmonics=6, takes=takes)) for takes in (1, 20))
 

@@ -13,7 +13,7 @@ from zarr.core.sync import cleanup_resources
 
 from tests.server.recording.made import APPLIED, frame, record
 from transientcam_server.errors.exceptions import DamagedFrame, MissingExtra, NotConvertible
-from transientcam_server.offline.convert import convert
+from transientcam_server.offline import convert_recording
 from transientcam_server.recording import Recording
 
 FRAMES = 3
@@ -34,7 +34,7 @@ def source(tmp_path: Path) -> Path:
 def test_npz_has_images_labels_and_documents(source: Path, tmp_path: Path) -> None:
     done: list[tuple[int, int]] = []
     with Recording(source) as recording:
-        convert(recording, tmp_path / "a.npz", progress=lambda *each: done.append(each))
+        convert_recording(recording, tmp_path / "a.npz", progress=lambda *each: done.append(each))
 
     with np.load(tmp_path / "a.npz") as archive:
         for number in range(FRAMES):
@@ -47,7 +47,7 @@ def test_npz_has_images_labels_and_documents(source: Path, tmp_path: Path) -> No
 
 def test_netcdf_opens_in_xarray(source: Path, tmp_path: Path) -> None:
     with Recording(source) as recording:
-        convert(recording, tmp_path / "a.nc")
+        convert_recording(recording, tmp_path / "a.nc")
 
     with xarray.open_dataset(tmp_path / "a.nc", engine="h5netcdf") as dataset:
         assert dataset["raw"].dims == ("frame", "image", "y", "x")
@@ -58,7 +58,7 @@ def test_netcdf_opens_in_xarray(source: Path, tmp_path: Path) -> None:
 
 def test_zarr_opens_in_zarr_and_xarray(source: Path, tmp_path: Path) -> None:
     with Recording(source) as recording:
-        convert(recording, tmp_path / "a.zarr")
+        convert_recording(recording, tmp_path / "a.zarr")
 
     group = zarr.open_group(tmp_path / "a.zarr", mode="r")
     raw = group["raw"]
@@ -71,7 +71,7 @@ def test_zarr_opens_in_zarr_and_xarray(source: Path, tmp_path: Path) -> None:
 
 def test_mcap_has_an_image_a_topic_with_its_label_and_time(source: Path, tmp_path: Path) -> None:
     with Recording(source) as recording:
-        convert(recording, tmp_path / "a.mcap")
+        convert_recording(recording, tmp_path / "a.mcap")
         host_time_s = recording.series("host_time_s")
 
     with (tmp_path / "a.mcap").open("rb") as stream:
@@ -96,7 +96,7 @@ def test_another_suffix_is_refused_with_those_there_are(source: Path, tmp_path: 
         Recording(source) as recording,
         pytest.raises(NotConvertible, match=r"a\.mat: .* \.mcap, \.nc, \.npz, \.zarr"),
     ):
-        convert(recording, tmp_path / "a.mat")
+        convert_recording(recording, tmp_path / "a.mat")
 
 
 def test_a_missing_library_is_named_with_its_extra(
@@ -107,7 +107,7 @@ def test_a_missing_library_is_named_with_its_extra(
         Recording(source) as recording,
         pytest.raises(MissingExtra, match=r"transientcam\[convert\]"),
     ):
-        convert(recording, tmp_path / "a.zarr")
+        convert_recording(recording, tmp_path / "a.zarr")
 
 
 def test_nothing_is_left_of_a_conversion_that_failed(source: Path, tmp_path: Path) -> None:
@@ -115,7 +115,7 @@ def test_nothing_is_left_of_a_conversion_that_failed(source: Path, tmp_path: Pat
         file["crc32"][1] ^= 1
     for suffix in ("npz", "nc", "zarr"):
         with Recording(source) as recording, pytest.raises(DamagedFrame):
-            convert(recording, tmp_path / f"b.{suffix}")
+            convert_recording(recording, tmp_path / f"b.{suffix}")
 
     assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
 
@@ -123,4 +123,4 @@ def test_nothing_is_left_of_a_conversion_that_failed(source: Path, tmp_path: Pat
 def test_what_is_there_is_not_replaced(source: Path, tmp_path: Path) -> None:
     (tmp_path / "a.npz").write_text("mine")
     with Recording(source) as recording, pytest.raises(FileExistsError):
-        convert(recording, tmp_path / "a.npz")
+        convert_recording(recording, tmp_path / "a.npz")

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from transientcam_server.errors.exceptions import InputError
 from transientcam_server.offline.measurement import (
     Measurement,
-    Reconstruction,
-    load,
+    TransientCube,
+    load_measurement,
     moments_of,
-    reconstruct,
-    save,
+    reconstruct_measurement,
+    save_cube,
 )
 from transientcam_server.settings import ReconstructionSettings
 
@@ -64,7 +64,7 @@ def test_returns_range_and_density_match_closed_form_and_dense_solve() -> None:
     delays_s, weights = [11.3e-9, 19.3e-9, 26.7e-9], [5.0, 3.0, 2.0]
     b = moments_of_returns(delays_s, weights, uniform=0.5, harmonics=3)
 
-    result = reconstruct(Measurement(b, F_HZ), bins=200, settings=PLAIN)
+    result = reconstruct_measurement(Measurement(b, F_HZ), bins=200, settings=PLAIN)
 
     np.testing.assert_allclose(result.range_m, LIGHT_M_S * delays_s[0] / 2.0, rtol=1e-9)
     np.testing.assert_allclose(result.direct, 5.0, rtol=1e-8)
@@ -79,7 +79,7 @@ def test_returns_range_and_density_match_closed_form_and_dense_solve() -> None:
 def test_the_cumulative_density_is_the_integral_of_the_density() -> None:
     b = moments_of_returns([8e-9, 20e-9], [2.0, 1.0], uniform=1.0, harmonics=4)
 
-    result = reconstruct(Measurement(b, F_HZ), bins=20_000, settings=PLAIN)
+    result = reconstruct_measurement(Measurement(b, F_HZ), bins=20_000, settings=PLAIN)
 
     step_s = result.time_s[1]
     h = result.density[:, 0, 0]
@@ -89,10 +89,10 @@ def test_the_cumulative_density_is_the_integral_of_the_density() -> None:
 
 def test_one_broken_pixel_is_flagged_and_leaves_the_others_as_they_are() -> None:
     b = np.tile(moments_of_returns([8e-9], [2.0], uniform=0.2, harmonics=3), (1, 4, 5))
-    healthy = reconstruct(Measurement(b, F_HZ), bins=16, settings=PLAIN)
+    healthy = reconstruct_measurement(Measurement(b, F_HZ), bins=16, settings=PLAIN)
     b[2, 1, 3] = np.nan
 
-    result = reconstruct(Measurement(b, F_HZ), bins=16, settings=PLAIN)
+    result = reconstruct_measurement(Measurement(b, F_HZ), bins=16, settings=PLAIN)
 
     others = np.ones((4, 5), dtype=bool)
     others[1, 3] = False
@@ -105,23 +105,23 @@ def test_one_broken_pixel_is_flagged_and_leaves_the_others_as_they_are() -> None
 
 def test_progress_counts_every_pixel_once() -> None:
     b = np.tile(moments_of_returns([8e-9], [2.0], uniform=0.2, harmonics=2), (1, 70, 90))
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
 
-    reconstruct(
-        Measurement(b, F_HZ), bins=512, settings=PLAIN, progress=lambda *each: told.append(each)
+    reconstruct_measurement(
+        Measurement(b, F_HZ), bins=512, settings=PLAIN, progress=lambda *each: reported.append(each)
     )
 
-    done = [each[0] for each in told]
+    done = [each[0] for each in reported]
     assert len(done) > 1
     assert done == sorted(set(done))
-    assert told[-1] == (6300, 6300)
+    assert reported[-1] == (6300, 6300)
 
 
 def test_moments_in_a_file_keep_their_frequency_and_may_lose_harmonics(tmp_path: Path) -> None:
     b = moments_of_returns([8e-9], [2.0], uniform=0.2, harmonics=5)
     file = written(tmp_path / "a.npz", moments=b, base_frequency_hz=F_HZ)
 
-    measurement = load(file, harmonics=3)
+    measurement = load_measurement(file, harmonics=3)
 
     assert measurement.base_frequency_hz == F_HZ
     assert measurement.harmonics == 3
@@ -131,7 +131,7 @@ def test_moments_in_a_file_keep_their_frequency_and_may_lose_harmonics(tmp_path:
 def test_moments_of_a_single_pixel_are_an_image_of_one(tmp_path: Path) -> None:
     file = written(tmp_path / "a.npz", moments=np.ones(4) + 0j, base_frequency_hz=F_HZ)
 
-    assert load(file).moments.shape == (4, 1, 1)
+    assert load_measurement(file).moments.shape == (4, 1, 1)
 
 
 def test_a_cube_is_read_along_its_optical_path_length(tmp_path: Path) -> None:
@@ -139,7 +139,7 @@ def test_a_cube_is_read_along_its_optical_path_length(tmp_path: Path) -> None:
     h[1, 2, 10] = 4.0
     file = written(tmp_path / "a.npz", h=h, start_opl_m=1.5, bin_opl_m=0.05)
 
-    b = load(file, frequency_hz=F_HZ, harmonics=3).moments
+    b = load_measurement(file, frequency_hz=F_HZ, harmonics=3).moments
 
     delay_s = (1.5 + 10 * 0.05) / LIGHT_M_S
     expected = moments_of_returns([delay_s], [4.0], uniform=0.0, harmonics=3)
@@ -152,7 +152,7 @@ def test_counts_of_many_pixels_are_an_image(tmp_path: Path) -> None:
     meas[1, 2, 7] = 5
     file = written(tmp_path / "a.npz", meas=meas, bin_s=16e-12)
 
-    b = load(file, frequency_hz=F_HZ, harmonics=2).moments
+    b = load_measurement(file, frequency_hz=F_HZ, harmonics=2).moments
 
     expected = moments_of_returns([7 * 16e-12], [5.0], uniform=0.0, harmonics=2)
     np.testing.assert_allclose(b[:, 1, 2], expected[:, 0, 0], rtol=1e-9)
@@ -163,8 +163,8 @@ def test_the_background_of_photon_counts_is_removed_where_that_is_wanted(tmp_pat
     counts[100] = 107
     file = written(tmp_path / "a.npz", counts=counts, bin_s=8e-12)
 
-    without = load(file, background="median").moments[0, 0, 0]
-    with_ = load(file).moments[0, 0, 0]
+    without = load_measurement(file, background="median").moments[0, 0, 0]
+    with_ = load_measurement(file).moments[0, 0, 0]
 
     assert without == pytest.approx(100.0)
     assert with_ == pytest.approx(7100.0)
@@ -206,7 +206,7 @@ def test_a_file_that_cannot_be_used_names_itself_and_the_key(
     file = written(tmp_path / "bad.npz", **arrays)
 
     with pytest.raises(InputError) as caught:
-        load(file)
+        load_measurement(file)
 
     assert caught.value.key == key
     assert str(file) in str(caught.value)
@@ -218,14 +218,14 @@ def test_a_file_that_is_no_npz_is_named(tmp_path: Path, content: bytes) -> None:
     file.write_bytes(content)
 
     with pytest.raises(InputError, match=r"bad\.npz"):
-        load(file)
+        load_measurement(file)
 
 
 def test_a_file_with_pickled_objects_is_refused_unread(tmp_path: Path) -> None:
     file = written(tmp_path / "bad.npz", moments=np.array([{"a": 1}], dtype=object))
 
     with pytest.raises(InputError, match="content"):
-        load(file)
+        load_measurement(file)
 
 
 def test_a_single_array_is_refused(tmp_path: Path) -> None:
@@ -233,7 +233,7 @@ def test_a_single_array_is_refused(tmp_path: Path) -> None:
     np.save(file, np.ones(3))
 
     with pytest.raises(InputError, match="single array"):
-        load(file)
+        load_measurement(file)
 
 
 @pytest.mark.parametrize(
@@ -250,7 +250,7 @@ def test_moments_cannot_be_had_at_another_frequency_or_with_more_harmonics(
     file = written(tmp_path / "a.npz", **GOOD)
 
     with pytest.raises(InputError, match=name):
-        load(file, **options)
+        load_measurement(file, **options)
 
 
 @pytest.mark.parametrize(
@@ -267,18 +267,18 @@ def test_impulse_responses_are_measured_only_with_modulations_that_exist(
     file = written(tmp_path / "a.npz", counts=np.ones(9), bin_s=1e-9)
 
     with pytest.raises(InputError, match=name):
-        load(file, **options)
+        load_measurement(file, **options)
 
 
 def test_what_is_saved_is_complete_and_leaves_no_part_behind(tmp_path: Path) -> None:
     b = np.tile(moments_of_returns([8e-9], [2.0], uniform=0.2, harmonics=3), (1, 2, 3))
-    result = reconstruct(Measurement(b, F_HZ), bins=10, settings=PLAIN)
+    result = reconstruct_measurement(Measurement(b, F_HZ), bins=10, settings=PLAIN)
 
-    save(tmp_path / "out.npz", result)
+    save_cube(tmp_path / "out.npz", result)
 
     assert [each.name for each in tmp_path.iterdir()] == ["out.npz"]
     with np.load(tmp_path / "out.npz") as file:
-        assert set(file) == set(Reconstruction.__slots__)
+        assert set(file) == set(TransientCube.__slots__)
         assert file["density"].shape == file["cumulative"].shape == (10, 2, 3)
         assert file["time_s"].shape == (10,)
         for name in ("range_m", "direct", "indirect", "uniform", "flags"):
@@ -310,14 +310,14 @@ def composite(data_dir: Path) -> tuple[NDArray[np.float64], float]:
 @pytest.mark.parametrize(
     ("harmonics", "peaks_ns"), [(3, (3.18, 9.73, 22.22)), (4, (3.07, 9.31, 21.68))]
 )
-def test_three_measured_responses_are_told_apart_where_the_reference_says(
+def test_three_measured_responses_are_resolved_where_the_reference_says(
     data_dir: Path, tmp_path: Path, harmonics: int, peaks_ns: tuple[float, ...]
 ) -> None:
     counts, bin_s = composite(data_dir)
     file = written(tmp_path / "composite.npz", counts=counts, bin_s=bin_s)
-    measurement = load(file, frequency_hz=F_HZ, harmonics=harmonics)
+    measurement = load_measurement(file, frequency_hz=F_HZ, harmonics=harmonics)
 
-    result = reconstruct(measurement, bins=8192, settings=PLAIN)
+    result = reconstruct_measurement(measurement, bins=8192, settings=PLAIN)
 
     h = result.density[:, 0, 0]
     peaks = np.flatnonzero((h[1:-1] > h[:-2]) & (h[1:-1] > h[2:])) + 1
@@ -334,7 +334,9 @@ def test_a_rendered_box_is_as_deep_as_its_first_light_says(data_dir: Path) -> No
     lit = light > 0.1 * np.median(light[light > 0.0])
     first = np.argmax(h > 0.2 * h.max(axis=-1, keepdims=True), axis=-1)
 
-    result = reconstruct(load(file, frequency_hz=F_HZ, harmonics=8), bins=8, settings=PLAIN)
+    result = reconstruct_measurement(
+        load_measurement(file, frequency_hz=F_HZ, harmonics=8), bins=8, settings=PLAIN
+    )
 
     error_m = np.abs(result.range_m - (start_m + first * bin_m) / 2.0)[lit]
     assert lit.sum() > 10_000

@@ -6,8 +6,7 @@ import pytest
 from PIL import Image
 
 from transientcam_server.errors.exceptions import MissingExtra
-from transientcam_server.offline import plot
-from transientcam_server.offline.measurement import Measurement, reconstruct
+from transientcam_server.offline import Measurement, plot, reconstruct_measurement
 from transientcam_server.settings import ReconstructionSettings
 
 
@@ -20,7 +19,7 @@ def test_a_picture_is_drawn_of_one_pixel_and_of_many(
     b = np.stack([np.exp(1j * j * delay_rad) for j in range(4)])
     b[0] += 0.3
     b[:, 0, 0] *= 0.0 if shape != (1, 1) else 1.0  # a pixel without light is no obstacle
-    result = reconstruct(
+    result = reconstruct_measurement(
         Measurement(b, 23e6), bins=32, settings=ReconstructionSettings(smoothing_px=0.0)
     )
 

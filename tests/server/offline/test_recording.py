@@ -11,7 +11,8 @@ from transientcam_server.errors.exceptions import InputError
 from transientcam_server.imaging.products import PRODUCTS
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.imaging.view import EVERYTHING
-from transientcam_server.offline.recording import DEFAULT_PRODUCTS, Wanted, reconstruct
+from transientcam_server.offline import BatchOptions, reconstruct_recording
+from transientcam_server.offline.recording import DEFAULT_PRODUCTS
 from transientcam_server.recording import Header, Recording, RecordingWriter
 from transientcam_server.settings import ReconstructionSettings
 
@@ -35,7 +36,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_products_are_those_the_service_computes(path: Path, tmp_path: Path) -> None:
     output = tmp_path / "products.h5"
     with Recording(path) as recording:
-        assert reconstruct(recording, output, Wanted()) == 0
+        assert reconstruct_recording(recording, output, BatchOptions()) == 0
         raw = recording.frame(2)
         recipe = Recipe(recording.header.applied, ReconstructionSettings(), 4095.0)
 
@@ -52,7 +53,9 @@ def test_products_are_those_the_service_computes(path: Path, tmp_path: Path) -> 
 
 def test_a_transient_has_the_times_of_flight_asked_for(path: Path, tmp_path: Path) -> None:
     with Recording(path) as recording:
-        reconstruct(recording, tmp_path / "t.h5", Wanted(products=("transient",), bins=8))
+        reconstruct_recording(
+            recording, tmp_path / "t.h5", BatchOptions(products=("transient",), bins=8)
+        )
         base_frequency_hz = recording.header.applied.sequence.base_frequency_hz
 
     with h5py.File(tmp_path / "t.h5") as file:
@@ -71,11 +74,11 @@ def test_an_interrupted_run_is_gone_on_with_and_ends_the_same(path: Path, tmp_pa
 
     whole, resumed = tmp_path / "whole.h5", tmp_path / "resumed.h5"
     with Recording(path) as recording:
-        reconstruct(recording, whole, Wanted())
+        reconstruct_recording(recording, whole, BatchOptions())
         with pytest.raises(Interruption):
-            reconstruct(recording, resumed, Wanted(), progress=interrupt)
+            reconstruct_recording(recording, resumed, BatchOptions(), progress=interrupt)
         assert not resumed.exists()
-        assert reconstruct(recording, resumed, Wanted()) == 2
+        assert reconstruct_recording(recording, resumed, BatchOptions()) == 2
 
     assert sorted(each.name for each in tmp_path.iterdir()) == ["resumed.h5", "whole.h5"]
     with h5py.File(whole) as one, h5py.File(resumed) as other:
@@ -92,13 +95,13 @@ def test_what_was_begun_otherwise_is_not_gone_on_with(path: Path, tmp_path: Path
 
     with Recording(path) as recording:
         with pytest.raises(KeyboardInterrupt):
-            reconstruct(recording, output, Wanted(), progress=interrupt)
-        other = Wanted(settings=ReconstructionSettings(bias=0.01))
+            reconstruct_recording(recording, output, BatchOptions(), progress=interrupt)
+        other = BatchOptions(settings=ReconstructionSettings(bias=0.01))
         with pytest.raises(InputError, match=r"reconstruction is .*0\.004.*0\.01"):
-            reconstruct(recording, output, other)
-        reconstruct(recording, output, Wanted())
+            reconstruct_recording(recording, output, other)
+        reconstruct_recording(recording, output, BatchOptions())
         with pytest.raises(FileExistsError):
-            reconstruct(recording, output, Wanted())
+            reconstruct_recording(recording, output, BatchOptions())
 
 
 def test_the_calibration_that_was_recorded_is_used(path: Path, tmp_path: Path) -> None:
@@ -123,7 +126,7 @@ def test_the_calibration_that_was_recorded_is_used(path: Path, tmp_path: Path) -
     writer.append(frames[0])
     writer.close({})
     with Recording(calibrated) as recording:
-        reconstruct(recording, tmp_path / "out.h5", Wanted(products=("moments",)))
+        reconstruct_recording(recording, tmp_path / "out.h5", BatchOptions(products=("moments",)))
 
     settings = ReconstructionSettings().for_moments(
         base_frequency_hz=header.applied.sequence.base_frequency_hz,

@@ -14,16 +14,17 @@ import transientcam_moments as tm
 from transientcam_driver import Camera, Capabilities, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.capture import repeatability
-from transientcam_server import planning
 from transientcam_server.camera.source import noise_of
 from transientcam_server.cli import plan as plan_verb
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.planning import Goal, plan
-from transientcam_server.planning import scene as scene_statistic
-from transientcam_server.planning.planner import Planner
-from transientcam_server.planning.prediction import Deviation, Predictor, both_found
-from transientcam_server.planning.timing import ComputingTime
+from transientcam_server.planning import Choice, Goal, Plan, Planner, Predictor, uniform_scene
+from transientcam_server.planning.candidates import candidates
+from transientcam_server.planning.choice import choices_on_front
+from transientcam_server.planning.plan import plan
+from transientcam_server.planning.prediction import Deviation, both_found
+from transientcam_server.planning.scene import scene_of_frame
+from transientcam_server.planning.timing import ReconstructionTimer
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
 Array = NDArray[Any]
@@ -51,7 +52,7 @@ class ClosedForm:
     least_harmonics = 1
 
     def __init__(self, *, far_m: float = 2.0) -> None:
-        self.scene = scene_statistic.given(1e6, [(far_m, 1.0)])
+        self.scene = uniform_scene(1e6, [(far_m, 1.0)])
 
     def longest_exposure_s(self) -> float:
         return 0.004
@@ -78,14 +79,14 @@ class ClosedForm:
         return 1.0 - float(0.5 ** (sequence.harmonics * distance_m))
 
 
-def planned(goal: Goal, capabilities: Capabilities, *, seconds: float = 1e-3) -> planning.Plan:
+def planned(goal: Goal, capabilities: Capabilities, *, seconds: float = 1e-3) -> Plan:
     predictor = cast(Predictor, ClosedForm())
     return plan(goal, predictor, capabilities, reconstruct_s=lambda _: seconds)
 
 
-def everything(goal: Goal, capabilities: Capabilities) -> list[planning.Choice]:
+def everything(goal: Goal, capabilities: Capabilities) -> list[Choice]:
     predictor = cast(Predictor, ClosedForm())
-    return planning.candidates(goal, predictor, capabilities, reconstruct_s=lambda _: 1e-3)
+    return candidates(goal, predictor, capabilities, reconstruct_s=lambda _: 1e-3)
 
 
 def test_a_target_gets_the_quickest_sequence_that_reaches_it(capabilities: Capabilities) -> None:
@@ -122,7 +123,7 @@ def test_neighbours_take_half_the_time_and_have_half_the_error(capabilities: Cap
     assert document["half_time"]["error_factor"] > 1.0
     assert document["twice_accuracy"]["error_factor"] <= 0.5
     assert document["twice_accuracy"]["time_factor"] > 1.0
-    on_front = planning.choices_on_front(everything(Goal(capture_s=0.5), capabilities))
+    on_front = choices_on_front(everything(Goal(capture_s=0.5), capabilities))
     assert made.half_time in on_front
     assert made.twice_accuracy.applied.capture_s in [each.applied.capture_s for each in on_front]
 
@@ -151,7 +152,7 @@ def test_too_few_harmonics_for_the_scene_are_not_recommended(capabilities: Capab
     assert chosen.harmonics >= 3
 
 
-def test_harmonics_that_are_fixed_are_taken_and_their_bias_is_told(
+def test_harmonics_that_are_fixed_are_kept_and_their_bias_is_reported(
     capabilities: Capabilities,
 ) -> None:
     goal = Goal(range_std_m=0.05, base=Sequence(harmonics=2), fixed=frozenset({"harmonics"}))
@@ -177,7 +178,7 @@ def test_bounds_and_separation_are_targets_too(capabilities: Capabilities) -> No
 def test_no_exposure_saturates_and_no_range_is_ambiguous(capabilities: Capabilities) -> None:
     choices = everything(Goal(capture_s=1.0), capabilities)
     far = cast(Predictor, ClosedForm(far_m=9.0))
-    wide = planning.candidates(Goal(capture_s=1.0), far, capabilities, reconstruct_s=lambda _: 1e-3)
+    wide = candidates(Goal(capture_s=1.0), far, capabilities, reconstruct_s=lambda _: 1e-3)
 
     assert max(choice.applied.sequence.exposure_s for choice in choices) <= 0.9 * 0.004 + 1e-9
     assert {choice.applied.sequence.base_frequency_hz for choice in wide} == {11.5e6}
@@ -211,7 +212,7 @@ def test_what_is_out_of_reach_is_refused_with_the_best_there_is(
         assert best["capture_s"] <= 0.06  # the best that the budget allows
 
 
-def test_the_best_that_is_told_can_be_asked_for(capabilities: Capabilities) -> None:
+def test_the_best_that_is_reported_can_be_reached(capabilities: Capabilities) -> None:
     with pytest.raises(Problem) as refusal:
         planned(Goal(range_std_m=1e-9), capabilities)
 
@@ -235,7 +236,7 @@ def test_a_goal_that_cannot_be_meant_is_refused(goal: Goal, capabilities: Capabi
 
 
 def test_a_given_scene_has_the_moments_of_its_returns() -> None:
-    scene = scene_statistic.given(1e6, [(1.5, 3.0), (3.0, 1.0)])
+    scene = uniform_scene(1e6, [(1.5, 3.0), (3.0, 1.0)])
     period_m = tm.SPEED_OF_LIGHT_M_S / (2 * FREQUENCY_HZ)
 
     b = scene.relative_moments(2, FREQUENCY_HZ)
@@ -256,7 +257,7 @@ def test_the_scene_of_a_frame_is_what_its_moments_hold() -> None:
     found = tm.reconstruct(frame, SETTINGS.for_moments(base_frequency_hz=FREQUENCY_HZ))
     noise = tm.noise.MomentNoise(np.full((4, 12, 10), 4.0))
 
-    scene = scene_statistic.of_frame(found, noise, exposure_s=0.001, base_frequency_hz=FREQUENCY_HZ)
+    scene = scene_of_frame(found, noise, exposure_s=0.001, base_frequency_hz=FREQUENCY_HZ)
 
     assert scene is not None
     np.testing.assert_allclose(scene.brightness_dn_per_s, 910e3, rtol=1e-4)
@@ -275,10 +276,7 @@ def test_a_dark_frame_is_no_scene() -> None:
 
     noise = tm.noise.MomentNoise(np.ones((3, 5, 5)))
 
-    assert (
-        scene_statistic.of_frame(found, noise, exposure_s=0.001, base_frequency_hz=FREQUENCY_HZ)
-        is None
-    )
+    assert scene_of_frame(found, noise, exposure_s=0.001, base_frequency_hz=FREQUENCY_HZ) is None
 
 
 # -- prediction ---------------------------------------------------------------------------------
@@ -286,7 +284,7 @@ def test_a_dark_frame_is_no_scene() -> None:
 
 def test_deviation_of_one_return_at_one_frequency_is_the_closed_form() -> None:
     sensor = tm.noise.Sensor()
-    predictor = Predictor(scene_statistic.given(4e5, [(2.0, 1.0)]), sensor, SETTINGS)
+    predictor = Predictor(uniform_scene(4e5, [(2.0, 1.0)]), sensor, SETTINGS)
     sequence = Sequence(harmonics=1, exposure_s=0.001, takes=2, zeroth="estimated")
 
     predicted = predictor.range_std(sequence)
@@ -324,7 +322,7 @@ def predictor(camera: Camera) -> Predictor:
     planner = Planner(camera.capabilities, noise, SETTINGS)
     (found,) = captured(camera, sequence, 1)
     recipe = Recipe(camera.applied, SETTINGS, 4095.0)
-    return Predictor(planner.statistic(recipe, found, 0.0), noise.sensor, SETTINGS)
+    return Predictor(planner.scene_statistics(recipe, found, 0.0), noise.sensor, SETTINGS)
 
 
 PINNED = frozenset({"base_frequency_hz"})
@@ -381,7 +379,7 @@ def test_frames_say_their_own_deviation(camera: Camera) -> None:
 def test_computing_time_is_measured_once_and_grows_with_takes(capabilities: Capabilities) -> None:
     ticks = iter(range(10_000))
     small = dataclasses.replace(capabilities, width=8, height=6)
-    seconds = ComputingTime(small, SETTINGS, clock=lambda: float(next(ticks)))
+    seconds = ReconstructionTimer(small, SETTINGS, clock=lambda: float(next(ticks)))
 
     first = seconds(Sequence(harmonics=3))
     used = next(ticks)
@@ -411,7 +409,7 @@ def test_the_command_prints_a_plan_as_json(capsys: pytest.CaptureFixture[str]) -
     assert said["predicted"]["range_std_m"]["median"] <= 0.01
 
 
-def test_the_command_tells_a_plan_in_words(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_a_plan_in_words(capsys: pytest.CaptureFixture[str]) -> None:
     plan_verb.plan(**NEARBY, capture_s=0.1, separation_m=1.0, bound_width=9.0)
 
     first, *words = capsys.readouterr().out.splitlines()

@@ -46,7 +46,7 @@ def test_what_others_deleted_is_forgotten(library: Library, tmp_path: Path) -> N
 
 
 class Busy(frozenset[str]):
-    """Ids; whoever looks for one is interrupted by somebody who describes another file."""
+    """Ids; a look-up is interrupted by another thread that describes another file."""
 
     descriptions: Descriptions
     others: list[Path]

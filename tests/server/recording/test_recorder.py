@@ -139,10 +139,10 @@ def test_one_that_is_stopped_before_its_past_is_known_ends(start: Start, tmp_pat
 
 
 def test_a_slow_disk_costs_frames_and_never_the_camera(start: Start, tmp_path: Path) -> None:
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
     writer = GatedWriter(tmp_path / "a.h5", header())
     recorder = start(
-        writer, queue_frames=3, on_dropped=lambda count, total: told.append((count, total))
+        writer, queue_frames=3, on_dropped=lambda count, total: reported.append((count, total))
     )
     recorder.offer(frame(0), APPLIED)
     assert writer.waiting.wait(PATIENCE_S)
@@ -160,8 +160,8 @@ def test_a_slow_disk_costs_frames_and_never_the_camera(start: Start, tmp_path: P
         assert recording.series("frame").tolist() == [0, 1, 2, 3, 9]
         assert recording.series("dropped_frames").tolist() == [0, 0, 0, 0, 5]
         assert recording.end["dropped_frames"] == 5
-    assert sum(count for count, _ in told) == 5
-    assert told[-1][1] == 5
+    assert sum(count for count, _ in reported) == 5
+    assert reported[-1][1] == 5
 
 
 def test_it_ends_after_the_frames_wanted(start: Start, tmp_path: Path) -> None:

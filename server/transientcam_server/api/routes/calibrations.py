@@ -26,8 +26,8 @@ from transientcam_server.api.documents.calibration import (
 from transientcam_server.api.documents.job import JobDocument
 from transientcam_server.api.problems import documented
 from transientcam_server.api.routes import jobs
-from transientcam_server.camera.calibration_store import Stored
-from transientcam_server.camera.calibrator import Drift, Wanted
+from transientcam_server.camera.calibration_store import StoredCalibration
+from transientcam_server.camera.calibrator import CalibrationOptions, Drift
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.service import Service
 
@@ -96,7 +96,7 @@ async def measure_calibration(
     if running is not None:
         detail = "A calibration would end it; stop it first."
         raise Problem(kinds.RECORDING_RUNS, detail, recording=running)
-    order = Wanted(**wanted.model_dump())
+    order = CalibrationOptions(**wanted.model_dump())
     job = service.calibrations.measure(order, lambda: service.applied)
     return jobs.accepted(job, response)
 
@@ -223,7 +223,9 @@ def _active(service: Service) -> ActiveDocument:
     return ActiveDocument(id=service.calibrations.active_id, **notice)
 
 
-def _document(service: Service, stored: Stored, drift: Drift | None) -> CalibrationDocument:
+def _document(
+    service: Service, stored: StoredCalibration, drift: Drift | None
+) -> CalibrationDocument:
     subject = stored.subject
     misfit = service.calibrations.misfit(stored, service.applied)
     active = stored.id == service.calibrations.active_id

@@ -11,8 +11,7 @@ from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.plan import PlanDocument, PlanRequest, TradeoffDocument
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
-from transientcam_server.planning import Goal
-from transientcam_server.planning.scene import SceneStatistic, given
+from transientcam_server.planning import Goal, SceneStatistics, uniform_scene
 from transientcam_server.service import Service
 
 router = APIRouter(tags=["accuracy"])
@@ -71,10 +70,10 @@ async def read_tradeoff(
     return TradeoffDocument.model_validate(await service.fronts.of(frame, by))
 
 
-async def _scene(service: Service, request: PlanRequest) -> SceneStatistic:
+async def _scene(service: Service, request: PlanRequest) -> SceneStatistics:
     scene = request.scene
     if scene is not None:
-        return given(
+        return uniform_scene(
             scene.brightness_dn_per_s,
             [(each.range_m, each.weight) for each in scene.returns],
             ambient_dn_per_s=scene.ambient_dn_per_s,
@@ -82,6 +81,6 @@ async def _scene(service: Service, request: PlanRequest) -> SceneStatistic:
     frame = await service.hub.newest(after=0, wait_s=_FRAME_WITHIN_S)
     found = await frame.reconstruction("returns")
     statistic, _ = await service.workers.run(
-        service.planner.statistic, frame.recipe, found, request.ambient_dn_per_s
+        service.planner.scene_statistics, frame.recipe, found, request.ambient_dn_per_s
     )
     return statistic

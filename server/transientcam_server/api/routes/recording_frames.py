@@ -14,7 +14,7 @@ from transientcam_server.api.routes.recordings import RecordingName
 from transientcam_server.errors import kinds
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.recording.frames import Settings, timeline
+from transientcam_server.recording.frames import SettingsChoice, timeline
 from transientcam_server.service import Service
 
 router = APIRouter(prefix="/recordings/{recording}/frames", tags=["recordings"])
@@ -34,7 +34,7 @@ class ChosenFrame:
     service: Service
     recording: str
     name: str
-    settings: Settings
+    settings: SettingsChoice
 
     async def frame(self) -> Frame:
         """Read it from the recording."""
@@ -52,7 +52,7 @@ async def _chosen(
     recording: RecordingName,
     frame: FrameName,
     reconstruction: Annotated[
-        Settings,
+        SettingsChoice,
         Query(description="settings it was recorded with, or those the service has now"),
     ] = "recorded",
 ) -> ChosenFrame:

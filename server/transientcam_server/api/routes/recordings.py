@@ -20,8 +20,7 @@ from transientcam_server.api.documents.recording import (
 )
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
-from transientcam_server.recording.library import Wanted
-from transientcam_server.recording.recorder import Limits
+from transientcam_server.recording import Limits, RecordingOptions
 
 router = APIRouter(tags=["recordings"])
 
@@ -75,7 +74,7 @@ async def start_recording(service: ServiceOf, wanted: RecordingRequest) -> Recor
     """
     service.acquisition.require_free()  # what a calibration captures is not recorded
     limits = Limits(duration_s=wanted.duration_s, size_bytes=wanted.max_bytes, frames=wanted.frames)
-    order = Wanted(name=wanted.name, limits=limits, annotations=wanted.annotations)
+    order = RecordingOptions(name=wanted.name, limits=limits, annotations=wanted.annotations)
     return document(await service.record(order, history_s=wanted.history_s))
 
 

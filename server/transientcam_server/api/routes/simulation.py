@@ -51,7 +51,7 @@ async def change_simulation(service: ServiceOf, wanted: SimulationRequest) -> Si
     await asyncio.to_thread(simulation.change, scene=wanted.scene, effects=wanted.effects)
     service.fronts.forget()
     changed = _document(simulation)
-    service.hub.tell(
+    service.hub.notify(
         "simulation-changed", {"scene": changed.scene, "effects": dict(changed.effects)}
     )
     return changed

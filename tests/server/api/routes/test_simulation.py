@@ -41,9 +41,9 @@ def test_an_unknown_fault_is_refused(http: httpx.Client, body: object) -> None:
 
 
 def test_a_real_camera_has_no_simulation_no_faults_and_no_truth(
-    served: Served, http: httpx.Client
+    served: Served, http: httpx.Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    served.camera.simulation = None
+    monkeypatch.setattr(served.camera, "simulation", None)
     served.service.pipeline.products.pop("truth")
 
     for response in (

@@ -1,0 +1,38 @@
+"""The state of the acquisition, as the API and the service manager report it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+State = Literal["starting", "streaming", "stopped", "calibrating", "lost"]
+
+
+@dataclass(frozen=True, slots=True)
+class AcquisitionStatus:
+    """State and rate of the acquisition.
+
+    Attributes
+    ----------
+    state
+        ``streaming`` also before the first frame; ``stopped`` on request;
+        ``calibrating`` while a calibration has exclusive use of the camera.
+    running
+        Whether frames are to be captured.
+    rate_hz
+        Measured over the last frames; None before there are two.
+    frames
+        Captured since the start of the service.
+    frame_age_s
+        Since the last frame, or since the start where there was none.
+    reason
+        Why the camera is lost.
+    stalled
+        Whether frames are to be captured and the camera is there, but none came for too long.
+    """
+
+    state: State
+    running: bool
+    rate_hz: float | None
+    frames: int
+    frame_age_s: float
+    reason: str | None
+    stalled: bool

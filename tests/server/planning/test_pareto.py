@@ -1,0 +1,27 @@
+"""The Pareto front of points with a cost and an error."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from transientcam_server.planning.pareto import front
+
+
+@given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), max_size=30))
+def test_the_front_is_what_no_other_point_beats(points: list[tuple[int, int]]) -> None:
+    found = front(points, cost=lambda p: p[0], error=lambda p: p[1])
+
+    unbeaten = {
+        point
+        for point in points
+        if not any(
+            other[0] <= point[0] and other[1] <= point[1] and other != point for other in points
+        )
+    }
+    assert set(found) == unbeaten
+    assert found == sorted(unbeaten)
+
+
+def test_points_that_were_not_measured_are_on_no_front() -> None:
+    points = [(1.0, float("nan")), (2.0, 1.0), (float("inf"), 0.0)]
+
+    assert front(points, cost=lambda p: p[0], error=lambda p: p[1]) == [(2.0, 1.0)]
