@@ -20,7 +20,7 @@ _STAGES = {
     "measure": "four-bucket, calibration",
     "smooth": "smoothing",
     "eigenvalue": "smallest eigenvalue",
-    "judge": "flags, biasing",
+    "flag_and_bias": "flags, biasing",
     "returns": "returns",
     "gather": "redone in float64",
     "wide_eigenvalue": "redone in float64",

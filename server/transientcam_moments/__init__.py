@@ -34,13 +34,7 @@ from transientcam_moments.levinson import (
     moments_of,
 )
 from transientcam_moments.maximum_entropy import density
-from transientcam_moments.modulation import (
-    arccos_sub_phases,
-    effective_modulation,
-    harmonic_cancellation_sub_phases,
-    harmonic_distortion,
-    modulation_gain,
-)
+from transientcam_moments.modulation import modulation_gain
 from transientcam_moments.peaks import Peaks, peaks
 from transientcam_moments.pisarenko import Returns, Separation, pisarenko, separate
 from transientcam_moments.ranging import SPEED_OF_LIGHT_M_S, range_m
@@ -65,7 +59,6 @@ __all__ = [
     "Separation",
     "Settings",
     "ShapeError",
-    "arccos_sub_phases",
     "average_takes",
     "bias",
     "bounds",
@@ -74,7 +67,6 @@ __all__ = [
     "comparisons",
     "cumulative",
     "density",
-    "effective_modulation",
     "estimate_zeroth",
     "extend",
     "fill_bad_pixels",
@@ -82,8 +74,6 @@ __all__ = [
     "flags",
     "four_bucket",
     "from_reflection",
-    "harmonic_cancellation_sub_phases",
-    "harmonic_distortion",
     "kernels",
     "levinson",
     "measure",

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from transientcam_moments import _kernels
 from transientcam_moments._arrays import (
     Array,
     by_blocks,
@@ -21,6 +20,7 @@ from transientcam_moments._arrays import (
     namespace,
     squared,
 )
+from transientcam_moments._kernels import accelerated
 from transientcam_moments._loops import repeat
 from transientcam_moments.levinson import normalised
 
@@ -71,10 +71,7 @@ def smallest_eigenvalue(b: Array) -> Array:
     paper cites.
     """
     planes, trailing = moment_planes(b)
-    lane = _kernels.find("smallest_eigenvalue", planes)
-    if lane is not None:
-        return lane(planes).reshape(trailing)
-    return by_blocks(lambda part: (_smallest_eigenvalue(part),), planes)[0].reshape(trailing)
+    return _eigenvalues(planes).reshape(trailing)
 
 
 def bias(
@@ -152,7 +149,7 @@ def estimate_zeroth(b: Array, epsilon: float = EPSILON) -> Array:
     planes, trailing = moment_planes(b)
     xp = namespace(planes)
     without = xp.concatenate([xp.zeros_like(planes[:1]), planes[1:]])
-    zeroth = -smallest_eigenvalue(without) / (1 - epsilon)
+    zeroth = -smallest_eigenvalue(without) / (1 - epsilon)  # b_0 + lambda = epsilon b_0
     zeroth = zeroth.astype(planes.dtype)
     return xp.concatenate([zeroth[None], planes[1:]]).reshape((planes.shape[0], *trailing))
 
@@ -164,11 +161,17 @@ def _bias(b: Array, eigenvalue: Array, epsilon: float, keep: str) -> tuple[Array
     with np.errstate(all="ignore"):
         biased = eigenvalue < epsilon * b0
         if keep == "harmonics":
+            # b_0 := (b_0 - lambda) / (1 - epsilon) (Sec. 4.3, see `bias`)
             raised = xp.where(biased, (b0 - eigenvalue) / (1 - epsilon), b0)
             return xp.concatenate([raised.astype(b.dtype)[None], b[1:]]), biased
         biased = biased & (b0 > 0)
         factor = xp.where(biased, (1 - epsilon) * (b0 / (b0 - eigenvalue)), 1.0).astype(b0.dtype)
         return xp.concatenate([b0.astype(b.dtype)[None], b[1:] * factor]), biased
+
+
+@accelerated("smallest_eigenvalue")
+def _eigenvalues(b: Array) -> Array:
+    return by_blocks(lambda part: (_smallest_eigenvalue(part),), b)[0]
 
 
 def _smallest_eigenvalue(b: Array) -> Array:
@@ -188,7 +191,8 @@ def search(b: list[Array]) -> Array:
         size = xp.sqrt(squared(plane))
         largest = xp.maximum(largest, size)
         total = total + size
-    high = b[0] - largest  # from the 2 x 2 minors; for m = 1 that is all there is
+    # an upper bound of lambda, from the 2 x 2 minors; for m = 1 that is all there is
+    high = b[0] - largest
     if len(b) == 2:
         return high
     low = b[0] - 2 * total - tolerance  # Gershgorin
@@ -238,9 +242,10 @@ def _probe(b: tuple[Array, ...], mu: Array) -> tuple[Array, Array]:
         inner = b[k]
         for j in range(1, k):
             inner = inner + a[j - 1] * b[k - j]
+        # Levinson: g_k = -(b_k + sum_{0<j<k} a_j b_{k-j}) / E_{k-1}
         g = inner * xp.where(alive, -1 / error, 0.0).astype(error.dtype)
         a = [a[j - 1] + g * a[k - j - 1].conj() for j in range(1, k)] + [g]
-        error = error * (1 - squared(g))
+        error = error * (1 - squared(g))  # E_k = E_{k-1} (1 - |g_k|^2)
         alive = alive & (error > 0)
     norm = 1 + squared(a[0])
     for plane in a[1:]:

@@ -127,6 +127,7 @@ def _disc(reflection: Array, w: Array, spread: float) -> tuple[Array, Array]:
     radius = spread * size * xp.ones_like(reflection[0].real)
     for g in reflection[::-1]:
         p, q = -g.conj(), -g
+        # zeta = w f_{k-1} for the disc of zeta = w f_k
         below = 1 + q * centre
         inverse = 1 / (squared(below) - squared(q) * radius * radius)
         centre = w * (((centre + p) * below.conj() - q.conj() * radius * radius) * inverse)

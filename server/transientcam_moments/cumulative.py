@@ -1,4 +1,4 @@
-"""The cumulative density in closed form, and by quadrature where the closed form is ill."""
+"""The cumulative density in closed form, and by quadrature where that is ill-conditioned."""
 
 from typing import Any
 
@@ -82,12 +82,13 @@ def _closed_form(coefficients: Coefficients, phase: Array) -> tuple[Array, Array
         b0 = b[0].real
         poles = disc_roots(list(a[1:]))
         shares, error = _shares(poles, coefficients, b)
-        # whole turns are told apart first: close to a sharp peak 2 pi + x isn't quite x
+        # whole turns are separated first: close to a sharp peak 2 pi + x isn't quite x
         turns = xp.floor(phase / (2 * np.pi))
         rest = (phase - 2 * np.pi * turns)[:, None].astype(b0.dtype)
         backwards = to_complex(xp.cos(rest), -xp.sin(rest))
         total = rest * b0
         for pole, share in zip(poles, shares, strict=True):
+            # S(phi) - S(0), S(x) = sum_l C_l log(1 - p_l exp(-i x))
             angle, stretch = _logarithm(pole * backwards)
             angle_0, stretch_0 = _logarithm(pole)
             total = total + 2 * (share.real * (angle - angle_0))
@@ -111,7 +112,7 @@ def _shares(poles: list[Array], coefficients: Coefficients, b: Array) -> tuple[l
     Notes
     -----
     There are two ways. As residues of the density, C_l = E p_l^{m-1} / (p'(p_l) prod_j (1 -
-    conj(p_j) p_l)), they know the light in a sharp peak to no more digits than the distance of its
+    conj(p_j) p_l)), they have the light in a sharp peak to no more digits than the distance of its
     pole from the circle has. As solution of the equations for k < m, C_l = sum_k q_k b_k / p'(p_l)
     with p(z) / (z - p_l) = sum_k q_k z^k, they suffer twice where poles nearly coincide. Each
     pixel takes the better one.

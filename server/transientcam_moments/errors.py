@@ -5,9 +5,11 @@ MomentsError
 └── ParameterError (also a ValueError)
 """
 
+from dataclasses import dataclass, fields
+
 
 class MomentsError(Exception):
-    """Everything that this package raises on purpose.
+    """Everything that this package raises on purpose; its fields say what is wrong.
 
     Catch it around any call::
 
@@ -17,29 +19,34 @@ class MomentsError(Exception):
             print(error)
     """
 
+    def __post_init__(self) -> None:
+        """Give the fields to the exception itself, which is pickled with them."""
+        self.args = tuple(getattr(self, each.name) for each in fields(self))  # type: ignore[arg-type]  # of dataclasses
 
+
+@dataclass(eq=False)
 class ShapeError(MomentsError, ValueError):
-    """An array has a shape or an element type that the function cannot take."""
+    """An array has a shape or an element type that the function cannot take.
 
-    def __init__(self, name: str, found: object, expected: str) -> None:
-        super().__init__(name, found, expected)
-        self.name = name
-        self.found = found
-        self.expected = expected
+    ``name`` says which array, ``found`` what it is and ``expected`` what it has to be.
+    """
+
+    name: str
+    found: object
+    expected: str
 
     def __str__(self) -> str:
         """Name the array, what it is and what it has to be."""
         return f"{self.name} is {self.found}, expected {self.expected}"
 
 
+@dataclass(eq=False)
 class ParameterError(MomentsError, ValueError):
-    """An argument lies outside of what the function is defined for."""
+    """An argument ``field`` has a ``value`` outside of the ``limit`` of what a function is for."""
 
-    def __init__(self, field: str, value: object, limit: str) -> None:
-        super().__init__(field, value, limit)
-        self.field = field
-        self.value = value
-        self.limit = limit
+    field: str
+    value: object
+    limit: str
 
     def __str__(self) -> str:
         """Name the argument, its value and the limit."""

@@ -1,4 +1,4 @@
-"""What a pixel says about itself."""
+"""Flags of pixels: biased, dark, saturated, not finite, replaced."""
 
 from enum import IntFlag
 
@@ -9,7 +9,7 @@ from transientcam_moments.biasing import smallest_eigenvalue
 
 
 class Flags(IntFlag):
-    """Bits of a pixel's flags, stored as uint8; 0 is a valid pixel that nobody touched."""
+    """Bits of a pixel's flags, stored as uint8; 0 is a valid pixel that was not changed."""
 
     VALID = 0
     BIASED = 1

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from transientcam_moments import _kernels
 from transientcam_moments._arrays import (
     MAX_HARMONICS,
     Array,
@@ -14,6 +13,7 @@ from transientcam_moments._arrays import (
     squared,
     to_complex,
 )
+from transientcam_moments._kernels import accelerated
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.takes import average_takes
 
@@ -94,23 +94,8 @@ def measure(
     """
     chosen("zeroth", zeroth, tuple(ZEROTH_IMAGES))
     stack = takes_first(images, takes)
-    m = harmonics_of(stack.shape[1], zeroth)
-    if isinstance(stack, np.ndarray) and stack.dtype == np.uint16 and stack.shape[0] == 1:
-        lane = _kernels.lookup("measure", m, stack[0, 0].size)
-        if lane is not None:
-            return lane(stack[0], zeroth)
-    average = _real(average_takes(stack).images)
-    xp = namespace(average)
-    phasors = average[ZEROTH_IMAGES[zeroth] :]
-    phasors = four_bucket(phasors.reshape((m, 4, *phasors.shape[1:])))
-    if zeroth == "low-frequency":
-        low = four_bucket(average[None, :4])[0]
-        b0 = xp.sqrt(squared(low))
-    elif zeroth == "on-off":
-        b0 = 2 * (average[0] - average[1])
-    else:
-        b0 = xp.zeros_like(average[0])
-    return xp.concatenate([b0.astype(phasors.dtype)[None], phasors])
+    harmonics_of(stack.shape[1], zeroth)
+    return _measure(average_takes(stack).images, zeroth)
 
 
 def harmonics_of(images: int, zeroth: str) -> int:
@@ -126,6 +111,24 @@ def harmonics_of(images: int, zeroth: str) -> int:
         expected = f"{ZEROTH_IMAGES[zeroth]} + 4 m of them a take, m in 1..32, for {zeroth!r}"
         raise ShapeError("images", f"{images} images a take", expected)
     return m
+
+
+@accelerated("measure", order=lambda images, zeroth: harmonics_of(len(images), zeroth), of="H")
+def _measure(images: Array, zeroth: str) -> Array:
+    """Planar statement of `measure` for the images (N, ...) of one take."""
+    average = _real(images)
+    xp = namespace(average)
+    m = harmonics_of(len(images), zeroth)
+    phasors = average[ZEROTH_IMAGES[zeroth] :]
+    phasors = four_bucket(phasors.reshape((m, 4, *phasors.shape[1:])))
+    if zeroth == "low-frequency":
+        low = four_bucket(average[None, :4])[0]
+        b0 = xp.sqrt(squared(low))
+    elif zeroth == "on-off":
+        b0 = 2 * (average[0] - average[1])
+    else:
+        b0 = xp.zeros_like(average[0])
+    return xp.concatenate([b0.astype(phasors.dtype)[None], phasors])
 
 
 def saturated(images: Array, *, full_scale: float = 4095) -> Array:

@@ -1,7 +1,7 @@
 """Compiled lanes for the hot algorithms: what is ready, and how to make it ready.
 
 Nothing has to be called: every algorithm runs on NumPy and gives the same results. A process that
-wants them faster calls `compile_in_background` when it starts and goes on; each algorithm changes
+needs them faster calls `compile_in_background` when it starts and goes on; each algorithm changes
 over as soon as its lane is there.
 
 The environment variable ``TRANSIENTCAM_KERNELS=off`` leaves everything to NumPy. Compiled code is
@@ -14,8 +14,8 @@ from collections.abc import Callable, Sequence
 from typing import TypedDict
 
 from transientcam_moments._arrays import MAX_HARMONICS
+from transientcam_moments._kernels.parallel import Spread, at_once, over
 from transientcam_moments._kernels.registry import PRECISION_NAMES, REGISTRY, Key
-from transientcam_moments._kernels.spread import Spread, at_once, over
 from transientcam_moments.errors import ParameterError
 
 __all__ = [
@@ -78,7 +78,7 @@ def state() -> State:
     }
 
 
-def compile(  # noqa: A001  # tm.kernels.compile says it best, and the builtin isn't used here
+def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the builtin isn't used here
     *,
     harmonics: Sequence[int] = (3, 4, 8),
     precisions: Sequence[str] = ("float32", "float64"),

@@ -1,17 +1,17 @@
 """Levinson's recursion: from moments to the polynomial of Eq. (2), and back.
 
-The recursion runs over the leading blocks of the Toeplitz matrix B. At order k it knows the
+The recursion runs over the leading blocks of the Toeplitz matrix B. At order k it has the
 predictor polynomial a (a_0 = 1), the error E and adds one reflection coefficient g, |g| < 1 as
 long as B is positive definite (Prop. 1). Where the data leave the positive definite cone, or come
-closer to its border than rounding can tell, g is projected back onto the disc and the recursion
+closer to its border than rounding resolves, g is projected back onto the disc and the recursion
 ends there: what comes out is always a valid positive density, and `flags` marks the pixel.
 """
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from transientcam_moments import _kernels
 from transientcam_moments._arrays import (
     MAX_HARMONICS,
     Array,
@@ -24,6 +24,7 @@ from transientcam_moments._arrays import (
     some,
     squared,
 )
+from transientcam_moments._kernels import accelerated
 from transientcam_moments.errors import ParameterError, ShapeError
 
 
@@ -37,7 +38,7 @@ class Coefficients(NamedTuple):
     polynomial : array, shape (m + 1, ...)
         a_0 = 1, a_1 .. a_m; E B^-1 e_0 = a.
     reflection : array, shape (m, ...)
-        g_1 .. g_m, inside the unit disc. Together with b_0 they say the same as the moments.
+        g_1 .. g_m, inside the unit disc. Together with b_0 they are equivalent to the moments.
     """
 
     error: Array
@@ -54,7 +55,7 @@ class Coefficients(NamedTuple):
 
 
 class Recursion(NamedTuple):
-    """All that Levinson's recursion learns of one block of pixels with b_0 = 1.
+    """What Levinson's recursion returns for one block of pixels with b_0 = 1.
 
     Attributes
     ----------
@@ -100,8 +101,7 @@ def levinson(b: Array) -> Coefficients:
     Theorem 1 and Eq. (2) of the paper; the recursion is Levinson's and Durbin's.
     """
     planes, trailing = moment_planes(b)
-    run = _kernels.find("levinson", planes) or _levinson
-    error, polynomial, reflection = by_blocks(run, planes) if run is _levinson else run(planes)
+    error, polynomial, reflection = _coefficients(planes)
     return Coefficients(
         error.reshape(trailing),
         polynomial.reshape((polynomial.shape[0], *trailing)),
@@ -202,12 +202,18 @@ def _predicted(a: Array, b: list[Array], k: int) -> Array:
     return -total
 
 
+@accelerated("levinson")
+def _coefficients(b: Array) -> tuple[Array, ...]:
+    return by_blocks(_levinson, b)
+
+
 def _levinson(b: Array) -> tuple[Array, Array, Array]:
     """Planar statement of `levinson`: b (m + 1, P) to error, polynomial, reflection."""
     xp = namespace(b)
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
         relative, scale = normalised(b)
-        result = recursion(_physical(relative), 4 * float(np.finfo(scale.dtype).eps))
+        floor = 4 * float(np.finfo(scale.dtype).eps)
+        result = recursion(_physical(relative), [floor] * (len(b) - 1), into_disc(floor))
         error = result.errors[-1] * (relative[0] * scale)
     one = xp.ones_like(b[0])
     return error, xp.stack([one, *result.polynomial]), xp.stack(result.reflection)
@@ -252,7 +258,7 @@ def _physical(b: list[Array]) -> list[Array]:
     """Divide by b_0 and bring moments larger than 2 b_0 back to that, so that nothing overflows.
 
     |b_k| <= b_0 for every density; a pixel that breaks this is projected onto the border of the
-    cone anyway, and only the direction of b_k still says something.
+    cone anyway, and only the direction of b_k still counts.
     """
     xp = namespace(b[1])
     b0 = b[0]
@@ -269,48 +275,45 @@ def _physical(b: list[Array]) -> list[Array]:
     return planes
 
 
-def recursion(b: list[Array], floor: float, *, sparse: bool = False) -> Recursion:
+Border = Callable[[Array, Array], tuple[Array, Array]]
+"""Takes g_k / |g_k| and E_{k-1} at the border of the cone; returns g_k and E_k there."""
+
+
+def recursion(b: list[Array], floors: Sequence[float], border: Border) -> Recursion:
     """Run Levinson's recursion over planes with b_0 = 1, or 0 where there is no light (Theorem 1).
 
     Parameters
     ----------
     b : list of m + 1 planes
         The first one real.
-    floor : float
-        The border of the cone is where E_k falls to it: less than rounding leaves of it.
-    sparse : bool
-        At the border g_k is projected onto the disc and all later ones are zero. Inside the disc,
-        so that E_k = floor, is for densities; onto its circle, which ends at order m wherever it
-        has not before, is for sharp returns (Theorem 2), whose number is the order.
+    floors : sequence of m float
+        The border of the cone is where E_k falls to the k-th of them: less than rounding leaves of
+        it. From there on all reflection coefficients are zero.
+    border : callable
+        What becomes of g_k at the border: `into_disc` for densities, `onto_circle` for returns.
     """
     xp = namespace(b[1])
-    m = len(b) - 1
-    error = b[0]
+    error = b[0]  # E_0 = b_0
     errors = [error]
     a: list[Array] = []
     reflection: list[Array] = []
     alive = error > 0
-    order = xp.where(alive, m, 0)
-    for k in range(1, m + 1):
+    order = xp.where(alive, len(b) - 1, 0)
+    for k, floor in enumerate(floors, start=1):
+        # Levinson: g_k = -(b_k + sum_{0<j<k} a_j b_{k-j}) / E_{k-1}
         inner = b[k]
         for j in range(1, k):
             inner = inner + a[j - 1] * b[k - j]
         g = inner * (-1 / error)
-        remaining = error * below_one(g)
+        remaining = error * below_one(g)  # E_k = E_{k-1} (1 - |g_k|^2)
         ends = alive & ~(remaining > floor)
-        if sparse and k == m:
-            ends = alive
         if some(ends | ~alive):
             size = xp.sqrt(squared(g))
-            onto = xp.where(size > 0, g * (1 / size).astype(error.dtype), xp.ones_like(g))
-            if not sparse:
-                onto = onto * xp.sqrt(xp.maximum(1 - floor / error, 0))
-            g = xp.where(ends, onto, g)
+            unit = xp.where(size > 0, g * (1 / size).astype(error.dtype), xp.ones_like(g))
+            at_border = border(unit, error)
             # NaN belongs to an invalid pixel, which keeps it; what comes after the border is zero
-            g = xp.where(alive, g, 0 * b[k])
-            # E belongs to the rounded g; on the circle it is zero, and nobody asks
-            remaining = xp.where(ends, error if sparse else error * below_one(g), remaining)
-            remaining = xp.where(alive, remaining, error)
+            g = xp.where(alive, xp.where(ends, at_border[0], g), 0 * b[k])
+            remaining = xp.where(alive, xp.where(ends, at_border[1], remaining), error)
             order = xp.where(ends, k, order)
             alive = alive & ~ends
         a = _step_up(a, g)
@@ -320,7 +323,22 @@ def recursion(b: list[Array], floor: float, *, sparse: bool = False) -> Recursio
     return Recursion(errors, a, reflection, order.astype(np.int32))
 
 
+def into_disc(floor: float) -> Border:
+    """Project g_k into the unit disc so that E_k is ``floor``: the density stays positive."""
+
+    def border(unit: Array, error: Array) -> tuple[Array, Array]:
+        g = unit * namespace(unit).sqrt(namespace(unit).maximum(1 - floor / error, 0))
+        return g, error * below_one(g)  # E_k that belongs to the rounded g_k
+
+    return border
+
+
+def onto_circle(unit: Array, error: Array) -> tuple[Array, Array]:
+    """Project g_k onto the unit circle: k sharp returns (Theorem 2), whose E_k = 0 is not used."""
+    return unit, error
+
+
 def _step_up(a: list[Array], g: Array) -> list[Array]:
-    """Raise the order by one: a_j + g conj(a_{k-j}), a_k = g."""
+    """Raise the order by one (Durbin): a_j + g conj(a_{k-j}), a_k = g."""
     k = len(a) + 1
     return [a[j - 1] + g * a[k - j - 1].conj() for j in range(1, k)] + [g]

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from transientcam_moments import _kernels
 from transientcam_moments._arrays import (
     Array,
     below_one,
@@ -14,6 +13,7 @@ from transientcam_moments._arrays import (
     phases,
     real_type,
 )
+from transientcam_moments._kernels import accelerated
 from transientcam_moments.levinson import Coefficients
 
 _BLOCK_VALUES = 1 << 18
@@ -53,23 +53,24 @@ def density(coefficients: Coefficients, phase_rad: Array, *, evaluation: str = "
     chosen("evaluation", evaluation, ("modulus", "fourier"))
     error, a = coefficients.error, coefficients.polynomial
     phase = phases(phase_rad, like=a)
-    planes = flat_planes(a)
-    out = None
-    if evaluation == "modulus":
-        lane = _kernels.find("density", planes)
-        if lane is not None:
-            out = lane(planes, flat_planes(coefficients.reflection), error.reshape(-1), phase, None)
-    if out is None:
-        fill = _density if evaluation == "modulus" else _density_fourier
-        floor = modulus_floor(coefficients).reshape(-1)
-        out = _by_blocks(fill, planes, error.reshape(-1), floor, phase)
+    evaluate = _by_modulus if evaluation == "modulus" else _by_series
+    out = evaluate(flat_planes(a), flat_planes(coefficients.reflection), error.reshape(-1), phase)
     return out.reshape((phase.shape[0], *error.shape))
 
 
-def modulus_floor(coefficients: Coefficients) -> Array:
-    """Return the smallest squared modulus that is told from rounding: eps prod (1 - |g_k|^2)."""
-    product = below_one(coefficients.reflection[0])
-    for g in coefficients.reflection[1:]:
+@accelerated("density")
+def _by_modulus(a: Array, reflection: Array, error: Array, phase: Array) -> Array:
+    return _by_blocks(_density, a, error, modulus_floor(reflection), phase)
+
+
+def _by_series(a: Array, reflection: Array, error: Array, phase: Array) -> Array:
+    return _by_blocks(_density_fourier, a, error, modulus_floor(reflection), phase)
+
+
+def modulus_floor(reflection: Array) -> Array:
+    """Return the smallest squared modulus above rounding: eps prod (1 - |g_k|^2)."""
+    product = below_one(reflection[0])
+    for g in reflection[1:]:
         product = product * below_one(g)
     return float(np.finfo(product.dtype).eps) * product
 
@@ -99,6 +100,7 @@ def _density(a: Array, error: Array, floor: Array, phase: Array) -> Array:
     real = xp.concatenate([cos, sin], axis=1) @ parts
     imag = xp.concatenate([sin, -cos], axis=1) @ parts
     with np.errstate(all="ignore"):
+        # Eq. (2): e_0* B^-1 e_0 = 1 / E and e_0* B^-1 s(phi) = sum_j conj(a_j) exp(i j phi) / E
         return error / (2 * np.pi) / xp.maximum(real * real + imag * imag, floor)
 
 
@@ -111,5 +113,6 @@ def _density_fourier(a: Array, error: Array, floor: Array, phase: Array) -> Arra
     cos, sin = xp.cos(angles).astype(error.dtype), xp.sin(angles).astype(error.dtype)
     parts = xp.stack([r[0].real] + [2 * p.real for p in r[1:]] + [-2 * p.imag for p in r[1:]])
     with np.errstate(all="ignore"):
+        # the reciprocal of a positive Fourier series, as Sec. 3.3 has it
         series = xp.concatenate([cos, sin[:, 1:]], axis=1) @ parts
         return error / (2 * np.pi) / xp.maximum(series, floor)

@@ -75,7 +75,7 @@ def peaks(coefficients: Coefficients, *, threshold: float = PEAK_THRESHOLD) -> P
     in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
     a, error = flat_planes(coefficients.polynomial), coefficients.error.reshape(-1)
     m = a.shape[0] - 1
-    floor = modulus_floor(coefficients).reshape(-1)
+    floor = modulus_floor(coefficients.reflection).reshape(-1)
 
     def find(part: Array, scale: Array, least: Array) -> tuple[Array, ...]:
         return _peaks(part, scale, least, threshold)

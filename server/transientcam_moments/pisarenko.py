@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from transientcam_moments import _kernels
 from transientcam_moments._arrays import (
     Array,
     by_blocks,
@@ -14,8 +13,9 @@ from transientcam_moments._arrays import (
     namespace,
     squared,
 )
+from transientcam_moments._kernels import accelerated
 from transientcam_moments.biasing import search
-from transientcam_moments.levinson import Recursion, normalised, recursion
+from transientcam_moments.levinson import Recursion, normalised, onto_circle, recursion
 from transientcam_moments.polishing import polish, residual, size
 from transientcam_moments.roots import circle_roots
 
@@ -93,15 +93,7 @@ def pisarenko(b: Array, *, eigenvalue: Array | None = None) -> Returns:
     the recursion's polynomials Phi_k, and so never negative.
     """
     planes, trailing = moment_planes(b)
-    lane = _kernels.find("pisarenko", planes)
-    if lane is not None:
-        found = lane(planes, eigenvalue)
-    else:
-        known = () if eigenvalue is None else (eigenvalue.reshape(-1),)
-        found = by_blocks(_pisarenko, planes, *known)
-        if namespace(planes) is np:
-            found = _improved(planes, found)
-    phase, weight, uniform, count = found
+    phase, weight, uniform, count = _explained(planes, eigenvalue)
     return Returns(
         phase.reshape((phase.shape[0], *trailing)),
         weight.reshape((weight.shape[0], *trailing)),
@@ -111,7 +103,7 @@ def pisarenko(b: Array, *, eigenvalue: Array | None = None) -> Returns:
 
 
 def separate(returns: Returns, threshold: float = DIRECT_THRESHOLD) -> Separation:
-    """Tell direct from indirect light.
+    """Separate direct from indirect light.
 
     Parameters
     ----------
@@ -135,20 +127,29 @@ def separate(returns: Returns, threshold: float = DIRECT_THRESHOLD) -> Separatio
     Sec. 5.1: "the first return with a weight above a relative threshold".
     """
     in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
-    xp = namespace(returns.weight)
-    weights = returns.weight
-    if isinstance(weights, np.ndarray) and weights.dtype == np.float32:
-        lane = _kernels.lookup("separate", weights.shape[0], weights[0].size)
-        if lane is not None:
-            return Separation(*lane(returns.phase_rad, weights, threshold))
+    return Separation(*_separate(returns.weight, returns.phase_rad, threshold))
+
+
+@accelerated("separate", order=lambda weights, *_: len(weights), of="f")
+def _separate(weights: Array, phases_rad: Array, threshold: float) -> tuple[Array, ...]:
+    """Planar statement of `separate`: direct, indirect and phase of the direct return."""
+    xp = namespace(weights)
     enough = threshold * weights.max(axis=0)
     direct = xp.zeros_like(weights[0])
     phase = xp.full(weights[0].shape, np.nan, dtype=weights.dtype)
-    for weight, angle in zip(weights[::-1], returns.phase_rad[::-1], strict=True):
+    for weight, angle in zip(weights[::-1], phases_rad[::-1], strict=True):
         first = (weight >= enough) & (weight > 0)
         direct = xp.where(first, weight, direct)
         phase = xp.where(first, angle, phase)
-    return Separation(direct, xp.maximum(weights.sum(axis=0) - direct, 0), phase)
+    return direct, xp.maximum(weights.sum(axis=0) - direct, 0), phase
+
+
+@accelerated("pisarenko")
+def _explained(b: Array, eigenvalue: Array | None) -> tuple[Array, ...]:
+    """Return phase, weight, uniform and count of flat planes, improved where they are ill."""
+    known = () if eigenvalue is None else (eigenvalue.reshape(-1),)
+    found = by_blocks(_pisarenko, b, *known)
+    return _improved(b, found) if namespace(b) is np else found
 
 
 def _pisarenko(
@@ -225,14 +226,17 @@ def _returns(
     are multiplied with `scale`.
     """
     xp = namespace(b[1])
-    total = b[0] - uniform
+    total = b[0] - uniform  # "using b_0 - lambda_m in place of b_0" (Sec. 5.1)
     inverse = xp.where(total > 0, 1 / total, 0 * total)
     block = [xp.where(total > 0, 1, 0).astype(total.dtype)] + [part * inverse for part in b[1:]]
-    singular = recursion(block, floor, sparse=True)
+    # the recursion ends at order m wherever it has not before: B - lambda I is singular
+    floors = [floor] * (len(b) - 2) + [np.inf]
+    singular = recursion(block, floors, onto_circle)
     last = singular.reflection[0]
     for k, g in enumerate(singular.reflection[1:], start=2):
         last = xp.where(singular.order == k, g, last)
     phases, weights = [], []
+    # roots of c* s(phi) (Theorem 2), c = a; weights of Eq. (4) without its linear system
     for index, u in enumerate(circle_roots(singular.polynomial, singular.order, last)):
         share = 1 / _christoffel(singular, u)
         weight = share * total * scale

@@ -10,7 +10,7 @@ import numpy as np
 from transientcam_moments._arrays import Array, to_complex
 
 _STEPS = 6
-_LEAST_SHARE = 0.1  # of Newton's step; where less is needed, the linear system says nothing
+_LEAST_SHARE = 0.1  # of Newton's step; where less is needed, the linear system has no information
 
 
 def residual(b: Array, phase: Array, weight: Array, uniform: Array) -> Array:

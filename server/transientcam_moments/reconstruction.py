@@ -191,19 +191,19 @@ class Reconstruction:
     def flags(self) -> Array:
         """Flags of every pixel, uint8 of `Flags`."""
         xp = namespace(self.smoothed)
-        judged = flags(
+        found = flags(
             self.smoothed,
             minimum_brightness=self.settings.minimum_brightness,
             eigenvalue=self.eigenvalue,
         )
         # biasing made the matrix definite; what is left of its defect is the flag for biasing
-        judged = xp.where(judged == int(Flags.DEGENERATE), 0, judged)
-        judged = judged | xp.where(self._biased[1], int(Flags.BIASED), 0)
+        found = xp.where(found == int(Flags.DEGENERATE), 0, found)
+        found = found | xp.where(self._biased[1], int(Flags.BIASED), 0)
         if self._saturated is not None:
-            judged = judged | xp.where(xp.asarray(self._saturated), int(Flags.SATURATED), 0)
+            found = found | xp.where(xp.asarray(self._saturated), int(Flags.SATURATED), 0)
         if self._bad is not None:
-            judged = judged | xp.where(xp.asarray(self._bad), int(Flags.REPLACED), 0)
-        return judged.astype(xp.uint8)
+            found = found | xp.where(xp.asarray(self._bad), int(Flags.REPLACED), 0)
+        return found.astype(xp.uint8)
 
     @property
     def has_range(self) -> Array:
@@ -236,19 +236,19 @@ class Reconstruction:
 
     @cached_property
     def _separation(self) -> Separation:
-        rival = self._rival
-        if rival is None:
+        technique = self._technique
+        if technique is None:
             return separate(self.returns, self.settings.threshold)
         xp = namespace(self.smoothed)
         b = np.asarray(self.smoothed)
-        check_order(b.shape[0] - 1, least=rival.least_harmonics, name=rival.name)
-        # as measured: none of them asks for biased moments
-        found = rival.estimate(b).separate(self.settings.threshold)
+        check_order(b.shape[0] - 1, least=technique.least_harmonics, name=technique.name)
+        # as measured: none of them needs biased moments
+        found = technique.estimate(b).separate(self.settings.threshold)
         return Separation(*(xp.asarray(part) for part in found))
 
     @property
-    def _rival(self) -> Technique | None:
-        """The technique of the settings where it is none of those that this class knows."""
+    def _technique(self) -> Technique | None:
+        """The technique of the settings where this class does not implement it itself."""
         name = self.settings.estimator
         return None if name in _OWN else TECHNIQUES[name]
 
@@ -259,8 +259,8 @@ class Reconstruction:
 
     @cached_property
     def uniform(self) -> Array:
-        """Brightness of the uniform part; of a rival's, all that it does not explain."""
-        if self._rival is not None:
+        """Brightness of the uniform part; of another technique, what it leaves unexplained."""
+        if self._technique is not None:
             return self.brightness - self.direct - self.indirect
         return self.returns.uniform
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from transientcam_moments import _kernels
 from transientcam_moments._arrays import Array, as_array
-from transientcam_moments._kernels.margins import LEAST_WIDTH
 from transientcam_moments._kernels.one_pass import Constants, OnePass
-from transientcam_moments._kernels.spread import Spread, at_once
+from transientcam_moments._kernels.padding import LEAST_WIDTH
+from transientcam_moments._kernels.parallel import Spread, at_once
 from transientcam_moments.bad_pixels import Replacement, checked_mask, fill_bad_pixels
 from transientcam_moments.calibration import calibrate, inverse_gains
 from transientcam_moments.four_bucket import harmonics_of, measure, saturated, takes_first

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from transientcam_moments import _kernels
 from transientcam_moments._arrays import Array, as_array, in_range, namespace, real_type
+from transientcam_moments._kernels import accelerated
 from transientcam_moments.errors import ShapeError
 
 SIGMA_PX = 0.6
@@ -40,13 +40,13 @@ def smooth(moments: Array, sigma_px: float = SIGMA_PX) -> Array:
         raise ShapeError("moments", f"of shape {tuple(moments.shape)}", "(..., H, W)")
     if sigma_px == 0:
         return moments
+    return _smooth(moments, gaussian_taps(sigma_px))
+
+
+@accelerated("smooth", of="F")
+def _smooth(moments: Array, taps: Array) -> Array:
+    """Planar statement of `smooth`."""
     xp = namespace(moments)
-    taps = gaussian_taps(sigma_px)
-    if xp is np and moments.dtype == np.complex64 and moments.ndim == 3:
-        lane = _kernels.lookup("smooth", moments.shape[0] - 1, moments[0].size)
-        done = None if lane is None else lane(moments, taps)
-        if done is not None:
-            return done
     present = xp.isfinite(moments).reshape((-1, *moments.shape[-2:])).all(axis=0)
     share = _blur(present.astype(real_type(moments)), taps)
     smoothed = _blur(xp.where(present, moments, 0), taps)

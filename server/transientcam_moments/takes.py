@@ -35,7 +35,7 @@ def average_takes(images: Array, *, outlier_factor: float = 3.0) -> Average:
     outlier_factor : float
         An image is an outlier when its mean absolute difference from the median over the takes is
         more than this many times the median of that figure over the takes, > 1. With fewer than
-        three takes nothing tells which one is wrong, and all are kept.
+        three takes the wrong one cannot be identified, and all are kept.
 
     Returns
     -------

@@ -14,7 +14,7 @@ from tests.moments import oracles
 from tests.moments.kernel_lanes import lanes, without_lanes
 from transientcam_moments import _kernels
 from transientcam_moments._kernels import density as density_module
-from transientcam_moments._kernels.spread import blocks
+from transientcam_moments._kernels.parallel import blocks
 from transientcam_moments.levinson import _levinson
 from transientcam_moments.polishing import residual, size
 

@@ -386,18 +386,38 @@ def test_density_varies_as_predicted_wherever_first_order_holds(m: int, zeroth: 
     assert abs(observed / predicted.std - 1)[predicted.holds].max() < WITHIN
 
 
-@pytest.mark.parametrize("count", [1, 2])
-@pytest.mark.parametrize("m", [1, 2, 3, 4])
-def test_first_peak_varies_as_predicted_wherever_first_order_holds(m: int, count: int) -> None:
-    b, of_moments = random_pixels(m, min(count, m), seed=50 + m, pixels=80)
-    predicted = noise.peak_noise(b, of_moments)
-    drawn = noise.draw(b, of_moments, np.random.default_rng(m), draws=DRAWS)
+@pytest.mark.parametrize("zeroth", ["low-frequency", "estimated"])
+@pytest.mark.parametrize("m", [1, 3, 8])
+def test_the_deviation_of_whole_frames_is_that_of_each_pixel(m: int, zeroth: str) -> None:
+    b, of_moments = random_pixels(m, min(m, 2), seed=m, pixels=3000)
+    b[:, 1], b[0, 2] = 0, np.nan
 
-    first = tm.peaks(tm.levinson(tm.bias(drawn).moments)).first_rad
-    observed = turned(first - predicted.phase_rad).std(axis=0)
+    found = noise.density_std(
+        b.reshape((m + 1, 50, 60)),
+        noise.MomentNoise(of_moments.variance.reshape((m + 1, 50, 60))),
+        np.linspace(0, 6, 50),
+        zeroth=zeroth,
+    )
 
-    assert predicted.holds.sum() > 4
-    assert abs(ratios(observed, predicted.phase_std_rad, predicted.holds) - 1).max() < WITHIN
+    expected = noise.density_noise(b, of_moments, np.linspace(0, 6, 50), zeroth=zeroth).std
+    assert found.shape == (50, 50, 60)
+    assert found.dtype == np.float32
+    assert np.isnan(expected[:, 1]).all()
+    np.testing.assert_allclose(found.reshape(expected.shape), expected, rtol=1e-2)
+
+
+def test_a_pixel_without_light_has_no_noise_and_disturbs_no_other() -> None:
+    b, of_moments = random_pixels(3, 2, seed=1, pixels=5)
+    broken = b.copy()
+    broken[:, 1], broken[2, 3] = 0, np.inf
+
+    found = noise.density_noise(broken, of_moments, PHASES)
+
+    expected = noise.density_noise(b, of_moments, PHASES)
+    others = [0, 2, 4]
+    assert np.array_equal(found.std[:, others], expected.std[:, others])
+    assert np.isnan(found.std[:, [1, 3]]).all()
+    assert not found.holds[:, [1, 3]].any()
 
 
 def test_density_of_a_nearly_singular_or_barely_biased_pixel_is_not_predicted() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 import transientcam_moments as tm
 from tests.moments import oracles
-from transientcam_moments.levinson import recursion
+from transientcam_moments.levinson import into_disc, recursion
 from transientcam_moments.pisarenko import _christoffel
 
 ORDERS = [1, 2, 3, 4, 8, 16, 32]
@@ -171,7 +171,7 @@ def test_christoffel_function_is_the_quadratic_form_of_the_inverse() -> None:
     b = oracles.random_moments(np.random.default_rng(7), 3, 1)
     b /= b[0].real
     planes = [b[0].real, *b[1:]]
-    steps = recursion(planes, 0.0)
+    steps = recursion(planes, [0.0] * 3, into_disc(0.0))
     phi = 1.234
     s = np.exp(1j * np.arange(3) * phi)
     block = oracles.toeplitz(b[:3])[0]

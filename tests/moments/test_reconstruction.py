@@ -5,6 +5,7 @@ import pytest
 
 import transientcam_moments as tm
 from tests.moments import oracles
+from transientcam_driver import SubPhases
 from transientcam_moments.comparisons import sra_table
 from transientcam_moments.reconstruction import ESTIMATORS
 
@@ -127,15 +128,15 @@ def test_multipath_disturbs_a_single_frequency_and_not_the_others() -> None:
 
 def test_images_go_through_calibration_to_range() -> None:
     b, phase, _ = scene(3)
-    sub_phases, weights = tm.arccos_sub_phases(8)
-    gain = complex(tm.modulation_gain(1, sub_phases, weights))
+    steps = SubPhases("arccos", 8)
+    gain = complex(tm.modulation_gain(1, steps.phases_rad))
     low = b[0].real * abs(gain)
     images = [(b[0].real + (low * 1j**-k).real) / 2 for k in range(4)]
     for plane in b[1:]:
         images += [(b[0].real + (plane * gain * 1j**-k).real) / 2 for k in range(4)]
     raw = np.round(np.stack(images)).astype(np.uint16)
     raw[5, 2, 2] = 4095
-    calibration = tm.nominal_calibration(3, sub_phases, weights)
+    calibration = tm.nominal_calibration(3, steps.phases_rad)
 
     result = tm.reconstruct(raw, PLAIN, calibration=calibration)
     listed = tm.reconstruct(list(raw), PLAIN, calibration=calibration)

@@ -1,42 +1,84 @@
 """Compiled lanes beside the planar algorithms: the same results, chosen when they are ready.
 
-A planar function asks ``find`` once and uses what it gets::
+A *lane* is one algorithm compiled for one order m and one precision, which takes as many pixels at
+a time as a vector register holds. A planar function names the lane that may stand in for it::
 
-    lane = find("levinson", b)
-    if lane is not None:
-        return lane(b)
+    @accelerated("levinson")
+    def _coefficients(b): ...
 
 The lanes and their signatures, each that of the planar statement it stands beside
 (``b`` complex (m+1, ...), NumPy arrays with any trailing shape, strided or not):
 
 ``levinson(b) -> error (...), polynomial (m+1, ...), reflection (m, ...)``
 
-``density(polynomial, reflection, error, phase_rad (T,), out (T, ...) or None) -> out``
+``density(polynomial, reflection, error, phase_rad (T,)) -> (T, ...)``, also into ``out``
 
 ``smallest_eigenvalue(b) -> (...)``
 
 ``pisarenko(b, eigenvalue (...) or None) -> phase_rad, weight (m, ...), uniform, count (...)``
 
-For whole frames in single precision, found by `lookup`:
+For whole frames in single precision:
 
 ``measure(images (N, ...) uint16, zeroth) -> moments (m+1, ...)``
 
-``smooth(moments (m+1, H, W), taps) -> (m+1, H, W)``, or None where a moment isn't finite
+``smooth(moments (m+1, H, W), taps) -> (m+1, H, W)``, or None for other moments and where one
+isn't finite
 
-``separate(phase (m, ...), weight (m, ...), threshold) -> direct, indirect, phase (...)``
+``separate(weight (m, ...), phase (m, ...), threshold) -> direct, indirect, phase (...)``
 
-All take ``spread=`` to do parts of the pixels on other threads (see ``spread``).
+``reconstruct(shape, constants) -> OnePass``, found by `lookup`
+
+All others take ``spread=`` to do parts of the pixels on other threads (see ``parallel``).
 Importing this package imports no compiler: numba is imported by the thread that compiles.
 """
 
 from collections.abc import Callable
+from functools import wraps
 from typing import Any
 
 import numpy as np
 
 from transientcam_moments._kernels.registry import LEAST_PIXELS, PRECISIONS, REGISTRY, Key
 
-__all__ = ["find", "lookup"]
+__all__ = ["accelerated", "find", "lookup"]
+
+Planar = Callable[..., Any]
+
+
+def _planes_less_one(planes: Any, *_: Any) -> int:
+    return int(planes.shape[0]) - 1
+
+
+def accelerated(
+    name: str, *, order: Callable[..., int] = _planes_less_one, of: str | None = None
+) -> Callable[[Planar], Planar]:
+    """Have the lane ``name`` stand in for a planar function wherever there is one for its data.
+
+    Parameters
+    ----------
+    name
+        One of the lanes of the module's table. It takes the same positional arguments, and may
+        return None to leave them to the function.
+    order
+        Returns m from those arguments.
+    of
+        Character of the only type of array that the lane takes; those of `find`, when left out.
+    """
+
+    def decorate(planar: Planar) -> Planar:
+        @wraps(planar)
+        def run(planes: Any, *rest: Any) -> Any:
+            lane = None
+            if isinstance(planes, np.ndarray) and planes.ndim:
+                precision = PRECISIONS.get(planes.dtype.char) if of is None else "f"
+                if precision is not None and of in (None, planes.dtype.char):
+                    lane = _of(name, order(planes, *rest), planes[0].size, precision)
+            found = None if lane is None else lane(planes, *rest)
+            return planar(planes, *rest) if found is None else found
+
+        return run
+
+    return decorate
 
 
 def find(name: str, planes: object) -> Callable[..., Any] | None:
@@ -59,11 +101,13 @@ def find(name: str, planes: object) -> Callable[..., Any] | None:
     if not isinstance(planes, np.ndarray) or planes.ndim == 0:
         return None
     precision = PRECISIONS.get(planes.dtype.char)
-    if precision is None or planes.size < LEAST_PIXELS * planes.shape[0]:
-        return None
-    return REGISTRY.compiled.get(Key(name, planes.shape[0] - 1, precision))
+    return None if precision is None else _of(name, len(planes) - 1, planes[0].size, precision)
 
 
 def lookup(name: str, m: int, pixels: int) -> Callable[..., Any] | None:
     """Return a lane of order m for so many pixels in single precision, or None, as `find` does."""
-    return None if pixels < LEAST_PIXELS else REGISTRY.compiled.get(Key(name, m, "f"))
+    return _of(name, m, pixels, "f")
+
+
+def _of(name: str, m: int, pixels: int, precision: str) -> Callable[..., Any] | None:
+    return None if pixels < LEAST_PIXELS else REGISTRY.compiled.get(Key(name, m, precision))

@@ -1,4 +1,4 @@
-"""Every lane by its name. Importing this module imports numba, so only who compiles may."""
+"""Every lane by its name. Importing this module imports numba: only the compiling thread does."""
 
 from collections.abc import Callable
 from typing import Any

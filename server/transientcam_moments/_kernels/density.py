@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from transientcam_moments._kernels import simd, toeplitz
-from transientcam_moments._kernels.entries import (
+from transientcam_moments._kernels.compiled_entry import (
     FLAG,
     PIXELS,
     PLACES,
@@ -18,7 +18,7 @@ from transientcam_moments._kernels.entries import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._kernels.spread import Spread, at_once
+from transientcam_moments._kernels.parallel import Spread, at_once
 
 _BANK = 240  # pairs of registers of coefficients, which stay in the first cache for all phases
 _PAST_CACHES_BYTES = 1 << 24
@@ -245,7 +245,7 @@ def density_lane(m: int, precision: str) -> Callable[..., Any]:
         past_caches = out.nbytes > _PAST_CACHES_BYTES
         row = pixels * out.itemsize
         alike = simd.REGISTER_BYTES // math.gcd(simd.REGISTER_BYTES, row) if past_caches else 1
-        if phases.size <= _REMEMBERED:  # one frame after the other is wanted at the same phases
+        if phases.size <= _REMEMBERED:  # frames in a row are evaluated at the same phases
             pairs = _paired_before(phases.tobytes(), m, precision, alike)
         else:
             pairs = paired(phases, m, precision, alike)

@@ -7,14 +7,14 @@ import numpy as np
 from numba import njit
 
 from transientcam_moments._kernels import simd, toeplitz
-from transientcam_moments._kernels.entries import (
+from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
     complex_arrays,
     entry,
     order_type,
     real_arrays,
 )
-from transientcam_moments._kernels.spread import Spread, at_once
+from transientcam_moments._kernels.parallel import Spread, at_once
 
 _INTERLEAVE = 4
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from transientcam_moments._kernels import back, front
-from transientcam_moments._kernels.entries import (
+from transientcam_moments._kernels import inputs, outputs
+from transientcam_moments._kernels.compiled_entry import (
     BYTES,
     IMAGES,
     PIXELS,
@@ -16,9 +16,9 @@ from transientcam_moments._kernels.entries import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._kernels.margins import LEAST_WIDTH, normalisation, row_length
+from transientcam_moments._kernels.padding import LEAST_WIDTH, normalisation, row_length
+from transientcam_moments._kernels.parallel import Spread, at_once
 from transientcam_moments._kernels.registry import LEAST_PIXELS
-from transientcam_moments._kernels.spread import Spread, at_once
 
 ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}
 _REAL, _COMPLEX = real_arrays("f"), complex_arrays("f")
@@ -27,7 +27,7 @@ _REAL, _COMPLEX = real_arrays("f"), complex_arrays("f")
 def measure_entry(m: int) -> Callable[..., Any]:
     """Compile the kernel of order m."""
     return entry(
-        front.measure,
+        inputs.measure,
         order_type(m), IMAGES, PIXELS, _COMPLEX[2], PIXELS, REAL, _COMPLEX[2], BYTES, PIXELS,
         PIXELS,
     )  # fmt: skip
@@ -36,14 +36,14 @@ def measure_entry(m: int) -> Callable[..., Any]:
 def smooth_entry() -> Callable[..., Any]:
     """Compile the kernel of all orders."""
     plane, planes = _REAL[1], _REAL[2]
-    return entry(front.smooth, planes, plane, plane, plane, planes, PIXELS, PIXELS, PIXELS)
+    return entry(inputs.smooth, planes, plane, plane, plane, planes, PIXELS, PIXELS, PIXELS)
 
 
 def separate_entry(m: int) -> Callable[..., Any]:
     """Compile the kernel of order m."""
     plane, planes = _REAL[1], _REAL[2]
     return entry(
-        back.separate,
+        outputs.separate,
         order_type(m), planes, planes, BYTES, plane, plane, plane, REAL, REAL, PIXELS, PIXELS,
     )  # fmt: skip
 
@@ -68,12 +68,14 @@ def measure_lane(m: int, precision: str) -> Callable[..., Any]:
 
 
 def smooth_lane(m: int, precision: str) -> Callable[..., Any]:
-    """Compile smoothing; the lane gives None where a moment isn't finite or the image narrow."""
+    """Compile smoothing; the lane gives None for
+    moments that aren't finite, narrow images and other axes.
+    """
     run = smooth_entry()
 
     def lane(moments: Any, taps: Any, *, spread: Spread = at_once) -> Any:
         height, width = moments.shape[-2:]
-        if width < LEAST_WIDTH:
+        if width < LEAST_WIDTH or moments.ndim != 3:
             return None
         planes = np.ascontiguousarray(moments).reshape(len(moments), -1).view(np.float32)
         out = np.empty_like(planes)
@@ -92,10 +94,10 @@ def smooth_lane(m: int, precision: str) -> Callable[..., Any]:
 
 
 def separate_lane(m: int, precision: str) -> Callable[..., Any]:
-    """Compile telling direct from indirect light."""
+    """Compile the separation of direct and indirect light."""
     order, run = (0,) * m, separate_entry(m)
 
-    def lane(phase: Any, weight: Any, threshold: float, *, spread: Spread = at_once) -> Any:
+    def lane(weight: Any, phase: Any, threshold: float, *, spread: Spread = at_once) -> Any:
         shape, pixels = weight.shape[1:], weight[0].size
         angles = np.ascontiguousarray(phase).reshape(m, pixels)
         weights = np.ascontiguousarray(weight).reshape(m, pixels)

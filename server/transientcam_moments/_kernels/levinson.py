@@ -7,14 +7,14 @@ import numpy as np
 from numba import njit
 
 from transientcam_moments._kernels import simd, toeplitz
-from transientcam_moments._kernels.entries import (
+from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
     complex_arrays,
     entry,
     order_type,
     real_arrays,
 )
-from transientcam_moments._kernels.spread import Spread, at_once
+from transientcam_moments._kernels.parallel import Spread, at_once
 
 _INTERLEAVE = 2
 
@@ -44,6 +44,7 @@ def _levinson(
         scale = toeplitz.load_relative(order, b0, b, p, re, im)
         brightness = re[0] * scale
         toeplitz.physical(order, re, im)
+        # a = E_m B^-1 e_0, what Eq. (2) is evaluated with (Theorem 1)
         simd.store(error, p, brightness * toeplitz.levinson(order, re, im, ar, ai, gr, gi))
         simd.store_complex(polynomial[0], p, one, one * 0.0)
         for j in range(m):

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from transientcam_moments._kernels.careful import redo
-from transientcam_moments._kernels.margins import normalisation, row_length
+from transientcam_moments._kernels.padding import normalisation, row_length
+from transientcam_moments._kernels.parallel import Spread, blocks
+from transientcam_moments._kernels.refine import redo
 from transientcam_moments._kernels.registry import LEAST_PIXELS
-from transientcam_moments._kernels.spread import Spread, blocks
 
 _ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}
 _ROOM = 1024  # pixels that are redone in double precision at a time
@@ -28,7 +28,7 @@ class Stages(NamedTuple):
     measure: Callable[..., Any]
     smooth: Callable[..., Any]
     eigenvalue: Callable[..., Any]
-    judge: Callable[..., Any]
+    flag_and_bias: Callable[..., Any]
     returns: Callable[..., Any]
     separate: Callable[..., Any]
     gather: Callable[..., Any]
@@ -183,7 +183,7 @@ class OnePass:
                 s.eigenvalue(
                     s.order, smoothed, int(self._estimated), scratch.eigenvalue, left, right
                 )
-                s.judge(
+                s.flag_and_bias(
                     s.order, int(self._estimated), smoothed, scratch.saturated, scratch.eigenvalue,
                     planes.brightness, planes.uniform, planes.validity, planes.flags,
                     settings.epsilon, settings.minimum_brightness, left, right,

@@ -5,9 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from transientcam_moments._kernels.careful import redo
-from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
-from transientcam_moments._kernels.entries import (
+from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
     REAL,
@@ -16,8 +14,10 @@ from transientcam_moments._kernels.entries import (
     order_type,
     real_arrays,
 )
+from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
+from transientcam_moments._kernels.parallel import Spread, at_once, blocks
+from transientcam_moments._kernels.refine import redo
 from transientcam_moments._kernels.returns import find_returns
-from transientcam_moments._kernels.spread import Spread, at_once, blocks
 
 
 def half_turns(m: int, precision: str) -> Any:

@@ -3,9 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
-from transientcam_moments._kernels import back
-from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
-from transientcam_moments._kernels.entries import (
+from transientcam_moments._kernels import outputs
+from transientcam_moments._kernels.compiled_entry import (
     BYTES,
     COUNTS,
     PIXELS,
@@ -16,6 +15,7 @@ from transientcam_moments._kernels.entries import (
     order_type,
     real_arrays,
 )
+from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.frames import measure_entry, separate_entry, smooth_entry
 from transientcam_moments._kernels.one_pass import Constants, OnePass, Stages
 from transientcam_moments._kernels.pisarenko import half_turns, returns_entry
@@ -44,19 +44,19 @@ def reconstruct_stages(m: int) -> Stages:
         measure=measure_entry(m),
         smooth=smooth_entry(),
         eigenvalue=eigenvalue_entry(m, "f"),
-        judge=entry(
-            back.judge,
+        flag_and_bias=entry(
+            outputs.flag_and_bias,
             order, PIXELS, cplx[2], BYTES, plane, plane, plane, plane, BYTES, REAL, REAL,
             PIXELS, PIXELS,
         ),
         returns=returns_entry(m, "f"),
         separate=separate_entry(m),
         gather=entry(
-            back.gather,
+            outputs.gather,
             order, cplx[2], plane, plane, REAL, wide_cplx[2], PLACES, PIXELS,
         ),
         scatter=entry(
-            back.scatter,
+            outputs.scatter,
             order, PLACES, PIXELS, wide[2], wide[2], COUNTS, wide[1],
             planes, planes, COUNTS, plane,
         ),

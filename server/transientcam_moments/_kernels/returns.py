@@ -47,7 +47,7 @@ def singular(
         if k < m:
             error = error * toeplitz.below_one(x, y)
             fewer = fewer | ~(error > floor)
-        else:
+        else:  # E_m = 0: a is the eigenvector of the smallest eigenvalue (Sec. 5.1)
             unit = 1.0 / simd.sqrt(x * x + y * y)
             x, y = x * unit, y * unit
         toeplitz.step_up(k, ar, ai, x, y)

@@ -69,7 +69,7 @@ def physical(order: Any, re: Any, im: Any) -> None:
 @njit(forceinline=True, error_model="numpy")
 def step_up(k: int, ar: Any, ai: Any, gr: Any, gi: Any) -> None:
     """Raise the order of a polynomial to k: a_j + g conj(a_{k-j}), a_k = g."""
-    for j in range(1, k // 2 + 1):
+    for j in range(1, k // 2 + 1):  # a_j and a_{k-j} together (Durbin's update)
         ur, ui, vr, vi = ar[j], ai[j], ar[k - j], ai[k - j]
         ar[j], ai[j] = ur + gr * vr + gi * vi, ui + gi * vr - gr * vi
         ar[k - j], ai[k - j] = vr + gr * ur + gi * ui, vi + gi * ur - gr * ui
@@ -80,7 +80,7 @@ def step_up(k: int, ar: Any, ai: Any, gr: Any, gi: Any) -> None:
 def reflect(k: int, re: Any, im: Any, ar: Any, ai: Any, error: Any) -> Any:
     """Return g_k = -(b_k + sum_j a_j b_{k-j}) / E_{k-1} (Levinson; Theorem 1)."""
     x, y = re[k], im[k]
-    for j in range(1, k):
+    for j in range(1, k):  # b_k + sum_{0<j<k} a_j b_{k-j}
         x = x + ar[j] * re[k - j] - ai[j] * im[k - j]
         y = y + ar[j] * im[k - j] + ai[j] * re[k - j]
     inverse = -1.0 / error
@@ -103,15 +103,16 @@ def below_one(x: Any, y: Any) -> Any:
 def levinson(order: Any, re: Any, im: Any, ar: Any, ai: Any, gr: Any, gi: Any) -> Any:
     """Fill a_1 .. a_m and g_1 .. g_m from moments with b_0 = 1, and return E_m.
 
-    Where E_k would fall to 4 eps or below, the border of the cone, g_k is projected into the disc
-    and all later ones are zero.
+    Levinson's and Durbin's steps, which end with E_m B^-1 e_0 = a (Theorem 1). Where E_k would fall
+    to 4 eps or below, the border of the cone, g_k is projected into the disc and all later ones are
+    zero.
     """
-    error = re[0]
+    error = re[0]  # E_0 = b_0
     floor = 4.0 * simd.eps(error)
     alive = error > 0.0
     for k in range(1, len(order) + 1):
         x, y = reflect(k, re, im, ar, ai, error)
-        remaining = error * below_one(x, y)
+        remaining = error * below_one(x, y)  # E_k = E_{k-1} (1 - |g_k|^2)
         inside = remaining > floor
         if simd.some(~inside | ~alive):
             onto = simd.sqrt(simd.maximum(1.0 - floor / error, 0.0)) / simd.sqrt(x * x + y * y)

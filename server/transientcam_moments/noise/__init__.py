@@ -1,10 +1,10 @@
 """How noise of the sensor becomes uncertainty of moments, returns, range and density.
 
 From a sensor to the covariance of calibrated moments (`moment_noise`), from there to first order
-to the returns (`return_noise`), the density (`density_noise`) and the range at its peak
-(`peak_noise`), with the bound that no unbiased estimate of the returns falls below
-(`cramer_rao`). Each says where first order holds. Where it does not, `draw` gives noisy moments to
-put through the estimator itself. ::
+to the returns (`return_noise`) and the density (`density_noise`, `density_std`), with the bound
+that no unbiased estimate of the returns falls below (`cramer_rao`). `return_noise` and
+`density_noise` mark where first order holds. Where it does not, `draw` gives noisy moments to put
+through the estimator itself. ::
 
     noise = tm.noise.moment_noise(b[0].real, sensor, calibration=calibration, takes=takes)
     noise = tm.noise.smoothed(noise, sigma_px=0.6)
@@ -13,7 +13,7 @@ put through the estimator itself. ::
 """
 
 from transientcam_moments.noise.cramer_rao import CramerRao, cramer_rao
-from transientcam_moments.noise.density import DensityNoise, PeakNoise, density_noise, peak_noise
+from transientcam_moments.noise.density import DensityNoise, density_noise, density_std
 from transientcam_moments.noise.draws import draw
 from transientcam_moments.noise.moments import (
     MomentNoise,
@@ -29,14 +29,13 @@ __all__ = [
     "CramerRao",
     "DensityNoise",
     "MomentNoise",
-    "PeakNoise",
     "ReturnNoise",
     "Sensor",
     "cramer_rao",
     "density_noise",
+    "density_std",
     "draw",
     "moment_noise",
-    "peak_noise",
     "return_noise",
     "smoothed",
     "smoothed_at",

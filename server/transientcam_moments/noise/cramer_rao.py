@@ -9,7 +9,7 @@ from transientcam_moments.errors import ShapeError
 from transientcam_moments.noise.moments import MomentNoise
 
 _COINCIDE_RAD = 1e-5
-"""Returns closer than that cannot be told apart in double precision: the bound is infinite."""
+"""Returns closer than that cannot be resolved in double precision: the bound is infinite."""
 
 
 class CramerRao(NamedTuple):
@@ -53,7 +53,7 @@ def cramer_rao(phase_rad: Array, weight: Array, noise: MomentNoise) -> CramerRao
     Notes
     -----
     b_j = sum_k w_k exp(i j phi_k) for j >= 1 depends on each return by exp(i j phi_k) per dw_k and
-    i j exp(i j phi_k) per w_k dphi_k. b_0 tells nothing about returns as long as the uniform part
+    i j exp(i j phi_k) per w_k dphi_k. b_0 has no information on returns as long as the uniform part
     is unknown, and that the variance itself depends on the brightness is left out. For one return:
     variance / (w^2 sum_j j^2), with the phase and the weight uncorrelated.
     """

@@ -1,24 +1,22 @@
-"""First-order noise of the maximum entropy density and of its peaks."""
+"""First-order noise of the maximum entropy density."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from transientcam_moments._arrays import Array, in_range, moment_planes, phases
+from transientcam_moments._arrays import Array, in_range, moment_planes, phases, squared
 from transientcam_moments.biasing import EPSILON, bias, estimate_zeroth
 from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.maximum_entropy import density
 from transientcam_moments.noise.moments import MomentNoise
-from transientcam_moments.peaks import PEAK_THRESHOLD, peaks
 
 CLEAR = 5.0
 """Standard deviations that eigenvalues must keep from each other and from the limit of biasing."""
-
-
 FAR, BENT = 5.0, 1.2
 """How far moments are moved to see whether what they determine follows, in standard deviations of
 theirs, and how far it may be from where the differential sees it, in those of its own."""
+_BLOCK_VALUES = 1 << 17
 
 
 class DensityNoise(NamedTuple):
@@ -36,24 +34,6 @@ class DensityNoise(NamedTuple):
 
     density: Array
     std: Array
-    holds: Array
-
-
-class PeakNoise(NamedTuple):
-    """The first peak of a density, and how much noise moves it.
-
-    Attributes
-    ----------
-    phase_rad : array, shape (...)
-        As `peaks` finds it; NaN without any.
-    phase_std_rad : array, shape (...)
-        Its standard deviation; NaN without any.
-    holds : boolean array, shape (...)
-        Where first order holds.
-    """
-
-    phase_rad: Array
-    phase_std_rad: Array
     holds: Array
 
 
@@ -83,7 +63,7 @@ def density_noise(
     Returns
     -------
     DensityNoise
-        In double precision.
+        In double precision; NaN where a moment is not finite or there is no light.
 
     Notes
     -----
@@ -104,6 +84,7 @@ def density_noise(
     with np.errstate(all="ignore"):
         std = np.array([MomentNoise(system.variance).deviation(part) for part in slope])
         std = std.reshape(height.shape)
+        std[:, ~system.lit] = height[:, ~system.lit] = np.nan
         holds = system.holds & (std > 0)
         for step in _steps(system.variance):
             moved = density(_coefficients(system.measured + step, epsilon, zeroth), phase)
@@ -113,74 +94,48 @@ def density_noise(
     return DensityNoise(height.reshape(shape), std.reshape(shape), holds.reshape(shape))
 
 
-def peak_noise(
+def density_std(
     b: Array,
     noise: MomentNoise,
+    phase_rad: Array,
     *,
-    threshold: float = PEAK_THRESHOLD,
     epsilon: float = EPSILON,
     zeroth: str = "low-frequency",
-) -> PeakNoise:
-    """Propagate the noise of moments to the first peak of the density, the range of Sec. 5.3.
+) -> Array:
+    """Return the standard deviation of the maximum entropy density alone, for whole frames.
 
     Parameters
     ----------
-    b, noise, epsilon, zeroth
+    b, noise, phase_rad, epsilon, zeroth
         As for `density_noise`.
-    threshold : float
-        As for `peaks`, 0 to 1.
 
     Returns
     -------
-    PeakNoise
-        In double precision.
+    array, shape (T, ...), float32
+        In the unit of b_0 per radian; NaN where a moment is not finite or there is no light.
+        Multiply by 2 pi f for a density per second.
+
+    Raises
+    ------
+    ShapeError, ParameterError
+        As `density_noise` does.
 
     Notes
     -----
-    At a maximum Re(Q' / Q) = 0 with Q = q* s; differentiating that gives dphi. Beside what
-    `density_noise` asks for, the peak has to move as the differential says when any moment is
-    off by `FAR` standard deviations, to `BENT` of its own: one might come out of a shoulder.
-    Nor may an earlier one reach the threshold, this one fall below it, or cross the ends of the
-    turn.
+    `density_noise` says where first order holds, which takes most of its time.
     """
-    in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
-    system = _System(b, noise, epsilon=epsilon, zeroth=zeroth)
-    found = peaks(levinson(system.b), threshold=threshold)
-    first_rad = found.first_rad
-    with np.errstate(all="ignore"):
-        gradient, curvature = system.peak(np.nan_to_num(first_rad))
-        gradient = system.through_bias(gradient) / -curvature
-        std = np.where(
-            np.isnan(first_rad), np.nan, MomentNoise(system.variance).deviation(gradient)
-        )
-        holds = system.holds & (std > 0) & _decided(system, first_rad, std, threshold)
-        for step in _steps(system.variance):
-            coefficients = _coefficients(system.measured + step, epsilon, zeroth)
-            moved = peaks(coefficients, threshold=threshold).first_rad
-            by = np.remainder(moved - first_rad + np.pi, 2 * np.pi) - np.pi
-            expected = (gradient.conj() * step).real.sum(axis=0)
-            holds &= abs(by - expected) < BENT * std
-    return PeakNoise(
-        first_rad.reshape(system.trailing),
-        std.reshape(system.trailing),
-        holds.reshape(system.trailing),
-    )
-
-
-def _decided(system: "_System", first_rad: Array, std: Array, threshold: float) -> Array:
-    """Whether noise cannot make another peak the first one above the threshold."""
-    found = peaks(levinson(system.b), threshold=0.0)
-    first = np.nan_to_num(first_rad)
-    decided = (first > CLEAR * std) & (2 * np.pi - first > CLEAR * std)
-    strongest = np.nan_to_num(found.strongest_rad)
-    highest, of_highest = system.density(strongest)
-    for phase in found.phase_rad:
-        where = np.nan_to_num(phase)
-        height, slope = system.density(where)
-        sways = _noise_of(system, slope - of_highest)
-        clear = abs(np.log(height / highest / threshold)) > CLEAR * sways
-        decided &= np.isnan(phase) | (where > first) | (where == strongest) | clear
-    return decided
+    planes, trailing = moment_planes(b)
+    variance = np.asarray(noise.variance).reshape(planes.shape)
+    phase = np.asarray(phases(phase_rad, like=planes), dtype=float)
+    steering = np.exp(1j * np.arange(len(planes))[:, None] * phase).astype(np.complex64)
+    out = np.empty((phase.size, planes.shape[1]), np.float32)
+    pixels = max(64, _BLOCK_VALUES // max(1, phase.size))
+    for start in range(0, planes.shape[1], pixels):
+        part = slice(start, start + pixels)
+        of_part = MomentNoise(variance[:, part])
+        system = _System(planes[:, part], of_part, epsilon=epsilon, zeroth=zeroth)
+        out[:, part] = system.std(steering)
+    return out.reshape((phase.size, *trailing))
 
 
 def _steps(variance: Array) -> Iterator[Array]:
@@ -199,11 +154,6 @@ def _coefficients(b: Array, epsilon: float, zeroth: str) -> Coefficients:
     return levinson(bias(b, epsilon).moments)
 
 
-def _noise_of(system: "_System", gradient: Array) -> Array:
-    """Return the standard deviation of a quantity with a gradient in the biased moments."""
-    return MomentNoise(system.variance).deviation(system.through_bias(gradient))
-
-
 class _System:
     """The Toeplitz systems of all pixels, pixels first, and how they answer to noise."""
 
@@ -216,6 +166,8 @@ class _System:
         self.variance = np.asarray(noise.variance, dtype=float).reshape(self.b.shape)
         if zeroth == "estimated":
             self.b[0] = 0
+        finite = np.isfinite(self.b).all(axis=0) & np.isfinite(self.variance).all(axis=0)
+        self.b[:, ~finite] = 0
         self.measured = self.b.copy()
         eigenvalues, vectors = np.linalg.eigh(_toeplitz(self.b))
         self._vector = vectors[:, :, 0].T  # (m + 1, P)
@@ -223,6 +175,8 @@ class _System:
         b0 = self.b[0].real
         self.biased = (smallest < epsilon * b0) | (zeroth == "estimated")
         self.b[0] = np.where(self.biased, (b0 - smallest) / (1 - epsilon), b0)
+        self.lit = finite & (self.b[0].real > 0)
+        self.b[:, ~self.lit] = np.eye(len(self.b), 1)  # has an inverse, and is not used
         self.inverse = np.linalg.inv(_toeplitz(self.b))
         self.q = self.inverse[:, :, 0].T
         self.holds = self._holds(b0, eigenvalues, zeroth)
@@ -237,7 +191,7 @@ class _System:
         holds = np.where(self.biased, gap > CLEAR * size, smallest > CLEAR * size)
         if zeroth != "estimated":
             holds &= abs(smallest - self.epsilon * b0) > CLEAR * moved
-        return holds
+        return np.asarray(holds & self.lit)
 
     def through_bias(self, gradient: Array) -> Array:
         """Turn a gradient in the biased moments into one in the measured ones."""
@@ -256,16 +210,33 @@ class _System:
         gradient = _form(self.q, self.q, -1 / self.q[0].real)
         return height, gradient + _form(self.q, self._solve(steering), 2 / value)
 
-    def peak(self, phase: Array) -> tuple[Array, Array]:
-        """Gradient and derivative of half the slope of log h, -Re(Q' / Q)."""
-        order = np.arange(len(self.b))[:, None]
-        steering = np.exp(1j * order * phase)
-        value, first, second = (
-            (self.q.conj() * (1j * order) ** power * steering).sum(axis=0) for power in range(3)
-        )
-        gradient = _form(self.q, self._solve(1j * order * steering), 1 / value)
-        gradient = gradient - _form(self.q, self._solve(steering), first / value**2)
-        return gradient, -(second / value - (first / value) ** 2).real
+    def std(self, steering: Array) -> Array:
+        """Return the standard deviation (T, P) of the density at s(phi) (m + 1, T), complex64.
+
+        The gradient of log h is that of `density`. Its Toeplitz forms are linear in s, which
+        leaves one matrix product for all phases and pixels.
+        """
+        n, q = len(self.b), self.q
+        forms = np.empty((self.pixels, 2, n, n), np.complex64)
+        for lag in range(n):
+            forms[:, 0, lag] = np.einsum("ip,pik->pk", q[lag:].conj(), self.inverse[:, : n - lag])
+            forms[:, 1, lag] = np.einsum("ip,pik->pk", q[: n - lag].conj(), self.inverse[:, lag:])
+        products = (forms.reshape((-1, n)) @ steering).reshape((self.pixels, 2, n, -1))
+        value = q.T.conj().astype(np.complex64) @ steering
+        constant = _form(q, q, -1 / q[0].real).astype(np.complex64)[..., None]
+        raised = _form(self._vector, self._vector, 1 / (1 - self.epsilon))
+        raised = np.where(self.biased, raised, 0).astype(np.complex64)[..., None]
+        variance = self.variance.astype(np.float32)[..., None]
+        with np.errstate(all="ignore"):
+            factor = 2 / value
+            of_b0 = (factor * products[:, 0, 0]).real + constant[0].real
+            total = np.where(self.biased[:, None], 0, of_b0**2 * variance[0])
+            for lag in range(1, n):
+                gradient = (factor * products[:, 0, lag]).conj() + factor * products[:, 1, lag]
+                gradient += constant[lag] - of_b0 * raised[lag]
+                total += squared(gradient) * variance[lag]
+            height = (q[0].real / (2 * np.pi)).astype(np.float32)[:, None] / squared(value)
+            return np.where(self.lit, (height * np.sqrt(total)).T, np.nan)
 
     def _solve(self, right: Array) -> Array:
         return np.einsum("pjk,kp->jp", self.inverse, right)

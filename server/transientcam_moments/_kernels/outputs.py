@@ -13,7 +13,7 @@ _BIASED, _NO_SIGNAL, _SATURATED, _NON_FINITE = 1.0, 2.0, 4.0, 8.0
 
 
 @njit(nogil=True, error_model="numpy")
-def judge(
+def flag_and_bias(
     order: Any,
     estimated: bool,
     b: Any,
@@ -77,7 +77,7 @@ def separate(
     start: int,
     stop: int,
 ) -> None:
-    """Tell direct from indirect light: the first return above a threshold (Sec. 5.1)."""
+    """Separate direct from indirect light: the first return above a threshold (Sec. 5.1)."""
     one = simd.ones(direct, _INTERLEAVE)
     step = simd.width(one)
     for left in range(start, stop, step):
