@@ -2,8 +2,9 @@
 
 import transientcam_moments as tm
 from transientcam_driver import Camera, Sequence, list_scenes
+from transientcam_server.camera.source import sensor_of
 from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.settings import ReconstructionSettings
+from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
 SEED = 1
 SETTINGS = ReconstructionSettings()
@@ -19,7 +20,8 @@ def captured(
 ) -> tuple[Recipe, list[tm.Reconstruction]]:
     """Capture and reconstruct frames with a sequence."""
     applied = camera.configure(sequence)
-    recipe = Recipe(applied, SETTINGS, 2.0**camera.capabilities.bits - 1.0)
+    sensor = sensor_of(camera, SensorSettings())
+    recipe = Recipe(applied, SETTINGS, 2.0**camera.capabilities.bits - 1.0, sensor=sensor)
     camera.start()
     found = [recipe.reconstruct(camera.read_frame()) for _ in range(frames)]
     camera.stop()

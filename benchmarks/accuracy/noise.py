@@ -14,8 +14,7 @@ from benchmarks.accuracy.capturing import SEED, captured, short
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.measuring import spec_of
-from transientcam_server.camera.source import noise_of
-from transientcam_server.settings import SensorSettings
+from transientcam_server.imaging.noise import moment_noise
 
 
 @dataclass(frozen=True)
@@ -49,10 +48,9 @@ def predicted_and_observed() -> list[Compared]:
     """Predict the deviation of the range of `mirrors` from its mean frame, and observe it."""
     compared = []
     with open_camera(spec_of("mirrors", seed=SEED), clock=VirtualClock()) as camera:
-        model = noise_of(camera, SensorSettings())
         for sequence in NOISE:
             recipe, found = captured(camera, sequence, FRAMES)
-            noise = model.of_moments(recipe, found[0])
+            noise = moment_noise(recipe, found[0])
             mean = np.mean([each.smoothed for each in found], axis=0)
             predicted = tm.noise.return_noise(tm.pisarenko(mean), noise)
             ranges = np.stack([np.asarray(each.range_m, dtype=float) for each in found])

@@ -10,7 +10,7 @@ from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.capture import repeatability
 from transientcam_experiments.tradeoff.measuring import spec_of
-from transientcam_server.camera.source import noise_of
+from transientcam_server.camera.source import sensor_of
 from transientcam_server.planning import Goal, Planner, Predictor
 from transientcam_server.planning.plan import plan
 from transientcam_server.settings import SensorSettings
@@ -44,10 +44,10 @@ def planned(scene: str) -> Iterator[Planned]:
     if scene not in known_scenes():
         return
     with open_camera(spec_of(scene, seed=SEED + 1), clock=VirtualClock()) as camera:
-        noise = noise_of(camera, SensorSettings())
-        planner = Planner(camera.capabilities, noise, SETTINGS)
+        sensor = sensor_of(camera, SensorSettings())
+        planner = Planner(camera.capabilities, sensor, SETTINGS)
         recipe, (look,) = captured(camera, Sequence(harmonics=6, takes=16, exposure_s=0.0015), 1)
-        predictor = Predictor(planner.scene_statistics(recipe, look, 0.0), noise.sensor, SETTINGS)
+        predictor = Predictor(planner.scene_statistics(recipe, look, 0.0), sensor, SETTINGS)
         for wanted, goal in GOALS.items():
             best = plan(
                 goal, predictor, camera.capabilities, reconstruct_s=lambda _: 1e-3

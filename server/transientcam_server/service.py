@@ -26,7 +26,7 @@ from transientcam_server.camera import (
 from transientcam_server.camera.events import Back, Captured, Event, Lost, SequenceChanged
 from transientcam_server.camera.jobs import Job
 from transientcam_server.camera.lease import Change, Lease, Timer
-from transientcam_server.camera.source import noise_of
+from transientcam_server.camera.source import sensor_of
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import (
     NOMINAL_ID,
@@ -34,6 +34,7 @@ from transientcam_server.imaging.calibration import (
     calibration_id,
     load_calibration,
 )
+from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.history import History
 from transientcam_server.imaging.lens import Intrinsics, known_intrinsics
 from transientcam_server.imaging.pipeline import Pipeline
@@ -81,16 +82,17 @@ class Service:
         self.history = History(settings.history)
         self.mjpeg_clients = 0
         self.observers: list[Observer] = []
+        self._superseded: list[Frame] = []
         self._executor = ThreadPoolExecutor(settings.workers, thread_name_prefix="worker")
         self.workers = Workers(self._executor, count=settings.workers)
-        noise = noise_of(camera, settings.sensor)
-        self.planner = Planner(camera.capabilities, noise, settings.reconstruction)
+        sensor = sensor_of(camera, settings.sensor)
+        self.planner = Planner(camera.capabilities, sensor, settings.reconstruction)
         kept = CalibrationStore(settings.calibrations, given=settings.calibration)
         self.pipeline = Pipeline(
             camera,
             settings.reconstruction,
             self.workers,
-            noise=noise,
+            sensor=sensor,
             calibration=_calibration(camera, settings, kept),
             intrinsics=lambda: self.intrinsics,
         )
@@ -106,7 +108,7 @@ class Service:
             kept,
             acquisition=self.acquisition,
             pipeline=self.pipeline,
-            noise=noise,
+            sensor=sensor,
             jobs=self.jobs,
             history=self.history,
             notify=partial(self.hub.notify, "calibration-changed"),
@@ -250,9 +252,7 @@ class Service:
             observer.happened(event)
         match event:
             case Captured(raw, applied):
-                if self.hub.latest is not None:
-                    for observer in self.observers:
-                        observer.superseded(self.hub.latest.meta())
+                self._report_superseded()
                 frame = self.pipeline.frame(raw, applied)
                 self.history.append(frame)
                 self.hub.publish(frame)
@@ -264,6 +264,17 @@ class Service:
                 before, self.applied = self.applied, applied
                 self._notify_sequence_changed()
                 self._notify_calibration(before)
+
+    def _report_superseded(self) -> None:
+        """Report former frames to the observers once nothing of them is being computed."""
+        if self.hub.latest is not None:
+            self._superseded.append(self.hub.latest)
+        computing = [frame for frame in self._superseded if frame.computing]
+        for frame in self._superseded:
+            if frame not in computing:
+                for observer in self.observers:
+                    observer.superseded(frame.meta())
+        self._superseded = computing
 
     def _call_later(self, delay_s: float, callback: Callable[[], None]) -> Timer:
         return asyncio.get_running_loop().call_later(delay_s, callback)

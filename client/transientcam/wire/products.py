@@ -56,6 +56,13 @@ PRODUCTS: Final[dict[str, Product]] = {
         Product("moments", "DN", ("moment", *_IMAGE), "<c8", "calibrated moments b_0 to b_m"),
         Product("raw", "DN", ("image", *_IMAGE), "<u2", "images of the sensor, each labelled"),
         Product("transient", "DN/s", ("time", *_IMAGE), "<f4", "density over time of flight"),
+        Product(
+            "density_std",
+            "DN/s",
+            ("time", *_IMAGE),
+            "<f4",
+            "standard deviation of transient that the sensor's noise predicts, to first order",
+        ),
         Product("cumulative", "DN", ("time", *_IMAGE), "<f4", "light up to a time of flight"),
         Product("streak", "DN/s", ("time", "x"), "<f4", "density over time of flight of one row"),
         Product(

@@ -34,7 +34,7 @@ from transientcam_server.imaging.calibration import (
 )
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.history import History
-from transientcam_server.imaging.noise import NoiseModel, invalid_share
+from transientcam_server.imaging.noise import invalid_share, moment_noise
 from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.imaging.recipe import Recipe
 
@@ -93,7 +93,7 @@ class Calibrator:
         *,
         acquisition: Acquisition,
         pipeline: Pipeline,
-        noise: NoiseModel,
+        sensor: tm.noise.Sensor,
         jobs: Jobs,
         history: History,
         notify: Callable[[Mapping[str, Any]], None],
@@ -103,7 +103,7 @@ class Calibrator:
         self._camera = camera
         self._acquisition = acquisition
         self._pipeline = pipeline
-        self._noise = noise
+        self._sensor = sensor
         self._jobs = jobs
         self._history = history
         self._notify = notify
@@ -268,14 +268,20 @@ class Calibrator:
         return share
 
     def _share(self, recipe: Recipe, found: tm.Reconstruction) -> float | None:
-        return invalid_share(found, self._noise.of_moments(recipe, found))
+        return invalid_share(found, moment_noise(recipe, found))
 
     def _share_of_takes(
         self, calibration: Calibration, takes: "_Takes", once: AppliedSequence
     ) -> float | None:
         """Return the share of the measurement's own frames, each by itself; runs on a worker."""
         full_scale = 2.0**self._camera.capabilities.bits - 1.0
-        recipe = Recipe(once, self._pipeline.reconstruction.settings, full_scale, calibration.gains)
+        recipe = Recipe(
+            once,
+            self._pipeline.reconstruction.settings,
+            full_scale,
+            calibration.gains,
+            sensor=self._sensor,
+        )
         shares = []
         for images in takes.frames():
             raw = RawFrame(0, 0, images, once.labels, 0.0, 0.0, 0.0, 0.0, 0)

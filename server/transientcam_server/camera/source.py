@@ -4,6 +4,7 @@ from types import TracebackType
 from typing import Protocol, Self
 
 import transientcam_driver
+import transientcam_moments as tm
 from transientcam_driver import (
     AppliedSequence,
     Capabilities,
@@ -13,7 +14,6 @@ from transientcam_driver import (
     Simulation,
     Status,
 )
-from transientcam_server.imaging.noise import NoiseModel
 from transientcam_server.recording.replay import PREFIX, ReplayCamera, parse_replay
 from transientcam_server.settings import SensorSettings
 
@@ -84,10 +84,16 @@ class Camera(Protocol):
     ) -> None: ...
 
 
-def noise_of(camera: Camera, sensor: SensorSettings) -> NoiseModel:
-    """Return the noise model: of the simulated sensor, or of ``sensor`` for a real camera."""
-    model = sensor if camera.simulation is None else camera.simulation.sensor
-    return NoiseModel(model, bits=camera.capabilities.bits)
+def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:
+    """Return the sensor of a camera: a simulated one has its own, a real one the settings'."""
+    model = settings if camera.simulation is None else camera.simulation.sensor
+    return tm.noise.Sensor(
+        gain_e_per_dn=model.gain_e_per_dn,
+        full_well_e=model.full_well_e,
+        read_noise_e=model.read_noise_e,
+        dark_dn=model.dark_dn,
+        bits=camera.capabilities.bits,
+    )
 
 
 def open_camera(spec: str) -> Camera:

@@ -72,7 +72,7 @@ def plan(
     """
     import transientcam_moments as tm
     from transientcam_driver import Sequence, open_camera
-    from transientcam_server.camera.source import noise_of
+    from transientcam_server.camera.source import sensor_of
     from transientcam_server.errors.exceptions import Problem
     from transientcam_server.planning import Goal, Planner, uniform_scene
     from transientcam_server.settings import ReconstructionSettings, SensorSettings
@@ -92,7 +92,7 @@ def plan(
     console = Console(stderr=True)
     with open_camera(camera) as opened:
         planner = Planner(
-            opened.capabilities, noise_of(opened, SensorSettings()), ReconstructionSettings()
+            opened.capabilities, sensor_of(opened, SensorSettings()), ReconstructionSettings()
         )
         if computing_share is not None:
             with console.status("compiling kernels"):
@@ -124,8 +124,9 @@ def plan(
 def _captured(camera: "Camera") -> tuple["Recipe", "tm.Reconstruction"]:
     """Capture the scene with many harmonics and little noise, to describe it by."""
     from transientcam_driver import Sequence
+    from transientcam_server.camera.source import sensor_of
     from transientcam_server.imaging.recipe import Recipe
-    from transientcam_server.settings import ReconstructionSettings
+    from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
     applied = camera.configure(
         camera.capabilities.nearest(Sequence(harmonics=6, takes=16, exposure_s=0.0015))
@@ -134,7 +135,8 @@ def _captured(camera: "Camera") -> tuple["Recipe", "tm.Reconstruction"]:
     frame = camera.read_frame()
     camera.stop()
     full_scale = 2.0**camera.capabilities.bits - 1.0
-    recipe = Recipe(applied, ReconstructionSettings(), full_scale)
+    sensor = sensor_of(camera, SensorSettings())
+    recipe = Recipe(applied, ReconstructionSettings(), full_scale, sensor=sensor)
     return recipe, recipe.reconstruct(frame)
 
 

@@ -2,7 +2,6 @@
 
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.history import History
-from transientcam_server.imaging.noise import NoiseModel
 from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.imaging.products import PRODUCTS, Product
 from transientcam_server.imaging.recipe import Recipe
@@ -12,7 +11,6 @@ __all__ = [
     "PRODUCTS",
     "Frame",
     "History",
-    "NoiseModel",
     "Pipeline",
     "Product",
     "Recipe",

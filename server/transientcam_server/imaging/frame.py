@@ -25,7 +25,6 @@ from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import calibration_id
 from transientcam_server.imaging.encodings.encoding import Encoding
-from transientcam_server.imaging.noise import NoiseModel
 from transientcam_server.imaging.products import PRODUCTS, Product
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.imaging.stages import STAGES, Computed, compute
@@ -63,7 +62,6 @@ class Frame:
         raw: RawFrame,
         recipe: Recipe,
         *,
-        noise: NoiseModel | None = None,
         truth: Callable[[float | None], Truth] | None = None,
         past: bool = False,
     ) -> None:
@@ -73,7 +71,6 @@ class Frame:
         self.past = past
         self._workers = workers
         self._run = workers.run_long if past else workers.run
-        self._noise = noise
         self._truth = truth
         self._computed = Computed()
         self._reconstruct_s: float | None = None
@@ -91,7 +88,6 @@ class Frame:
             self.number,
             self.raw,
             self.recipe,
-            noise=self._noise,
             truth=self._truth,
             past=True,
         )
@@ -101,6 +97,11 @@ class Frame:
         """Height and width in pixels."""
         height, width = self.raw.images.shape[-2:]
         return height, width
+
+    @property
+    def computing(self) -> bool:
+        """Whether stages of its reconstruction are being computed."""
+        return self._computing is not None
 
     def meta(self) -> dict[str, Any]:
         """Return what is known of the frame, as the wire contract has it."""
@@ -166,7 +167,7 @@ class Frame:
             while self._requested:
                 requested, self._requested = self._requested, set()
                 self._computed, elapsed_s = await self._run(
-                    compute, self._computed, self.recipe, self.raw, self._noise, requested
+                    compute, self._computed, self.recipe, self.raw, requested
                 )
                 self._reconstruct_s = (self._reconstruct_s or 0.0) + elapsed_s
                 for stage in requested:

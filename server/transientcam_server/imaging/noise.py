@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,19 +18,6 @@ MEDIAN_OF_NORMAL: Final = 0.674490
 """Median of the absolute value of a standard normal variable."""
 EXPLAINED_DEVIATIONS: Final = 4.0
 """Standard deviations of a negative eigenvalue that noise explains."""
-
-
-class SensorModel(Protocol):
-    """What `NoiseModel` takes of a sensor, simulated or set by hand."""
-
-    @property
-    def gain_e_per_dn(self) -> float: ...  # noqa: D102 - named and used as in tm.noise.Sensor
-    @property
-    def full_well_e(self) -> float: ...  # noqa: D102
-    @property
-    def read_noise_e(self) -> float: ...  # noqa: D102
-    @property
-    def dark_dn(self) -> float: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,78 +46,61 @@ class RangeNoise:
         }
 
 
-class NoiseModel:
-    """What the noise of one sensor does to frames; pure, so any worker may call it.
+def moment_noise(recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoise:
+    """Return the noise of a frame's smoothed moments (m + 1, H, W), of the recipe's sensor."""
+    noise = _of_pixels(recipe, np.asarray(found.smoothed[0].real))
+    return tm.noise.smoothed(noise, recipe.settings.smoothing_px)
 
-    Attributes
-    ----------
-    sensor : tm.noise.Sensor
-        Gain, full well, read noise and offset.
+
+def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
+    """Predict the deviation of a frame's range from its own returns, by a sample of pixels.
+
+    None where no pixel has a range. With another estimator than Pisarenko's it is that of
+    Pisarenko's nevertheless, which is cheap enough for every frame.
     """
+    seen = np.flatnonzero(np.asarray(found.has_range).ravel())
+    if not seen.size:
+        return None
+    sample = seen[:: max(1, seen.size // SAMPLED_PIXELS)]
 
-    def __init__(self, model: SensorModel, *, bits: int) -> None:
-        self.sensor = tm.noise.Sensor(
-            gain_e_per_dn=model.gain_e_per_dn,
-            full_well_e=model.full_well_e,
-            read_noise_e=model.read_noise_e,
-            dark_dn=model.dark_dn,
-            bits=bits,
-        )
+    def sampled(planes: _Array) -> _Array:
+        return np.asarray(planes).reshape((planes.shape[0], -1))[:, sample]
 
-    def of_moments(self, recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoise:
-        """Return the noise of a frame's smoothed moments (m + 1, H, W)."""
-        noise = self._of_pixels(recipe, np.asarray(found.smoothed[0].real))
-        return tm.noise.smoothed(noise, recipe.settings.smoothing_px)
+    returns = tm.Returns(
+        sampled(found.returns.phase_rad),
+        sampled(found.returns.weight),
+        np.asarray(found.returns.uniform).ravel()[sample],
+        np.asarray(found.returns.count).ravel()[sample],
+    )
+    noise = tm.noise.smoothed_at(
+        partial(_of_pixels, recipe),
+        np.asarray(found.smoothed[0].real),
+        sample,
+        recipe.settings.smoothing_px,
+    )
+    deviation = tm.noise.return_noise(returns, noise, threshold=recipe.settings.return_threshold)
+    std_m = tm.range_m(deviation.direct_phase_std_rad, recipe.base_frequency_hz)
+    known = np.isfinite(std_m)
+    if not known.any():
+        return None
+    return RangeNoise(
+        float(np.median(std_m[known])),
+        float(np.quantile(std_m[known], 0.9)),
+        float(deviation.holds.mean()),
+    )
 
-    def _of_pixels(self, recipe: Recipe, brightness: _Array) -> tm.noise.MomentNoise:
-        """Return the noise of moments with this brightness, each pixel by itself."""
-        sequence = recipe.applied.sequence
-        return tm.noise.moment_noise(
-            brightness,
-            self.sensor,
-            calibration=nominal_gains(sequence),
-            zeroth=sequence.zeroth,
-            takes=sequence.takes,
-        )
 
-    def of_range(self, recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
-        """Predict the deviation of a frame's range from its own returns, by a sample of pixels.
-
-        None where no pixel has a range. With another estimator than Pisarenko's it is that of
-        Pisarenko's nevertheless, which is cheap enough for every frame.
-        """
-        seen = np.flatnonzero(np.asarray(found.has_range).ravel())
-        if not seen.size:
-            return None
-        sample = seen[:: max(1, seen.size // SAMPLED_PIXELS)]
-
-        def sampled(planes: _Array) -> _Array:
-            return np.asarray(planes).reshape((planes.shape[0], -1))[:, sample]
-
-        returns = tm.Returns(
-            sampled(found.returns.phase_rad),
-            sampled(found.returns.weight),
-            np.asarray(found.returns.uniform).ravel()[sample],
-            np.asarray(found.returns.count).ravel()[sample],
-        )
-        noise = tm.noise.smoothed_at(
-            partial(self._of_pixels, recipe),
-            np.asarray(found.smoothed[0].real),
-            sample,
-            recipe.settings.smoothing_px,
-        )
-        deviation = tm.noise.return_noise(
-            returns, noise, threshold=recipe.settings.return_threshold
-        )
-        std_m = tm.range_m(deviation.direct_phase_std_rad, recipe.base_frequency_hz)
-        known = np.isfinite(std_m)
-        if not known.any():
-            return None
-        return RangeNoise(
-            float(np.median(std_m[known])),
-            float(np.quantile(std_m[known], 0.9)),
-            float(deviation.holds.mean()),
-        )
+def _of_pixels(recipe: Recipe, brightness: _Array) -> tm.noise.MomentNoise:
+    """Return the noise of moments with this brightness, each pixel by itself."""
+    assert recipe.sensor is not None  # noqa: S101 - callers have one, or no noise to predict
+    sequence = recipe.applied.sequence
+    return tm.noise.moment_noise(
+        brightness,
+        recipe.sensor,
+        calibration=nominal_gains(sequence),
+        zeroth=sequence.zeroth,
+        takes=sequence.takes,
+    )
 
 
 def invalid_share(found: tm.Reconstruction, noise: tm.noise.MomentNoise) -> float | None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol
 
+import transientcam_moments as tm
 from transientcam_driver import (
     AppliedSequence,
     CalibrationMismatch,
@@ -16,7 +17,6 @@ from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import Calibration, Gains
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.lens import Intrinsics
-from transientcam_server.imaging.noise import NoiseModel
 from transientcam_server.imaging.products import PRODUCTS, Product
 from transientcam_server.imaging.recipe import Recipe, SettingsVersion
 from transientcam_server.imaging.workers import Workers
@@ -40,7 +40,7 @@ class Source(Protocol):
 class Pipeline:
     """Makes frames of the captures of one camera; on the event loop.
 
-    ``noise`` predicts the deviation of the range of each frame whose returns are computed;
+    From ``sensor``, where it is known, the deviation of each frame's range is predicted.
     ``intrinsics`` returns where the pixels of the next frame look.
 
     Attributes
@@ -48,7 +48,8 @@ class Pipeline:
     workers
         What computes for its frames.
     products
-        Products that this camera's frames have; only a simulated camera has a ground truth.
+        Products that this camera's frames have; only a simulated camera has
+        a ground truth, and noise is predicted for a sensor that is known.
     reconstruction
         How frames are computed from the next one on.
     calibration
@@ -61,14 +62,14 @@ class Pipeline:
         settings: ReconstructionSettings,
         workers: Workers,
         *,
-        noise: NoiseModel | None = None,
+        sensor: tm.noise.Sensor | None = None,
         calibration: Calibration | None = None,
         intrinsics: Callable[[], Intrinsics] | None = None,
     ) -> None:
         self.workers = workers
         self.calibration = calibration
         self.reconstruction = SettingsVersion(1, settings)
-        self._noise = noise
+        self._sensor = sensor
         self._intrinsics = intrinsics
         self._capabilities = camera.capabilities
         self._full_scale = 2.0**camera.capabilities.bits - 1.0
@@ -76,10 +77,13 @@ class Pipeline:
         self._frames = 0
         self._recipe: Recipe | None = None
         self.products: dict[str, Product] = {
-            name: product
-            for name, product in PRODUCTS.items()
-            if name != "truth" or self._truth is not None
+            name: product for name, product in PRODUCTS.items() if self._has(product)
         }
+
+    def _has(self, product: Product) -> bool:
+        if product.needs == "truth":
+            return self._truth is not None
+        return self._sensor is not None or not product.of_noise
 
     def frame(self, raw: RawFrame, applied: AppliedSequence) -> Frame:
         """Return the next frame, counted from 1."""
@@ -91,6 +95,7 @@ class Pipeline:
             self.gains_for(applied),
             self.reconstruction.id,
             None if self._intrinsics is None else self._intrinsics(),
+            self._sensor,
         )
         if recipe != self._recipe:  # else the same one: it holds what need not be prepared again
             self._recipe = recipe
@@ -100,9 +105,7 @@ class Pipeline:
         self, number: int, raw: RawFrame, recipe: Recipe, *, past: bool = False
     ) -> Frame:
         """Return a frame with a number and a recipe of its own, as of a recording."""
-        return Frame(
-            self.workers, number, raw, recipe, noise=self._noise, truth=self._truth, past=past
-        )
+        return Frame(self.workers, number, raw, recipe, truth=self._truth, past=past)
 
     def gains_for(self, applied: AppliedSequence) -> Gains | None:
         """Return the gains of the calibration, if it fits this sequence."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam import wire
 from transientcam_driver import AppliedSequence, RawFrame, Truth
+from transientcam_server.imaging.noise import moment_noise
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.imaging.view import Crop, View
 
@@ -53,6 +54,8 @@ class Product:
         Whether it is evaluated at times of flight that the request names.
     of_row
         Whether it is one row of the picture, which the request may name.
+    of_noise
+        Whether it is predicted from the noise of the sensor, which must be known.
     steps
         Of a 16-bit PNG; None for steps of one unit.
     fields
@@ -64,6 +67,7 @@ class Product:
     compute: Callable[[Recipe, Any, View], _Array]
     over_time: bool = False
     of_row: bool = False
+    of_noise: bool = False
     steps: Steps | None = None
     fields: Callable[[Recipe, RawFrame, View], dict[str, Any]] = _no_fields
 
@@ -114,6 +118,19 @@ def _transient(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
         _cropped(found.coefficients, view.crop), rad_s * np.array(view.time_s)
     )
     return np.float32(rad_s) * density
+
+
+def _density_std(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
+    rad_s = 2.0 * np.pi * recipe.base_frequency_hz
+    noise = moment_noise(recipe, found)
+    std: _Array = tm.noise.density_std(
+        view.crop.apply(found.smoothed),
+        tm.noise.MomentNoise(view.crop.apply(noise.variance)),
+        rad_s * np.array(view.time_s),
+        epsilon=recipe.settings.bias,
+        zeroth=recipe.applied.sequence.zeroth,
+    )
+    return np.float32(rad_s) * std
 
 
 def _cumulative(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
@@ -219,6 +236,7 @@ PRODUCTS: Final[dict[str, Product]] = {
         Product(_WIRE["moments"], "moments", _property("moments")),
         Product(_WIRE["raw"], "raw", _images, fields=_labels),
         Product(_WIRE["transient"], "coefficients", _transient, over_time=True),
+        Product(_WIRE["density_std"], "moments", _density_std, over_time=True, of_noise=True),
         Product(_WIRE["cumulative"], "coefficients", _cumulative, over_time=True),
         Product(
             _WIRE["streak"],

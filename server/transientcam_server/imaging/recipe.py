@@ -78,6 +78,8 @@ class Recipe:
         Counts the settings there were.
     intrinsics
         Where the pixels look; None for a usual field of view.
+    sensor
+        Whose noise the images have; None where that is not known.
     """
 
     applied: AppliedSequence
@@ -86,6 +88,7 @@ class Recipe:
     gains: Gains | None = None
     settings_version: int = 1
     intrinsics: Intrinsics | None = None
+    sensor: tm.noise.Sensor | None = None
 
     def lens(self, height: int, width: int) -> Intrinsics:
         """Return where the pixels look, as it is known or else assumed."""

@@ -9,7 +9,7 @@ import numpy as np
 
 import transientcam_moments as tm
 from transientcam_driver import RawFrame
-from transientcam_server.imaging.noise import NoiseModel
+from transientcam_server.imaging.noise import range_noise
 from transientcam_server.imaging.recipe import Recipe
 
 _log = logging.getLogger(__name__)
@@ -47,9 +47,7 @@ class Computed:
     range_noise: dict[str, float] | None = None
 
 
-def compute(
-    before: Computed, recipe: Recipe, raw: RawFrame, noise: NoiseModel | None, stages: Iterable[str]
-) -> Computed:
+def compute(before: Computed, recipe: Recipe, raw: RawFrame, stages: Iterable[str]) -> Computed:
     """Compute stages of a frame; one that fails leaves the others as they are. Never raises."""
     requested = set(stages)
     computed = Computed(before.reconstruction, {}, before.pixels, before.range_noise)
@@ -69,8 +67,8 @@ def compute(
             _read(found, stage)
         except Exception as error:
             computed.failures[stage] = error
-    if noise is not None and "returns" in requested and "returns" not in computed.failures:
-        computed.range_noise = _range_noise(noise, recipe, found, raw.number)
+    if recipe.sensor is not None and "returns" in requested and "returns" not in computed.failures:
+        computed.range_noise = _range_noise(recipe, found, raw.number)
     return computed
 
 
@@ -91,12 +89,10 @@ def pixel_counts(found: tm.Reconstruction) -> dict[str, int]:
     return counts
 
 
-def _range_noise(
-    noise: NoiseModel, recipe: Recipe, found: tm.Reconstruction, number: int
-) -> dict[str, float] | None:
+def _range_noise(recipe: Recipe, found: tm.Reconstruction, number: int) -> dict[str, float] | None:
     """Return the predicted deviation of the range; a failure of it spoils no range."""
     try:
-        predicted = noise.of_range(recipe, found)
+        predicted = range_noise(recipe, found)
     except Exception:
         _log.exception("capture %d: predicting the deviation of the range failed", number)
         return None

@@ -6,7 +6,7 @@ import transientcam_moments as tm
 from transientcam_driver import Capabilities, Truth
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.noise import NoiseModel
+from transientcam_server.imaging.noise import moment_noise
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.planning.candidates import candidates
 from transientcam_server.planning.choice import Choice, choices_on_front
@@ -25,17 +25,17 @@ class Planner:
     ----------
     capabilities
         Of the camera.
-    noise
-        Of its sensor.
+    sensor
+        Whose noise its images have.
     settings
         Of the reconstruction.
     """
 
     def __init__(
-        self, capabilities: Capabilities, noise: NoiseModel, settings: ReconstructionSettings
+        self, capabilities: Capabilities, sensor: tm.noise.Sensor, settings: ReconstructionSettings
     ) -> None:
         self._capabilities = capabilities
-        self._noise = noise
+        self._sensor = sensor
         self.reconstruct_with(settings)
 
     def reconstruct_with(self, settings: ReconstructionSettings) -> None:
@@ -55,7 +55,7 @@ class Planner:
         """
         statistics = scene_of_frame(
             found,
-            self._noise.of_moments(recipe, found),
+            moment_noise(recipe, found),
             exposure_s=recipe.applied.sequence.exposure_s,
             base_frequency_hz=recipe.base_frequency_hz,
             ambient_dn_per_s=ambient_dn_per_s,
@@ -82,7 +82,7 @@ class Planner:
         return choices_on_front(choices, goal.leading)
 
     def _predictor(self, scene: SceneStatistics) -> Predictor:
-        return Predictor(scene, self._noise.sensor, self._settings)
+        return Predictor(scene, self._sensor, self._settings)
 
 
 def range_error(found: tm.Reconstruction, truth: Truth) -> dict[str, float] | None:

@@ -8,10 +8,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import transientcam_moments as tm
 from tests.serving import Served, serving
 from transientcam import wire
-from transientcam_driver import Truth
+from transientcam_driver import Sequence, Truth, open_camera
+from transientcam_driver.clock import VirtualClock
+from transientcam_server.camera.source import sensor_of
+from transientcam_server.imaging.noise import moment_noise
 from transientcam_server.imaging.products import PRODUCTS
+from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.imaging.view import Crop, View
+from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
 LATEST = "/api/v1/frames/latest"
 F_HZ = 23e6
@@ -231,6 +238,30 @@ def test_saturated_pixels_are_flagged() -> None:
     assert saturated.any()
     np.testing.assert_array_equal((flags & 4) != 0, saturated)
     assert meta["pixels"]["saturated"] == saturated.sum()
+
+
+def test_the_deviation_of_the_density_is_that_of_the_moments_noise() -> None:
+    with open_camera("sim:mirrors?seed=2", clock=VirtualClock()) as camera:
+        applied = camera.configure(Sequence(harmonics=3))
+        sensor = sensor_of(camera, SensorSettings())
+        camera.start()
+        raw = camera.read_frame()
+    recipe = Recipe(applied, ReconstructionSettings(), 4095.0, sensor=sensor)
+    found, noise = recipe.reconstruct(raw), moment_noise(recipe, recipe.reconstruct(raw))
+    view = View((5e-9, 12e-9, 30e-9), Crop((40, 30, 8, 6)))
+
+    std = PRODUCTS["density_std"].compute(recipe, found, view)
+
+    rad_s = 2 * np.pi * recipe.base_frequency_hz
+    expected = tm.noise.density_noise(
+        found.smoothed[:, 30:36, 40:48].astype(complex),
+        tm.noise.MomentNoise(noise.variance[:, 30:36, 40:48]),
+        rad_s * np.array(view.time_s),
+        epsilon=recipe.settings.bias,
+    )
+    known = np.isfinite(expected.std)
+    assert known.mean() > 0.9
+    np.testing.assert_allclose(std[known], rad_s * expected.std[known], rtol=1e-2)
 
 
 def test_the_registry_is_the_contract() -> None:

@@ -14,9 +14,10 @@ import transientcam_moments as tm
 from transientcam_driver import Camera, Capabilities, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.capture import repeatability
-from transientcam_server.camera.source import noise_of
+from transientcam_server.camera.source import sensor_of
 from transientcam_server.cli import plan as plan_verb
 from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging.noise import range_noise
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.planning import Choice, Goal, Plan, Planner, Predictor, uniform_scene
 from transientcam_server.planning.candidates import candidates
@@ -318,11 +319,11 @@ def captured(camera: Camera, sequence: Sequence, frames: int) -> list[tm.Reconst
 @pytest.fixture(scope="module")
 def predictor(camera: Camera) -> Predictor:
     sequence = Sequence(harmonics=6, takes=16, exposure_s=0.0015)
-    noise = noise_of(camera, SensorSettings())
-    planner = Planner(camera.capabilities, noise, SETTINGS)
+    sensor = sensor_of(camera, SensorSettings())
+    planner = Planner(camera.capabilities, sensor, SETTINGS)
     (found,) = captured(camera, sequence, 1)
-    recipe = Recipe(camera.applied, SETTINGS, 4095.0)
-    return Predictor(planner.scene_statistics(recipe, found, 0.0), noise.sensor, SETTINGS)
+    recipe = Recipe(camera.applied, SETTINGS, 4095.0, sensor=sensor)
+    return Predictor(planner.scene_statistics(recipe, found, 0.0), sensor, SETTINGS)
 
 
 PINNED = frozenset({"base_frequency_hz"})
@@ -361,11 +362,11 @@ def test_bounds_measure_as_predicted(camera: Camera, predictor: Predictor) -> No
 
 
 def test_frames_say_their_own_deviation(camera: Camera) -> None:
-    noise = noise_of(camera, SensorSettings())
+    sensor = sensor_of(camera, SensorSettings())
     found = captured(camera, Sequence(harmonics=3), 6)
     measured_m = repeatability(np.stack([np.asarray(each.range_m) for each in found]))
 
-    predicted = noise.of_range(Recipe(camera.applied, SETTINGS, 4095.0), found[0])
+    predicted = range_noise(Recipe(camera.applied, SETTINGS, 4095.0, sensor=sensor), found[0])
 
     assert predicted is not None
     assert measured_m == pytest.approx(predicted.median_m, rel=0.25)
