@@ -136,7 +136,7 @@ class Reconstruction:
         self._bad = bad_pixels
         self._kept = kept
 
-    @property
+    @cached_property
     def measured(self) -> Array:
         """Calibrated moments (m + 1, ...), not smoothed."""
         return self._measured
