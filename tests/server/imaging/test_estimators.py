@@ -137,7 +137,7 @@ def test_computing_time_is_that_of_sequences_which_the_estimator_takes() -> None
 
 
 def test_the_page_of_estimators_says_what_the_techniques_say() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "estimators.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "estimators.md").read_text(encoding="utf-8")
 
     for technique in tm.comparisons.TECHNIQUES.values():
         assert f"**{technique.name}**, {technique.label}\n" in page
