@@ -121,9 +121,9 @@ class CalibrationStore:
                 capture.save(part)
             except OSError as error:
                 raise self.not_stored(error) from error
-            return self._take(part, capture)
+            return self._move_in(part, capture)
 
-    def take_in(self, part: Path) -> StoredCalibration:
+    def import_file(self, part: Path) -> StoredCalibration:
         """Store a file that was received; a calibration that exists stays as it is.
 
         Raises
@@ -145,7 +145,7 @@ class CalibrationStore:
         with suppress(Problem):
             return self.get(identity)
         self.require_room()
-        return self._take(part, capture)
+        return self._move_in(part, capture)
 
     def delete(self, calibration_id: str) -> StoredCalibration:
         """Delete a calibration permanently.
@@ -245,7 +245,7 @@ class CalibrationStore:
                 if part.stat().st_mtime < self._unix_s() - _ABANDONED_S:
                     part.unlink()
 
-    def _take(self, part: Path, capture: CalibrationCapture) -> StoredCalibration:
+    def _move_in(self, part: Path, capture: CalibrationCapture) -> StoredCalibration:
         path = self.directory / (capture.id + SUFFIX)
         try:
             with part.open("rb") as file:

@@ -80,7 +80,7 @@ class Calibrator:
 
     Parameters
     ----------
-    kept
+    store
         The stored calibrations.
     notify
         Called when other gains are used, with the details of a ``calibration-changed`` notice.
@@ -89,7 +89,7 @@ class Calibrator:
     def __init__(
         self,
         camera: Camera,
-        kept: CalibrationStore,
+        store: CalibrationStore,
         *,
         acquisition: Acquisition,
         pipeline: Pipeline,
@@ -99,7 +99,7 @@ class Calibrator:
         notify: Callable[[Mapping[str, Any]], None],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.kept = kept
+        self.store = store
         self._camera = camera
         self._acquisition = acquisition
         self._pipeline = pipeline
@@ -154,7 +154,7 @@ class Calibrator:
         """
         calibration = None
         if new_id != NOMINAL_ID:
-            stored = await asyncio.to_thread(self.kept.get, new_id)
+            stored = await asyncio.to_thread(self.store.get, new_id)
             self._require_fit(self.misfit(stored, applied()))
             loaded, _ = await self._pipeline.workers.run_long(load_calibration, stored.path)
             # the sequence may be another one by now
@@ -164,7 +164,7 @@ class Calibrator:
             _log.info("frames are calibrated by %s", new_id)
             self._pipeline.calibration = calibration
             self._notify(self.notice(applied()))
-        await asyncio.to_thread(self.kept.remember_active, new_id)
+        await asyncio.to_thread(self.store.remember_active, new_id)
 
     async def delete(self, deleted_id: str) -> StoredCalibration:
         """Delete a calibration that is not active.
@@ -181,7 +181,7 @@ class Calibrator:
                 field="calibration",
                 value=deleted_id,
             )
-        return await asyncio.to_thread(self.kept.delete, deleted_id)
+        return await asyncio.to_thread(self.store.delete, deleted_id)
 
     def measure(self, options: CalibrationOptions, applied: Callable[[], AppliedSequence]) -> Job:
         """Start measuring with the present sequence; the job's result is the calibration.
@@ -205,7 +205,7 @@ class Calibrator:
             )
 
         async def work(job: Job) -> dict[str, Any]:
-            await asyncio.to_thread(self.kept.require_room)  # checked before anything is captured
+            await asyncio.to_thread(self.store.require_room)  # checked before anything is captured
             takes = _Takes()
             measuring = self._acquisition.occupy(
                 job.id, lambda camera, go_on: _capture(camera, job, options, takes, go_on)
@@ -217,7 +217,7 @@ class Calibrator:
                 self._share_of_takes, calibration, takes, once
             )
             notes = {"name": options.name, "invalid_share": share}
-            stored = await asyncio.to_thread(self.kept.add, replace(capture, notes=notes))
+            stored = await asyncio.to_thread(self.store.add, replace(capture, notes=notes))
             if options.activate:
                 await self.activate(stored.id, applied)
             return {

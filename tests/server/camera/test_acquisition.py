@@ -1,4 +1,4 @@
-"""The acquisition's thread against a camera that does as it is told."""
+"""The acquisition's thread against a scripted camera."""
 
 import queue
 import threading
@@ -40,7 +40,7 @@ APPLIED = AppliedSequence(
 
 
 class ScriptedCamera:
-    """Delivers and fails in the order it is told; says nothing in between."""
+    """Delivers and fails in the scripted order; nothing in between."""
 
     def __init__(self) -> None:
         self.applied = APPLIED
@@ -220,7 +220,7 @@ def test_a_loss_is_noticed_while_nothing_is_read() -> None:
         assert isinstance(one.event(), Back)
 
 
-def test_an_error_nobody_thought_of_does_not_end_the_acquisition() -> None:
+def test_an_unexpected_error_does_not_end_the_acquisition() -> None:
     with running() as one:
         one.camera.script.put(ZeroDivisionError())
         one.camera.deliver(1)
@@ -250,9 +250,9 @@ def test_a_command_that_was_taken_back_is_not_run() -> None:
 # -- while something has the camera for itself ---------------------------------------------------
 
 
-def until(told: threading.Event, go_on: Callable[[], None]) -> None:
-    """Work that lasts until it is told to end, or broken off."""
-    while not told.wait(0.001):
+def until(ended: threading.Event, go_on: Callable[[], None]) -> None:
+    """Work that lasts until ``ended`` is set, or it is interrupted."""
+    while not ended.wait(0.001):
         go_on()
 
 
@@ -316,7 +316,7 @@ def test_what_it_counted_anew_is_reported_and_frames_of_it_are_known() -> None:
 
 
 def test_a_sequence_that_it_left_behind_is_put_back() -> None:
-    """As where the camera was lost meanwhile, and could not be told."""
+    """As if the camera was lost meanwhile, and not configured."""
 
     def leave(camera: Any, go_on: Callable[[], None]) -> None:
         camera.configure(Sequence(harmonics=7))
@@ -366,7 +366,7 @@ def test_silence_for_much_longer_than_a_frame_takes_is_a_stall() -> None:
     assert [each.stalled for each in (early, late, patient)] == [False, True, False]
 
 
-def test_the_camera_is_told_to_switch_off_at_the_end_even_when_it_is_gone() -> None:
+def test_the_camera_is_switched_off_at_the_end_even_when_it_is_gone() -> None:
     one = Running()
 
     def gone() -> None:

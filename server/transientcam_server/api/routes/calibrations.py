@@ -61,11 +61,11 @@ _FILE: Final[dict[str, Any]] = {
 async def read_calibrations(service: ServiceOf) -> CalibrationsDocument:
     """List the calibrations, the newest first, with the active one and how it does."""
     desk = service.calibrations
-    stored = await asyncio.to_thread(desk.kept.all)
+    stored = await asyncio.to_thread(desk.store.all)
     drift = await desk.drift()
     return CalibrationsDocument(
         active=desk.active_id,
-        directory=str(desk.kept.directory),
+        directory=str(desk.store.directory),
         calibrations=[_document(service, each, drift) for each in stored],
     )
 
@@ -147,13 +147,13 @@ async def import_calibration(service: ServiceOf, request: Request) -> Calibratio
 
     It may be of another camera or for another sequence; whether it can be used, `fits` says.
     """
-    kept = service.calibrations.kept
-    part = await asyncio.to_thread(kept.new_part)
+    store = service.calibrations.store
+    part = await asyncio.to_thread(store.new_part)
     try:
         await _receive(request, part, limit=service.settings.calibrations.max_bytes)
-        stored = await asyncio.to_thread(kept.take_in, part)
+        stored = await asyncio.to_thread(store.import_file, part)
     except OSError as error:
-        raise kept.not_stored(error) from error
+        raise store.not_stored(error) from error
     except ClientDisconnect as error:
         raise Problem(kinds.BAD_REQUEST, "The body ended early.") from error
     finally:
@@ -168,7 +168,7 @@ async def import_calibration(service: ServiceOf, request: Request) -> Calibratio
 )
 async def read_calibration(service: ServiceOf, calibration: _Calibration) -> CalibrationDocument:
     """Describe a calibration."""
-    stored = await asyncio.to_thread(service.calibrations.kept.get, calibration)
+    stored = await asyncio.to_thread(service.calibrations.store.get, calibration)
     return _document(service, stored, await service.calibrations.drift())
 
 
@@ -199,7 +199,7 @@ async def read_calibration_file(
     service: ServiceOf, calibration: _Calibration, wanted: downloads.Range = None
 ) -> FileResponse:
     """Download a calibration as .npz: to `import` it elsewhere, or for `serve --calibration`."""
-    stored = await asyncio.to_thread(service.calibrations.kept.get, calibration)
+    stored = await asyncio.to_thread(service.calibrations.store.get, calibration)
     return await downloads.answer(stored.path, wanted, media_type=NPZ, filename=f"{stored.id}.npz")
 
 
