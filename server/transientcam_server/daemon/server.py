@@ -31,7 +31,13 @@ NOTSENT_LOWAT_BYTES: Final = 128 * 1024
 """What the kernel keeps of a message beyond what is on the wire: frames wait here, not there."""
 PING_S: Final = 10.0
 SHUTDOWN_S: Final = 3
+FREEZING_THREAD: Final = "freezing"
 _BACKLOG = 1024
+
+
+def configure_logging(settings: Settings) -> None:
+    """Log to standard error, one line a message."""
+    logs.configure(level=settings.log_level, form=settings.log_format)
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -175,6 +181,27 @@ def serve(
         raise KeyboardInterrupt
 
 
+def freeze_startup_objects(compiling: threading.Thread) -> threading.Thread:
+    """Exempt what exists now from garbage collection, and again once ``compiling`` has ended.
+
+    Returns the thread that waits for it.
+    """
+    _freeze()
+
+    def wait() -> None:
+        compiling.join()
+        _freeze()
+
+    waiting = threading.Thread(target=wait, name=FREEZING_THREAD, daemon=True)
+    waiting.start()
+    return waiting
+
+
+def _freeze() -> None:
+    gc.collect()
+    gc.freeze()
+
+
 @contextmanager
 def exit_without_joining() -> Iterator[Callable[[threading.Thread], None]]:
     """Do not wait, at the end of the block and of the process, for what is handed to its value.
@@ -196,30 +223,3 @@ def exit_without_joining() -> Iterator[Callable[[threading.Thread], None]]:
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
         os._exit(code)
-
-
-def configure_logging(settings: Settings) -> None:
-    """Log to standard error, one line a message."""
-    logs.configure(level=settings.log_level, form=settings.log_format)
-
-
-NAME: Final = "long-lived"
-
-
-def set_aside() -> None:
-    """Collect once more, and from then on pass over everything that is there now."""
-    gc.collect()
-    gc.freeze()
-
-
-def freeze_startup_objects(compiling: threading.Thread) -> threading.Thread:
-    """Set aside what is there now, and once more what the compiler leaves when it has ended."""
-    set_aside()
-
-    def wait() -> None:
-        compiling.join()
-        set_aside()
-
-    waiting = threading.Thread(target=wait, name=NAME, daemon=True)
-    waiting.start()
-    return waiting

@@ -1,5 +1,6 @@
 """The daemon as a process: its address, its signals, its socket."""
 
+import gc
 import os
 import re
 import signal
@@ -25,6 +26,7 @@ from transientcam_server.daemon.server import (
     Server,
     address,
     exit_without_joining,
+    freeze_startup_objects,
     listen,
 )
 from transientcam_server.errors.exceptions import AddressUnavailable
@@ -253,3 +255,50 @@ def test_sigterm_while_kernels_are_compiled_closes_streams_and_recordings(tmp_pa
     with Recording(recordings / f"{running}.h5") as recording:
         assert recording.end["reason"] == "shutdown"
         assert recording.frames >= 1
+
+
+@pytest.fixture
+def collector() -> Iterator[None]:
+    """Unfreeze the garbage collector after the test."""
+    yield
+    gc.unfreeze()
+
+
+class Node:
+    """Something that refers to itself."""
+
+    def __init__(self) -> None:
+        self.itself = self
+
+
+@pytest.mark.usefixtures("collector")
+def test_startup_objects_and_those_of_the_compiler_are_frozen() -> None:
+    finish = threading.Event()
+    left: list[Node] = []
+
+    def compile_() -> None:
+        finish.wait()
+        left.extend(Node() for _ in range(100))
+
+    compiling = threading.Thread(target=compile_)
+    compiling.start()
+    waiting = freeze_startup_objects(compiling)
+    before = gc.get_freeze_count()
+    finish.set()
+    waiting.join()
+
+    assert before > 1000
+    assert gc.get_freeze_count() >= before + 100
+    frozen = {id(each) for each in gc.get_objects()}
+    assert not any(id(each) in frozen for each in left)
+
+
+@pytest.mark.usefixtures("collector")
+def test_later_garbage_is_still_collected() -> None:
+    done = threading.Thread(target=lambda: None)
+    done.start()
+    freeze_startup_objects(done).join()
+    for _ in range(10):
+        Node()
+
+    assert gc.collect() >= 10
