@@ -1,4 +1,4 @@
-"""What a frame is asked, whether it is the latest, a former one or recorded: query and answer."""
+"""Queries of a frame and their answers, whether it is the latest, a former or a recorded one."""
 
 import json
 from collections.abc import Awaitable, Callable
@@ -50,7 +50,7 @@ PixelBins = Annotated[int, Query(ge=1, le=MAX_BINS, description="times of flight
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a request says of the product it wants."""
+    """What a request states about the product it is for."""
 
     time_s: list[float] | None
     bins: int | None
@@ -136,11 +136,11 @@ async def _wanted(
 
 
 WantedOf = Annotated[Wanted, Depends(_wanted)]
-"""What the request wants of a product."""
+"""The query for a product of the request."""
 
 
 def choose(product: Product, suffix: str | None, wanted: Wanted) -> Encoding:
-    """Return the format that a request wants a product in.
+    """Return the format that a request selects for a product.
 
     Raises
     ------
@@ -158,7 +158,7 @@ async def product_answer(
     product: Callable[[str], Product],
     frame: Callable[[], Awaitable[Frame]],
 ) -> Response:
-    """Answer with a product; the frame is asked for once the request is known to make sense."""
+    """Answer with a product; the frame is looked up once the request is known to be valid."""
     stem, dot, suffix = name.partition(".")
     chosen = product(stem)
     encoding = choose(chosen, suffix if dot else None, wanted)
@@ -166,7 +166,7 @@ async def product_answer(
     view = wanted.view_of(chosen, found)
     data = await found.encoded(chosen, encoding, view)
     headers = {"Cache-Control": "no-store", "Vary": "Accept"}
-    if encoding is not MSGPACK:  # which says so inside
+    if encoding is not MSGPACK:  # which holds it
         meta = found.meta() | view.crop.to_meta(*found.shape)
         headers |= {
             "Transientcam-Frame": str(found.number),
@@ -208,7 +208,7 @@ def invalid(field: str, value: object, limit: str) -> Problem:
 _BINARY: Final[dict[str, Any]] = {"schema": {"type": "string", "format": "binary"}}
 _HEADERS: Final = {
     "Transientcam-Frame": {
-        "description": "number of the frame (not with msgpack, which says so inside)",
+        "description": "number of the frame (not with msgpack, which holds it)",
         "schema": {"type": "integer"},
     },
     "Transientcam-Unit": {"description": "of one step", "schema": {"type": "string"}},

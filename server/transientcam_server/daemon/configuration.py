@@ -261,5 +261,5 @@ def _bad_certificate(settings: Settings, places: Places) -> Iterator[SettingsMis
 
 
 def _no_password() -> str:
-    """Keep ssl from asking a terminal that may not be there."""
+    """Keep ssl from prompting on a terminal that may not exist."""
     return ""

@@ -11,7 +11,7 @@ from tests.serving import serving
 from transientcam import Camera, discover
 from transientcam.discovery import FoundCamera
 from transientcam_server.daemon import announcement
-from transientcam_server.daemon.announcement import _addresses, _instance, inside_container, wanted
+from transientcam_server.daemon.announcement import _addresses, _instance, enabled, inside_container
 from transientcam_server.settings import Settings
 
 LOOPBACK = ["127.0.0.1"]
@@ -67,7 +67,7 @@ def test_it_is_announced_where_others_may_come_in_and_not_from_a_container(
 ) -> None:
     settings = Settings.model_validate({"announce": announce, "host": host})
 
-    assert wanted(settings, in_container=container) is expected
+    assert enabled(settings, in_container=container) is expected
 
 
 @pytest.mark.parametrize("mark", [".dockerenv", "run/.containerenv"])
