@@ -96,7 +96,7 @@ def test_a_network_that_cannot_be_asked_is_logged_and_the_service_goes_on(
     assert "Network is unreachable" in caplog.text
 
 
-def test_a_service_for_everybody_tells_addresses_that_others_can_use() -> None:
+def test_a_service_for_every_client_reports_addresses_that_others_can_use() -> None:
     for host in ("0.0.0.0", "::"):
         told = _addresses(host)
         assert told

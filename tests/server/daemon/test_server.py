@@ -77,7 +77,7 @@ def test_the_address_is_printed_once_it_is_listened_on(tmp_path: Path) -> None:
         assert process.returncode == 0
 
 
-def test_sigterm_tells_the_clients_and_ends_well(tmp_path: Path) -> None:
+def test_sigterm_notifies_the_clients_and_ends_well(tmp_path: Path) -> None:
     with daemon(tmp_path) as (process, url):
         with streaming(url.replace("http", "ws") + "/api/v1/stream") as client:
             client.subscribe("flags")
@@ -117,7 +117,7 @@ def test_the_environment_and_a_file_set_what_the_command_line_does_not(tmp_path:
         (["--config", "absent.toml"], "absent.toml"),
     ],
 )
-def test_what_cannot_be_served_is_said_in_a_sentence(
+def test_what_cannot_be_served_is_reported_in_a_sentence(
     tmp_path: Path, arguments: list[str], message: str
 ) -> None:
     result = subprocess.run(
@@ -134,7 +134,7 @@ def test_what_cannot_be_served_is_said_in_a_sentence(
     assert "Traceback" not in result.stderr
 
 
-def test_a_port_that_is_taken_is_said_in_a_sentence(tmp_path: Path) -> None:
+def test_a_port_that_is_taken_is_reported_in_a_sentence(tmp_path: Path) -> None:
     with listen("127.0.0.1", 0) as listener:
         port = str(listener.getsockname()[1])
         result = subprocess.run(

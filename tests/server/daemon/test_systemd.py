@@ -141,7 +141,7 @@ def test_ready_comes_first_and_stopping_last(manager: Listener) -> None:
     assert last == {"STOPPING": "1"}
 
 
-def test_without_a_manager_nothing_is_said_and_nothing_runs() -> None:
+def test_without_a_manager_nothing_is_sent_and_nothing_runs() -> None:
     async def run() -> None:
         acquisition = cast("Acquisition", FakeAcquisition())
         async with supervised(acquisition, ServiceManager()):
@@ -150,7 +150,7 @@ def test_without_a_manager_nothing_is_said_and_nothing_runs() -> None:
     asyncio.run(run())
 
 
-def test_a_manager_that_is_gone_disturbs_nobody(tmp_path: Path) -> None:
+def test_a_manager_that_is_gone_is_no_error(tmp_path: Path) -> None:
     ServiceManager(str(tmp_path / "nobody")).notify(READY="1")
 
 

@@ -13,7 +13,8 @@ class RateLimiter:
     """Counts what is done against what is allowed (a token bucket).
 
     ``rate_hz`` is allowed in the long run, and what that gives in `BURST_S` at once. What was
-    sent to the client may be acknowledged, too: `credit` allows one more, up to `MOST_ANSWERS` of them.
+    sent to the client may be acknowledged, too: `credit` allows one more message, up to
+    `MOST_ANSWERS` of them.
     """
 
     def __init__(self, rate_hz: float, *, clock: Callable[[], float]) -> None:
