@@ -21,7 +21,7 @@ def documented_file(media_type: str) -> dict[int | str, dict[str, Any]]:
     """Return what the OpenAPI document says of an answer that is a file."""
     return {
         200: {"description": "the whole file", "content": {media_type: {}}},
-        206: {"description": "the bytes asked for", "content": {media_type: {}}},
+        206: {"description": "the requested bytes", "content": {media_type: {}}},
     }
 
 

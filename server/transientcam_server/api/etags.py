@@ -13,7 +13,7 @@ from transientcam_server.errors.kinds import ProblemKind
 IfMatch = Annotated[
     str | None, Header(description="change it only if what is in use has this `ETag`")
 ]
-IfNoneMatch = Annotated[str | None, Header(description="the `ETag` of what need not be told again")]
+IfNoneMatch = Annotated[str | None, Header(description="the `ETag` of what the client has already")]
 _HEADERS: Final[dict[str, Any]] = {
     "ETag": {"description": "names this very document", "schema": {"type": "string"}}
 }
@@ -21,7 +21,7 @@ READING: Final[dict[int | str, dict[str, Any]]] = {
     200: {"headers": _HEADERS},
     304: {"description": "It is still the one that If-None-Match names", "content": {}},
 }
-"""What the OpenAPI document says of a route that reads."""
+"""What the OpenAPI document states of a route that reads."""
 CHANGING: Final[dict[int | str, dict[str, Any]]] = {200: {"headers": _HEADERS}}
 """The same of one that changes."""
 

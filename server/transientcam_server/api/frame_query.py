@@ -1,4 +1,4 @@
-"""What a frame is asked, whether it is the latest, a former one or recorded: query and answer."""
+"""Queries of a frame and their answers, whether it is the latest, a former or a recorded one."""
 
 import json
 from collections.abc import Awaitable, Callable, Iterable
@@ -146,7 +146,7 @@ FrameQueryOf = Annotated[FrameQuery, Depends(_frame_query)]
 
 
 def choose(product: Product, suffix: str | None, wanted: FrameQuery) -> Encoding:
-    """Return the format that a request wants a product in.
+    """Return the format that a request selects for a product.
 
     Raises
     ------
@@ -164,7 +164,7 @@ async def product_answer(
     product: Callable[[str], Product],
     frame: Callable[[], Awaitable[Frame]],
 ) -> Response:
-    """Answer with a product; the frame is asked for once the request is known to make sense."""
+    """Answer with a product; the frame is looked up once the request is known to be valid."""
     stem, dot, suffix = name.partition(".")
     chosen = product(stem)
     encoding = choose(chosen, suffix if dot else None, wanted)
@@ -172,7 +172,7 @@ async def product_answer(
     view = wanted.view_of(chosen, found)
     data = await found.encoded(chosen, encoding, view)
     headers = {"Cache-Control": "no-store", "Vary": "Accept"}
-    if encoding is not MSGPACK:  # which says so inside
+    if encoding is not MSGPACK:  # which holds it
         meta = found.meta() | view.crop.to_meta(*found.shape)
         headers |= {
             "Transientcam-Frame": str(found.number),
@@ -214,7 +214,7 @@ def invalid(field: str, value: object, limit: str) -> Problem:
 _BINARY: Final[dict[str, Any]] = {"schema": {"type": "string", "format": "binary"}}
 _HEADERS: Final = {
     "Transientcam-Frame": {
-        "description": "number of the frame (not with msgpack, which says so inside)",
+        "description": "number of the frame (not with msgpack, which holds it)",
         "schema": {"type": "integer"},
     },
     "Transientcam-Unit": {"description": "of one step", "schema": {"type": "string"}},

@@ -1,6 +1,6 @@
-"""What Prometheus may know of a service: few series, whatever the number of clients.
+"""What Prometheus reads of a service: few series, whatever the number of clients.
 
-What the service counts anyway is read when somebody scrapes; only distributions are observed as
+What the service counts anyway is read at each scrape; only distributions are observed as
 they happen. Each service has a registry of its own.
 """
 
@@ -57,7 +57,7 @@ class Metrics:
         for each in ("2xx", "3xx", "4xx", "5xx"):
             self._requests.labels(each)
         self._last: Captured | None = None
-        # every series from the start, so that rates of it can be asked for
+        # every series from the start, so that its rate can be queried
         self.pixels: Mapping[str, int] = {"total": 1} | dict.fromkeys(_FLAGS, 0)
         self.losses = 0
         self.reconnects = 0
@@ -82,11 +82,11 @@ class Metrics:
                 self.reconnects += 1
 
     def sent(self, latency_s: float) -> None:
-        """Note how old a frame was when it left for a client."""
+        """Observe how old a frame was when it left for a client."""
         self._latency.observe(latency_s)
 
     def superseded(self, meta: Mapping[str, Any]) -> None:
-        """Note what came of a frame that is the newest no more."""
+        """Count a frame that is no longer the newest by what became of it."""
         if meta["reconstruct_s"] is not None:
             self._reconstruction.observe(meta["reconstruct_s"])
         self.pixels = meta["pixels"] or self.pixels
@@ -101,14 +101,14 @@ class Metrics:
 
 
 class _ServiceCollector(Collector):
-    """Reads what the service counts anyway."""
+    """Collects what the service counts anyway."""
 
     def __init__(self, service: Service, metrics: Metrics) -> None:
         self._service = service
         self._metrics = metrics
 
     def describe(self) -> Iterator[Metric]:
-        """Name nothing in advance: there is one of these in a registry."""
+        """Describe no metrics in advance: a registry has one such collector."""
         return iter(())
 
     def collect(self) -> Iterator[Metric]:
@@ -239,7 +239,7 @@ class _ServiceCollector(Collector):
         yield GaugeMetricFamily("transientcam_stream_clients", "Streams open now.", hub.clients)
         yield GaugeMetricFamily(
             "transientcam_preview_clients",
-            "Clients that are shown a film now.",
+            "Clients that receive a preview as MJPEG now.",
             self._service.mjpeg_clients,
         )
         yield CounterMetricFamily(
@@ -249,19 +249,19 @@ class _ServiceCollector(Collector):
         )
         yield GaugeMetricFamily(
             "transientcam_lease_held",
-            "Whether somebody controls the camera alone.",
+            "Whether a client holds the lease.",
             self._service.lease.current is not None,
         )
 
 
 class RecordingCollector(Collector):
-    """Reads what a library counts anyway."""
+    """Collects what a library counts anyway."""
 
     def __init__(self, library: Library) -> None:
         self._library = library
 
     def describe(self) -> Iterator[Metric]:
-        """Name nothing in advance: there is one of these in a registry."""
+        """Describe no metrics in advance: a registry has one such collector."""
         return iter(())
 
     def collect(self) -> Iterator[Metric]:

@@ -11,7 +11,7 @@ _BY_MEDIA_TYPE = {encoding.media_type: encoding for encoding in ENCODINGS.values
 
 
 def negotiate(product: Product, *, suffix: str | None, accept: str | None) -> Encoding:
-    """Return the encoding that a suffix names, else the one an Accept header likes best.
+    """Return the encoding that a suffix names, else the one an Accept header prefers.
 
     Raises
     ------
@@ -25,9 +25,9 @@ def negotiate(product: Product, *, suffix: str | None, accept: str | None) -> En
                 return encoding
         raise _not_acceptable(product, supported, field="suffix", value=suffix)
     for media_type in _preferences(accept or "*/*"):
-        liked = _matching(media_type, supported)
-        if liked is not None:
-            return liked
+        preferred = _matching(media_type, supported)
+        if preferred is not None:
+            return preferred
     raise _not_acceptable(product, supported, field="Accept", value=accept)
 
 

@@ -47,7 +47,7 @@ _REFERENCE = {"$ref": "#/components/schemas/ProblemDocument"}
 
 
 def documented(*problem_kinds: ProblemKind) -> dict[int | str, dict[str, Any]]:
-    """Return what a route's OpenAPI entry says of the problems it may answer with."""
+    """Return what a route's OpenAPI entry states of the problems it may answer with."""
     responses: dict[int | str, dict[str, Any]] = {}
     _add_to(responses, problem_kinds, key=int)
     return responses
@@ -80,7 +80,7 @@ def _add_to(
 
 
 def describe(app: FastAPI) -> None:
-    """Let the OpenAPI document of ``app`` hold what `documented` refers to.
+    """Add to the OpenAPI document of ``app`` what `documented` refers to.
 
     A model named in a route's responses would be documented as plain JSON beside the problem.
     """
@@ -96,7 +96,7 @@ def describe(app: FastAPI) -> None:
 
 
 def install(app: FastAPI) -> None:
-    """Let every error of ``app`` be answered as a problem, and documented as one."""
+    """Answer every error of ``app`` as a problem, and document it as one."""
     describe(app)
 
     async def known(request: Request, error: Exception) -> Response:
@@ -156,7 +156,7 @@ def _of_validation(error: RequestValidationError) -> Problem:
 def _mistake(each: dict[str, Any]) -> dict[str, Any]:
     if each["type"] == "json_invalid":  # its place is that of a character
         return {"field": "body", "value": None, "limit": _limit(each)}
-    # the first part of the place says only whether it was body, query or path
+    # the first part of the location is only body, query or path
     parts = [str(part) for part in each["loc"][1:]] or [str(each["loc"][0])]
     value = None if each["type"] == "missing" else plain(each.get("input"))
     return {"field": ".".join(parts), "value": value, "limit": _limit(each)}

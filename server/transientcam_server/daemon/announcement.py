@@ -1,6 +1,6 @@
-"""The service tells the local network where it is (mDNS, DNS-SD: RFC 6762, RFC 6763).
+"""Announces the service on the local network (mDNS, DNS-SD: RFC 6762, RFC 6763).
 
-What is told, and how it is read: `transientcam.discovery`.
+What is announced, and how it is read: `transientcam.discovery`.
 """
 
 import asyncio
@@ -29,10 +29,10 @@ _MARKS_OF_CONTAINERS: Final = (".dockerenv", "run/.containerenv")
 _VARIABLES_OF_CONTAINERS: Final = ("container", "KUBERNETES_SERVICE_HOST")
 
 
-def wanted(settings: Settings, *, in_container: bool) -> bool:
-    """Return whether to announce: ``auto`` is where other machines could come, and would find us.
+def enabled(settings: Settings, *, in_container: bool) -> bool:
+    """Return whether to announce: ``auto`` is where other machines can reach the service.
 
-    A container's network is mostly one of its own, in which nobody listens.
+    A container's network is mostly one of its own, in which no client listens.
     """
     if settings.announce == "auto":
         return not settings.on_loopback and not in_container
@@ -42,7 +42,7 @@ def wanted(settings: Settings, *, in_container: bool) -> bool:
 def inside_container(
     environment: Mapping[str, str] = os.environ, *, root: Path = Path("/")
 ) -> bool:
-    """Return whether this process runs in a container, as far as those let it know."""
+    """Return whether this process runs in a container, as far as containers show it."""
     marked = any((root / mark).exists() for mark in _MARKS_OF_CONTAINERS)
     return marked or any(name in environment for name in _VARIABLES_OF_CONTAINERS)
 
@@ -51,11 +51,11 @@ def inside_container(
 async def announced(
     settings: Settings, capabilities: Capabilities, *, port: int
 ) -> AsyncIterator[None]:
-    """Announce the service within the block, if that is wanted; what fails is logged, no more."""
-    if not wanted(settings, in_container=inside_container()):
+    """Announce the service within the block, if settings say so; failures are logged."""
+    if not enabled(settings, in_container=inside_container()):
         yield
         return
-    # asking whether the names are free takes more than a second, which nobody has to wait for
+    # checking that the names are free takes more than a second, so the service does not wait for it
     announcing = asyncio.create_task(_announce(settings, capabilities, port))
     try:
         yield
@@ -85,7 +85,7 @@ async def _announce(settings: Settings, capabilities: Capabilities, port: int) -
 
 def _services(settings: Settings, capabilities: Capabilities, port: int) -> list[ServiceInfo]:
     instance = _instance(f"{capabilities.model} {capabilities.serial}")
-    told = {
+    properties = {
         "path": "/",
         "api": "v1",
         "sn": capabilities.serial,
@@ -98,7 +98,7 @@ def _services(settings: Settings, capabilities: Capabilities, port: int) -> list
             f"{instance}.{kind}",
             port=port,
             parsed_addresses=_addresses(settings.host),
-            properties=told,
+            properties=properties,
             server=f"{own_names()[-1]}.",
         )
         for kind in (SERVICE_TYPE, WEB_TYPE)
@@ -124,7 +124,7 @@ def _addresses(host: str) -> list[str]:
 
 
 def _is_ours_alone(address: str) -> bool:
-    """Whether an address means this machine whoever uses it."""
+    """Return whether an address means this machine on every other machine, too."""
     ip = ipaddress.ip_address(address)
     return not ip.is_loopback and not (ip.version == 6 and ip.is_link_local)
 

@@ -68,7 +68,7 @@ def to_toml(document: Mapping[str, Any]) -> Iterator[str]:
     """Return lines that would set the same in a file, each with where it was given."""
     for name, setting in document.items():
         given = setting["given"] or "default"
-        if setting["value"] is None:  # TOML knows no null
+        if setting["value"] is None:  # TOML has no null
             yield f"# {name} is not set"
         else:
             # what JSON writes for these types is TOML, too

@@ -9,20 +9,13 @@ is the one given with ``--config``, else ``./transientcam.toml``, else
 import json
 import ssl
 import tomllib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final
 
 from pydantic import BaseModel, ValidationError
-from pydantic_settings import (
-    BaseSettings,
-    EnvSettingsSource,
-    InitSettingsSource,
-    PydanticBaseSettingsSource,
-    SettingsConfigDict,
-)
 
 from transientcam_server.api.auth import TokenFile
 from transientcam_server.errors import SettingsError
@@ -36,6 +29,23 @@ OTHER_VARIABLES: Final = frozenset(
 """Those that begin so, too, but are not for the daemon's settings."""
 DEFAULT_FILES: Final = (Path("transientcam.toml"), Path("/etc/transientcam/transientcam.toml"))
 _UNKNOWN: Final = "there is no such setting"
+_Location = tuple[str, ...]
+"""Of a setting: the tables it is in, and its name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Where each setting was given."""
+
+    by_location: Mapping[_Location, str]
+
+    def of(self, location: _Location) -> str:
+        """Return where a setting was given, or its name where it was not given."""
+        return self.given(location) or ".".join(location)
+
+    def given(self, location: _Location) -> str | None:
+        """Return where a setting was given; None where it has its default."""
+        return self.by_location.get(location)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +53,7 @@ class Configuration:
     """Settings, and where each of them was set."""
 
     settings: Settings
-    places: "Places"
+    places: Places
 
 
 def load_settings(
@@ -89,82 +99,98 @@ def tokens_file_of(file: Path | None, *, environment: Mapping[str, str]) -> Path
 def _load(
     command_line: Mapping[str, Any], *, file: Path | None, environment: Mapping[str, str]
 ) -> Configuration:
-    given = {name: value for name, value in command_line.items() if value is not None}
-    path = file if file is not None else next((p for p in DEFAULT_FILES if p.is_file()), None)
-    mistakes: list[SettingsMistake] = []
-    from_file: dict[str, Any] = {}
-    if path is not None:
-        try:
-            from_file = _read(path)
-        except SettingsError as error:  # what stands elsewhere is looked at all the same
-            mistakes += error.mistakes
-    variables = _ours(environment)
-    mistakes += _unusable_variables(variables)
-    places = Places(given, variables, from_file, path)
-    settings = None
+    given = _Given()
+    given.read_file(file)
+    given.read_environment(environment)
+    given.read_command_line(command_line)
+    places = Places(given.places)
     try:
-        layers = _layers(given, variables, from_file)
-        settings = Settings.model_validate(layers().model_dump())
+        settings = Settings.model_validate(given.values)
     except ValidationError as error:
-        mistakes += [_mistake(each, places) for each in error.errors()]
-    if settings is None or mistakes:
-        raise SettingsError(mistakes)
+        raise SettingsError(
+            [*given.mistakes, *(_mistake(each, places) for each in error.errors())]
+        ) from error
+    if given.mistakes:
+        raise SettingsError(given.mistakes)
     return Configuration(settings, places)
 
 
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        reason = f"cannot be read: {error.strerror}"
-        raise SettingsError([SettingsMistake(str(path), None, reason)]) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SettingsError([SettingsMistake(str(path), None, f"is no TOML: {error}")]) from error
+@dataclass
+class _Given:
+    """What was given, each source over those read before it, and where."""
 
+    values: dict[str, Any] = field(default_factory=dict)
+    places: dict[_Location, str] = field(default_factory=dict)
+    mistakes: list[SettingsMistake] = field(default_factory=list)
 
-# -- the environment ---------------------------------------------------------------------------
-
-
-def _ours(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return the variables that are meant for these settings, by their names in capitals."""
-    capitals = {name.upper(): value for name, value in environment.items()}
-    return {
-        name: value
-        for name, value in capitals.items()
-        if name.startswith(ENVIRONMENT_PREFIX) and name not in OTHER_VARIABLES
-    }
-
-
-def _unusable_variables(variables: dict[str, str]) -> list[SettingsMistake]:
-    """Name the variables that no setting has, or that are no JSON where it is needed.
-
-    They are taken out of ``variables``, so that what remains can be read.
-    """
-    mistakes = []
-    for name in sorted(variables):
-        field, _, rest = name.removeprefix(ENVIRONMENT_PREFIX).lower().partition("__")
-        if field not in Settings.model_fields:
-            known = [ENVIRONMENT_PREFIX + each.upper() for each in Settings.model_fields]
-            reason = _UNKNOWN + _meant(name, known)
-        elif not rest and _takes_json(field) and not _is_json(variables[name]):
-            reason = 'must be JSON, as in ["a", "b"] for a list or {"a": 1} for a table'
+    def read_file(self, path: Path | None) -> None:
+        path = path or next((each for each in DEFAULT_FILES if each.is_file()), None)
+        if path is None:
+            return
+        try:
+            values = tomllib.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            self._refuse(str(path), None, f"cannot be read: {error.strerror}")
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            self._refuse(str(path), None, f"is no TOML: {error}")
         else:
-            continue
-        mistakes.append(SettingsMistake(name, variables.pop(name), reason))
-    return mistakes
+            self._merge(values, lambda location: f"{path}: {'.'.join(location)}")
+
+    def read_environment(self, environment: Mapping[str, str]) -> None:
+        variables = {name.upper(): text for name, text in environment.items()}
+        for name, text in sorted(variables.items()):  # a table before its values
+            if name.startswith(ENVIRONMENT_PREFIX) and name not in OTHER_VARIABLES:
+                self._read_variable(name, text)
+
+    def _read_variable(self, name: str, text: str) -> None:
+        location = name.removeprefix(ENVIRONMENT_PREFIX).lower().split("__")
+        if location[0] not in Settings.model_fields:
+            known = [ENVIRONMENT_PREFIX + each.upper() for each in Settings.model_fields]
+            self._refuse(name, text, _UNKNOWN + _meant(name, known))
+            return
+        try:
+            value: Any = json.loads(text) if _takes_json(location) else text
+        except ValueError:
+            reason = 'must be JSON, as in ["a", "b"] for a list or {"a": 1} for a table'
+            self._refuse(name, text, reason)
+            return
+        for part in reversed(location):
+            value = {part: value}
+        self._merge(value, lambda _: name)
+
+    def read_command_line(self, options: Mapping[str, Any]) -> None:
+        values = {name: value for name, value in options.items() if value is not None}
+        self._merge(values, lambda location: f"--{location[0].replace('_', '-')}")
+
+    def _merge(self, values: Mapping[str, Any], place_of: Callable[[_Location], str]) -> None:
+        self.values = self._merged(self.values, values, (), place_of)
+
+    def _merged(
+        self,
+        former: Any,
+        values: Mapping[str, Any],
+        above: _Location,
+        place_of: Callable[[_Location], str],
+    ) -> dict[str, Any]:
+        merged = dict(former) if isinstance(former, dict) else {}
+        for name, value in values.items():
+            location = (*above, name)
+            self.places[location] = place_of(location)
+            if isinstance(value, dict):
+                value = self._merged(merged.get(name), value, location, place_of)
+            merged[name] = value
+        return merged
+
+    def _refuse(self, place: str, value: object, reason: str) -> None:
+        self.mistakes.append(SettingsMistake(place, value, reason))
 
 
-def _takes_json(field: str) -> bool:
-    default = Settings.model_fields[field].get_default(call_default_factory=True)
+def _takes_json(location: list[str]) -> bool:
+    """Return whether a setting is a list or a table, which a variable gives as JSON."""
+    default: Any = Settings()
+    for name in location:
+        default = getattr(default, name, None)
     return isinstance(default, BaseModel | tuple)
-
-
-def _is_json(text: str) -> bool:
-    try:
-        json.loads(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _meant(name: str, known: list[str]) -> str:
@@ -172,71 +198,12 @@ def _meant(name: str, known: list[str]) -> str:
     return f"; did you mean {close[0]}?" if close else ""
 
 
-def _layers(
-    given: Mapping[str, Any], variables: Mapping[str, str], from_file: Mapping[str, Any]
-) -> type[BaseSettings]:
-    class Layers(Settings, BaseSettings):
-        model_config = SettingsConfigDict(
-            env_prefix=ENVIRONMENT_PREFIX, env_nested_delimiter="__", frozen=True, extra="forbid"
-        )
-
-        @classmethod
-        def settings_customise_sources(
-            cls, settings_cls: type[BaseSettings], *_: Any, **__: Any
-        ) -> tuple[PydanticBaseSettingsSource, ...]:
-            from_environment = EnvSettingsSource(settings_cls)
-            # what was handed in, and not what this process happens to have
-            from_environment.env_vars = {name.lower(): text for name, text in variables.items()}
-            return (
-                InitSettingsSource(settings_cls, init_kwargs=dict(given)),
-                from_environment,
-                InitSettingsSource(settings_cls, init_kwargs=dict(from_file)),
-            )
-
-    return Layers
-
-
 # -- mistakes ----------------------------------------------------------------------------------
-
-
-class Places:
-    """Where a setting came from: the layer that wins, in the order they are asked."""
-
-    def __init__(
-        self,
-        given: Mapping[str, Any],
-        variables: Mapping[str, str],
-        from_file: Mapping[str, Any],
-        path: Path | None,
-    ) -> None:
-        self._given = given
-        self._variables = variables
-        self._from_file = from_file
-        self._path = path
-
-    def of(self, location: tuple[str, ...]) -> str:
-        """Return where a setting was given, or is looked for where it was not given."""
-        return self.given(location) or ".".join(location)
-
-    def given(self, location: tuple[str, ...]) -> str | None:
-        """Return where a setting was given; None where it has its default."""
-        if location[0] in self._given:
-            return f"--{location[0].replace('_', '-')}"
-        for length in range(len(location), 0, -1):
-            variable = ENVIRONMENT_PREFIX + "__".join(location[:length]).upper()
-            if variable in self._variables:
-                return variable
-        stands: Any = self._from_file
-        for part in location:
-            if not isinstance(stands, dict) or part not in stands:
-                return None
-            stands = stands[part]
-        return f"{self._path}: {'.'.join(location)}"
 
 
 def _mistake(each: Any, places: Places) -> SettingsMistake:
     location = tuple(str(part) for part in each["loc"])
-    # what is wrong with an item of a list is told of the list, of which the place is known
+    # an item of a list has the place of the list
     known = tuple(part for part in location if not part.isdigit()) or ("settings",)
     reason = str(each["msg"])
     if each["type"] == "extra_forbidden":
@@ -256,7 +223,7 @@ def _names_beside(location: tuple[str, ...]) -> list[str]:
 
 
 def _unsafe(settings: Settings, places: Places) -> Iterator[SettingsMistake]:
-    """Find settings under which everybody or nobody would get in by mistake."""
+    """Find settings that would admit every client, or none, unintentionally."""
     if settings.insecure and settings.require_token:
         yield SettingsMistake(places.of(("insecure",)), True, "contradicts require_token")
         return
@@ -271,9 +238,9 @@ def _unsafe(settings: Settings, places: Places) -> Iterator[SettingsMistake]:
         yield SettingsMistake(
             places.of((place,)),
             value,
-            "whoever asks will need a token, and there is none: make one with "
+            "clients will need a token, and there is none: make one with "
             "`transientcam token create`; or listen on 127.0.0.1, or add --insecure to "
-            "let anybody who reaches the port control the camera",
+            "let every client that reaches the port control the camera",
         )
 
 
@@ -294,5 +261,5 @@ def _bad_certificate(settings: Settings, places: Places) -> Iterator[SettingsMis
 
 
 def _no_password() -> str:
-    """Keep ssl from asking a terminal that may not be there."""
+    """Keep ssl from prompting on a terminal that may not exist."""
     return ""

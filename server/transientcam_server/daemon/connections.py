@@ -1,4 +1,4 @@
-"""Connections that cannot hurt: how many there are, and how long each may take.
+"""Bounds on connections: how many there are, and how long each may take.
 
 The HTTP server waits for ever for the rest of a request or for a client that reads nothing, and
 reads heads of any length; here is what bounds all of it.
@@ -20,6 +20,41 @@ from transientcam_server.settings import LimitSettings
 _LARGE_BYTES = 1 << 16
 
 
+class StallTimer:
+    """Aborts a connection that takes nothing for ``limit_s`` while something waits to be written.
+
+    A client that takes little is slow, not gone: what counts is that what waits gets less.
+    """
+
+    def __init__(
+        self, transport: asyncio.WriteTransport, *, limit_s: float, loop: asyncio.AbstractEventLoop
+    ) -> None:
+        self._transport = transport
+        self._limit_s = limit_s
+        self._loop = loop
+        self._timer: asyncio.TimerHandle | None = None
+        self._left_bytes = 0
+
+    def begin(self) -> None:
+        """Start the timer: there is more to write than the connection takes at once."""
+        self.end()
+        self._left_bytes = self._transport.get_write_buffer_size()
+        self._timer = self._loop.call_later(self._limit_s, self._look)
+
+    def end(self) -> None:
+        """Stop the timer: the connection takes more."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _look(self) -> None:
+        if self._transport.get_write_buffer_size() < self._left_bytes:
+            self.begin()
+        else:
+            self._timer = None
+            self._transport.abort()
+
+
 class BoundedConnection(HttpToolsProtocol):
     """One connection, until it ends or becomes a WebSocket."""
 
@@ -27,16 +62,18 @@ class BoundedConnection(HttpToolsProtocol):
         super().__init__(*arguments, **options)
         self._limits = limits
         self._deadline: asyncio.TimerHandle | None = None
-        self._patience: StallTimer | None = None
+        self._stall_timer: StallTimer | None = None
         self._in_head = True
         self._head_bytes = 0
 
     # -- of the transport ----------------------------------------------------------------------
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Take part, or refuse where there are too many already."""
+        """Register the connection, or refuse it where there are too many already."""
         super().connection_made(cast("asyncio.Transport", transport))  # uvloop has its own class
-        self._patience = StallTimer(self.transport, limit_s=self._limits.stalled_s, loop=self.loop)
+        self._stall_timer = StallTimer(
+            self.transport, limit_s=self._limits.stalled_s, loop=self.loop
+        )
         problem = self._too_many()
         if problem is None:
             self._expect_within(self._limits.head_s)
@@ -44,10 +81,10 @@ class BoundedConnection(HttpToolsProtocol):
             self._refuse(problem)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forget every timer."""
+        """Stop all timers."""
         self._expect_within(None)
-        if self._patience is not None:
-            self._patience.end()
+        if self._stall_timer is not None:
+            self._stall_timer.end()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
@@ -65,15 +102,15 @@ class BoundedConnection(HttpToolsProtocol):
             self._refuse(Problem(kinds.HEAD_TOO_LARGE, detail, field="headers", limit=limit))
 
     def pause_writing(self) -> None:
-        """Start to lose patience with a client that does not read."""
+        """Start the timer: the client does not read."""
         super().pause_writing()
-        if self._patience is not None:
-            self._patience.begin()
+        if self._stall_timer is not None:
+            self._stall_timer.begin()
 
     def resume_writing(self) -> None:
-        """Find it again."""
-        if self._patience is not None:
-            self._patience.end()
+        """Stop the timer."""
+        if self._stall_timer is not None:
+            self._stall_timer.end()
         super().resume_writing()
 
     # -- of the parser -------------------------------------------------------------------------
@@ -151,29 +188,31 @@ class BoundedStream(WebSocketsSansIOProtocol):
     def __init__(self, *arguments: Any, limits: LimitSettings, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self._limits = limits
-        self._patience: StallTimer | None = None
+        self._stall_timer: StallTimer | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Take part."""
+        """Register the connection."""
         super().connection_made(transport)
-        self._patience = StallTimer(self.transport, limit_s=self._limits.stalled_s, loop=self.loop)
+        self._stall_timer = StallTimer(
+            self.transport, limit_s=self._limits.stalled_s, loop=self.loop
+        )
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forget the timer."""
-        if self._patience is not None:
-            self._patience.end()
+        """Stop the timer."""
+        if self._stall_timer is not None:
+            self._stall_timer.end()
         super().connection_lost(exc)
 
     def pause_writing(self) -> None:
-        """Start to lose patience with a client that does not read."""
+        """Start the timer: the client does not read."""
         super().pause_writing()
-        if self._patience is not None:
-            self._patience.begin()
+        if self._stall_timer is not None:
+            self._stall_timer.begin()
 
     def resume_writing(self) -> None:
-        """Find it again."""
-        if self._patience is not None:
-            self._patience.end()
+        """Stop the timer."""
+        if self._stall_timer is not None:
+            self._stall_timer.end()
         super().resume_writing()
 
     def shutdown(self) -> None:
@@ -194,7 +233,7 @@ class BoundedStream(WebSocketsSansIOProtocol):
             await super().send(message)
             return
         await self.writable.wait()
-        if self.transport.is_closing():  # before uvicorn hears of it
+        if self.transport.is_closing():  # before uvicorn notices it
             raise ClientDisconnected
         if self._open():
             self.transport.writelines((_frame_head(len(data)), data))
@@ -225,38 +264,3 @@ def _bytes(response: Response) -> bytes:
 
 def _headers(response: Response) -> list[bytes]:
     return [name + b": " + value for name, value in response.raw_headers]
-
-
-class StallTimer:
-    """Aborts a connection that takes nothing for ``limit_s`` while something waits to be written.
-
-    A client that takes little is slow, not gone: what counts is that what waits gets less.
-    """
-
-    def __init__(
-        self, transport: asyncio.WriteTransport, *, limit_s: float, loop: asyncio.AbstractEventLoop
-    ) -> None:
-        self._transport = transport
-        self._limit_s = limit_s
-        self._loop = loop
-        self._timer: asyncio.TimerHandle | None = None
-        self._left_bytes = 0
-
-    def begin(self) -> None:
-        """Start to lose it: there is more to write than the connection takes at once."""
-        self.end()
-        self._left_bytes = self._transport.get_write_buffer_size()
-        self._timer = self._loop.call_later(self._limit_s, self._look)
-
-    def end(self) -> None:
-        """Find it again: the connection takes more."""
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-
-    def _look(self) -> None:
-        if self._transport.get_write_buffer_size() < self._left_bytes:
-            self.begin()
-        else:
-            self._timer = None
-            self._transport.abort()

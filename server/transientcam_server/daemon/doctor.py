@@ -1,4 +1,4 @@
-"""What ``transientcam doctor`` asks the server: whether `transientcam serve` could run here.
+"""The server's checks of ``transientcam doctor``: whether `transientcam serve` could run here.
 
 Findings are tuples ``(level, check, message, remedy)``, as that verb's entry points give them.
 """
@@ -46,7 +46,9 @@ def checks(config: Path | None = None) -> Iterator[Reported]:
         return
     yield "ok", "settings", f"valid; the camera is {settings.camera}", None
     if not (settings.needs_token or settings.on_loopback):
-        message = f"whoever reaches {settings.host}, port {settings.port}, controls the camera"
+        message = (
+            f"every client that reaches {settings.host}, port {settings.port}, controls the camera"
+        )
         yield "warning", "access", message, "make tokens, and leave insecure out"
     yield from _directories(settings)
     yield _disk(settings)
@@ -62,7 +64,9 @@ def _libraries() -> Iterator[Reported]:
     for name in ("numba", "scipy", "h5py", "fastapi", "uvicorn"):
         try:
             import_module(name)
-        except Exception as error:  # numba refuses a NumPy newer than it knows with its own error
+        except (
+            Exception
+        ) as error:  # numba refuses a NumPy newer than it supports with its own error
             # without numba everything works, only slower
             level = "warning" if name == "numba" else "fault"
             yield level, "packages", f"{name} cannot be imported: {error}", _REINSTALL
@@ -148,7 +152,7 @@ def _port(settings: Settings) -> Reported:
 
 
 def _who_answers(settings: Settings) -> str | None:
-    """Say which daemon of ours has the port; None where it is not ours."""
+    """Return which transientcam daemon has the port; None where it is another program."""
     scheme = "https" if settings.tls_certificate is not None else "http"
     host = "127.0.0.1" if settings.host in ("0.0.0.0", "::") else settings.host  # noqa: S104
     url = f"{scheme}://{f'[{host}]' if ':' in host else host}:{settings.port}"

@@ -26,12 +26,18 @@ from transientcam_server.service import Service
 from transientcam_server.settings import Settings
 
 USER_TIMEOUT_MS: Final = 20_000
-"""A client that acknowledges nothing for so long is gone, whatever its WebSocket says."""
+"""A client that acknowledges nothing for so long is gone, whatever the state of its WebSocket."""
 NOTSENT_LOWAT_BYTES: Final = 128 * 1024
 """What the kernel keeps of a message beyond what is on the wire: frames wait here, not there."""
 PING_S: Final = 10.0
 SHUTDOWN_S: Final = 3
+FREEZING_THREAD: Final = "freezing"
 _BACKLOG = 1024
+
+
+def configure_logging(settings: Settings) -> None:
+    """Log to standard error, one line a message."""
+    logs.configure(level=settings.log_level, form=settings.log_format)
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -81,7 +87,7 @@ def address(listener: socket.socket, *, tls: bool = False) -> str:
 
 
 class Server(uvicorn.Server):
-    """uvicorn, which says when it listens and lets streams say goodbye before it closes them."""
+    """uvicorn that reports when it listens, and closes streams before their connections."""
 
     def __init__(
         self, app: FastAPI, settings: Settings, *, on_listening: Callable[[], None]
@@ -90,7 +96,7 @@ class Server(uvicorn.Server):
             uvicorn.Config(
                 app,
                 lifespan="on",
-                # a class would do as well, but could not know its limits
+                # a class would do as well, but could not be given its limits
                 http=partial(BoundedConnection, limits=settings.limits),  # type: ignore[arg-type]
                 ssl_certfile=settings.tls_certificate,
                 ssl_keyfile=settings.tls_key,
@@ -113,7 +119,7 @@ class Server(uvicorn.Server):
         self._on_listening = on_listening
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Start, then say so."""
+        """Start, then report it."""
         await super().startup(sockets)
         if self.started and sockets:
             port = sockets[0].getsockname()[1]
@@ -126,14 +132,14 @@ class Server(uvicorn.Server):
             self._on_listening()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Let every stream be told that it ends, then stop."""
+        """Close every stream, then stop."""
         await self._around.aclose()
         await self._service.close_streams()
         await super().shutdown(sockets)
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Take SIGINT and SIGTERM as a wish to end, which is then fulfilled and forgotten.
+        """Take SIGINT and SIGTERM as requests to end, and do not raise them again.
 
         uvicorn's own raises them once more at the end, which would kill this process before it
         closed its camera.
@@ -141,17 +147,17 @@ class Server(uvicorn.Server):
         if threading.current_thread() is not threading.main_thread():
             yield
             return
-        wishes = (signal.SIGINT, signal.SIGTERM)
-        before = {wish: signal.signal(wish, self.handle_exit) for wish in wishes}
+        handled = (signal.SIGINT, signal.SIGTERM)
+        before = {each: signal.signal(each, self.handle_exit) for each in handled}
         try:
             yield
         finally:
-            for wish, handler in before.items():
-                signal.signal(wish, handler)
+            for each, handler in before.items():
+                signal.signal(each, handler)
 
     @property
     def signals(self) -> tuple[int, ...]:
-        """Which signals asked it to end."""
+        """Which signals ended it."""
         return tuple(self._captured_signals)
 
 
@@ -175,13 +181,34 @@ def serve(
         raise KeyboardInterrupt
 
 
+def freeze_startup_objects(compiling: threading.Thread) -> threading.Thread:
+    """Exempt what exists now from garbage collection, and again once ``compiling`` has ended.
+
+    Returns the thread that waits for it.
+    """
+    _freeze()
+
+    def wait() -> None:
+        compiling.join()
+        _freeze()
+
+    waiting = threading.Thread(target=wait, name=FREEZING_THREAD, daemon=True)
+    waiting.start()
+    return waiting
+
+
+def _freeze() -> None:
+    gc.collect()
+    gc.freeze()
+
+
 @contextmanager
 def exit_without_joining() -> Iterator[Callable[[threading.Thread], None]]:
     """Do not wait, at the end of the block and of the process, for what is handed to its value.
 
-    A compiler that is at work cannot be interrupted, and takes longer for one kernel than those
-    wait who have asked the process to end. What it has finished is on the disk; what it has not
-    is lost in any case. Where nothing is at work the process ends as any other.
+    A compiler that is at work cannot be interrupted, and takes longer for one kernel than a
+    service manager waits for the process to end. What it has finished is on the disk; what it has
+    not is lost in any case. Where nothing is at work the process ends as any other.
     """
     at_work: list[threading.Thread] = []
     code = 0
@@ -196,30 +223,3 @@ def exit_without_joining() -> Iterator[Callable[[threading.Thread], None]]:
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
         os._exit(code)
-
-
-def configure_logging(settings: Settings) -> None:
-    """Log to standard error, one line a message."""
-    logs.configure(level=settings.log_level, form=settings.log_format)
-
-
-NAME: Final = "long-lived"
-
-
-def set_aside() -> None:
-    """Collect once more, and from then on pass over everything that is there now."""
-    gc.collect()
-    gc.freeze()
-
-
-def freeze_startup_objects(compiling: threading.Thread) -> threading.Thread:
-    """Set aside what is there now, and once more what the compiler leaves when it has ended."""
-    set_aside()
-
-    def wait() -> None:
-        compiling.join()
-        set_aside()
-
-    waiting = threading.Thread(target=wait, name=NAME, daemon=True)
-    waiting.start()
-    return waiting

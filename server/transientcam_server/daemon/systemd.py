@@ -1,7 +1,7 @@
-"""Word to systemd: ready, fine, stopping (sd_notify(3), sd_watchdog_enabled(3)).
+"""Notifications to systemd: ready, alive, stopping (sd_notify(3), sd_watchdog_enabled(3)).
 
 The protocol is one datagram of lines ``NAME=value`` to the socket that ``NOTIFY_SOCKET`` names;
-the libraries for it are no shorter than this, and nobody has released one of them for years.
+the libraries for it are no shorter than this, and none of them was released for years.
 """
 
 import asyncio
@@ -19,20 +19,20 @@ from transientcam_server.camera import Acquisition, AcquisitionStatus
 _log = logging.getLogger(__name__)
 
 UNWATCHED_EVERY_S: Final = 10.0
-"""How often the status line is renewed where no watchdog waits for us."""
+"""How often the status line is renewed without a watchdog."""
 ROUNDS_PER_WATCHDOG: Final = 3
 """How often we report within the time after which we would be restarted."""
 
 
 @dataclass(frozen=True, slots=True)
 class ServiceManager:
-    """Who started this process, if it wants to hear of it.
+    """The service manager that started this process, if it accepts notifications.
 
     Attributes
     ----------
     address
         Its socket: a path, or a name in Linux' abstract namespace (which begins with a zero);
-        None where nobody listens.
+        None where there is none.
     watchdog_s
         After how much silence it restarts this process; None for never.
     """
@@ -42,7 +42,7 @@ class ServiceManager:
 
     @classmethod
     def of(cls, environment: Mapping[str, str], *, pid: int | None = None) -> Self:
-        """Return the one that this process was started by."""
+        """Return the manager that started this process."""
         path = environment.get("NOTIFY_SOCKET", "")
         if not path.startswith(("/", "@")):
             return cls()
@@ -55,13 +55,13 @@ class ServiceManager:
 
     @property
     def every_s(self) -> float:
-        """How often it should hear of us."""
+        """How often it is notified."""
         if self.watchdog_s is None:
             return UNWATCHED_EVERY_S
         return min(UNWATCHED_EVERY_S, self.watchdog_s / ROUNDS_PER_WATCHDOG)
 
-    def tell(self, **what: str) -> None:
-        """Send some variables; a manager that cannot be reached is no reason to stop."""
+    def notify(self, **what: str) -> None:
+        """Send variables; a manager that cannot be reached is no reason to stop."""
         if self.address is None:
             return
         lines = "\n".join(f"{name}={' '.join(value.split())}" for name, value in what.items())
@@ -70,23 +70,23 @@ class ServiceManager:
                 sender.setblocking(False)
                 sender.sendto(lines.encode(), self.address)
         except OSError as error:
-            _log.debug("the service manager does not hear: %s", error)
+            _log.debug("the service manager cannot be notified: %s", error)
 
 
 @contextlib.asynccontextmanager
 async def supervised(acquisition: Acquisition, manager: ServiceManager) -> AsyncIterator[None]:
-    """Say that the service is ready, then how it is, until the block ends."""
+    """Report that the service is ready, then its state, until the block ends."""
     if manager.address is None:
         yield
         return
-    manager.tell(READY="1", STATUS=status_line(acquisition.status()))
+    manager.notify(READY="1", STATUS=status_line(acquisition.status()))
     reporting = asyncio.create_task(_report(acquisition, manager))
     try:
         yield
     finally:
         reporting.cancel()
         await asyncio.gather(reporting, return_exceptions=True)
-        manager.tell(STOPPING="1")
+        manager.notify(STOPPING="1")
 
 
 async def _report(acquisition: Acquisition, manager: ServiceManager) -> None:
@@ -94,28 +94,28 @@ async def _report(acquisition: Acquisition, manager: ServiceManager) -> None:
     while True:
         await asyncio.sleep(manager.every_s)
         status = acquisition.status()
-        manager.tell(STATUS=status_line(status))
-        if pulse.felt() and not status.stalled:
-            manager.tell(WATCHDOG="1")
+        manager.notify(STATUS=status_line(status))
+        if pulse.alive() and not status.stalled:
+            manager.notify(WATCHDOG="1")
 
 
 class Pulse:
-    """Whether the thread that owns the camera still does what it is asked to."""
+    """Whether the thread that owns the camera still runs commands."""
 
     def __init__(self, acquisition: Acquisition) -> None:
         self._acquisition = acquisition
-        self._asked: Future[None] | None = None
+        self._pending: Future[None] | None = None
 
-    def felt(self) -> bool:
-        """Return whether it has answered since the last call, and ask it anew."""
-        if self._asked is not None and not self._asked.done():
+    def alive(self) -> bool:
+        """Return whether it has answered since the last call, and submit the next command."""
+        if self._pending is not None and not self._pending.done():
             return False
-        self._asked = self._acquisition.submit(lambda: None)
+        self._pending = self._acquisition.submit(lambda: None)
         return True
 
 
 def status_line(status: AcquisitionStatus) -> str:
-    """Return how the service is in a few words.
+    """Return the state of the service in a few words.
 
     A camera that is gone, or was stopped on request, is nothing that a restart would mend: frames
     are missed only where they are wanted and could be had.

@@ -31,7 +31,7 @@ class ProblemDocument(BaseModel):
     title: str = Field(description="the kind of problem in one sentence")
     status: int = Field(description="the HTTP status")
     detail: str = Field(description="this occurrence in one sentence")
-    instance: str | None = Field(default=None, description="the path that was asked for")
+    instance: str | None = Field(default=None, description="the path that was requested")
     request_id: str | None = Field(
         default=None, description="names the request in the service's log; also in X-Request-ID"
     )
@@ -99,7 +99,7 @@ def problem_of(error: Exception) -> Problem:
                 limit=error.limit,
             )
         case _:
-            return Problem(kinds.INTERNAL_ERROR, "The service failed; its log says more.")
+            return Problem(kinds.INTERNAL_ERROR, "The service failed; its log has the details.")
 
 
 def plain(value: object) -> object:

@@ -53,7 +53,7 @@ def test_frames_clients_and_latency_are_counted(served: Served, http: httpx.Clie
     assert samples["transientcam_http_requests_total{status=5xx}"] == 0
 
 
-def test_the_memory_of_former_frames_is_told_with_its_limit(
+def test_the_memory_of_former_frames_is_reported_with_its_limit(
     served: Served, http: httpx.Client
 ) -> None:
     http.get("/api/v1/frames/3", params={"wait_s": 10.0})

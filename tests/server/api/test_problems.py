@@ -35,7 +35,7 @@ def test_every_error_of_this_project_has_its_problem(
     assert (problem.kind.slug, problem.kind.status) == (slug, status)
 
 
-def test_a_refused_value_is_told_as_field_value_and_limit() -> None:
+def test_a_refused_value_is_reported_as_field_value_and_limit() -> None:
     document = problem_document(
         problem_of(SequenceError("harmonics", 99, "at most 32")), instance="/api/v1/sequence"
     )
@@ -52,7 +52,7 @@ def test_a_refused_value_is_told_as_field_value_and_limit() -> None:
     }
 
 
-def test_what_went_wrong_inside_is_not_told_outside() -> None:
+def test_what_went_wrong_inside_is_not_reported_outside() -> None:
     assert "secret" not in json.dumps(problem_document(problem_of(ZeroDivisionError("secret"))))
 
 
@@ -68,7 +68,7 @@ def test_what_went_wrong_inside_is_not_told_outside() -> None:
         1j,
     ],
 )
-def test_any_refused_value_can_be_told_as_short_json(value: object) -> None:
+def test_any_refused_value_can_be_reported_as_short_json(value: object) -> None:
     response = problem_response(Problem(kinds.INVALID_REQUEST, "no", value=value))
 
     assert response.headers["content-type"] == "application/problem+json"
@@ -132,7 +132,9 @@ class Labels(BaseModel):
         ({"colour": "green"}, "colour is 'green', but must be 'red' or 'blue'"),
     ],
 )
-def test_what_pydantic_refuses_is_told_in_a_sentence(given: dict[str, object], detail: str) -> None:
+def test_what_pydantic_refuses_is_reported_in_a_sentence(
+    given: dict[str, object], detail: str
+) -> None:
     with pytest.raises(ValidationError) as refused:
         Labels.model_validate(given)
     (mistake,) = refused.value.errors()

@@ -11,7 +11,7 @@ from tests.serving import serving
 from transientcam import Camera, discover
 from transientcam.discovery import FoundCamera
 from transientcam_server.daemon import announcement
-from transientcam_server.daemon.announcement import _addresses, _instance, inside_container, wanted
+from transientcam_server.daemon.announcement import _addresses, _instance, enabled, inside_container
 from transientcam_server.settings import Settings
 
 LOOPBACK = ["127.0.0.1"]
@@ -67,7 +67,7 @@ def test_it_is_announced_where_others_may_come_in_and_not_from_a_container(
 ) -> None:
     settings = Settings.model_validate({"announce": announce, "host": host})
 
-    assert wanted(settings, in_container=container) is expected
+    assert enabled(settings, in_container=container) is expected
 
 
 @pytest.mark.parametrize("mark", [".dockerenv", "run/.containerenv"])
@@ -96,7 +96,7 @@ def test_a_network_that_cannot_be_asked_is_logged_and_the_service_goes_on(
     assert "Network is unreachable" in caplog.text
 
 
-def test_a_service_for_everybody_tells_addresses_that_others_can_use() -> None:
+def test_a_service_for_every_client_reports_addresses_that_others_can_use() -> None:
     for host in ("0.0.0.0", "::"):
         told = _addresses(host)
         assert told

@@ -26,7 +26,7 @@ def checked(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, d
     return code, json.loads(capsys.readouterr().out)
 
 
-def test_every_setting_is_told_with_where_it_was_given(
+def test_every_setting_is_reported_with_where_it_was_given(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "transientcam.toml").write_text("[stream]\nmax_clients = 5\n")
@@ -93,7 +93,7 @@ def test_a_recording_that_can_be_replayed_is_usable(
     assert checked(capsys, "--camera", f"recording:{record(tmp_path / 'a.h5', 1)}")[0] == 0
 
 
-def test_a_calibration_that_is_none_is_told_beside_the_camera(
+def test_a_calibration_that_is_none_is_reported_beside_the_camera(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "a.npz").write_bytes(b"no zip")

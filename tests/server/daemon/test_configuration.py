@@ -89,7 +89,7 @@ def test_every_mistake_is_listed_with_its_place(tmp_path: Path) -> None:
     assert str(file) in str(caught.value)
 
 
-def test_mistakes_of_every_source_are_told_together_also_beside_a_broken_file(
+def test_mistakes_of_every_source_are_reported_together_also_beside_a_broken_file(
     tmp_path: Path,
 ) -> None:
     file = tmp_path / "broken.toml"
@@ -111,7 +111,7 @@ def test_mistakes_of_every_source_are_told_together_also_beside_a_broken_file(
     assert "JSON" in told["TRANSIENTCAM_ALLOWED_HOSTS"]
 
 
-def test_what_is_unsafe_and_what_cannot_be_served_are_told_together(tmp_path: Path) -> None:
+def test_what_is_unsafe_and_what_cannot_be_served_are_reported_together(tmp_path: Path) -> None:
     with pytest.raises(SettingsError) as caught:
         load(host="0.0.0.0", tls_certificate=tmp_path / "absent.pem")
 
@@ -128,7 +128,7 @@ def test_what_is_unsafe_and_what_cannot_be_served_are_told_together(tmp_path: Pa
         ("allowed_hosts = [1]", "allowed_hosts", ""),
     ],
 )
-def test_a_mistake_in_a_file_is_told_with_its_key_and_what_may_have_been_meant(
+def test_a_mistake_in_a_file_is_reported_with_its_key_and_what_may_have_been_meant(
     tmp_path: Path, text: str, place: str, meant: str
 ) -> None:
     file = tmp_path / "a.toml"
@@ -161,7 +161,7 @@ def test_lists_and_tables_are_json_in_the_environment() -> None:
     assert (settings.stream.max_clients, settings.stream.queue_frames) == (8, 3)
 
 
-def test_each_setting_knows_where_it_was_given(tmp_path: Path) -> None:
+def test_each_setting_has_where_it_was_given(tmp_path: Path) -> None:
     file = tmp_path / "a.toml"
     file.write_text('camera = "usb"\nport = 1\n[stream]\nmax_clients = 5\n')
 
@@ -215,7 +215,7 @@ def test_a_token_makes_an_address_others_can_reach_safe(tmp_path: Path) -> None:
     assert settings.needs_token
 
 
-def test_asking_for_tokens_where_there_are_none_would_lock_everybody_out() -> None:
+def test_asking_for_tokens_where_there_are_none_would_lock_every_client_out() -> None:
     with pytest.raises(SettingsError, match=r"REQUIRE_TOKEN.*token create"):
         load(environment={"TRANSIENTCAM_REQUIRE_TOKEN": "true"})
 

@@ -58,7 +58,7 @@ def test_every_mistake_in_the_settings_is_a_fault_with_its_place(tmp_path: Path)
     assert "stream.queue_frames" in told
 
 
-def test_a_service_that_lets_everybody_in_is_warned_of(tmp_path: Path) -> None:
+def test_a_service_that_admits_every_client_is_warned_of(tmp_path: Path) -> None:
     everybody = found(settings(tmp_path, 'host = "0.0.0.0"\nport = 0\ninsecure = true\n'))
     nobody = found(settings(tmp_path, "port = 0\ninsecure = true\n"))
 
@@ -80,7 +80,7 @@ def test_kernels_are_counted_where_they_are_kept(
     assert after[2].startswith("1 functions")
 
 
-def test_kernels_that_can_be_kept_nowhere_or_are_off_are_told(
+def test_kernels_that_can_be_kept_nowhere_or_are_off_are_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").touch()
@@ -112,7 +112,7 @@ def test_looking_leaves_nothing_behind(tmp_path: Path) -> None:
     assert not (tmp_path / "a").exists()
 
 
-def test_a_disk_too_full_to_record_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_too_full_to_record_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=10**9))
 
     level, _, message, _ = found()["disk"]
@@ -121,7 +121,7 @@ def test_a_disk_too_full_to_record_is_told(monkeypatch: pytest.MonkeyPatch) -> N
     assert message.startswith("1.0 GB free")
 
 
-def test_too_few_descriptors_for_the_connections_allowed_are_told(
+def test_too_few_descriptors_for_the_connections_allowed_are_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(resource, "getrlimit", lambda _: (256, 256))

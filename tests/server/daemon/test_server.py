@@ -1,5 +1,6 @@
 """The daemon as a process: its address, its signals, its socket."""
 
+import gc
 import os
 import re
 import signal
@@ -25,6 +26,7 @@ from transientcam_server.daemon.server import (
     Server,
     address,
     exit_without_joining,
+    freeze_startup_objects,
     listen,
 )
 from transientcam_server.errors.exceptions import AddressUnavailable
@@ -75,7 +77,7 @@ def test_the_address_is_printed_once_it_is_listened_on(tmp_path: Path) -> None:
         assert process.returncode == 0
 
 
-def test_sigterm_tells_the_clients_and_ends_well(tmp_path: Path) -> None:
+def test_sigterm_notifies_the_clients_and_ends_well(tmp_path: Path) -> None:
     with daemon(tmp_path) as (process, url):
         with streaming(url.replace("http", "ws") + "/api/v1/stream") as client:
             client.subscribe("flags")
@@ -115,7 +117,7 @@ def test_the_environment_and_a_file_set_what_the_command_line_does_not(tmp_path:
         (["--config", "absent.toml"], "absent.toml"),
     ],
 )
-def test_what_cannot_be_served_is_said_in_a_sentence(
+def test_what_cannot_be_served_is_reported_in_a_sentence(
     tmp_path: Path, arguments: list[str], message: str
 ) -> None:
     result = subprocess.run(
@@ -132,7 +134,7 @@ def test_what_cannot_be_served_is_said_in_a_sentence(
     assert "Traceback" not in result.stderr
 
 
-def test_a_port_that_is_taken_is_said_in_a_sentence(tmp_path: Path) -> None:
+def test_a_port_that_is_taken_is_reported_in_a_sentence(tmp_path: Path) -> None:
     with listen("127.0.0.1", 0) as listener:
         port = str(listener.getsockname()[1])
         result = subprocess.run(
@@ -253,3 +255,50 @@ def test_sigterm_while_kernels_are_compiled_closes_streams_and_recordings(tmp_pa
     with Recording(recordings / f"{running}.h5") as recording:
         assert recording.end["reason"] == "shutdown"
         assert recording.frames >= 1
+
+
+@pytest.fixture
+def collector() -> Iterator[None]:
+    """Unfreeze the garbage collector after the test."""
+    yield
+    gc.unfreeze()
+
+
+class Node:
+    """Something that refers to itself."""
+
+    def __init__(self) -> None:
+        self.itself = self
+
+
+@pytest.mark.usefixtures("collector")
+def test_startup_objects_and_those_of_the_compiler_are_frozen() -> None:
+    finish = threading.Event()
+    left: list[Node] = []
+
+    def compile_() -> None:
+        finish.wait()
+        left.extend(Node() for _ in range(100))
+
+    compiling = threading.Thread(target=compile_)
+    compiling.start()
+    waiting = freeze_startup_objects(compiling)
+    before = gc.get_freeze_count()
+    finish.set()
+    waiting.join()
+
+    assert before > 1000
+    assert gc.get_freeze_count() >= before + 100
+    frozen = {id(each) for each in gc.get_objects()}
+    assert not any(id(each) in frozen for each in left)
+
+
+@pytest.mark.usefixtures("collector")
+def test_later_garbage_is_still_collected() -> None:
+    done = threading.Thread(target=lambda: None)
+    done.start()
+    freeze_startup_objects(done).join()
+    for _ in range(10):
+        Node()
+
+    assert gc.collect() >= 10

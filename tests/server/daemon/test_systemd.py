@@ -142,7 +142,7 @@ def test_ready_comes_first_and_stopping_last(manager: Listener) -> None:
     assert last == {"STOPPING": "1"}
 
 
-def test_without_a_manager_nothing_is_said_and_nothing_runs() -> None:
+def test_without_a_manager_nothing_is_sent_and_nothing_runs() -> None:
     async def run() -> None:
         acquisition = cast("Acquisition", FakeAcquisition())
         async with supervised(acquisition, ServiceManager()):
@@ -151,14 +151,14 @@ def test_without_a_manager_nothing_is_said_and_nothing_runs() -> None:
     asyncio.run(run())
 
 
-def test_a_manager_that_is_gone_disturbs_nobody(tmp_path: Path) -> None:
-    ServiceManager(str(tmp_path / "nobody")).tell(READY="1")
+def test_a_manager_that_is_gone_is_no_error(tmp_path: Path) -> None:
+    ServiceManager(str(tmp_path / "nobody")).notify(READY="1")
 
 
 def test_a_name_in_the_abstract_namespace_is_a_socket_too() -> None:
     listener = Listener(f"@transientcam-test-{os.getpid()}")
     try:
-        ServiceManager.of({"NOTIFY_SOCKET": listener.address}).tell(STATUS="two\nlines")
+        ServiceManager.of({"NOTIFY_SOCKET": listener.address}).notify(STATUS="two\nlines")
         assert listener.hear() == {"STATUS": "two lines"}
     finally:
         listener.close()

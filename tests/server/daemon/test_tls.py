@@ -49,7 +49,7 @@ def test_every_one_of_many_streams_opens(
                 assert not stream.closed
 
 
-def test_an_authority_nobody_trusts_is_not_trusted(files: dict[str, Path]) -> None:
+def test_an_unknown_authority_is_not_trusted(files: dict[str, Path]) -> None:
     with (
         serving(tls_certificate=files["both"]) as served,
         Camera(served.url) as camera,

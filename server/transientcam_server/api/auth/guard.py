@@ -1,4 +1,4 @@
-"""Who asks: the token of a request or a stream, and whether one is needed at all."""
+"""Authentication: the token of a request or a stream, and whether one is required."""
 
 import logging
 from collections.abc import Callable
@@ -22,7 +22,7 @@ _FORWARDED: Final = ("forwarded", "x-forwarded-for")
 
 @dataclass(frozen=True, slots=True)
 class Principal:
-    """Who asks; ``token_id`` is None for somebody who needed no token."""
+    """An authenticated client; ``token_id`` is None where no token was required."""
 
     name: str
     role: Role
@@ -30,11 +30,11 @@ class Principal:
 
 
 ANYBODY: Final = Principal("anybody", Role.ADMIN)
-"""Whoever reaches a service that asks for no token."""
+"""Every client of a service that requires no token."""
 
 
 class Guard:
-    """Knows who may come in.
+    """Decides which clients are admitted.
 
     No token is needed where only this machine reaches the service, unless a proxy has forwarded
     the request, and none where ``insecure`` says so.
@@ -59,11 +59,11 @@ class Guard:
             return self._check(token)
         forwarded = any(name in headers for name in _FORWARDED)
         if self._required or (forwarded and not self._insecure):
-            raise Problem(kinds.TOKEN_REQUIRED, "This service asks everybody for a token.")
+            raise Problem(kinds.TOKEN_REQUIRED, "This service requires a token.")
         return ANYBODY
 
     def still_valid(self, principal: Principal) -> bool:
-        """Return whether somebody who came in may stay."""
+        """Return whether a client that was admitted still is."""
         if principal.token_id is None:
             return True
         try:
@@ -83,7 +83,7 @@ class Guard:
 
 
 class Authentication:
-    """Lets nobody into the interface who cannot say who they are; streams ask for themselves."""
+    """Refuses requests without a valid token; streams authenticate by themselves."""
 
     def __init__(self, app: ASGIApp, *, guard: Guard) -> None:
         self._app = app
@@ -107,9 +107,9 @@ class Authentication:
 
 
 def log_refusal(scope: Scope, problem: Problem) -> None:
-    """Note that somebody was not let in; never what they showed."""
+    """Log that a client was refused; never its token."""
     client = scope.get("client")
-    who = client[0] if client else "somebody"
+    who = client[0] if client else "a client"
     _log.warning("%s was not let in to %s: %s", who, scope["path"][:200], problem.kind.slug)
 
 

@@ -1,7 +1,7 @@
-"""What a request needs before it is let in: a role, and for changes the lease.
+"""What a request requires to be admitted: a role, and for changes the lease.
 
 A route that reads needs a viewer, one that changes something an operator and the lease where
-somebody holds one. A route that is otherwise says so with `needs`.
+a client holds one. A route that differs declares it with `needs`.
 """
 
 from collections.abc import Callable, Iterable
@@ -24,7 +24,7 @@ _Endpoint = TypeVar("_Endpoint", bound=Callable[..., Any])
 
 @dataclass(frozen=True, slots=True)
 class Needs:
-    """What a route asks for: at least this role, and perhaps the lease."""
+    """What a route requires: at least this role, and perhaps the lease."""
 
     role: Role
     lease: bool
@@ -35,7 +35,7 @@ _TO_CHANGE: Final = Needs(Role.OPERATOR, lease=True)
 
 
 def needs(role: Role, *, lease: bool) -> Callable[[_Endpoint], _Endpoint]:
-    """Let a route need something else than its method lets expect."""
+    """Declare what a route requires where its method does not imply it."""
 
     def mark(endpoint: _Endpoint) -> _Endpoint:
         setattr(endpoint, _MARK, Needs(role, lease))
@@ -54,7 +54,7 @@ _MARK: Final = "_transientcam_needs"
 
 
 async def admit(request: Request, service: ServiceOf) -> None:
-    """Let a request of the interface in, or say what it lacks."""
+    """Admit a request of the interface, or refuse it with what it lacks."""
     wanted = needed(request.scope["endpoint"], request.method)
     principal: Principal = request.state.principal
     if principal.role < wanted.role:
@@ -80,7 +80,7 @@ PrincipalOf = Annotated[Principal, Depends(_principal)]
 
 
 def describe(app: FastAPI, routers: Iterable[APIRouter], *, prefix: str) -> None:
-    """Let the OpenAPI document of ``app`` say what each operation needs, and how it refuses.
+    """Add to the OpenAPI document of ``app`` what each operation requires, and how it refuses.
 
     ``routers`` are those whose routes `admit` guards.
     """
@@ -120,7 +120,7 @@ _SCHEMES: Final[dict[str, Any]] = {
         "type": "http",
         "scheme": "bearer",
         "description": "A token made by `transientcam token create`. A service that only its own "
-        "machine can reach asks for none.",
+        "machine can reach requires none.",
     },
     "key": {"type": "apiKey", "in": "header", "name": "X-API-Key", "description": "The same."},
 }

@@ -1,7 +1,7 @@
-"""Tokens: what proves who asks. Only what cannot be turned back into one is kept, in a file.
+"""Tokens, which authenticate clients. The file of tokens keeps only their hashes.
 
-A token is 256 random bits, so its SHA-256 tells nothing that could be searched for; a slow hash is
-for passwords, which people choose, and would let anybody who asks keep this machine busy.
+A token is 256 random bits, so its SHA-256 cannot be searched for; a slow hash is for
+passwords, which people choose, and would let any client keep this machine busy.
 """
 
 import fcntl
@@ -25,14 +25,14 @@ _NOT_A_TOKEN: Final = hashlib.sha256(b"").hexdigest()
 
 
 class Role(IntEnum):
-    """What somebody may do; each role may do what those below it may."""
+    """What a client may do; each role includes those below it."""
 
     VIEWER = 1
     """Look at everything, change nothing; and switch the light off."""
     OPERATOR = 2
     """Control the camera."""
     ADMIN = 3
-    """Take the lease from anybody, and delete what cannot be made again."""
+    """Take over any lease, and delete what cannot be made again."""
 
     def __str__(self) -> str:
         return self.name.lower()

@@ -13,12 +13,12 @@ _SCHEMAS: Final = "#/components/schemas/"
 _Schema = dict[str, Any]
 
 _SUMMARIES: Final = {
-    "subscribe": "what a client wants from now on; its first message, within "
+    "subscribe": "what a client receives from now on; its first message, within "
     f"{wire.FIRST_MESSAGE_WITHIN_S:g} s; answered with hello or error",
     "ack": "the client is done with a frame and all before it",
     "hello": "the answer to a subscription",
     "frame": "one product of one frame",
-    "notice": "something a client should know",
+    "notice": "an event that clients are notified of",
     "error": "a message could not be used, or a product not be computed",
 }
 _OF_CLIENT: Final = ("subscribe", "ack")

@@ -16,7 +16,7 @@ STATIC: Final = Path(__file__).parents[2] / "static"
 
 DESCRIPTION: Final = """\
 An amplitude modulated lidar on the network. Frames are captured continuously; every product of a
-frame is computed when it is asked for, once for all who ask.
+frame is computed when it is requested, once for all clients.
 
 All quantities are in SI units, named in the name of each field; DN are digital numbers of the
 sensor. Every error is a problem document (RFC 9457). The stream of frames is the WebSocket

@@ -20,7 +20,7 @@ class CameraDocument(Document):
         width: int
         height: int
         source: Literal["settings", "scene", "recording", "assumed"]
-        """Who says so: the settings `[lens]`, the simulated scene, the recording, or nobody."""
+        """Its origin: the settings `[lens]`, the simulated scene, the recording, or none."""
 
     state: Literal["starting", "streaming", "stopped", "calibrating", "lost"]
     reason: str | None = None

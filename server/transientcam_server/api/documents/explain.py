@@ -1,4 +1,4 @@
-"""The JSON document that says what a simulated scene calls for."""
+"""The JSON document about the effects that a simulated scene calls for."""
 
 from typing import Literal
 

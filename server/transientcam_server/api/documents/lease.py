@@ -20,7 +20,7 @@ class LeaseDocument(Document):
     """Who controls the camera."""
 
     held: bool
-    """Whether anybody does; where nobody does, everybody may."""
+    """Whether a client does; where none does, every client may."""
     holder: str | None = None
     """What the one who does calls itself."""
     expires_in_s: float | None = None
@@ -28,18 +28,18 @@ class LeaseDocument(Document):
     duration_s: float | None = None
     """How long it lasts after it was granted or renewed."""
     on_lapse: Literal["stop", "keep"] | None = None
-    """What becomes of the capture, and so of the light, when nobody renews it in time."""
+    """What becomes of the capture, and so of the light, when it is not renewed in time."""
 
 
 class GrantedLeaseDocument(LeaseDocument):
     """A lease, for the eyes of its holder."""
 
     lease_id: str
-    """To be sent in the header Transientcam-Lease with every change; known to nobody else."""
+    """To be sent in the header Transientcam-Lease with every change; no other client sees it."""
 
 
 class LeaseRequest(Document):
-    """Who wants to control the camera, and on which terms."""
+    """Which client is to control the camera, and on which terms."""
 
     model_config = ConfigDict(
         extra="forbid",
@@ -53,7 +53,7 @@ class LeaseRequest(Document):
     on_lapse: Literal["stop", "keep"] = "stop"
     """What becomes of the capture, and so of the light, when you do not renew it in time."""
     takeover: bool = Field(default=False, strict=True)
-    """Take it from whoever has it, who is told so with everybody else."""
+    """Take it from the client that has it, which is notified with all others."""
 
 
 class LeaseRenewal(Document):

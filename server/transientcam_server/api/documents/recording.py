@@ -27,7 +27,7 @@ class RecordingDocument(Document):
     """`interrupted`: its writer died, and the next start of the service recovers it."""
     frames: int
     dropped_frames: int
-    """Frames the disk was too slow for; each frame in the file says how many before it."""
+    """Frames the disk was too slow for; each frame in the file states how many before it."""
     size_bytes: int
     started_s: float | None = None
     """Unix time."""
@@ -48,11 +48,11 @@ class RecordingDocument(Document):
     limits: dict[str, float | None] | None = None
     """When it ends by itself; null once it has ended."""
     history_frames: int | None = None
-    """Of the past that it began with; only in the answer that tells of its start."""
+    """Of the past that it began with; only in the answer to the request that started it."""
 
 
 class RecordingLimitsDocument(Document):
-    """When recordings end by themselves, whatever was asked for; null without such a limit."""
+    """When recordings end by themselves, whatever was requested; null without such a limit."""
 
     max_duration_s: float | None = None
     max_bytes: int | None = None
@@ -136,5 +136,5 @@ class RecordingChange(Document):
 
 
 def document(described: dict[str, Any]) -> RecordingDocument:
-    """Return what the library says of a recording as its document."""
+    """Return the library's description of a recording as its document."""
     return RecordingDocument.model_validate(described)

@@ -12,13 +12,13 @@ class InfoDocument(Document):
     """What answers here."""
 
     class CallerDocument(Document):
-        """Who the service takes the one who asks for."""
+        """The client that sent this request, as the service authenticated it."""
 
-        name: str = Field(description="of the token; anybody where none is needed")
+        name: str = Field(description="of the token; `anybody` where none is required")
         role: Literal["viewer", "operator", "admin"]
 
     class ProductDocument(Document):
-        """An array that a frame can be asked for."""
+        """An array that can be requested of a frame."""
 
         name: str
         unit: str
@@ -38,7 +38,7 @@ class InfoDocument(Document):
         path: str
         subprotocol: str
         asyncapi: str = Field(description="where its messages are described, as AsyncAPI 3")
-        encodings: list[str] = Field(description="which a subscription may ask for")
+        encodings: list[str] = Field(description="which a subscription may request")
 
     name: str
     version: str
@@ -47,7 +47,7 @@ class InfoDocument(Document):
     products: list[ProductDocument]
     caller: CallerDocument
     history: HistoryDocument
-    """Which frames can be had, as `GET /frames` says."""
+    """Which frames can be had, as in `GET /frames`."""
     clients: int
     """Streams open now."""
     kernels: dict[str, Any]

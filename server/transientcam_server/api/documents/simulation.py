@@ -21,7 +21,7 @@ class SimulationDocument(Document):
 
     scene: str
     effects: dict[str, Choice]
-    """What was chosen for effects by name, in place of what the scene says."""
+    """What was chosen for effects by name, in place of the scene's own choice."""
     scenes: list[SceneDocument]
     """What the camera can be put before."""
     plugged: bool

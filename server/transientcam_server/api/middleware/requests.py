@@ -1,4 +1,4 @@
-"""Every request: its id, its outcome counted and logged, and an answer even where it fails."""
+"""The log of requests: ids, outcomes counted and logged, and an answer to every failure."""
 
 import logging
 import re
@@ -22,7 +22,7 @@ _READS: Final = frozenset(("GET", "HEAD", "OPTIONS"))
 
 
 def asks_for_head(scope: Scope) -> bool:
-    """Whether a request that is answered as GET is HEAD; what never ends has to know."""
+    """Whether a request that is answered as GET is HEAD; an endless answer must not start then."""
     return bool(scope.get(_HEAD))
 
 
@@ -38,7 +38,7 @@ class RequestLog:
         self._metrics = metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on, count, log."""
+        """Pass a request on, then count and log it."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -56,7 +56,7 @@ class RequestLog:
         begin_s = time.perf_counter()
         head = scope["method"] == "HEAD"
 
-        async def watched(message: Message) -> None:
+        async def observed(message: Message) -> None:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
@@ -67,18 +67,18 @@ class RequestLog:
 
         inner = {**scope, "method": "GET", _HEAD: True} if head else scope
         try:
-            await self._app(inner, receive, watched)
+            await self._app(inner, receive, observed)
         except Exception as error:
             _log.exception("%s %s failed", scope["method"], scope["path"][:200])
-            if status:  # its beginning is on the way: only breaking it off tells the client
+            if status:  # it has begun: only an abort shows the client that it failed
                 raise
             response = problem_response(problem_of(error), instance=scope["path"])
-            await response(inner, receive, watched)
-        self._metrics.answered(status or 499)  # nobody was there any more
+            await response(inner, receive, observed)
+        self._metrics.answered(status or 499)  # the client was gone
         self._note(inner, scope["method"], status, time.perf_counter() - begin_s)
 
     def _note(self, scope: Scope, method: str, status: int, duration_s: float) -> None:
-        """Log a request: a change for everybody to see, a look for those who search."""
+        """Log a request: a change at the level info, a read at debug."""
         principal = scope.get("state", {}).get("principal")
         level = logging.DEBUG if method in _READS else logging.INFO
         details = {

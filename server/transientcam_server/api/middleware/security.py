@@ -57,14 +57,14 @@ class SecurityHeaders:
 
 
 def own_names() -> tuple[str, ...]:
-    """Return what this machine is called: its name, in full, for short, and on the local link."""
+    """Return the names of this machine: fully qualified, short, and on the local link."""
     name = socket.gethostname().lower()
     short = name.partition(".")[0]
     return name, short, f"{short}.local"
 
 
 class OriginCheck:
-    """Refuses names this service is not called by, and pages of other sites that change things.
+    """Refuses requests for other hosts, and changes by pages of other origins.
 
     The first keeps a foreign page from rebinding its name to this address; the second covers
     WebSockets, which the browser's same-origin policy leaves to the server.
@@ -75,7 +75,7 @@ class OriginCheck:
         self._names = {name.lower() for name in settings.allowed_hosts}
         self._names |= _LOOPBACK_NAMES | {settings.host.lower(), f"[{settings.host.lower()}]"}
         self._origins = {origin.lower().rstrip("/") for origin in settings.allowed_origins}
-        # whoever opened the service to other machines reaches it by its addresses and its names
+        # a service that other machines can reach is called by its addresses and its names
         self._any_address = not settings.on_loopback
         if self._any_address:
             self._names |= set(own_names())
@@ -156,7 +156,7 @@ class BodyLimit:
             await self._refuse(scope, receive, send)
             return
         if announced:
-            await self._app(scope, receive, send)  # the server holds it to what it announced
+            await self._app(scope, receive, send)  # the server enforces the announced length
             return
         begin = [await receive()]
         received = len(begin[0].get("body", b""))

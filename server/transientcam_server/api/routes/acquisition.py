@@ -17,7 +17,7 @@ router = APIRouter(tags=["acquisition"])
 
 @router.get("/acquisition", summary="Whether frames are captured")
 async def read_acquisition(service: ServiceOf) -> AcquisitionDocument:
-    """Say whether frames are captured, and how fast."""
+    """Return whether frames are captured, and how fast."""
     return _document(service)
 
 
@@ -48,10 +48,10 @@ async def change_acquisition(service: ServiceOf, wanted: AcquisitionRequest) -> 
 )
 @needs(Role.VIEWER, lease=False)
 async def switch_off(service: ServiceOf) -> AcquisitionDocument:
-    """Stop capturing and switch the light off, whoever holds the lease.
+    """Stop capturing and switch the light off, whichever client holds the lease.
 
     Where the camera cannot be reached it is not started again when it is back; its own watchdog
-    switches the light off as soon as it hears nothing from here.
+    switches the light off as soon as it receives nothing from here.
     """
     await asyncio.wrap_future(service.acquisition.safe_off())
     return _document(service)

@@ -1,4 +1,4 @@
-"""CalibrationStore: measure one, use it, take it elsewhere."""
+"""Calibrations: measure, activate, import, download and delete them."""
 
 import asyncio
 import time
@@ -103,7 +103,7 @@ async def measure_calibration(
 
 @router.get("/calibrations/active", summary="The active calibration")
 async def read_active_calibration(service: ServiceOf) -> ActiveDocument:
-    """Say which calibration is active, and what frames are really calibrated by."""
+    """Return which calibration is active, and what frames are really calibrated by."""
     return _active(service)
 
 
@@ -121,8 +121,8 @@ async def read_active_calibration(service: ServiceOf) -> ActiveDocument:
 async def activate_calibration(service: ServiceOf, wanted: ActivationRequest) -> ActiveDocument:
     """Calibrate frames from the next one on, and after the next start, by this.
 
-    One that is not good for this camera and its present sequence is refused. Streams are told with
-    a `calibration-changed` notice, and each frame carries the id of its calibration.
+    One that is not good for this camera and its present sequence is refused. Streams are sent a
+    `calibration-changed` notice, and each frame carries the id of its calibration.
     """
     await service.calibrations.activate(wanted.id, lambda: service.applied)
     return _active(service)
@@ -145,7 +145,7 @@ async def activate_calibration(service: ServiceOf, wanted: ActivationRequest) ->
 async def import_calibration(service: ServiceOf, request: Request) -> CalibrationDocument:
     """Keep the file that is sent as body; one that is here already stays as it is.
 
-    It may be of another camera or for another sequence; whether it can be used, `fits` says.
+    It may be of another camera or for another sequence; `fits` states whether it can be used.
     """
     store = service.calibrations.store
     part = await asyncio.to_thread(store.new_part)

@@ -16,11 +16,11 @@ router = APIRouter(tags=["camera"])
 
 @router.get("/camera", summary="The camera")
 async def read_camera(service: ServiceOf) -> CameraDocument:
-    """Say what the camera can do and how it is; asks the camera itself for its status."""
+    """Return what the camera can do and its state, with its status as the camera reports it."""
     camera = service.camera
     status = None
     if service.acquisition.status().state != "lost":
-        with contextlib.suppress(CameraError):  # which is what `state` and `reason` then say
+        with contextlib.suppress(CameraError):  # `state` and `reason` then report it
             status = _document(await asyncio.wrap_future(service.acquisition.device_status()))
     acquisition = service.acquisition.status()
     return CameraDocument(

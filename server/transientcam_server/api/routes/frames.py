@@ -85,7 +85,7 @@ async def _chosen(
 
 @router.get("/frames", summary="Which frames can be had")
 async def read_frames(service: ServiceOf) -> HistoryDocument:
-    """Say which frames are kept, and how much of them may be."""
+    """Return which frames are kept, and how much of them may be."""
     return HistoryDocument(**service.history.to_document())
 
 
@@ -99,7 +99,7 @@ add_frame_routes(
         kinds.NO_FRAME_YET,
         kinds.SHUTTING_DOWN,
     ),
-    frame=("A frame", "Say what is known of the latest frame, or of one of the last seconds."),
+    frame=("A frame", "Return what is known of the latest frame, or of one of the last seconds."),
     pixel="one pixel",
     product=("A product of a frame", _PRODUCT),
 )

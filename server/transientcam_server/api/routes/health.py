@@ -1,4 +1,4 @@
-"""Health, for whoever restarts or routes around this service."""
+"""Health, for orchestrators and load balancers."""
 
 from fastapi import APIRouter
 
@@ -18,7 +18,7 @@ async def livez() -> LivenessDocument:
 
 @router.get("/readyz", summary="Frames can be had", responses=documented(kinds.NOT_READY))
 async def readyz(service: ServiceOf) -> ReadinessDocument:
-    """Answer 200 while the camera delivers frames or was stopped on request, else say why not."""
+    """Answer 200 while the camera delivers frames or was stopped on request, else why not."""
     reasons = service.not_ready()
     if reasons:
         raise Problem(kinds.NOT_READY, "; ".join(reasons), reasons=reasons)

@@ -19,14 +19,14 @@ versions = APIRouter(tags=["info"])
 
 @versions.get("/api/versions", summary="Versions of the interface")
 async def read_versions() -> VersionsDocument:
-    """Say which versions of the interface are served; this path itself has no version."""
+    """Return which versions of the interface are served; this path itself has no version."""
     api = [VersionsDocument.ApiDocument(name="v1", path="/api/v1")]
     return VersionsDocument(name="transientcam", version=VERSION, api=api)
 
 
 @router.get("/info", summary="The service")
 async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
-    """Say what this service is, which products its frames have, and who asks."""
+    """Return what this service is, which products its frames have, and what the caller may do."""
     return InfoDocument(
         name=service.identity["name"],
         version=service.identity["version"],

@@ -1,4 +1,4 @@
-"""Jobs: long work that was started elsewhere, and how far it is."""
+"""Jobs: long work that other requests started, and its progress."""
 
 from typing import Annotated, Any, Final
 
@@ -17,7 +17,7 @@ ACCEPTED: Final[dict[int | str, dict[str, Any]]] = {
         "description": "It has begun, or waits for its turn",
         "headers": {
             "Location": {
-                "description": "where its progress is told",
+                "description": "where its progress is reported",
                 "schema": {"type": "string"},
             }
         },
@@ -48,7 +48,7 @@ async def read_job(
         float, Query(ge=0.0, le=MAX_WAIT_S, description="how long to wait for its end")
     ] = 0.0,
 ) -> JobDocument:
-    """Say how far a job is; with `wait_s` not before it has ended, or that long has passed."""
+    """Return how far a job is; with `wait_s` not before it has ended, or that long has passed."""
     found = service.jobs.get(job)
     await service.jobs.end_of(found, wait_s=wait_s)
     return document(found)
@@ -60,7 +60,7 @@ async def read_job(
     responses=documented(kinds.UNKNOWN_JOB, kinds.INVALID_REQUEST),
 )
 async def cancel_job(service: ServiceOf, job: _Job) -> JobDocument:
-    """Let a job end as soon as it can; it stays in the list, and one that has ended as it is."""
+    """Cancel a job, which ends as soon as it can; it stays listed, and an ended one as it is."""
     return document(service.jobs.cancel(job))
 
 
@@ -70,6 +70,6 @@ def document(job: Job) -> JobDocument:
 
 
 def accepted(job: Job, response: Response) -> JobDocument:
-    """Answer whoever started a job."""
+    """Return the answer to a request that started a job."""
     response.headers["Location"] = f"/api/v1/jobs/{job.id}"
     return document(job)

@@ -30,7 +30,7 @@ _LeaseId = Annotated[
 
 @router.get("/lease", summary="Who controls the camera")
 async def read_lease(service: ServiceOf) -> LeaseDocument:
-    """Say who controls the camera, and until when."""
+    """Return who controls the camera, and until when."""
     lease = service.lease.current
     return LeaseDocument(held=False) if lease is None else _document(service, lease)
 
@@ -47,8 +47,8 @@ async def take_lease(
 ) -> GrantedLeaseDocument:
     """Let only those change anything who send this lease's id, until it is given back or lapses.
 
-    Renew it well before it expires. Without a lease anybody may change anything as long as nobody
-    else holds one.
+    Renew it well before it expires. Without a lease every client may change anything as long as no
+    other holds one.
     """
     lease = service.lease.grant(
         holder=wanted.holder,
@@ -85,7 +85,7 @@ async def renew_lease(
 )
 @needs(Role.OPERATOR, lease=False)
 async def give_lease_back(service: ServiceOf, lease_id: _LeaseId = None) -> LeaseDocument:
-    """Let everybody change things again; the camera goes on as it is."""
+    """Allow changes by every client again; the camera goes on as it is."""
     service.lease.release(lease_id)
     return LeaseDocument(held=False)
 

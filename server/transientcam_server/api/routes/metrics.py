@@ -26,6 +26,6 @@ _TEXT: Final[dict[int | str, dict[str, Any]]] = {
     responses=_TEXT | documented(kinds.TOKEN_REQUIRED, kinds.TOKEN_REFUSED),
 )
 async def read_metrics(service: ServiceOf, metrics: MetricsOf) -> Response:
-    """Return what Prometheus scrapes; where tokens are asked for, a viewer's will do."""
+    """Return what Prometheus scrapes; where tokens are required, one of a viewer is enough."""
     await service.calibrations.drift()  # counted anew every few seconds at most
     return Response(metrics.exposition(), media_type=CONTENT_TYPE)

@@ -36,7 +36,7 @@ async def make_plan(service: ServiceOf, request: PlanRequest) -> PlanDocument:
 
     With targets it is the quickest one that reaches all of them within the budgets; with budgets
     alone the most accurate one within them. The scene is that of the current frame where none is
-    given; what that frame does not resolve, the plan cannot know. Nothing is changed: `sequence`
+    given; the plan cannot consider what that frame does not resolve. Nothing is changed: `sequence`
     of the answer is the body for a `PUT /sequence`.
     """
     document = {"base_frequency_hz": service.applied.sequence.base_frequency_hz, **request.fixed}

@@ -1,4 +1,4 @@
-"""A film for people: coloured pictures of a product, one after another, as long as one looks."""
+"""The preview as MJPEG: coloured pictures of a product, until the client disconnects."""
 
 from collections.abc import AsyncGenerator
 from typing import Annotated, Any, Final
@@ -20,7 +20,7 @@ router = APIRouter(tags=["frames"])
 
 _BOUNDARY: Final = "frame"
 MEDIA_TYPE: Final = "multipart/x-mixed-replace"
-_FILM: Final = f"{MEDIA_TYPE}; boundary={_BOUNDARY}"
+_MEDIA_TYPE_WITH_BOUNDARY: Final = f"{MEDIA_TYPE}; boundary={_BOUNDARY}"
 _WAIT_S: Final = 10.0
 MAX_FRAMES: Final = 2**31
 _RESPONSES: Final[dict[int | str, dict[str, Any]]] = {
@@ -33,7 +33,7 @@ _RESPONSES: Final[dict[int | str, dict[str, Any]]] = {
 
 @router.get(
     "/preview.mjpeg",
-    summary="A product as a film",
+    summary="A product as MJPEG",
     response_class=StreamingResponse,
     responses=_RESPONSES
     | documented(
@@ -53,12 +53,16 @@ async def read_preview(
     ] = None,
     frames: Annotated[
         int | None,
-        Query(ge=1, le=MAX_FRAMES, description="end after so many; without it when nobody looks"),
+        Query(
+            ge=1,
+            le=MAX_FRAMES,
+            description="end after so many; without it when the client disconnects",
+        ),
     ] = None,
 ) -> Response:
-    """Show an image in colours as motion JPEG, which browsers and players know: for eyes alone.
+    """Show an image in colours as motion JPEG, for browsers and players; it holds no values.
 
-    Who is too slow sees fewer pictures, always the newest, and delays nobody. It ends when the
+    A slow client receives fewer pictures, always the newest, and delays no other. It ends when the
     client goes or the service does.
     """
     wanted = service.pipeline.product(product)
@@ -77,13 +81,13 @@ async def read_preview(
     _require_room(service)
     headers = {"Cache-Control": "no-store"}
     if asks_for_head(request.scope):
-        return Response(media_type=_FILM, headers=headers)
+        return Response(media_type=_MEDIA_TYPE_WITH_BOUNDARY, headers=headers)
     pictures = _pictures(service, Channel(0, wanted, max_rate_hz), frames)
-    return _Film(service, pictures, media_type=_FILM, headers=headers)
+    return _Mjpeg(service, pictures, media_type=_MEDIA_TYPE_WITH_BOUNDARY, headers=headers)
 
 
-class _Film(StreamingResponse):
-    """Pictures for one client, who counts among those of the stream while it looks."""
+class _Mjpeg(StreamingResponse):
+    """Pictures for one client, which counts among those of the stream while it is connected."""
 
     def __init__(self, service: Service, pictures: AsyncGenerator[bytes], **options: Any) -> None:
         super().__init__(pictures, **options)
@@ -102,13 +106,13 @@ class _Film(StreamingResponse):
 def _require_room(service: Service) -> None:
     limit = service.settings.stream.max_clients
     if service.hub.clients + service.mjpeg_clients >= limit:
-        raise Problem(kinds.TOO_MANY_CLIENTS, f"{limit} clients look on.", limit=limit)
+        raise Problem(kinds.TOO_MANY_CLIENTS, f"{limit} clients are connected.", limit=limit)
 
 
 async def _pictures(
     service: Service, channel: Channel, frames: int | None
 ) -> AsyncGenerator[bytes]:
-    """Make parts of a film; nothing is made ahead of the client."""
+    """Yield the parts of the response; nothing is made ahead of the client."""
     yield f"--{_BOUNDARY}\r\n".encode()
     number = shown = 0
     while shown != frames:
@@ -120,7 +124,7 @@ async def _pictures(
             continue
         try:
             picture = await frame.encoded(channel.product, COLOUR_JPEG)
-        except Problem:  # which the log tells; the next frame may be better
+        except Problem:  # it is logged; the next frame may succeed
             continue
         shown += 1
         yield _part(number, picture)

@@ -71,7 +71,7 @@ async def change_reconstruction(
 ) -> ReconstructionDocument:
     """Compute frames from the next one on with these settings.
 
-    The camera goes on as it is. Streams are told with a `reconstruction-changed` notice, and each
+    The camera goes on as it is. Streams are sent a `reconstruction-changed` notice, and each
     frame carries the `reconstruction_id` of its settings.
     """
     tag = _tag(service.pipeline.reconstruction)

@@ -65,7 +65,7 @@ async def _chosen(
     responses=documented(kinds.INVALID_REQUEST, *_MISSING),
 )
 async def read_frames(service: ServiceOf, recording: RecordingName) -> TimelineDocument:
-    """Say how many frames there are, and when they were captured; also while it is recorded."""
+    """Return how many frames there are, and when they were captured; also while it is recorded."""
     opened = await service.recorded_frames.opened(recording)
     return TimelineDocument(**timeline(await opened.host_time_s()))
 
@@ -77,7 +77,7 @@ add_frame_routes(
     missing=_MISSING,
     frame=(
         "A recorded frame",
-        "Say what is known of a recorded frame; recorded frames are counted from 1.",
+        "Return what is known of a recorded frame; recorded frames are counted from 1.",
     ),
     pixel="one pixel of a recorded frame",
     product=(

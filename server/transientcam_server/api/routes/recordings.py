@@ -65,7 +65,7 @@ async def read_recordings(service: ServiceOf) -> RecordingsDocument:
         kinds.RECORDING_NOT_STORED,
     ),
 )
-@needs(Role.OPERATOR, lease=False)  # it disturbs nobody who controls the camera
+@needs(Role.OPERATOR, lease=False)  # it does not disturb the client that controls the camera
 async def start_recording(service: ServiceOf, wanted: RecordingRequest) -> RecordingDocument:
     """Record every frame from now on, raw, until it is stopped or a limit is reached.
 

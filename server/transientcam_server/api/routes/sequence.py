@@ -29,7 +29,7 @@ def _schema() -> dict[str, Any]:
     return schema
 
 
-# The driver checks a sequence and knows the limits of its camera; the schema is for the reader.
+# The driver checks a sequence against the limits of its camera; the schema is documentation.
 _Sequence = Annotated[
     dict[str, Any],
     WithJsonSchema(_schema()),
@@ -90,8 +90,8 @@ async def change_sequence(
 ) -> AppliedDocument:
     """Set the camera to a sequence, between two frames; what is absent takes its default.
 
-    A document read from here may be changed and sent back: what only the camera can say is
-    ignored. Streams are told with a `sequence-changed` notice.
+    A document read from here may be changed and sent back: what only the camera can state
+    is ignored. Streams are sent a `sequence-changed` notice.
     """
     wanted = Sequence.from_document(sequence)
     applied = await _configure(service, wanted, if_match)
@@ -106,7 +106,7 @@ async def change_sequence(
 )
 @needs(Role.VIEWER, lease=False)
 async def validate_sequence(service: ServiceOf, sequence: _Sequence) -> AppliedDocument:
-    """Say what the camera would make of a sequence, without touching it."""
+    """Return what the camera would make of a sequence, without touching it."""
     applied = service.camera.validate(Sequence.from_document(sequence))
     return AppliedDocument.model_validate(applied.to_document())
 

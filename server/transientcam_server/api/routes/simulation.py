@@ -30,7 +30,7 @@ _FAULTS: Final[dict[str, Callable[[Simulation], None]]] = {
 
 @router.get("/simulation", summary="The simulated world", responses=documented(kinds.NOT_SIMULATED))
 async def read_simulation(service: ServiceOf) -> SimulationDocument:
-    """Say which scene is simulated, and what can be changed."""
+    """Return which scene is simulated, and what can be changed."""
     return _document(_simulation(service))
 
 
@@ -43,7 +43,7 @@ async def change_simulation(service: ServiceOf, wanted: SimulationRequest) -> Si
     """Change the scene, or force effects on or off; capturing goes on meanwhile.
 
     Answered once the scene is prepared, which may take seconds. The frame that is captured at that
-    moment may hold images of both. Streams are told with a `simulation-changed` notice.
+    moment may hold images of both. Streams are sent a `simulation-changed` notice.
     """
     simulation = _simulation(service)
     if wanted.scene is not None:
@@ -63,7 +63,7 @@ async def change_simulation(service: ServiceOf, wanted: SimulationRequest) -> Si
     responses=documented(kinds.NOT_SIMULATED),
 )
 async def explain_simulation(service: ServiceOf) -> ExplanationDocument:
-    """Say of each effect whether it is called for, why, how large it is and what it costs."""
+    """Return for each effect whether it is called for, why, how large it is and what it costs."""
     explanation = await asyncio.to_thread(_simulation(service).explain)
     return ExplanationDocument.model_validate(explanation.to_document())
 

@@ -1,4 +1,4 @@
-"""How often somebody may do something: so many times a second on average, and some at once."""
+"""A token bucket: so many messages a second on average, and some at once."""
 
 from collections.abc import Callable
 from typing import Final
@@ -13,7 +13,8 @@ class RateLimiter:
     """Counts what is done against what is allowed (a token bucket).
 
     ``rate_hz`` is allowed in the long run, and what that gives in `BURST_S` at once. What was
-    asked for may be answered, too: `earn` allows one more, up to `MOST_ANSWERS` of them.
+    sent to the client may be acknowledged, too: `credit` allows one more message, up to
+    `MOST_ANSWERS` of them.
     """
 
     def __init__(self, rate_hz: float, *, clock: Callable[[], float]) -> None:

@@ -16,7 +16,7 @@ from transientcam_server.errors.translation import problem_document
 from transientcam_server.imaging.view import View
 
 _AT_ONCE = 4
-"""Deliveries after which others have their turn."""
+"""Deliveries after which other tasks run."""
 
 
 class Sender:
@@ -32,7 +32,7 @@ class Sender:
         self._failing: set[str] = set()
 
     async def send_all(self) -> None:
-        """Send until the client is gone or was told goodbye."""
+        """Send until the client is gone or the stream was closed."""
         delivered = 0
         while True:
             item = await self._outbox.next()
@@ -64,11 +64,11 @@ class Sender:
         self, delivery: Delivery, channel: Channel, task: asyncio.Task[bytes] | None
     ) -> None:
         if channel.dropped:
-            await self._tell_dropped(channel)
+            await self._report_dropped(channel)
         try:
             data = await (self._encoded(delivery, channel) if task is None else task)
         except Problem as problem:
-            await self._tell_failed(channel, problem)
+            await self._report_failed(channel, problem)
             return
         self._failing.discard(channel.product.name)
         self._rate_limiter.credit()  # for its acknowledgement
@@ -80,14 +80,14 @@ class Sender:
             channel.product, channel.encoding, View(crop=channel.crop), channel=channel.number
         )
 
-    async def _tell_dropped(self, channel: Channel) -> None:
+    async def _report_dropped(self, channel: Channel) -> None:
         count, channel.dropped = channel.dropped, 0
         channel.dropped_total += count
         details = {"channel": channel.number, "count": count, "total": channel.dropped_total}
         await self._websocket.send_bytes(wire.encode(wire.Notice("dropped", details)))
 
-    async def _tell_failed(self, channel: Channel, problem: Problem) -> None:
-        """Tell a failure once, not with every frame until it is mended."""
+    async def _report_failed(self, channel: Channel, problem: Problem) -> None:
+        """Report a failure once, not with every frame until it is fixed."""
         if channel.product.name not in self._failing:
             self._failing.add(channel.product.name)
             document: dict[str, Any] = problem_document(problem)

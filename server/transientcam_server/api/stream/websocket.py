@@ -31,7 +31,7 @@ _REVOKED = "the token is not valid any more"
 
 @router.websocket("/stream")
 async def stream(websocket: WebSocket) -> None:
-    """Serve one client from its handshake to its goodbye."""
+    """Serve one client from its handshake to its close."""
     service: Service = websocket.app.state.service
     offered = websocket.scope["subprotocols"]
     if wire.SUBPROTOCOL not in offered:
@@ -88,14 +88,16 @@ class _Client:
         )
 
     async def serve(self) -> None:
-        """Subscribe, then send and receive until either end has enough."""
+        """Subscribe, then send and receive until either end closes."""
         hub = self._service.hub
         limit = self._service.settings.stream.max_clients
         if hub.clients >= limit:
-            problem = Problem(kinds.TOO_MANY_CLIENTS, f"{limit} clients look on.", limit=limit)
-            await self._dismiss(problem, wire.CloseCode.TRY_AGAIN_LATER)
+            problem = Problem(
+                kinds.TOO_MANY_CLIENTS, f"{limit} clients are connected.", limit=limit
+            )
+            await self._close_with(problem, wire.CloseCode.TRY_AGAIN_LATER)
             return
-        # counted from here on, so that those who do not subscribe are limited too
+        # counted from here on, so that clients that do not subscribe are limited too
         hub.join(self._outbox)
         try:
             try:
@@ -139,7 +141,7 @@ class _Client:
         if problem.kind in (kinds.TOKEN_REQUIRED, kinds.TOKEN_REFUSED):
             log_refusal(self._websocket.scope, problem)
             code = wire.CloseCode.AUTHENTICATION_FAILED
-        await self._dismiss(problem, code)
+        await self._close_with(problem, code)
 
     async def _exchange(self) -> None:
         """Send beside receiving; whichever ends first ends the other."""
@@ -159,7 +161,7 @@ class _Client:
         while True:
             data = await self._receive()
             if not self._rate_limiter.allow():
-                await self._send_away()
+                await self._close_flooding()
                 return
             try:
                 message = wire.parse_client_message(data)
@@ -234,7 +236,7 @@ class _Client:
         encoding = stream_encoding(wanted.encoding)
         return Channel(UNNUMBERED, product, wanted.max_rate_hz, encoding, crop)
 
-    async def _send_away(self) -> None:
+    async def _close_flooding(self) -> None:
         """End a stream whose client sends more than is read here."""
         limit_hz = self._service.settings.stream.max_messages_hz
         problem = Problem(
@@ -247,7 +249,7 @@ class _Client:
         # read nothing more; the sender ends the stream
         await asyncio.Event().wait()
 
-    async def _dismiss(self, problem: Problem, code: wire.CloseCode) -> None:
+    async def _close_with(self, problem: Problem, code: wire.CloseCode) -> None:
         message = wire.ErrorMessage(problem_document(problem))
         await self._websocket.send_bytes(wire.encode(message))
         await self._websocket.close(code, problem.kind.title)

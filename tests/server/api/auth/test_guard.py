@@ -52,7 +52,9 @@ def bearer(token: str) -> dict[str, str]:
     return {"Authorization": f"Bearer {token}"}
 
 
-def test_without_a_token_nothing_of_the_camera_is_told(http: httpx.Client, daemon: Served) -> None:
+def test_without_a_token_nothing_of_the_camera_is_reported(
+    http: httpx.Client, daemon: Served
+) -> None:
     for path, methods in daemon.app.openapi()["paths"].items():
         if not path.startswith("/api/v1/"):
             continue
@@ -78,7 +80,7 @@ def test_health_and_pages_are_open(http: httpx.Client, path: str) -> None:
         {"Authorization": "bearer  x"},
     ],
 )
-def test_a_token_nobody_made_is_refused(http: httpx.Client, headers: dict[str, str]) -> None:
+def test_a_token_that_was_not_made_is_refused(http: httpx.Client, headers: dict[str, str]) -> None:
     answer = http.get("/api/v1/info", headers=headers)
 
     assert (answer.status_code, answer.json()["type"]) == (401, "/problems/token-refused")
@@ -266,7 +268,7 @@ def test_where_none_is_needed_a_role_that_is_shown_still_counts(tmp_path: Path) 
         here.identify(Headers(bearer("x")))
 
 
-def test_a_broken_file_lets_nobody_in_and_keeps_nobody(
+def test_a_broken_file_admits_and_keeps_no_client(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     here = guard(tmp_path, require_token=True)

@@ -55,7 +55,7 @@ def test_a_token_has_256_bits_that_no_other_has(file: TokenFile) -> None:
     assert all(len(text.split("_", 2)[2]) == 43 for text in texts)  # base64 of 32 bytes
 
 
-def test_nobody_else_may_read_the_file(file: TokenFile) -> None:
+def test_no_other_user_may_read_the_file(file: TokenFile) -> None:
     file.create("a", Role.VIEWER, now=NOW)
 
     assert stat.S_IMODE(file.path.stat().st_mode) == 0o600
@@ -119,7 +119,7 @@ def test_tokens_made_at_the_same_time_are_all_kept(file: TokenFile) -> None:
         '{"v": 1, "tokens": [], "more": 1}',
     ],
 )
-def test_a_file_that_cannot_be_used_lets_nobody_in(file: TokenFile, content: str) -> None:
+def test_a_file_that_cannot_be_used_admits_no_client(file: TokenFile, content: str) -> None:
     _, text = file.create("a", Role.VIEWER, now=NOW)
     assert file.find(text, now=NOW) is not None
 
@@ -143,7 +143,7 @@ def test_a_secret_in_a_broken_file_is_not_repeated_in_the_error(file: TokenFile)
     assert "geheim" not in str(caught.value)
 
 
-def test_a_directory_in_its_place_is_said_in_a_sentence(tmp_path: Path) -> None:
+def test_a_directory_in_its_place_is_reported_in_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(TokenFileError, match="directory"):
         TokenFile(tmp_path).tokens()
 

@@ -41,7 +41,7 @@ def test_without_one_that_may_stand_in_a_log_it_gets_one(
         "/docs",
     ],
 )
-def test_head_tells_what_get_would_without_a_body(http: httpx.Client, path: str) -> None:
+def test_head_reports_what_get_would_without_a_body(http: httpx.Client, path: str) -> None:
     http.put("/api/v1/acquisition", json={"running": False})  # both are about the same frame
     try:
         get, head = http.get(path), http.head(path)

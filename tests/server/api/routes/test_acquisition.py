@@ -6,7 +6,7 @@ from tests.serving import Served
 PATH = "/api/v1/acquisition"
 
 
-def test_the_acquisition_tells_its_measured_rate(served: Served, http: httpx.Client) -> None:
+def test_the_acquisition_reports_its_measured_rate(served: Served, http: httpx.Client) -> None:
     for after in (0, 1, 2):
         http.get("/api/v1/frames/latest", params={"wait_s": 10.0, "after": after})
 

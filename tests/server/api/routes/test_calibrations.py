@@ -238,7 +238,7 @@ def test_an_unknown_one_is_a_problem(http: httpx.Client, name: str) -> None:
         assert http.put(f"{CALIBRATIONS}/active", json={"id": name}).status_code == 404
 
 
-def test_the_next_start_knows_the_active_one(tmp_path: Path) -> None:
+def test_the_next_start_has_the_active_one(tmp_path: Path) -> None:
     kept = {"directory": tmp_path}
     with (
         serving("sim:calibration", calibrations=kept) as daemon,
@@ -350,7 +350,7 @@ def test_the_service_ends_in_the_middle_of_it(tmp_path: Path) -> None:
     assert daemon.camera.applied.sequence.zeroth != "on-off"
 
 
-def test_streams_are_told(bench: Served) -> None:
+def test_streams_are_notified(bench: Served) -> None:
     notices: list[Any] = []
     with (
         Camera(bench.url, timeout_s=60) as camera,

@@ -3,7 +3,7 @@ import httpx
 from tests.serving import Served
 
 
-def test_the_camera_is_told_with_capabilities_status_and_counters(
+def test_the_camera_is_reported_with_capabilities_status_and_counters(
     served: Served, http: httpx.Client
 ) -> None:
     http.get("/api/v1/frames/latest", params={"wait_s": 10.0})
@@ -20,7 +20,9 @@ def test_the_camera_is_told_with_capabilities_status_and_counters(
     assert document["counters"]["lost"] == 0
 
 
-def test_a_lost_camera_is_told_as_lost_with_the_reason(served: Served, http: httpx.Client) -> None:
+def test_a_lost_camera_is_reported_as_lost_with_the_reason(
+    served: Served, http: httpx.Client
+) -> None:
     http.get("/api/v1/frames/latest", params={"wait_s": 10.0})
     served.service.acquisition.submit(lambda: None).result()
     assert served.camera.simulation is not None

@@ -152,7 +152,7 @@ def test_bins_are_spread_over_one_period_of_the_base_frequency(steady: httpx.Cli
     np.testing.assert_allclose(message.extra["time_s"], np.arange(5) / (5 * 23e6), rtol=1e-12)
 
 
-def test_a_pixel_tells_everything_about_itself(steady: httpx.Client) -> None:
+def test_a_pixel_reports_everything_about_itself(steady: httpx.Client) -> None:
     response = steady.get(f"{LATEST}/pixel", params={"x": 80, "y": 60, "bins": 50, "wait_s": 10.0})
 
     pixel = response.json()
@@ -247,7 +247,7 @@ def test_a_frame_that_is_still_to_come_can_be_waited_for(http: httpx.Client) -> 
     assert found["frame"] == number + 3
 
 
-def test_a_frame_that_is_gone_is_told_so_with_those_that_are_there() -> None:
+def test_a_frame_that_is_gone_is_reported_so_with_those_that_are_there() -> None:
     with (
         serving("sim:mirrors?noise=off", history={"max_bytes": 4 * 16 * 120 * 163 * 2}) as daemon,
         httpx.Client(base_url=daemon.url, timeout=60.0) as http,
@@ -289,7 +289,7 @@ def test_a_region_and_every_so_many_pixels_of_it_are_cut_out_of_the_whole(
         assert (whole.meta["region"], whole.meta["decimation"]) == ([0, 0, 163, 120], 1)
 
 
-def test_every_format_knows_which_part_it_holds(still: httpx.Client) -> None:
+def test_every_format_has_which_part_it_holds(still: httpx.Client) -> None:
     cut: dict[str, Any] = {"region": "40,30,64,48", "decimation": 2}
     array = still.get(f"{LATEST}/range.npy", params=cut)
     with np.load(io.BytesIO(still.get(f"{LATEST}/range.npz", params=cut).content)) as file:

@@ -27,7 +27,7 @@ def test_the_service_says_what_it_is_and_what_its_frames_have(http: httpx.Client
     assert not products["transient"]["streamed"]
 
 
-def test_the_versions_of_the_interface_are_told_at_a_path_without_version(
+def test_the_versions_of_the_interface_are_reported_at_a_path_without_version(
     http: httpx.Client,
 ) -> None:
     versions = http.get("/api/versions").json()

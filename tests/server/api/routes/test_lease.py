@@ -19,12 +19,12 @@ def take(http: httpx.Client, **others: Any) -> dict[str, str]:
     return {LEASE_HEADER: response.json()["lease_id"]}
 
 
-def test_without_a_lease_anybody_changes_things(http: httpx.Client) -> None:
+def test_without_a_lease_any_client_changes_things(http: httpx.Client) -> None:
     assert http.get(PATH).json()["held"] is False
     assert http.put("/api/v1/sequence", json={"harmonics": 4}).status_code == 200
 
 
-def test_a_lease_shuts_everybody_else_out_of_changes_but_not_of_looking(
+def test_a_lease_shuts_every_other_client_out_of_changes_but_not_of_looking(
     http: httpx.Client,
 ) -> None:
     mine = take(http)
@@ -70,7 +70,7 @@ def test_renewing_keeps_the_id(http: httpx.Client) -> None:
     assert http.put(PATH).json()["type"] == "/problems/lease-lost"
 
 
-def test_a_lapse_is_told_and_stops_the_capture_and_the_light(
+def test_a_lapse_is_reported_and_stops_the_capture_and_the_light(
     served: Served, http: httpx.Client
 ) -> None:
     with streaming(served.stream_url) as watcher:
@@ -98,7 +98,7 @@ def test_a_lapse_leaves_the_camera_alone_where_that_was_asked_for(
     assert http.get("/api/v1/acquisition").json()["running"]
 
 
-def test_a_takeover_is_told_to_everybody_and_logged(
+def test_a_takeover_is_reported_to_every_client_and_logged(
     served: Served, http: httpx.Client, caplog: pytest.LogCaptureFixture
 ) -> None:
     mine = take(http)

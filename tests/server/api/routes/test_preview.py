@@ -81,7 +81,7 @@ def test_a_rate_leaves_frames_out(http: httpx.Client) -> None:
     assert all(2 <= step <= 5 for step in np.diff(numbers))
 
 
-def test_who_does_not_read_delays_nobody_and_has_nothing_made_ahead(
+def test_who_does_not_read_delays_no_other_and_has_nothing_made_ahead(
     served: Served, http: httpx.Client
 ) -> None:
     address = urlsplit(served.url)

@@ -91,7 +91,9 @@ def test_what_no_frame_can_be_computed_with_is_refused(
     assert http.get(PATH).json()["reconstruction_id"] == 1
 
 
-def test_streams_are_told_and_a_lease_keeps_others_out(served: Served, http: httpx.Client) -> None:
+def test_streams_are_notified_and_a_lease_keeps_others_out(
+    served: Served, http: httpx.Client
+) -> None:
     notices: list[Notice] = []
     with (
         Camera(served.url, timeout_s=60) as camera,

@@ -412,7 +412,7 @@ def test_the_end_of_the_service_finishes_the_recording(directory: Path) -> None:
         assert recording.end["reason"] == "shutdown"
 
 
-def test_streams_are_told_of_recordings(daemon: Served, http: httpx.Client) -> None:
+def test_streams_are_notified_of_recordings(daemon: Served, http: httpx.Client) -> None:
     import transientcam
 
     with (

@@ -10,7 +10,7 @@ PATH = "/api/v1/sequence"
 VIDEO: dict[str, Any] = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}
 
 
-def test_the_running_sequence_is_told_with_what_follows_from_it(http: httpx.Client) -> None:
+def test_the_running_sequence_is_reported_with_what_follows_from_it(http: httpx.Client) -> None:
     document = http.get("/api/v1/sequence").json()
 
     assert document["harmonics"] == 3
@@ -122,7 +122,7 @@ def test_a_body_that_is_no_sequence_at_all_is_refused(
 
 
 @pytest.mark.parametrize("text", ["NaN", "Infinity", "-Infinity"])
-def test_numbers_that_are_none_are_refused_and_told_back_as_text(
+def test_numbers_that_are_none_are_refused_and_returned_as_text(
     steady: httpx.Client, text: str
 ) -> None:
     response = steady.put(
@@ -145,7 +145,7 @@ def test_a_sequence_is_named_by_its_tag(http: httpx.Client) -> None:
     assert put.headers["etag"] == second.headers["etag"] != first.headers["etag"]
 
 
-def test_a_sequence_that_is_known_is_not_told_again(http: httpx.Client) -> None:
+def test_a_sequence_that_is_known_is_not_reported_again(http: httpx.Client) -> None:
     tag = http.get(PATH).headers["etag"]
 
     known = http.get(PATH, headers={"If-None-Match": f'"other", W/{tag}'})

@@ -10,7 +10,7 @@ from transientcam import wire
 from transientcam_driver import open_camera
 
 
-def test_the_simulated_scene_is_told(http: httpx.Client) -> None:
+def test_the_simulated_scene_is_reported(http: httpx.Client) -> None:
     document = http.get("/api/v1/simulation").json()
 
     assert document["scene"] == "mirrors"
@@ -101,7 +101,7 @@ def test_what_cannot_be_simulated_is_refused_by_name_and_the_scene_stays(
     assert http.get("/api/v1/simulation").json()["scene"] == "mirrors"
 
 
-def test_streams_are_told_of_another_scene(served: Served) -> None:
+def test_streams_are_notified_of_another_scene(served: Served) -> None:
     told: list[Any] = []
     with transientcam.Camera(served.url) as camera:
         with camera.stream("range", on_notice=told.append) as stream:

@@ -156,7 +156,7 @@ def test_with_credits_frames_of_the_past_wait_for_them_too(served: Served) -> No
     assert numbers == [1, 2, 3, 4]
 
 
-def test_what_is_kept_no_more_is_told_as_a_gap() -> None:
+def test_what_is_kept_no_more_is_reported_as_a_gap() -> None:
     with (
         serving("sim:mirrors?noise=off", history={"seconds": 0.3}) as daemon,
         streaming(daemon.stream_url) as client,
@@ -173,7 +173,7 @@ def test_what_is_kept_no_more_is_told_as_a_gap() -> None:
     assert gap.details["reason"] == "not kept any more"
 
 
-def test_nobody_waits_for_a_start_that_is_not_captured_yet(served: Served) -> None:
+def test_no_client_waits_for_a_start_that_is_not_captured_yet(served: Served) -> None:
     with streaming(served.stream_url) as client:
         client.subscribe("flags")
         latest = client.frame().meta["frame"]
@@ -241,7 +241,7 @@ def test_clients_who_want_the_same_share_a_channel_number_and_others_do_not(
     assert len({each.channel for each in (*first.channels, *second.channels)}) == 3
 
 
-def test_a_client_that_sends_without_end_is_sent_away_and_nobody_else(served: Served) -> None:
+def test_a_client_that_sends_without_end_is_closed_and_no_other(served: Served) -> None:
     with streaming(served.stream_url) as other, streaming(served.stream_url) as client:
         other.subscribe("flags")
         client.subscribe("flags", max_rate_hz=0.5)
@@ -269,7 +269,7 @@ def test_there_may_be_fewer_subscriptions_than_the_protocol_allows() -> None:
     assert (problem["field"], problem["value"]) == ("subscriptions", 3)
 
 
-def test_a_changed_sequence_is_told_before_its_first_frame(served: Served) -> None:
+def test_a_changed_sequence_is_reported_before_its_first_frame(served: Served) -> None:
     with streaming(served.stream_url) as client:
         client.subscribe("moments")
         client.frame()
@@ -421,7 +421,7 @@ def test_a_client_that_never_subscribes_is_sent_away() -> None:
     assert code == wire.CloseCode.BAD_FIRST_MESSAGE
 
 
-def test_one_client_too_many_is_told_to_try_again_later() -> None:
+def test_one_client_too_many_is_asked_to_try_again_later() -> None:
     with (
         serving("sim:mirrors?noise=off", stream={"max_clients": 1}) as daemon,
         streaming(daemon.stream_url) as first,
@@ -447,7 +447,7 @@ def test_a_client_that_leaves_is_forgotten(served: Served) -> None:
     assert served.service.hub.clients == 0
 
 
-def test_a_client_is_told_when_the_service_shuts_down() -> None:
+def test_a_client_is_notified_when_the_service_shuts_down() -> None:
     with serving("sim:mirrors?noise=off") as daemon:
         context = streaming(daemon.stream_url)
         client = context.__enter__()
