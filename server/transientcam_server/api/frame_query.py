@@ -49,7 +49,7 @@ PixelBins = Annotated[int, Query(ge=1, le=MAX_BINS, description="times of flight
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class FrameQuery:
     """What a request states about the product it is for."""
 
     time_s: list[float] | None
@@ -102,7 +102,7 @@ class Wanted:
 
 
 # async, or FastAPI takes a thread for it
-async def _wanted(
+async def _frame_query(
     request: Request,
     time_s: Annotated[
         list[FiniteFloat] | None,
@@ -119,7 +119,7 @@ async def _wanted(
         str | None,
         Query(
             max_length=64,
-            description="`x,y,width,height` of the part wanted, in pixels of the frame",
+            description="`x,y,width,height` of the part, in pixels of the frame",
             examples=["40,30,64,48"],
         ),
     ] = None,
@@ -130,16 +130,16 @@ async def _wanted(
         Literal["colour"] | None,
         Query(description="a PNG for eyes: 8 bits, coloured, without values"),
     ] = None,
-) -> Wanted:
+) -> FrameQuery:
     accept = request.headers.get("accept")
-    return Wanted(time_s, bins, y, region, decimation, view, accept)
+    return FrameQuery(time_s, bins, y, region, decimation, view, accept)
 
 
-WantedOf = Annotated[Wanted, Depends(_wanted)]
+FrameQueryOf = Annotated[FrameQuery, Depends(_frame_query)]
 """The query for a product of the request."""
 
 
-def choose(product: Product, suffix: str | None, wanted: Wanted) -> Encoding:
+def choose(product: Product, suffix: str | None, query: FrameQuery) -> Encoding:
     """Return the format that a request selects for a product.
 
     Raises
@@ -147,13 +147,13 @@ def choose(product: Product, suffix: str | None, wanted: Wanted) -> Encoding:
     Problem
         ``not-acceptable``.
     """
-    encoding = negotiate(product, suffix=suffix, accept=wanted.accept)
-    return COLOUR_PNG if wanted.view is not None and encoding is PNG else encoding
+    encoding = negotiate(product, suffix=suffix, accept=query.accept)
+    return COLOUR_PNG if query.view is not None and encoding is PNG else encoding
 
 
 async def product_answer(
     name: str,
-    wanted: Wanted,
+    query: FrameQuery,
     *,
     product: Callable[[str], Product],
     frame: Callable[[], Awaitable[Frame]],
@@ -161,9 +161,9 @@ async def product_answer(
     """Answer with a product; the frame is looked up once the request is known to be valid."""
     stem, dot, suffix = name.partition(".")
     chosen = product(stem)
-    encoding = choose(chosen, suffix if dot else None, wanted)
+    encoding = choose(chosen, suffix if dot else None, query)
     found = await frame()
-    view = wanted.view_of(chosen, found)
+    view = query.view_of(chosen, found)
     data = await found.encoded(chosen, encoding, view)
     headers = {"Cache-Control": "no-store", "Vary": "Accept"}
     if encoding is not MSGPACK:  # which holds it
