@@ -56,7 +56,7 @@ PixelBins = Annotated[int, Query(ge=1, le=MAX_BINS, description="times of flight
 
 @dataclass(frozen=True, slots=True)
 class FrameQuery:
-    """Which part of a product a request selects, and in which format."""
+    """What a request states about the product it is for."""
 
     time_s: list[float] | None
     bins: int | None
@@ -125,7 +125,7 @@ async def _frame_query(
         str | None,
         Query(
             max_length=64,
-            description="`x,y,width,height` of the part wanted, in pixels of the frame",
+            description="`x,y,width,height` of the part, in pixels of the frame",
             examples=["40,30,64,48"],
         ),
     ] = None,
@@ -142,10 +142,10 @@ async def _frame_query(
 
 
 FrameQueryOf = Annotated[FrameQuery, Depends(_frame_query)]
-"""The part and the format that the request selects."""
+"""The query for a product of the request."""
 
 
-def choose(product: Product, suffix: str | None, wanted: FrameQuery) -> Encoding:
+def choose(product: Product, suffix: str | None, query: FrameQuery) -> Encoding:
     """Return the format that a request selects for a product.
 
     Raises
@@ -153,13 +153,13 @@ def choose(product: Product, suffix: str | None, wanted: FrameQuery) -> Encoding
     Problem
         ``not-acceptable``.
     """
-    encoding = negotiate(product, suffix=suffix, accept=wanted.accept)
-    return COLOUR_PNG if wanted.view is not None and encoding is PNG else encoding
+    encoding = negotiate(product, suffix=suffix, accept=query.accept)
+    return COLOUR_PNG if query.view is not None and encoding is PNG else encoding
 
 
 async def product_answer(
     name: str,
-    wanted: FrameQuery,
+    query: FrameQuery,
     *,
     product: Callable[[str], Product],
     frame: Callable[[], Awaitable[Frame]],
@@ -167,9 +167,9 @@ async def product_answer(
     """Answer with a product; the frame is looked up once the request is known to be valid."""
     stem, dot, suffix = name.partition(".")
     chosen = product(stem)
-    encoding = choose(chosen, suffix if dot else None, wanted)
+    encoding = choose(chosen, suffix if dot else None, query)
     found = await frame()
-    view = wanted.view_of(chosen, found)
+    view = query.view_of(chosen, found)
     data = await found.encoded(chosen, encoding, view)
     headers = {"Cache-Control": "no-store", "Vary": "Accept"}
     if encoding is not MSGPACK:  # which holds it

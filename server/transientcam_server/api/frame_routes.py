@@ -109,7 +109,7 @@ def add_frame_routes(
         responses=PRODUCT_RESPONSES | documented(*PRODUCT_PROBLEMS, *missing),
     )
     async def read_product(
-        *, chosen: ChosenFrame = chosen_of, product: ProductName, wanted: FrameQueryOf
+        *, chosen: ChosenFrame = chosen_of, product: ProductName, query: FrameQueryOf
     ) -> Response:
         pipeline = await chosen.pipeline()
-        return await product_answer(product, wanted, product=pipeline.product, frame=chosen.frame)
+        return await product_answer(product, query, product=pipeline.product, frame=chosen.frame)

@@ -1,6 +1,5 @@
 """What the service serves: a camera on USB, a simulated one, or a recording."""
 
-from types import TracebackType
 from typing import Protocol, Self
 
 import transientcam_driver
@@ -76,12 +75,7 @@ class Camera(Protocol):
 
     def __enter__(self) -> Self: ...
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None: ...
+    def __exit__(self, *_: object) -> None: ...
 
 
 def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:

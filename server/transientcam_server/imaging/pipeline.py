@@ -97,8 +97,8 @@ class Pipeline:
             None if self._intrinsics is None else self._intrinsics(),
             self._sensor,
         )
-        if recipe != self._recipe:  # else the same one: it holds what need not be prepared again
-            self._recipe = recipe
+        if self._recipe is None or recipe != self._recipe:
+            self._recipe = recipe  # else the same one: it holds what was prepared for it
         return self.recorded_frame(self._frames, raw, self._recipe)
 
     def recorded_frame(

@@ -1,6 +1,7 @@
 """Planning over REST: recommendations, refusals, and the front of the scene that is seen."""
 
 from collections.abc import Iterator
+from importlib import import_module
 from typing import Any
 
 import httpx
@@ -8,7 +9,6 @@ import pytest
 
 from tests.server.contract import hold_to_contract
 from tests.serving import Served, serving
-from transientcam_server.planning import candidates
 
 FIXED = {"base_frequency_hz": 23e6, "harmonics": 3}
 SCENE = {"brightness_dn_per_s": 8e5, "returns": [{"range_m": 1.5}, {"range_m": 3.0, "weight": 0.5}]}
@@ -99,6 +99,7 @@ def test_a_request_that_cannot_be_meant_is_refused_by_name(
 def test_the_front_falls_and_the_current_frame_says_where_it_stands(
     noisy: httpx.Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    candidates = import_module("transientcam_server.planning.candidates")  # not the function
     monkeypatch.setattr(candidates, "HARMONICS", (3,))
 
     answer = noisy.get("/api/v1/tradeoff").json()
