@@ -33,7 +33,7 @@ test("a capture that takes long is waited for, but not for ever", async () => {
   const { api, told } = camera([early, early, 8]);
   expect(await captureOne(api, 12)).toBe(8);
   expect(told.filter((each) => each.startsWith("wait"))).toHaveLength(3);
-  await expect(captureOne(camera([early, early, early, early]).api, 0.1)).rejects.toThrow("no such frame");
+  await expect(captureOne(camera([early, early, early, early]).api, 0.1)).rejects.toThrow("No frame yet");
 });
 
 test("a camera that fails meanwhile is told to stop nevertheless", async () => {
