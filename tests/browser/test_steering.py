@@ -169,7 +169,7 @@ def page_of_guarded(browser: Browser, guarded: Any) -> Any:
 
 
 def show_token(page: Page, token: str) -> None:
-    dialog = page.get_by_role("dialog", name="Who are you?")
+    dialog = page.get_by_role("dialog", name="Authentication required")
     dialog.get_by_label("Token", exact=True).fill(token)
     dialog.get_by_role("button", name="Use this token").click()
 
@@ -177,7 +177,7 @@ def show_token(page: Page, token: str) -> None:
 def test_a_service_that_asks_for_a_token_is_shown_one(page_of_guarded: Any) -> None:
     page, _, tokens = page_of_guarded
     page.goto("/?debug")
-    dialog = page.get_by_role("dialog", name="Who are you?")
+    dialog = page.get_by_role("dialog", name="Authentication required")
     expect(dialog).to_be_visible()
     expect(page.locator("[data-field=state]")).to_have_text("Not let in")
     show_token(page, "tc_mistyped")
@@ -207,7 +207,7 @@ def test_a_viewer_looks_and_is_told_what_it_may_not(page_of_guarded: Any) -> Non
     expect(stop).to_be_disabled()
     expect(stop).to_have_attribute("title", "The token viewer is a viewer's")
     page.get_by_label("Page: layout, colours, help").select_option(label="Token…")
-    dialog = page.get_by_role("dialog", name="Who are you?")
+    dialog = page.get_by_role("dialog", name="Authentication required")
     expect(dialog.locator("[data-field=caller]")).to_contain_text("knows this page as viewer")
     # with another one it may at once
     show_token(page, tokens[Role.OPERATOR])
@@ -228,11 +228,11 @@ def test_a_token_that_is_revoked_is_asked_for_again(page_of_guarded: Any) -> Non
     page.goto("/?debug")
     show_token(page, tokens[Role.OPERATOR])
     page.locator(".panel-map canvas[data-frame]").wait_for()
-    file = served.service.guard.tokens
+    file = served.app.state.guard.tokens
     revoked = file.find(tokens[Role.OPERATOR], now=utc_now())
     assert revoked is not None
     file.revoke(revoked.id)
-    expect(page.get_by_role("dialog", name="Who are you?")).to_be_visible()
+    expect(page.get_by_role("dialog", name="Authentication required")).to_be_visible()
     expect(page.locator("[data-field=state]")).to_have_text("Not let in")
     show_token(page, tokens[Role.VIEWER])
     expect(page.locator("[data-field=state]")).to_have_text("Live")

@@ -11,7 +11,7 @@ export function TokenDialog() {
     asksForToken.value = false;
   };
   return (
-    <Dialog open={asksForToken.value} title="Who are you?" onClose={close}>
+    <Dialog open={asksForToken.value} title="Authentication required" onClose={close}>
       <TokenForm onDone={close} />
     </Dialog>
   );
