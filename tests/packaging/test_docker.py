@@ -79,7 +79,7 @@ def test_the_settings_of_a_container_are_settings(name: str) -> None:
 
 
 def test_the_image_alone_lets_nobody_in_without_a_token() -> None:
-    with pytest.raises(SettingsError, match="whoever asks will need a token"):
+    with pytest.raises(SettingsError, match="clients will need a token"):
         load_settings({}, environment=image_environment())
 
 
