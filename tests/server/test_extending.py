@@ -36,7 +36,7 @@ def extended_client(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_product_is_answered_over_rest_in_every_format_that_fits(url: str) -> None:
     with Camera(url) as camera:
-        frame = camera.frame("direct_share")
+        frame = camera.frame("direct_share", wait_s=10.0)
         number = frame.frame
     answer = httpx.get(f"{url}/api/v1/frames/{number}/direct_share.npy")
 

@@ -103,8 +103,9 @@ def test_with_credits_the_server_waits_for_the_client_and_then_sends_the_newest(
     with streaming(served.stream_url) as client:
         client.subscribe("range", credits=1)
         first = client.frame()
-        with pytest.raises(TimeoutError):
-            client.receive(timeout_s=0.5)
+        with pytest.raises(TimeoutError):  # notices may come: of lost images, on a laden machine
+            while not isinstance(client.receive(timeout_s=0.5), wire.Frame):
+                pass
         waited_for = served.service.hub.latest
         assert waited_for is not None
 
