@@ -12,7 +12,7 @@ from transientcam_server.imaging.calibration import nominal_gains
 from transientcam_server.imaging.recipe import Recipe
 
 _Array = NDArray[Any]
-SAMPLED_PIXELS: Final = 512
+SAMPLED_PIXELS: Final = 256
 """Pixels of each frame whose deviation is predicted."""
 MEDIAN_OF_NORMAL: Final = 0.674490
 """Median of the absolute value of a standard normal variable."""
