@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from tests.server.streaming import VIDEO, streaming
+from tests.server.streaming import VIDEO, Client, streaming
 from tests.serving import Served, serving
 from transientcam import density, wire
 from transientcam_driver import Sequence
