@@ -200,7 +200,13 @@ def main() -> None:
     latencies = {
         when: latency(tree, duration_s=3 * arguments.seconds) for when, tree in trees.items()
     }
-    page = report(costs, latencies, list(trees), against=arguments.against is not None)
+    page = report(
+        costs,
+        latencies,
+        list(trees),
+        against=arguments.against is not None,
+        duration_s=arguments.seconds,
+    )
     print(page)
     if arguments.write:
         PAGE.write_text(page, encoding="utf-8")
@@ -212,6 +218,7 @@ def report(
     trees: list[str],
     *,
     against: bool,
+    duration_s: float,
 ) -> str:
     """Return the page."""
     option = " --against DIRECTORY" if against else ""
@@ -226,6 +233,8 @@ def report(
         "are computed whole, too. *Processor time* is what a frame takes beyond a daemon that",
         "replays without a viewer, at a rate that both keep up with; *frames/s* is what the viewer",
         "gets where far more frames are offered. The viewer runs on the same two cores.",
+        f"Each figure is one run of {duration_s:g} s; at 640 x 480 that is "
+        f"{PACED_HZ[640] * duration_s:.0f} frames, so expect some 20 % either way there.",
     ]
     if against:
         lines += ["", "*Before* is the daemon of commit 0553079."]
