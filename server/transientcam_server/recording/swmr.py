@@ -17,6 +17,7 @@ from typing import Any, Final, TypeAlias
 
 import h5py
 import numpy as np
+from h5py import h5o
 from isal import isal_zlib
 from numpy.typing import NDArray
 
@@ -173,7 +174,10 @@ def salvage(source: File, target: Path, rows: int, *, row_axis: str) -> None:
     with open_file(target, "w", libver=LIBVER) as copy:
         copy.attrs.update(source.attrs)
         growing = [name for name, item in source.items() if item.maxshape[:1] == (None,)]
-        for name, dataset in source.items():
+        for name, dataset, first in _with_first_names(source):
+            if first != name:  # another name of the same dataset
+                copy[name] = copy[first]
+                continue
             if name in growing:
                 _copy_rows(dataset, copy, rows)
             else:
@@ -182,6 +186,15 @@ def salvage(source: File, target: Path, rows: int, *, row_axis: str) -> None:
         _restore_scales(source, copy)
     if row_axis not in growing:
         raise ValueError(f"no series {row_axis}")
+
+
+def _with_first_names(source: File) -> list[tuple[str, Dataset, str]]:
+    """Return name and dataset of everything, and the first name of the same dataset."""
+    first: dict[int, str] = {}
+    return [
+        (name, dataset, first.setdefault(h5o.get_info(dataset.id).addr, name))
+        for name, dataset in source.items()
+    ]
 
 
 def _copy_rows(dataset: Dataset, copy: File, rows: int) -> None:

@@ -290,7 +290,10 @@ def test_deviation_of_one_return_at_one_frequency_is_the_closed_form() -> None:
 
     predicted = predictor.range_std(sequence)
 
-    b0, gain = 400.0, abs(tm.nominal_calibration(1, sequence.sub_phases.phases_rad)[1])
+    b0, gain = (
+        400.0,
+        abs(tm.nominal_calibration(1, sequence.sub_phases.phases_rad, zeroth="on-off")[1]),
+    )
     variance = (b0 / 9.0 + 2 * (30 / 9.0) ** 2 + 1 / 6) / gain**2 / 2
     std_rad = np.sqrt(variance * tm.noise.smoothing_factor(0.6)) / b0
     assert predicted.median_m == pytest.approx(tm.range_m(std_rad, FREQUENCY_HZ), rel=0.02)
