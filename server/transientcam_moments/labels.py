@@ -1,7 +1,7 @@
 """What raw images show: the labels from which their order, their weights and b_0 follow."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -16,7 +16,6 @@ _STEP_WEIGHTS: Final = np.array([1, 1j, -1, -1j])
 _SAME_FREQUENCY: Final = 1e-6  # relative
 
 
-@dataclass(frozen=True, eq=False)
 class Labels:
     """What each of N raw images of a frame shows, in the order of capture.
 
@@ -47,24 +46,24 @@ class Labels:
     one without light, or not at all.
     """
 
-    harmonic: Array
-    phase_rad: Array
-    frequency_hz: Array | None = None
-    illumination: Array | None = None
-    take: Array | None = None
-
-    def __post_init__(self) -> None:
-        """Bring labels to arrays, and refuse those of no capture there is."""
-        count = np.size(self.harmonic)
-        object.__setattr__(self, "harmonic", _column("harmonic", self.harmonic, count, np.int64))
-        object.__setattr__(self, "phase_rad", _column("phase_rad", self.phase_rad, count, float))
-        if self.frequency_hz is not None:
-            column = _column("frequency_hz", self.frequency_hz, count, float)
-            object.__setattr__(self, "frequency_hz", column)
-        lit = np.ones(count, bool) if self.illumination is None else self.illumination
-        object.__setattr__(self, "illumination", _column("illumination", lit, count, bool))
-        take = np.zeros(count, int) if self.take is None else self.take
-        object.__setattr__(self, "take", _column("take", take, count, np.int64))
+    def __init__(
+        self,
+        harmonic: Array,
+        phase_rad: Array,
+        frequency_hz: Array | None = None,
+        illumination: Array | None = None,
+        take: Array | None = None,
+    ) -> None:
+        count = np.size(harmonic)
+        lit = np.ones(count, bool) if illumination is None else illumination
+        takes = np.zeros(count, int) if take is None else take
+        self.harmonic = _column("harmonic", harmonic, count, np.int64)
+        self.phase_rad = _column("phase_rad", phase_rad, count, float)
+        self.frequency_hz = (
+            None if frequency_hz is None else _column("frequency_hz", frequency_hz, count, float)
+        )
+        self.illumination = _column("illumination", lit, count, bool)
+        self.take = _column("take", takes, count, np.int64)
         self._require_a_capture()
 
     @property
@@ -75,12 +74,12 @@ class Labels:
     @property
     def takes(self) -> int:
         """How many captures of the same images there are."""
-        return len(np.unique(self._takes))
+        return len(np.unique(self.take))
 
     @property
     def zeroth(self) -> str:
         """How b_0 was measured: "low-frequency", "on-off" or "estimated"."""
-        images = np.count_nonzero(self.harmonic == 0) // self.takes
+        images = int(np.count_nonzero(self.harmonic == 0)) // self.takes
         return {STEPS: "low-frequency", 2: "on-off", 0: "estimated"}[images]
 
     @property
@@ -93,8 +92,7 @@ class Labels:
     @cached_property
     def order(self) -> Array:
         """Places (N,) of the images in the order that `measure` takes them in."""
-        lit: Any = self.illumination
-        return np.lexsort((self._steps, ~lit, self.harmonic, self._takes))
+        return np.lexsort((self._steps, ~self.illumination, self.harmonic, self.take))
 
     def in_order(self, images: Any) -> Any:
         """Return images (N, ...) in the order that `measure` takes them in.
@@ -142,7 +140,7 @@ class Labels:
         ParameterError
             When the settings say something else.
         """
-        found = {
+        found: dict[str, Any] = {
             "zeroth": self.zeroth,
             "takes": self.takes,
             "base_frequency_hz": self.base_frequency_hz,
@@ -163,19 +161,14 @@ class Labels:
             raise ParameterError("phase_rad", float(wrong[0]), "0, pi / 2, pi or 3 pi / 2")
         return steps.astype(np.int64) % STEPS
 
-    @property
-    def _takes(self) -> Array:
-        take: Array = self.take
-        return take
-
     def _require_a_capture(self) -> None:
         m = self.harmonics if self.harmonic.size else 0
         if not 1 <= m <= MAX_HARMONICS or self.harmonic.min() < 0:
             raise ParameterError("harmonic", self.harmonic.tolist(), "0 .. m, with m from 1 to 32")
-        lit: Any = self.illumination
-        for take in np.unique(self._takes):
+        lit = self.illumination
+        for take in np.unique(self.take):
             for j in range(m + 1):
-                here = (self._takes == take) & (self.harmonic == j)
+                here = (self.take == take) & (self.harmonic == j)
                 steps, on = sorted(self._steps[here]), sorted(lit[here])
                 four = steps == list(range(STEPS)) and all(on)
                 if not four and not (j == 0 and (not steps or on == [False, True])):
@@ -187,7 +180,7 @@ class Labels:
                         "0, 90, 180 and 270 degrees once each with the light on"
                         + ("; one with and one without light; or none" if j == 0 else ""),
                     )
-        zeroths = {int(np.sum((self._takes == t) & (self.harmonic == 0))) for t in self._takes}
+        zeroths = {int(np.sum((self.take == t) & (self.harmonic == 0))) for t in self.take}
         if len(zeroths) > 1:
             raise ParameterError("harmonic", self.harmonic.tolist(), "the same images in each take")
         self._require_multiples()

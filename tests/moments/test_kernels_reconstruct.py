@@ -30,7 +30,7 @@ def compiled() -> Iterator[None]:
 
 def settings_of(**changes: Any) -> tm.Settings:
     """Return the paper's settings with all that raw images need, one take at a low frequency."""
-    labels = {"base_frequency_hz": 23e6, "zeroth": "low-frequency", "takes": 1}
+    labels: dict[str, Any] = {"base_frequency_hz": 23e6, "zeroth": "low-frequency", "takes": 1}
     return tm.Settings(**(labels | changes))
 
 
@@ -55,7 +55,7 @@ def raw_images(
     phase_rad = np.stack([1 + 1.5 * x + 0.5 * y, 2.5 + x * y, 4 + x])
     weight = np.stack([800 + 600 * np.sin(6 * x), 300 + 300 * y, 150 + 0 * x])
     b = np.stack([(weight * np.exp(1j * j * phase_rad)).sum(0) for j in range(m + 1)])
-    images = digitised(b, settings.zeroth, seed=seed)
+    images = digitised(b, str(settings.zeroth), seed=seed)
     images[:, 3, 5] = 0  # a dead pixel
     images[2, 7, 7] = 4095  # a saturated one
     images[:, 20:24, 30:40] = 50  # darkness
@@ -262,7 +262,7 @@ def test_a_measured_scan_is_reconstructed_alike(data_dir: Path, smoothing_px: fl
     turn = np.exp(2j * np.pi * 100e6 * np.arange(5)[:, None] * time_s)
     b = np.einsum("yxt,jt->jyx", counts, turn) * (2000 / counts.sum(axis=-1).max())
     settings = settings_of(base_frequency_hz=100e6, smoothing_sigma_px=smoothing_px)
-    images = digitised(b, settings.zeroth)
+    images = digitised(b, str(settings.zeroth))
 
     found = in_one_pass(images, settings)
 

@@ -23,10 +23,10 @@ def images_of(sequence: Sequence, b: Array) -> Array:
         images.append(64.0 + (label.illumination * b[0].real + turned.real) / 2)
         if not label.frequency_hz:
             images[-1] = 64.0 + plane.real / 2
-    return np.stack(images)
+    return np.asarray(np.stack(images))
 
 
-def labels_of(sequence: Sequence) -> dict[str, Array]:
+def labels_of(sequence: Sequence) -> dict[str, Any]:
     names = ("harmonic", "phase_rad", "frequency_hz", "illumination", "take")
     return {name: np.array([getattr(each, name) for each in sequence.labels]) for name in names}
 

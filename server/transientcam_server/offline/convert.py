@@ -58,7 +58,7 @@ def convert_recording(
     """
     sink = sink_of(output, SINKS | {".mcap": _mcap}, what="recordings")
     blocks = {"raw": Block(_AXES, recording.shape, "<u2", {"units": "DN"})}
-    content = Content(_columns(recording), blocks, _attributes(recording))
+    content = Content(columns_of(recording), blocks, attributes_of(recording))
     write(output, content, _rows(recording, progress), sink)
 
 
@@ -68,7 +68,7 @@ def _rows(recording: Recording, progress: Progress) -> Iterator[Row]:
         progress(index + 1, recording.frames)
 
 
-def _columns(recording: Recording) -> dict[str, Column]:
+def columns_of(recording: Recording) -> dict[str, Column]:
     """Return everything but the images; of old files what follows from their sequence."""
     header, labels = recording.header, recording.labels
     columns = {
@@ -81,7 +81,8 @@ def _columns(recording: Recording) -> dict[str, Column]:
     return columns | moment_columns(header.applied.sequence, labels, header.gains)
 
 
-def _attributes(recording: Recording) -> dict[str, str]:
+def attributes_of(recording: Recording) -> dict[str, str]:
+    """Return name, sequence, settings and all other documents of a recording as texts."""
     header = recording.header
     return {
         "title": header.name,

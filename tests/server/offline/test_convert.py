@@ -66,7 +66,7 @@ def test_measured_gains_and_bad_pixels_go_with_the_images(tmp_path: Path, suffix
 
 def in_xarray(path: Path) -> dict[str, NDArray[Any]]:
     engine = "zarr" if path.suffix == ".zarr" else "h5netcdf"
-    with xarray.open_dataset(path, engine=engine) as dataset:  # type: ignore[arg-type]  # its literals
+    with xarray.open_dataset(path, engine=engine) as dataset:
         return {name: dataset[name].to_numpy() for name in ("gain", "bad")}
 
 

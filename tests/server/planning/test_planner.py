@@ -102,6 +102,19 @@ def test_a_target_gets_the_quickest_sequence_that_reaches_it(capabilities: Capab
     assert best.applied.capture_s == min(choice.applied.capture_s for choice in reaching)
 
 
+def test_a_plan_shows_what_it_recommends(capabilities: Capabilities) -> None:
+    found = planned(Goal(range_std_m=0.02), capabilities)
+
+    m, zeroth = (
+        found.recommended.applied.sequence.harmonics,
+        found.recommended.applied.sequence.zeroth,
+    )
+    assert repr(found).startswith(f"<Plan m = {m} at ")
+    assert f"zeroth {zeroth}" in repr(found)
+    assert repr(found).endswith(" mm>")
+    assert "<th>half the time</th>" in found._repr_html_()
+
+
 def test_a_budget_gets_the_most_accurate_sequence_within_it(capabilities: Capabilities) -> None:
     best = planned(Goal(frame_rate_hz=10.0), capabilities).recommended
 
