@@ -71,5 +71,6 @@ class UnlabelledImages(MomentsError, ValueError):  # noqa: N818 - says what is w
             "harmonic=..., phase_rad=..., frequency_hz=..., illumination=..., take=..., "
             "calibration=gain), each a dataset of the file; without: reconstruct(images, "
             "Settings(base_frequency_hz=..., zeroth=..., takes=...), "
-            "calibration=nominal_calibration(m, sub_phases_rad, weights, zeroth=...))"
+            "calibration=nominal_calibration(m, sub_phases_rad, weights, zeroth=...)); "
+            "transientcam.open(file) evaluates a recording by itself"
         )

@@ -35,7 +35,7 @@ def moments(m: int) -> Array:
     phase = np.linspace(0.5, 4.0, 12).reshape(SHAPE)
     b = 500 * np.exp(1j * np.arange(m + 1)[:, None, None] * phase)
     b[0] += 50
-    return b
+    return np.asarray(b)
 
 
 SEQUENCES = [

@@ -150,7 +150,7 @@ def _label(columns: Mapping[str, Column], index: int) -> dict[str, str]:
     own = {name: in_words(each) for name, each in columns.items() if each.axes == ("image",)}
     label = {name: values[index].item() for name, values in own.items() if name != "image"}
     weights = columns["weight"].values[:, index]
-    label["weight"] = np.stack([weights.real, weights.imag], axis=1).tolist()
+    label["weight"] = np.stack([np.real(weights), np.imag(weights)], axis=1).tolist()
     return {"index": str(index)} | {name: json.dumps(value) for name, value in label.items()}
 
 

@@ -95,7 +95,11 @@ class Recording:
             If its bytes are not the ones that were written.
         IndexError
             If there is none.
+        ValueError
+            If the file was closed.
         """
+        if not self._file:
+            raise ValueError(f"{self.path} is closed")
         if not 0 <= index < self.frames:
             raise IndexError(f"frame {index} of {self.frames}")
         images = self._images(index)

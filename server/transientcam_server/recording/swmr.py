@@ -17,7 +17,6 @@ from typing import Any, Final, TypeAlias
 
 import h5py
 import numpy as np
-from h5py import h5o
 from isal import isal_zlib
 from numpy.typing import NDArray
 
@@ -190,11 +189,8 @@ def salvage(source: File, target: Path, rows: int, *, row_axis: str) -> None:
 
 def _with_first_names(source: File) -> list[tuple[str, Dataset, str]]:
     """Return name and dataset of everything, and the first name of the same dataset."""
-    first: dict[int, str] = {}
-    return [
-        (name, dataset, first.setdefault(h5o.get_info(dataset.id).addr, name))
-        for name, dataset in source.items()
-    ]
+    first: dict[Dataset, str] = {}  # datasets are equal where they are the same in the file
+    return [(name, each, first.setdefault(each, name)) for name, each in source.items()]
 
 
 def _copy_rows(dataset: Dataset, copy: File, rows: int) -> None:

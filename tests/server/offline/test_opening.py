@@ -149,6 +149,15 @@ def test_a_recording_that_is_still_written_shows_what_there_is(tmp_path: Path) -
     writer.close({})
 
 
+def test_a_closed_recording_says_so_and_what_was_read_stays(path: Path) -> None:
+    with transientcam.open(path) as recording:
+        read, unread = recording[0], recording[1]
+        _ = read.raw
+    assert read.range_m.shape == (HEIGHT, WIDTH)
+    with pytest.raises(ValueError, match=r"a\.h5 is closed"):
+        _ = unread.raw
+
+
 def test_a_damaged_frame_is_no_array_of_numbers(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["crc32"][1] ^= 1
