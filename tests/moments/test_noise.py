@@ -170,17 +170,27 @@ def test_covariance_is_diagonal_over_real_and_imaginary_parts() -> None:
 def test_variance_falls_with_takes_and_grows_with_lost_modulation(
     brightness: float, takes: int, factor: float
 ) -> None:
-    one = noise.moment_noise(np.array([brightness]), SENSOR, calibration=np.ones(3))
-    many = noise.moment_noise(np.array([brightness]), SENSOR, calibration=np.ones(3), takes=takes)
-    weak = noise.moment_noise(np.array([brightness]), SENSOR, calibration=np.full(3, factor))
+    one = noise.moment_noise(
+        np.array([brightness]), SENSOR, calibration=np.ones(3), zeroth="low-frequency"
+    )
+    many = noise.moment_noise(
+        np.array([brightness]), SENSOR, calibration=np.ones(3), zeroth="low-frequency", takes=takes
+    )
+    weak = noise.moment_noise(
+        np.array([brightness]), SENSOR, calibration=np.full(3, factor), zeroth="low-frequency"
+    )
 
     np.testing.assert_allclose(many.variance * takes, one.variance, rtol=1e-12)
     np.testing.assert_allclose(weak.variance * factor**2, one.variance, rtol=1e-9)
 
 
 def test_ambient_light_adds_its_electrons_of_both_images() -> None:
-    dark = noise.moment_noise(np.array([100.0]), SENSOR, calibration=np.ones(2))
-    lit = noise.moment_noise(np.array([100.0]), SENSOR, calibration=np.ones(2), ambient=50.0)
+    dark = noise.moment_noise(
+        np.array([100.0]), SENSOR, calibration=np.ones(2), zeroth="low-frequency"
+    )
+    lit = noise.moment_noise(
+        np.array([100.0]), SENSOR, calibration=np.ones(2), zeroth="low-frequency", ambient=50.0
+    )
 
     np.testing.assert_allclose(lit.variance - dark.variance, 2 * 50.0 / 9.0)
 
@@ -443,11 +453,11 @@ def test_mistakes_name_the_field_and_its_limit() -> None:
     with pytest.raises(tm.ParameterError, match="bits"):
         noise.Sensor(bits=24)
     with pytest.raises(tm.ParameterError, match="takes"):
-        noise.moment_noise(ones, SENSOR, calibration=ones, takes=0)
+        noise.moment_noise(ones, SENSOR, calibration=ones, takes=0, zeroth="low-frequency")
     with pytest.raises(tm.ParameterError, match="zeroth"):
         noise.moment_noise(ones, SENSOR, calibration=ones, zeroth="guessed")
     with pytest.raises(tm.ShapeError, match="calibration"):
-        noise.moment_noise(ones, SENSOR, calibration=np.ones(1))
+        noise.moment_noise(ones, SENSOR, calibration=np.ones(1), zeroth="low-frequency")
     with pytest.raises(tm.ShapeError, match="phase_rad"):
         noise.cramer_rao(np.ones((3, 1)), np.ones((3, 1)), noise.MomentNoise(np.ones((3, 1))))
 

@@ -6,7 +6,7 @@ that no unbiased estimate of the returns falls below (`cramer_rao`). `return_noi
 `density_noise` mark where first order holds. Where it does not, `draw` gives noisy moments to put
 through the estimator itself. ::
 
-    noise = tm.noise.moment_noise(b[0].real, sensor, calibration=calibration, takes=takes)
+    noise = tm.noise.moment_noise(b[0].real, sensor, calibration=gain, zeroth="on-off")
     noise = tm.noise.smoothed(noise, sigma_px=0.6)
     deviation = tm.noise.return_noise(tm.pisarenko(b), noise)
     range_std_m = tm.range_m(deviation.direct_phase_std_rad, 23e6)

@@ -56,7 +56,7 @@ def moment_noise(
     sensor: Sensor,
     *,
     calibration: Array,
-    zeroth: str = "low-frequency",
+    zeroth: str,
     takes: int = 1,
     ambient: Array | float = 0.0,
 ) -> MomentNoise:

@@ -1,7 +1,8 @@
 """Files in, files out, with the daemon's arithmetic but without a daemon.
 
 A `Measurement` becomes a `TransientCube`; a recording becomes products of every frame, or a file
-of another format. `offline.plot` draws, where matplotlib is installed.
+of another format. `offline.opening` has it as a sequence of frames, for `transientcam.open`;
+`offline.plot` draws, where matplotlib is installed.
 """
 
 from transientcam_server.offline.convert import convert_recording
