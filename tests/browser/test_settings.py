@@ -39,11 +39,11 @@ def test_the_reconstruction_is_set_within_its_limits(page: Page, served: Served)
     panel.get_by_label("Range by").select_option("maximum-entropy")
     panel.get_by_role("button", name="Apply").click()
     expect(panel.get_by_role("button", name="Apply")).to_have_count(0)
-    told = reconstruction(served)
-    assert (told["smoothing_px"], told["estimator"]) == (2.5, "maximum-entropy")
+    reported = reconstruction(served)
+    assert (reported["smoothing_px"], reported["estimator"]) == (2.5, "maximum-entropy")
     page.wait_for_function(
         "(id) => transientcam.store.frames.of('range').peek()?.meta.reconstruction_id === id",
-        arg=told["reconstruction_id"],
+        arg=reported["reconstruction_id"],
     )
     panel.get_by_role("button", name="The paper's values").click()
     expect(smoothing).to_have_value("0.6")

@@ -202,7 +202,7 @@ class FakePast:
         return fake_frame(number)
 
 
-def told(items: list[Item]) -> list[dict[str, Any]]:
+def reported(items: list[Item]) -> list[dict[str, Any]]:
     return [dict(item.details) for item in items if isinstance(item, wire.Notice)]
 
 
@@ -247,7 +247,7 @@ def test_what_the_past_loses_meanwhile_is_told_as_a_gap_in_its_place() -> None:
 
         assert first is not None
         assert numbers([first]) == [1]
-        assert told(items[:1]) == [{"from": 2, "to": 4, "reason": "not kept any more"}]
+        assert reported(items[:1]) == [{"from": 2, "to": 4, "reason": "not kept any more"}]
         assert numbers(items[1:]) == [5, 6, 7, 8, 9]
 
     run(test)
@@ -262,7 +262,9 @@ def test_a_start_in_the_future_is_told_and_not_waited_for(last: int | None) -> N
 
         gap, delivery = waiting(outbox)
 
-        assert told([gap]) == [{"from": (last or 0) + 1, "to": 99, "reason": "not captured yet"}]
+        assert reported([gap]) == [
+            {"from": (last or 0) + 1, "to": 99, "reason": "not captured yet"}
+        ]
         assert numbers([delivery]) == [5]
 
     run(test)
@@ -348,7 +350,7 @@ def test_whatever_happens_a_resuming_client_knows_of_every_frame(
             outbox.acknowledge(2**53)
 
         seen = set(numbers(items))
-        for gap in told(items):
+        for gap in reported(items):
             seen |= set(range(gap["from"], gap["to"] + 1))
         (chosen,) = outbox.channels
         assert past.last is not None

@@ -362,7 +362,7 @@ def test_streams_are_notified(bench: Served) -> None:
         identity = measured(http, activate=True)["result"]["calibration"]
         next(each for each in frames if each.meta["calibration_id"] == identity)
 
-    told = [each.details["job"]["state"] for each in notices if each.kind == "job-changed"]
-    assert told == ["running", "done"]
+    reported = [each.details["job"]["state"] for each in notices if each.kind == "job-changed"]
+    assert reported == ["running", "done"]
     (changed,) = [each.details for each in notices if each.kind == "calibration-changed"]
     assert changed == {"calibration_id": identity, "reason": None}

@@ -5,7 +5,7 @@ from transientcam_server.api.stream.rate_limit import BURST_S, MOST_ANSWERS, Rat
 
 
 class Clock:
-    """Time that passes when told to."""
+    """A clock that the test sets."""
 
     def __init__(self) -> None:
         self.now_s = 0.0
