@@ -313,7 +313,8 @@ def _loads(loads: Sequence[Load]) -> list[str]:
         "Stuck ones subscribe and then never read.",
         "",
         "| viewers | of them stuck | for | frames/s, slowest / median | frames missing "
-        "| drops reported | latency, 50 / 99 / 100 % | daemon's share of one core | daemon's memory |",
+        "| drops reported | latency, 50 / 99 / 100 % | daemon's share of one core "
+        "| daemon's memory |",
         "|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
         *(_load(load) for load in loads),
         "",
