@@ -47,6 +47,7 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 	$(BIN)/python -m benchmarks.estimators --write
 	$(BIN)/python -m benchmarks.simulation --write
 	$(BIN)/python -m benchmarks.recording --write
+	$(BIN)/python -m benchmarks.by_hand --write
 	$(BIN)/python -m benchmarks.first_light --write
 	$(BIN)/python -m benchmarks.stream_load --write
 	$(BIN)/python -m benchmarks.robustness --write

@@ -21,10 +21,9 @@ from transientcam_server.imaging.encodings.encoding import (
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.pixel import pixel_csv, pixel_json
 from transientcam_server.imaging.products import Product
-from transientcam_server.imaging.view import Crop, View
+from transientcam_server.imaging.view import DEFAULT_BINS, Crop, View, evenly
 
 MAX_BINS: Final = 4096
-DEFAULT_BINS: Final = 64
 MAX_NUMBER: Final = 2**53 - 1
 LATEST: Final = "latest"
 
@@ -94,9 +93,7 @@ class FrameQuery:
     def _times_s(self, frame: Frame) -> tuple[float, ...]:
         if self.time_s is not None:
             return tuple(self.time_s)
-        count = self.bins or DEFAULT_BINS
-        period_s = 1.0 / frame.recipe.base_frequency_hz
-        return tuple(period_s * index / count for index in range(count))
+        return evenly(frame.recipe.base_frequency_hz, self.bins or DEFAULT_BINS)
 
     def _row(self, crop: Crop, height: int) -> int:
         _, first, _, rows = crop.region or (0, 0, 0, height)

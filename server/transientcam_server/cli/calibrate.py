@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from transientcam.cli.options import TokenOption
+from transientcam.cli.options import TokenOption, require_suffix
 
 if TYPE_CHECKING:
     from transientcam_driver import Camera
@@ -53,6 +53,7 @@ def calibrate(
     Put filter and diffusor before the lens first. A daemon measures with its present sequence and
     stores the result; without one, the file is meant for `serve --calibration FILE`.
     """
+    require_suffix(output, ".npz")
     if output is not None and not output.parent.is_dir():  # checked before anything is captured
         raise typer.BadParameter(f"there is no folder {output.parent}", param_hint="--output")
     if url is None:

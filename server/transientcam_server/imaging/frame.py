@@ -23,8 +23,8 @@ from transientcam.frame import FrameMeta
 from transientcam_driver import RawFrame, Truth
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.calibration import calibration_id
 from transientcam_server.imaging.encodings.encoding import Encoding
+from transientcam_server.imaging.meta import frame_meta
 from transientcam_server.imaging.products import PRODUCTS, Product
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.imaging.stages import STAGES, Computed, compute
@@ -105,30 +105,7 @@ class Frame:
 
     def meta(self) -> dict[str, Any]:
         """Return what is known of the frame, as the wire contract has it."""
-        sequence, found = self.recipe.applied.sequence, self._computed.reconstruction
-        height, width = self.shape
-        return {
-            "frame": self.number,
-            "sequence_id": self.raw.epoch,
-            "calibration_id": calibration_id(self.recipe.gains),
-            "reconstruction_id": self.recipe.settings_version,
-            "device_time_s": self.raw.device_time_s,
-            "host_time_s": self.raw.host_time_s,
-            "capture_s": self.raw.capture_s,
-            "reconstruct_s": self._reconstruct_s,
-            "base_frequency_hz": sequence.base_frequency_hz,
-            "harmonics": sequence.harmonics,
-            "zeroth": sequence.zeroth,
-            "exposure_s": sequence.exposure_s,
-            "takes": sequence.takes,
-            "width": width,
-            "height": height,
-            "temperature_c": self.raw.temperature_c,
-            "lost_images": self.raw.lost_images,
-            "rejected_images": None if found is None else found.rejected_images,
-            "pixels": self._computed.pixels,
-            "predicted_range_std_m": self._computed.range_noise,
-        }
+        return frame_meta(self.number, self.raw, self.recipe, self._computed, self._reconstruct_s)
 
     # -- the first hop: stages of the reconstruction -------------------------------------------
 
@@ -273,7 +250,7 @@ class Frame:
                 extra=extra | dict(zip(encoding.beside, beside, strict=True)),
             )
             (array, data), _ = await run(
-                _made, product, encoding, self.recipe, given, array, view, framed
+                _made, product, encoding, self.recipe, self.raw, given, array, view, framed
             )
         self._remember(product, view, array)
         self._workers.note_success(product.name)
@@ -360,6 +337,7 @@ def _made(
     product: Product,
     encoding: Encoding,
     recipe: Recipe,
+    raw: RawFrame,
     given: Any,
     array: _Array | None,
     view: View,
@@ -369,6 +347,8 @@ def _made(
     begin_s = time.perf_counter()
     whole = product.compute(recipe, given, view) if array is None else array
     shown, extra = whole, framed.keywords["extra"]
+    if encoding.archive:
+        extra |= product.archive(recipe, raw, view)
     if not product.over_time:  # those were computed for no more than that
         shown = view.crop.apply(whole, product.description.axes)
         extra |= {name: view.crop.apply(extra[name]) for name in encoding.beside}

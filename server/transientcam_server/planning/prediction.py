@@ -159,7 +159,7 @@ class Predictor:
             b0,
             self.sensor,
             calibration=tm.nominal_calibration(
-                1, sub_phases.phases_rad, sub_phases.weights, sequence.zeroth
+                1, sub_phases.phases_rad, sub_phases.weights, zeroth=sequence.zeroth
             ),
             zeroth=sequence.zeroth,
             takes=sequence.takes,

@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,14 @@ class Recording:
     One that is still being written, or whose writer died, shows the frames it had when it was
     opened.
 
+    Parameters
+    ----------
+    path
+        Of the file.
+    source
+        An open binary file with what stands at ``path``, where that is elsewhere; closed with the
+        recording.
+
     Raises
     ------
     NotARecording
@@ -28,15 +36,16 @@ class Recording:
         If there is no such file, or it may not be read.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, source: IO[bytes] | None = None) -> None:
         self.path = path
-        with path.open("rb"):
-            pass  # its errors are clearer than h5py's
+        self._source = source
+        if source is None:
+            with path.open("rb"):
+                pass  # its errors are clearer than h5py's
         try:
             # the writer of an unfinished one may still run: only SWMR readers may open it
-            self._file = swmr.open_file(
-                path, "r", libver="latest", swmr=path.name.endswith(".part")
-            )
+            unfinished = source is None and path.name.endswith(".part")
+            self._file = swmr.open_file(source or path, "r", libver="latest", swmr=unfinished)
         except OSError as error:
             raise NotARecording(str(path), _reason(error)) from error
         try:
@@ -86,7 +95,11 @@ class Recording:
             If its bytes are not the ones that were written.
         IndexError
             If there is none.
+        ValueError
+            If the file was closed.
         """
+        if not self._file:
+            raise ValueError(f"{self.path} is closed")
         if not 0 <= index < self.frames:
             raise IndexError(f"frame {index} of {self.frames}")
         images = self._images(index)
@@ -116,6 +129,8 @@ class Recording:
         """Close the file."""
         with contextlib.suppress(RuntimeError):  # of a damaged one
             self._file.close()
+        if self._source is not None:
+            self._source.close()
 
     def __enter__(self) -> "Recording":
         return self

@@ -173,7 +173,10 @@ def salvage(source: File, target: Path, rows: int, *, row_axis: str) -> None:
     with open_file(target, "w", libver=LIBVER) as copy:
         copy.attrs.update(source.attrs)
         growing = [name for name, item in source.items() if item.maxshape[:1] == (None,)]
-        for name, dataset in source.items():
+        for name, dataset, first in _with_first_names(source):
+            if first != name:  # another name of the same dataset
+                copy[name] = copy[first]
+                continue
             if name in growing:
                 _copy_rows(dataset, copy, rows)
             else:
@@ -182,6 +185,12 @@ def salvage(source: File, target: Path, rows: int, *, row_axis: str) -> None:
         _restore_scales(source, copy)
     if row_axis not in growing:
         raise ValueError(f"no series {row_axis}")
+
+
+def _with_first_names(source: File) -> list[tuple[str, Dataset, str]]:
+    """Return name and dataset of everything, and the first name of the same dataset."""
+    first: dict[Dataset, str] = {}  # datasets are equal where they are the same in the file
+    return [(name, each, first.setdefault(each, name)) for name, each in source.items()]
 
 
 def _copy_rows(dataset: Dataset, copy: File, rows: int) -> None:
