@@ -1,6 +1,6 @@
 """The JSON documents about calibrations."""
 
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -34,6 +34,39 @@ class DriftDocument(Document):
     """The newest of those frames."""
 
 
+class FindingDocument(Document):
+    """One test of a verdict."""
+
+    test: str
+    """What was tested: shares of the pixels, ranges in metres, phases in radian."""
+    value: float | None
+    """What was found; null where no pixel could be judged."""
+    limit: float
+    """The most that a diffusor may have, either sign."""
+    unit: Literal["share", "m", "rad"]
+    kept: bool
+
+
+class VerdictDocument(Document):
+    """Whether a calibration was measured on a diffusor, by what its images look like.
+
+    Through a diffusor all pixels see one return at the same time; a scene has ranges, and several
+    returns in a pixel.
+    """
+
+    verdict: Literal["diffusor", "in-doubt", "scene"]
+    """Only the first is used without `force`."""
+    reason: str | None
+    """What speaks against a diffusor; null where nothing does."""
+    tests: list[FindingDocument]
+    block_px: int
+    """Side in pixels of the blocks that were judged."""
+    blocks: list[str]
+    """A text for each row of blocks: `.` like a diffusor, `#` unlike one, `?` not judged."""
+    reference: str
+    """What it was compared with: the id of a calibration, or `nominal`."""
+
+
 class CalibrationDocument(Document):
     """A calibration, and whether it is good for what is captured at present."""
 
@@ -56,6 +89,9 @@ class CalibrationDocument(Document):
     """Why not."""
     active: bool
     """Whether frames are calibrated by it, as long as it fits."""
+    verdict: VerdictDocument
+    forced: bool
+    """Whether it was to be used whatever the verdict, when it was measured."""
     drift: DriftDocument | None = None
     """Null where it is not active, or no frame was calibrated by it yet."""
 
@@ -69,6 +105,8 @@ class ActiveDocument(Document):
     """What frames carry: `nominal` also where the active one is not good for the sequence."""
     reason: str | None = None
     """Why it is not."""
+    former: str | None = None
+    """What was active before, to which `POST /calibrations/active/undo` returns."""
 
 
 class CalibrationsDocument(Document):
@@ -76,6 +114,8 @@ class CalibrationsDocument(Document):
 
     active: str
     """Id of the active one, or `nominal`."""
+    former: str | None = None
+    """What was active before; null where nothing was, or it was deleted."""
     directory: str
     """Where the service keeps them."""
     calibrations: list[CalibrationDocument]
@@ -95,7 +135,9 @@ class CalibrationRequest(Document):
     frames: int = Field(default=DEFAULT_TAKES, ge=2, le=10_000)
     """Captured with the light on, and as many in the dark; averaged without outliers."""
     activate: bool = False
-    """Use it at once."""
+    """Use it at once, if it was measured on a diffusor."""
+    force: bool = False
+    """Let it be used whatever the verdict on it."""
 
 
 class ActivationRequest(Document):
@@ -109,3 +151,5 @@ class ActivationRequest(Document):
 
     id: str = Field(max_length=200)
     """`nominal` for none."""
+    force: bool = False
+    """Use it even if it was not measured on a diffusor."""
