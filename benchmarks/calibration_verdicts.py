@@ -192,7 +192,7 @@ def diffusors(data: Path) -> Iterator[Case]:
 
 def _delayed(delay_s: float) -> Any:
     diffusor = find_scene("calibration").diffusor
-    assert diffusor is not None  # noqa: S101 - it is that scene
+    assert diffusor is not None
     return replace(diffusor, delay_s=delay_s)
 
 
@@ -257,8 +257,8 @@ Written by `{COMMAND}`, which measures with simulated cameras ({WIDTH} x {HEIGHT
 takes, {SEQUENCE.base_frequency_hz / 1e6:.0f} MHz, m = {SEQUENCE.harmonics}, zeroth moment
 {SEQUENCE.zeroth}, unless a row says otherwise). The numbers do not depend on the machine.
 
-Only what is judged `diffusor` is used without being forced. *residual*, *harmonics* and *magnitudes*
-are what all but 5 % of the blocks keep, besides what noise explains; see
+Only what is judged `diffusor` is used without being forced. *residual*, *harmonics* and
+*magnitudes* are what all but 5 % of the blocks keep, besides what noise explains; see
 [calibration](calibration.md#was-it-a-diffusor) for the tests and their limits.
 
 """

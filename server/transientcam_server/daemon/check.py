@@ -8,9 +8,9 @@ from pydantic import BaseModel
 
 from transientcam_driver import DriverError
 from transientcam_driver.opening import parse_spec, scene_of
+from transientcam_server.camera.calibration_store import load_given
 from transientcam_server.daemon.configuration import Configuration
 from transientcam_server.errors import ServerError, SettingsError
-from transientcam_server.camera.calibration_store import load_given
 from transientcam_server.errors.exceptions import SettingsMistake
 from transientcam_server.recording import Recording
 from transientcam_server.recording.replay import PREFIX, parse_replay

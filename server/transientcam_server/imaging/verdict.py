@@ -1,4 +1,4 @@
-"""The verdict on a calibration measurement: was it measured on a diffusor?"""
+"""The verdict on a calibration measurement: whether it was measured on a diffusor."""
 
 import math
 from collections.abc import Mapping

@@ -92,9 +92,9 @@ async def measure_calibration(
 
     Put filter and diffusor before the lens first, so that the light shines at the sensor
     (Sec. 4.2). The job has the camera for itself, so that no frames come meanwhile; switching the
-    light off ends it. Its result holds the id of the calibration, in `calibration`, and in `verdict`
-    whether the images look like a diffusor's. If they don't, the calibration is kept, but not used
-    without `force`: `activated` says whether it is.
+    light off ends it. Its result holds the id of the calibration, in `calibration`, and in
+    `verdict` whether the images look like a diffusor's. If they don't, the calibration is kept, but
+    not used without `force`: `activated` says whether it is.
     """
     running = service.recordings.active_id
     if running is not None:

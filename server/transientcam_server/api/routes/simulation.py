@@ -42,8 +42,9 @@ async def read_simulation(service: ServiceOf) -> SimulationDocument:
 async def change_simulation(service: ServiceOf, wanted: SimulationRequest) -> SimulationDocument:
     """Change the scene, force effects on or off, or put the diffusor before the lens.
 
-    Capturing goes on meanwhile. Answered once the scene is prepared, which may take seconds. The frame that is captured at that
-    moment may hold images of both. Streams are sent a `simulation-changed` notice.
+    Capturing goes on meanwhile. Answered once the scene is prepared, which may take seconds. The
+    frame that is captured at that moment may hold images of both. Streams are sent a
+    `simulation-changed` notice.
     """
     simulation = _simulation(service)
     if wanted.scene is not None:
