@@ -41,7 +41,7 @@ from transientcam_server.imaging.calibration import (
 from transientcam_server.imaging.diffusor import judge
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.history import History
-from transientcam_server.imaging.noise import invalid_share, moment_noise
+from transientcam_server.imaging.noise import contradictory_share
 from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.imaging.verdict import Verdict
@@ -331,14 +331,11 @@ class Calibrator:
     async def _share_of(self, frame: Frame) -> float | None:
         try:
             found = await frame.reconstruction("moments")
-            share, _ = await self._pipeline.workers.run(self._share, frame.recipe, found)
+            share, _ = await self._pipeline.workers.run(contradictory_share, frame.recipe, found)
         except Exception:  # a frame that cannot be computed is no sign of drift
             _log.exception("frame %d: counting its invalid pixels failed", frame.number)
             return None
         return share
-
-    def _share(self, recipe: Recipe, found: tm.Reconstruction) -> float | None:
-        return invalid_share(found, moment_noise(recipe, found))
 
     def _share_of_takes(
         self, calibration: Calibration, takes: "_Takes", once: AppliedSequence
@@ -356,7 +353,7 @@ class Calibrator:
         for images in takes.frames():
             raw = RawFrame(0, 0, images, once.labels, 0.0, 0.0, 0.0, 0.0, 0)
             found = recipe.reconstruct(raw)
-            if (share := self._share(recipe, found)) is not None:
+            if (share := contradictory_share(recipe, found)) is not None:
                 shares.append(share)
         return min(shares, default=None)
 

@@ -173,13 +173,17 @@ def _before_lens(change: Callable[..., object]) -> Iterator[None]:
 
 def _measured_here(order: _Order) -> dict[str, Any]:
     from transientcam_driver import Sequence, open_camera
+    from transientcam_server.camera import start_with
     from transientcam_server.imaging.diffusor import judge
+    from transientcam_server.settings import SequenceSettings
 
     requested = None
     if order.sequence is not None:
         requested = Sequence.from_document(_document(order.sequence))
     with open_camera(order.camera) as opened:
-        if requested is not None:
+        if requested is None:
+            start_with(opened, SequenceSettings())
+        else:
             opened.configure(requested)
         simulation = opened.simulation if order.diffusor else None
         with nullcontext() if simulation is None else _before_lens(simulation.change):

@@ -22,8 +22,9 @@ class DeviceDocument(Document):
 class DriftDocument(Document):
     """How well the active calibration still does.
 
-    A pixel is invalid where its moments contradict each other by more than noise explains, as
-    they do after thermal drift: a share that has grown much calls for a new calibration.
+    A pixel is invalid where its moments contradict each other by more than noise explains (the flag
+    `contradictory`), as they do after thermal drift: a share that has grown much calls for a new
+    calibration.
     """
 
     invalid_share: float = Field(ge=0.0, le=1.0)
@@ -93,7 +94,8 @@ class CalibrationDocument(Document):
     forced: bool
     """Whether it was to be used whatever the verdict, when it was measured."""
     drift: DriftDocument | None = None
-    """Null where it is not active, or no frame was calibrated by it yet."""
+    """Null where it is not active, no frame was calibrated by it yet, or the zeroth moment is
+    estimated, as drift does not show then."""
 
 
 class ActiveDocument(Document):
