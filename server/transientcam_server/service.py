@@ -23,6 +23,7 @@ from transientcam_server.camera import (
     Jobs,
     LeaseManager,
 )
+from transientcam_server.camera.calibration_store import load_given
 from transientcam_server.camera.events import Back, Captured, Event, Lost, SequenceChanged
 from transientcam_server.camera.jobs import Job
 from transientcam_server.camera.lease import Change, Lease, Timer
@@ -328,7 +329,7 @@ def _calibration(camera: Camera, settings: Settings, kept: CalibrationStore) -> 
     path = settings.calibration
     if path is None:
         return _last_active(camera, kept)
-    loaded = load_calibration(path)
+    loaded = load_given(path)
     misfit = loaded.capture.misfit(camera.applied, camera.capabilities)
     if misfit is not None and misfit.field in DEVICE_FIELDS:
         raise misfit

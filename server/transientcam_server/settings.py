@@ -30,6 +30,25 @@ else:
     ]
 
 
+class SequenceSettings(_Group):
+    """What the camera captures from the start, until a client sets something else.
+
+    The default is on the front of accuracy against time (docs/default-sequence.md). A camera that
+    cannot do it does what is nearest.
+    """
+
+    base_frequency_hz: _Finite = Field(default=23e6, gt=0.0)
+    """Modulation frequencies are this and its multiples."""
+    harmonics: int = Field(default=4, ge=1, le=32)
+    """m: how many multiples."""
+    zeroth: Literal["low-frequency", "on-off", "estimated"] = "estimated"
+    """Where the zeroth moment comes from; costs four, two or no images (Sec. 4.3)."""
+    exposure_s: _Finite = Field(default=0.00192, gt=0.0)
+    """Of one image."""
+    takes: int = Field(default=1, ge=1, le=10_000)
+    """How often each image is captured, for averaging."""
+
+
 class ReconstructionSettings(_Group):
     """How images become moments and moments become returns."""
 
@@ -205,6 +224,7 @@ class Settings(_Group):
     """``auto`` is text on a terminal and JSON elsewhere."""
     workers: int = Field(default_factory=lambda: max(2, os.cpu_count() or 2), ge=2, le=256)
     """Threads that reconstruct and encode; at least 2, so that one long answer delays no other."""
+    sequence: SequenceSettings = SequenceSettings()
     reconstruction: ReconstructionSettings = ReconstructionSettings()
     sensor: SensorSettings = SensorSettings()
     lens: LensSettings = LensSettings()

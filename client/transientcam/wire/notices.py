@@ -88,7 +88,8 @@ NOTICES: Final[dict[str, NoticeKind]] = {
         NoticeKind(
             "simulation-changed",
             "the simulated camera stands before another scene, or with other effects",
-            {"scene": "string", "effects": "object"},
+            {"scene": "string", "effects": "object", "diffusor": "boolean"},
+            optional=("diffusor",),
         ),
         NoticeKind("job-changed", "a job began or ended", {"job": "object"}),
     )

@@ -162,6 +162,20 @@ CALIBRATION_MISFIT: Final = ProblemKind(
     "`field` names what differs, `value` is the present value and `limit` the one that the "
     "calibration fits. Frames are computed as before.",
 )
+CALIBRATION_DOUBTED: Final = ProblemKind(
+    "calibration-doubted",
+    409,
+    "Calibration was not measured on a diffusor",
+    "Its measurement does not look like a diffusor's: `detail` says what speaks against it, "
+    "`verdict` is `in-doubt` or `scene`, and `tests` has the figures. Used anyway, ranges may be "
+    "wrong everywhere; `force` does so. Frames are computed as before.",
+)
+NO_FORMER_CALIBRATION: Final = ProblemKind(
+    "no-former-calibration",
+    409,
+    "No former calibration",
+    "No other calibration was active before, or it was deleted.",
+)
 ESTIMATOR_MISFIT: Final = ProblemKind(
     "estimator-misfit",
     409,
