@@ -13,7 +13,7 @@ from websockets.exceptions import WebSocketException
 
 from tests.server.streaming import streaming
 from tests.serving import Served, serving
-from transientcam_server.daemon.connections import StallTimer
+from transientcam_server.daemon.stalls import StallTimer
 from transientcam_server.settings import LimitSettings
 
 PATIENCE_S = 60.0
@@ -101,15 +101,16 @@ def test_a_second_request_has_a_deadline_of_its_own() -> None:
     assert status == 408
 
 
-def test_a_body_that_does_not_come_is_given_up_without_an_answer_of_its_own() -> None:
+def test_a_body_that_does_not_come_is_given_up_and_changes_nothing() -> None:
     head = (
         b"PUT /api/v1/sequence HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
         b"Content-Length: 20\r\n\r\n{"
     )
     with limited(body_s=0.2) as served, raw(served, head) as connection:
-        assert rest_of(connection) == b""
+        status, document = problem(rest_of(connection))
         before = httpx.get(f"{served.url}/api/v1/sequence").json()
 
+    assert (status, document["type"], document["limit"]) == (408, "/problems/request-late", 0.2)
     assert before["harmonics"] == 3
 
 
