@@ -23,9 +23,18 @@ from transientcam_server.camera import (
     Jobs,
     LeaseManager,
 )
-from transientcam_server.camera.events import Back, Captured, Event, Lost, SequenceChanged
+from transientcam_server.camera.events import (
+    Back,
+    Captured,
+    Event,
+    Held,
+    Lost,
+    Released,
+    SequenceChanged,
+)
 from transientcam_server.camera.jobs import Job
 from transientcam_server.camera.lease import Change, Lease, Timer
+from transientcam_server.camera.light import LightGuard
 from transientcam_server.camera.source import sensor_of
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import (
@@ -48,6 +57,7 @@ from transientcam_server.settings import ReconstructionSettings, Settings
 _log = logging.getLogger(__name__)
 VERSION: Final = version("transientcam")
 _CLOSING_S = 1.0
+_TURN_S = 0.2
 
 
 class Observer(Protocol):
@@ -100,7 +110,8 @@ class Service:
             self.planner, self.workers, simulated=camera.simulation is not None
         )
         self._loop: asyncio.AbstractEventLoop | None = None
-        self.acquisition = Acquisition(camera, report=self._from_acquisition)
+        self._light = LightGuard(unserved_s=settings.limits.unserved_s)
+        self.acquisition = Acquisition(camera, report=self._from_acquisition, light=self._light)
         self.applied: AppliedSequence = camera.applied
         self.jobs = Jobs(report=self._job_changed)
         self.calibrations = Calibrator(
@@ -113,7 +124,9 @@ class Service:
             history=self.history,
             notify=partial(self.hub.notify, "calibration-changed"),
         )
-        self.lease = LeaseManager(report=self._lease_changed, call_later=self._call_later)
+        self.lease = LeaseManager(
+            report=self._lease_changed, call_later=self._call_later, due=self._lease_due
+        )
         self.recordings = Library(
             settings.recordings, header=self._recording_header, notify=self._notify_from_thread
         )
@@ -127,10 +140,13 @@ class Service:
         """Capture from entry to exit."""
         self._loop = asyncio.get_running_loop()
         await asyncio.to_thread(self.recordings.open)
+        self._light.turned()
         self.acquisition.start()
+        turning = asyncio.create_task(self._keep_light())
         try:
             yield
         finally:
+            turning.cancel()
             self.lease.close()
             self.hub.close()
             self.jobs.cancel_all()
@@ -170,6 +186,8 @@ class Service:
         reasons = []
         if status.state == "lost":
             reasons.append(f"the camera is lost: {status.reason}")
+        if status.state == "held":
+            reasons.append(f"the light is held off: {status.reason}")
         if status.state in ("starting", "streaming") and not status.frames:
             reasons.append("the camera is starting")
         if status.stalled:
@@ -260,6 +278,10 @@ class Service:
                 self.hub.notify("camera-lost", {"reason": reason})
             case Back():
                 self.hub.notify("camera-back", {})
+            case Held(reason):
+                self.hub.notify("light-held", {"reason": reason})
+            case Released():
+                self.hub.notify("light-released", {})
             case SequenceChanged(applied):
                 before, self.applied = self.applied, applied
                 self._notify_sequence_changed()
@@ -275,6 +297,16 @@ class Service:
                 for observer in self.observers:
                     observer.superseded(frame.meta())
         self._superseded = computing
+
+    async def _keep_light(self) -> None:
+        """Prove to the thread of the camera, again and again, that clients are served."""
+        while True:
+            self._light.turned()
+            await asyncio.sleep(_TURN_S)
+
+    def _lease_due(self, lease: Lease | None) -> None:
+        stops = lease is not None and lease.on_lapse == "stop"
+        self._light.lapses_at(lease.expires_s if lease is not None and stops else None)
 
     def _call_later(self, delay_s: float, callback: Callable[[], None]) -> Timer:
         return asyncio.get_running_loop().call_later(delay_s, callback)
