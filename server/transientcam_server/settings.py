@@ -168,6 +168,10 @@ class LimitSettings(_Group):
     """Time for the head of a request to arrive, and for a handshake of TLS."""
     body_s: _Finite = Field(default=30.0, gt=0.0, le=3600.0)
     """Time for its body."""
+    answers_bytes: int = Field(default=48 * 1024**2, ge=1024**2)
+    """Of answers on their way to clients, together; one more is refused, to try again later."""
+    answers_bytes_per_address: int = Field(default=24 * 1024**2, ge=1024**2)
+    """The same, of one address; a single answer may be larger."""
     stalled_s: _Finite = Field(default=20.0, gt=0.0, le=3600.0)
     """Time for a client to take anything of what waits for it; then its connection is cut."""
     head_bytes: int = Field(default=128 * 1024, ge=1024, le=16 * 1024 * 1024)
