@@ -58,6 +58,9 @@ _log = logging.getLogger(__name__)
 VERSION: Final = version("transientcam")
 _CLOSING_S = 1.0
 _TURN_S = 0.2
+_WORKERS_END_S = 1.0
+WORKER_THREADS: Final = "worker"
+"""What the names of their threads begin with."""
 
 
 class Observer(Protocol):
@@ -93,7 +96,7 @@ class Service:
         self.mjpeg_clients = 0
         self.observers: list[Observer] = []
         self._superseded: list[Frame] = []
-        self._executor = ThreadPoolExecutor(settings.workers, thread_name_prefix="worker")
+        self._executor = ThreadPoolExecutor(settings.workers, thread_name_prefix=WORKER_THREADS)
         self.workers = Workers(self._executor, count=settings.workers)
         sensor = sensor_of(camera, settings.sensor)
         self.planner = Planner(camera.capabilities, sensor, settings.reconstruction)
@@ -147,17 +150,21 @@ class Service:
             yield
         finally:
             turning.cancel()
+            self.planner.close()
             self.lease.close()
             self.hub.close()
             self.jobs.cancel_all()
             await self._loop.run_in_executor(self._executor, self.acquisition.stop)
             await self.jobs.close()
             await self._loop.run_in_executor(self._executor, self.recordings.close)
-            await self.workers.close()
-            self._executor.shutdown(wait=True, cancel_futures=True)
+            ended = await self.workers.close(within_s=_WORKERS_END_S)
+            if not ended:
+                _log.warning("a worker does not end; what it computes is dropped")
+            self._executor.shutdown(wait=ended, cancel_futures=True)
 
     async def close_streams(self) -> None:
         """Tell every stream that it ends, and give those that listen the time to hear it."""
+        self.planner.close()
         self.hub.close()
         self.jobs.cancel_all()
         with contextlib.suppress(TimeoutError):

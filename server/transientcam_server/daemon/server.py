@@ -25,7 +25,7 @@ from transientcam_server.daemon.connections import BoundedConnection
 from transientcam_server.daemon.streams import BoundedStream
 from transientcam_server.daemon.systemd import ServiceManager, supervised
 from transientcam_server.errors.exceptions import AddressUnavailable
-from transientcam_server.service import Service
+from transientcam_server.service import WORKER_THREADS, Service
 from transientcam_server.settings import Settings
 
 USER_TIMEOUT_MS: Final = 20_000
@@ -33,7 +33,7 @@ USER_TIMEOUT_MS: Final = 20_000
 NOTSENT_LOWAT_BYTES: Final = 128 * 1024
 """What the kernel keeps of a message beyond what is on the wire: frames wait here, not there."""
 PING_S: Final = 10.0
-SHUTDOWN_S: Final = 3
+SHUTDOWN_S: Final = 2
 FREEZING_THREAD: Final = "freezing"
 _BACKLOG = 1024
 
@@ -238,11 +238,16 @@ def exit_without_joining() -> Iterator[Callable[[threading.Thread], None]]:
     try:
         yield at_work.append
     except KeyboardInterrupt:
-        if not any(each.is_alive() for each in at_work):
+        if not any(each.is_alive() for each in (*at_work, *_workers())):
             raise
         code = INTERRUPTED
-    if any(each.is_alive() for each in at_work):
+    if any(each.is_alive() for each in (*at_work, *_workers())):
         logging.shutdown()
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
         os._exit(code)
+
+
+def _workers() -> list[threading.Thread]:
+    """Return those that were left behind: they compute what nobody waits for any more."""
+    return [each for each in threading.enumerate() if each.name.startswith(WORKER_THREADS)]
