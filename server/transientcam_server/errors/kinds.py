@@ -37,8 +37,9 @@ ORIGIN_NOT_ALLOWED: Final = ProblemKind(
     "origin-not-allowed",
     403,
     "Origin not allowed",
-    "A page of another origin sent a request that changes something, or opened the stream. Add its "
-    "origin to the setting allowed_origins if that is intended.",
+    "A page of another origin sent a request that changes something, opened the stream, or loads "
+    "something from here as a part of it. Add its origin to the setting allowed_origins if that is "
+    "intended.",
 )
 TOKEN_REQUIRED: Final = ProblemKind(
     "token-required",
