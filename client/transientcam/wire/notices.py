@@ -48,6 +48,12 @@ NOTICES: Final[dict[str, NoticeKind]] = {
         NoticeKind("camera-lost", "the camera does not answer", {"reason": "string"}),
         NoticeKind("camera-back", "the camera answers again"),
         NoticeKind(
+            "light-held",
+            "the light was switched off because clients were not served",
+            {"reason": "string"},
+        ),
+        NoticeKind("light-released", "the light goes on again"),
+        NoticeKind(
             "sequence-changed",
             "what is captured from now on",
             {"sequence": "object", "channels": "array"},

@@ -148,6 +148,13 @@ def test_a_rate_limit_holds_on_average_and_never_drops(
     assert one.dropped == 0
 
 
+@pytest.mark.parametrize("rate_hz", [1e-3, 1e-308, 5e-324])
+def test_the_least_rates_leave_the_first_frame_alone(rate_hz: float) -> None:
+    one = channel(max_rate_hz=rate_hz)
+
+    assert [one.take(index / 20.0) for index in range(5)] == [True, False, False, False, False]
+
+
 def test_a_rate_limit_does_not_catch_up_after_a_pause() -> None:
     one = channel(max_rate_hz=10.0)
     assert one.take(0.0)
