@@ -22,7 +22,7 @@ serve: .venv/serve.stamp dashboard  ## Run the daemon and its dashboard (PORT=80
 
 test: check debian-packages dashboard  ## Run every check and every test
 	npm --prefix client/dashboard test
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 check: .venv/test.stamp client/dashboard/node_modules/.package-lock.json  ## Lint, types, import laws
 	$(BIN)/ruff format --check .

@@ -4,7 +4,7 @@ import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -24,6 +24,8 @@ class PixelCounts(TypedDict):
     non_finite: int
     degenerate: int
     replaced: int
+    contradictory: NotRequired[int]
+    """More than noise explains; absent from daemons that do not look for it."""
 
 
 class PredictedStd(TypedDict):

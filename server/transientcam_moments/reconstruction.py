@@ -211,6 +211,19 @@ class Reconstruction:
             found = found | xp.where(xp.asarray(self._bad), int(Flags.REPLACED), 0)
         return found.astype(xp.uint8)
 
+    def add_flag(self, flag: Flags, where: Array) -> None:
+        """Add a flag to pixels, of which something is known that the moments do not show.
+
+        Parameters
+        ----------
+        flag
+            Such as `Flags.CONTRADICTORY`, which rests on the noise of the sensor.
+        where : boolean array, shape (...)
+        """
+        xp = namespace(self.flags)
+        added = xp.where(xp.asarray(where), int(flag), 0)
+        self.flags = (self.flags | added).astype(xp.uint8)
+
     @property
     def has_range(self) -> Array:
         """Where there is light and all moments are finite."""
