@@ -11,7 +11,7 @@ from transientcam_moments import _kernels
 from transientcam_moments._arrays import Array, as_array
 from transientcam_moments._kernels.one_pass import Constants, OnePass
 from transientcam_moments._kernels.padding import LEAST_WIDTH
-from transientcam_moments._kernels.parallel import Spread, at_once
+from transientcam_moments._kernels.parallel import Spread, at_once, on_threads
 from transientcam_moments.bad_pixels import Replacement, checked_mask, fill_bad_pixels
 from transientcam_moments.calibration import calibrate, inverse_gains
 from transientcam_moments.four_bucket import harmonics_of, measure, saturated, takes_first
@@ -198,11 +198,14 @@ def reconstruct(
     calibration: Array | None = None,
     saturated_pixels: Array | None = None,
     bad_pixels: Array | None = None,
+    threads: int | None = None,
 ) -> Reconstruction:
     """Reconstruct one frame of raw images or of moments.
 
     As ``Reconstructor(settings, calibration=..., bad_pixels=...)(data, saturated_pixels=...)``,
-    which see; for many frames keep the `Reconstructor`.
+    which see; for many frames keep the `Reconstructor`. The compiled pass uses all cores, or as
+    many ``threads``.
     """
     reconstructor = Reconstructor(settings, calibration=calibration, bad_pixels=bad_pixels)
-    return reconstructor(data, saturated_pixels=saturated_pixels)
+    spread = on_threads(threads)
+    return reconstructor(data, saturated_pixels=saturated_pixels, spread=spread)

@@ -15,6 +15,7 @@ from typing import Final
 import uvicorn
 from fastapi import FastAPI
 
+import transientcam_moments as tm
 from transientcam.cli import INTERRUPTED
 from transientcam.wire import MAX_CLIENT_MESSAGE_BYTES
 from transientcam_server import logs
@@ -211,14 +212,19 @@ def exit_without_joining() -> Iterator[Callable[[threading.Thread], None]]:
     not is lost in any case. Where nothing is at work the process ends as any other.
     """
     at_work: list[threading.Thread] = []
+
+    def working() -> bool:
+        compiling = (each for each in threading.enumerate() if each.name == tm.kernels.THREAD)
+        return any(each.is_alive() for each in (*at_work, *compiling))
+
     code = 0
     try:
         yield at_work.append
     except KeyboardInterrupt:
-        if not any(each.is_alive() for each in at_work):
+        if not working():
             raise
         code = INTERRUPTED
-    if any(each.is_alive() for each in at_work):
+    if working():
         logging.shutdown()
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
