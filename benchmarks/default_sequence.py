@@ -106,8 +106,9 @@ _INTRODUCTION = f"""# The default sequence
 Written by `{COMMAND}`: {FRAMES} frames of simulated cameras, 163 x 120 pixels,
 settings of the reconstruction as they come. The numbers do not depend on the machine.
 
-*deviation* is the typical difference of the ranges of two frames, scaled to a normal distribution's;
-*median error* is the median over the pixels of that of the mean range against the truth. `biased` is [normal](stream.md#products);
+*deviation* is the typical difference of the ranges of two frames, scaled to a normal
+distribution's; *median error* is the median over the pixels of the mean range's error.
+`biased` is [normal](stream.md#products);
 `contradictory` is not, and cannot be seen where the zeroth moment is estimated.
 
 """
