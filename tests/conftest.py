@@ -26,8 +26,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 # Threads that libraries keep for the life of the process, or of the loop of a daemon that several
 # tests share, by the start of their name.
-_LIBRARY_THREADS = ("pydev", "OpenBLAS", "transientcam-compile")
-_LIBRARY_THREADS += ("transientcam-lane", "AnyIO worker thread")
+_LIBRARY_THREADS = (
+    "pydev",
+    "OpenBLAS",
+    "transientcam-compile",
+    "transientcam-lane",
+    "AnyIO worker",
+)
 
 
 @pytest.fixture(scope="session")
