@@ -19,6 +19,7 @@ TOPICS = (
     "cumulative",
     "scaling",
     "compiling",
+    "automatic",
 )
 PAGE = Path(__file__).parents[1] / "docs" / "benchmarks.md"
 
@@ -36,7 +37,8 @@ def main() -> None:
     if not console.is_terminal:
         console = Console(width=120)
     console.print(f"On: {machine()}", highlight=False)
-    _compile(console)
+    if set(arguments.topics or TOPICS) - {"automatic", "compiling"}:
+        _compile(console)
     tables: list[Table] = []
     for topic in arguments.topics or TOPICS:
         for table in importlib.import_module(f"benchmarks.{topic}").tables():

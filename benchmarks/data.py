@@ -75,9 +75,11 @@ def numpy_alone() -> Iterator[None]:
     """Leave everything to NumPy inside."""
     lanes = dict(REGISTRY.compiled)
     REGISTRY.compiled.clear()
+    automatic, REGISTRY.automatic = REGISTRY.automatic, False
     try:
         yield
     finally:
+        REGISTRY.automatic = automatic
         REGISTRY.compiled.update(lanes)
 
 

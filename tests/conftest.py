@@ -10,6 +10,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
+# no process of a test compiles what it does not ask for; those that test it set it back
+os.environ["TRANSIENTCAM_KERNELS"] = "manual"
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let a real camera take part: ``pytest tests/driver --usb=real``."""
@@ -23,7 +26,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 # Threads that libraries keep for the life of the process, or of the loop of a daemon that several
 # tests share, by the start of their name.
-_LIBRARY_THREADS = ("pydev", "OpenBLAS", "transientcam-compile", "AnyIO worker thread")
+_LIBRARY_THREADS = (
+    "pydev",
+    "OpenBLAS",
+    "transientcam-compile",
+    "transientcam-lane",
+    "AnyIO worker",
+)
 
 
 @pytest.fixture(scope="session")

@@ -1,12 +1,19 @@
 """Compiled lanes for the hot algorithms: what is ready, and how to make it ready.
 
-Nothing has to be called: every algorithm runs on NumPy and gives the same results. A process that
-needs them faster calls `compile_in_background` when it starts and goes on; each algorithm changes
-over as soon as its lane is there.
+Nothing has to be called. Every algorithm runs on NumPy and gives the same results; from the first
+call with 4096 pixels or more on, the lane that would have served it is loaded from the cache (half
+a second), or compiled (seconds, once on a machine), on a thread that no call waits for, and later
+calls change over to it. `compile` makes lanes ready beforehand, and waits for them.
 
-The environment variable ``TRANSIENTCAM_KERNELS=off`` leaves everything to NumPy. Compiled code is
-kept for the next process in ``NUMBA_CACHE_DIR``, else in ``transientcam/kernels`` below
-``XDG_CACHE_HOME`` or ``~/.cache``, else (nothing there can be written to) not at all.
+A process that ends meanwhile waits at most for the one lane that is being compiled. The environment
+variable ``TRANSIENTCAM_KERNELS=off`` leaves everything to NumPy, ``TRANSIENTCAM_KERNELS=manual``
+compiles only what `compile` and `compile_in_background` are called for. Compiled code is kept for
+the next process in ``NUMBA_CACHE_DIR``, else in ``transientcam/kernels`` below ``XDG_CACHE_HOME``
+or ``~/.cache``, else (nothing there can be written to) not at all.
+
+`density`, `levinson`, `pisarenko` and `reconstruct` use all cores, or as many threads as their
+``threads`` says. A program that makes such calls on threads of its own calls `use_one_thread` on
+each of these.
 """
 
 import threading
@@ -14,7 +21,8 @@ from collections.abc import Callable, Sequence
 from typing import TypedDict
 
 from transientcam_moments._arrays import MAX_HARMONICS
-from transientcam_moments._kernels.parallel import Spread, at_once, over
+from transientcam_moments._kernels.automatic import MOST_ROOTS, THREAD, compile_one, is_offered
+from transientcam_moments._kernels.parallel import Spread, at_once, over, use_one_thread
 from transientcam_moments._kernels.registry import PRECISION_NAMES, REGISTRY, Key
 from transientcam_moments.errors import ParameterError
 
@@ -29,6 +37,7 @@ __all__ = [
     "compile_in_background",
     "over",
     "state",
+    "use_one_thread",
 ]
 
 LANES = (
@@ -41,11 +50,6 @@ LANES = (
     "density",
     "reconstruct",
 )
-_SINGLE_ONLY = ("smooth", "measure", "separate", "reconstruct")
-
-MOST_ROOTS = 8
-"""The largest m with lanes for eigenvalues and returns."""
-
 Progress = Callable[[int, int, str], None]
 """Takes lanes done, lanes in all, and the name of the lane that is next ("" after the last)."""
 
@@ -79,9 +83,9 @@ def state() -> State:
 
 
 def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the builtin isn't used here
-    *,
     harmonics: Sequence[int] = (3, 4, 8),
     precisions: Sequence[str] = ("float32", "float64"),
+    *,
     progress: Progress | None = None,
 ) -> None:
     """Compile all lanes, or load them from the cache, before returning.
@@ -111,7 +115,6 @@ def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the buil
 
 
 def compile_in_background(
-    *,
     harmonics: Sequence[int] = (3, 4, 8),
     precisions: Sequence[str] = ("float32", "float64"),
 ) -> threading.Thread:
@@ -123,9 +126,7 @@ def compile_in_background(
     keys = _keys(harmonics, precisions)
     main = threading.main_thread()
     # not a daemon: those are frozen at exit wherever they are, which a compiler doesn't survive
-    thread = threading.Thread(
-        target=_compile, args=(keys, None, main.is_alive), name="transientcam-compile"
-    )
+    thread = threading.Thread(target=_compile, args=(keys, None, main.is_alive), name=THREAD)
     thread.start()
     return thread
 
@@ -137,21 +138,13 @@ def _keys(harmonics: Sequence[int], precisions: Sequence[str]) -> list[Key]:
     for precision in precisions:
         if precision not in PRECISION_NAMES:
             raise ParameterError("precisions", precision, "float32 or float64")
-    return [
+    keys = (
         Key(name, m, PRECISION_NAMES[precision])
         for m in dict.fromkeys(harmonics)
         for precision in precisions
         for name in LANES
-        if _is_offered(name, m, precision)
-    ]
-
-
-def _is_offered(name: str, m: int, precision: str) -> bool:
-    """Say whether there is such a lane; the planar statement does all orders."""
-    if name in _SINGLE_ONLY and precision != "float32":
-        return False
-    # a characteristic polynomial with more roots underflows where they cluster
-    return m <= MOST_ROOTS or name not in ("pisarenko", "smallest_eigenvalue", "reconstruct")
+    )
+    return [key for key in keys if is_offered(key)]
 
 
 def _compile(keys: list[Key], progress: Progress | None, go_on: Callable[[], bool]) -> None:
@@ -162,23 +155,6 @@ def _compile(keys: list[Key], progress: Progress | None, go_on: Callable[[], boo
             return
         if progress is not None:
             progress(done, len(keys), str(key))
-        _compile_one(key)
+        compile_one(key)
     if progress is not None:
         progress(len(keys), len(keys), "")
-
-
-def _compile_one(key: Key) -> None:
-    with REGISTRY.lock:
-        if key in REGISTRY.compiled or key in REGISTRY.failed:
-            return
-        REGISTRY.compiling = key
-        try:
-            from transientcam_moments._kernels.compiler import compile_lane
-
-            REGISTRY.compiled[key] = compile_lane(key)
-        except Exception as error:
-            # whatever stops a compiler (a missing one, a full disk, an unknown processor) must
-            # stop nothing else: the planar statement goes on serving
-            REGISTRY.failed[key] = f"{type(error).__name__}: {error}".splitlines()[0]
-        finally:
-            REGISTRY.compiling = None

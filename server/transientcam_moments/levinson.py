@@ -25,6 +25,7 @@ from transientcam_moments._arrays import (
     squared,
 )
 from transientcam_moments._kernels import accelerated
+from transientcam_moments._kernels.parallel import on_threads
 from transientcam_moments.errors import ParameterError, ShapeError
 
 
@@ -75,7 +76,7 @@ class Recursion(NamedTuple):
     order: Array
 
 
-def levinson(b: Array) -> Coefficients:
+def levinson(b: Array, *, threads: int | None = None) -> Coefficients:
     """Solve the Toeplitz system of Theorem 1 for every pixel.
 
     Parameters
@@ -83,6 +84,8 @@ def levinson(b: Array) -> Coefficients:
     b : array, shape (m + 1, ...)
         Trigonometric moments b_0 .. b_m, complex64 or complex128; the imaginary part of b_0 is
         ignored.
+    threads : int, optional
+        How many threads a compiled lane uses; all cores when left out.
 
     Returns
     -------
@@ -95,13 +98,15 @@ def levinson(b: Array) -> Coefficients:
     ------
     ShapeError
         When `b` is not 2 to 33 planes of numbers.
+    ParameterError
+        For less than one thread.
 
     Notes
     -----
     Theorem 1 and Eq. (2) of the paper; the recursion is Levinson's and Durbin's.
     """
     planes, trailing = moment_planes(b)
-    error, polynomial, reflection = _coefficients(planes)
+    error, polynomial, reflection = _coefficients(planes, spread=on_threads(threads))
     return Coefficients(
         error.reshape(trailing),
         polynomial.reshape((polynomial.shape[0], *trailing)),

@@ -14,12 +14,19 @@ from transientcam_moments._arrays import (
     real_type,
 )
 from transientcam_moments._kernels import accelerated
+from transientcam_moments._kernels.parallel import on_threads
 from transientcam_moments.levinson import Coefficients
 
 _BLOCK_VALUES = 1 << 18
 
 
-def density(coefficients: Coefficients, phase_rad: Array, *, evaluation: str = "modulus") -> Array:
+def density(
+    coefficients: Coefficients,
+    phase_rad: Array,
+    *,
+    evaluation: str = "modulus",
+    threads: int | None = None,
+) -> Array:
     """Evaluate the density h of every pixel at given phases.
 
     Parameters
@@ -32,6 +39,8 @@ def density(coefficients: Coefficients, phase_rad: Array, *, evaluation: str = "
         Evaluate the denominator as the squared modulus of a polynomial, whose relative error near
         a peak of relative depth d grows like eps / sqrt(d), or as a real Fourier series, which is
         half the work and errs like eps / d.
+    threads : int, optional
+        How many threads a compiled lane uses; all cores when left out.
 
     Returns
     -------
@@ -41,7 +50,7 @@ def density(coefficients: Coefficients, phase_rad: Array, *, evaluation: str = "
     Raises
     ------
     ParameterError
-        For another `evaluation`.
+        For another `evaluation`, or less than one thread.
     ShapeError
         When `phase_rad` has more than one axis or isn't real.
 
@@ -53,8 +62,9 @@ def density(coefficients: Coefficients, phase_rad: Array, *, evaluation: str = "
     chosen("evaluation", evaluation, ("modulus", "fourier"))
     error, a = coefficients.error, coefficients.polynomial
     phase = phases(phase_rad, like=a)
-    evaluate = _by_modulus if evaluation == "modulus" else _by_series
-    out = evaluate(flat_planes(a), flat_planes(coefficients.reflection), error.reshape(-1), phase)
+    planes = flat_planes(a), flat_planes(coefficients.reflection), error.reshape(-1), phase
+    spread = on_threads(threads)
+    out = _by_modulus(*planes, spread=spread) if evaluation == "modulus" else _by_series(*planes)
     return out.reshape((phase.shape[0], *error.shape))
 
 

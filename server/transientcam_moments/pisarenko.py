@@ -14,6 +14,7 @@ from transientcam_moments._arrays import (
     squared,
 )
 from transientcam_moments._kernels import accelerated
+from transientcam_moments._kernels.parallel import on_threads
 from transientcam_moments.biasing import search
 from transientcam_moments.levinson import Recursion, normalised, onto_circle, recursion
 from transientcam_moments.polishing import polish, residual, size
@@ -74,7 +75,7 @@ class Separation(NamedTuple):
     phase_rad: Array
 
 
-def pisarenko(b: Array, *, eigenvalue: Array | None = None) -> Returns:
+def pisarenko(b: Array, *, eigenvalue: Array | None = None, threads: int | None = None) -> Returns:
     """Explain moments by a uniform part and as few returns as there have to be.
 
     Parameters
@@ -84,6 +85,8 @@ def pisarenko(b: Array, *, eigenvalue: Array | None = None) -> Returns:
         least total brightness.
     eigenvalue : array, shape (...), optional
         Smallest eigenvalue of `b`, where it is at hand already.
+    threads : int, optional
+        How many threads a compiled lane uses; all cores when left out.
 
     Returns
     -------
@@ -95,6 +98,8 @@ def pisarenko(b: Array, *, eigenvalue: Array | None = None) -> Returns:
     ------
     ShapeError
         When `b` is not 2 to 33 planes of numbers.
+    ParameterError
+        For less than one thread.
 
     Notes
     -----
@@ -104,7 +109,8 @@ def pisarenko(b: Array, *, eigenvalue: Array | None = None) -> Returns:
     the recursion's polynomials Phi_k, and so never negative.
     """
     planes, trailing = moment_planes(b)
-    phase, weight, uniform, count = _explained(planes, eigenvalue)
+    spread = on_threads(threads)
+    phase, weight, uniform, count = _explained(planes, eigenvalue, spread=spread)
     return Returns(
         phase.reshape((phase.shape[0], *trailing)),
         weight.reshape((weight.shape[0], *trailing)),

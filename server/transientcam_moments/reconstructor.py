@@ -11,7 +11,7 @@ from transientcam_moments import _kernels
 from transientcam_moments._arrays import Array, as_array
 from transientcam_moments._kernels.one_pass import Constants, OnePass
 from transientcam_moments._kernels.padding import LEAST_WIDTH
-from transientcam_moments._kernels.parallel import Spread, at_once
+from transientcam_moments._kernels.parallel import Spread, at_once, on_threads
 from transientcam_moments.bad_pixels import Replacement, checked_mask, fill_bad_pixels
 from transientcam_moments.calibration import calibrate, inverse_gains
 from transientcam_moments.errors import UnlabelledImages
@@ -222,6 +222,7 @@ def reconstruct(
     calibration: Array | None = None,
     saturated_pixels: Array | None = None,
     bad_pixels: Array | None = None,
+    threads: int | None = None,
 ) -> Reconstruction:
     """Reconstruct one frame of labelled raw images, or of moments.
 
@@ -252,6 +253,8 @@ def reconstruct(
         Pixels to be flagged; found in images by themselves.
     bad_pixels : boolean array, shape (H, W), optional
         Pixels that show the mean of their neighbours instead, and are flagged.
+    threads : int, optional
+        How many the compiled pass uses; all cores, when left out.
 
     Raises
     ------
@@ -277,7 +280,7 @@ def reconstruct(
         needed = {"frequency_hz": chosen.base_frequency_hz, "calibration": calibration}
         raise UnlabelledImages(tuple(name for name, value in needed.items() if value is None))
     reconstructor = Reconstructor(chosen, calibration=calibration, bad_pixels=bad_pixels)
-    return reconstructor(data, saturated_pixels=saturated_pixels)
+    return reconstructor(data, saturated_pixels=saturated_pixels, spread=on_threads(threads))
 
 
 def _require_stated(

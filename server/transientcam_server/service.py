@@ -10,6 +10,7 @@ from functools import partial
 from importlib.metadata import version
 from typing import Any, Final, Protocol
 
+import transientcam_moments as tm
 from transientcam import wire
 from transientcam_driver import AppliedSequence, CalibrationError
 from transientcam_driver.calibration.file import DEVICE_FIELDS
@@ -97,7 +98,9 @@ class Service:
         self.mjpeg_clients = 0
         self.observers: list[Observer] = []
         self._superseded: list[Frame] = []
-        self._executor = ThreadPoolExecutor(settings.workers, thread_name_prefix=WORKER_THREADS)
+        self._executor = ThreadPoolExecutor(
+            settings.workers, WORKER_THREADS, initializer=tm.kernels.use_one_thread
+        )
         self.workers = Workers(self._executor, count=settings.workers)
         sensor = sensor_of(camera, settings.sensor)
         self.planner = Planner(camera.capabilities, sensor, settings.reconstruction)

@@ -11,13 +11,25 @@ from tests.conformance.breaking import NOTHING, Breaking
 from tests.conformance.broken_promises import API, BROKEN, BROKEN_WITH_TOKENS
 from tests.conformance.conftest import Breakable, breakable_daemon
 from transientcam.cli import run as command
-from transientcam.conformance import CHECKS, GROUPS, Check, Device, Report, chosen, run
-from transientcam.errors import ParameterError, ServerUnreachable
+from transientcam.conformance import (
+    CHECKS,
+    GROUPS,
+    SLOW,
+    Check,
+    Device,
+    Rate,
+    Report,
+    chosen,
+    run,
+)
+from transientcam.conformance.rate import measured_rate
+from transientcam.errors import ParameterError, PromiseBroken, ServerUnreachable
 from transientcam.wire import LEASE_HEADER
 from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
 
 LONG_S = 20.0
 SHORT_S = 1.5
+KEPT, HALF = Rate(10.0, 10.0), Rate(5.0, 10.0)
 BY_NAME = {each.name: each for each in CHECKS}
 
 
@@ -55,10 +67,61 @@ def test_a_broken_promise_fails_its_check(
     # some things take their time also where they are broken
     timeout_s = LONG_S if BY_NAME[name].group in ("routes", "sizes") else SHORT_S
     with Device(breakable.served.url, timeout_s=timeout_s) as device:
-        result = run(device, only(name)).results[0]
+        result = run(device, only(name), rate=lambda device: KEPT).results[0]
 
     assert (result.check.name, result.outcome) == (name, "failed"), result.reason
     assert word in str(result.reason)
+
+
+@pytest.mark.parametrize(
+    ("rate", "outcome"), [(HALF, "skipped"), (KEPT, "failed"), (PromiseBroken("none"), "failed")]
+)
+def test_what_rests_on_the_rate_is_not_failed_where_the_camera_does_not_keep_it(
+    breakable: Breakable, rate: Rate | PromiseBroken, outcome: str
+) -> None:
+    name, breaking, _ = next(each for each in BROKEN if BY_NAME[each[0]].group == "stream")
+
+    def measured(device: Device) -> Rate:
+        if isinstance(rate, PromiseBroken):
+            raise rate
+        return rate
+
+    breakable.breaker.current = breaking
+    with Device(breakable.served.url, timeout_s=SHORT_S) as device:
+        report = run(device, only(name), rate=measured)
+
+    assert report.results[0].outcome == outcome
+    said_so = "the camera does not keep its rate: 5 of 10 frames/s arrive" in str(
+        report.results[0].reason
+    )
+    assert said_so is (outcome == "skipped")
+    assert (report.to_document()["slow"] is not None) is (outcome == "skipped")
+
+
+def test_a_slow_camera_is_no_excuse_for_a_wrong_answer(breakable: Breakable) -> None:
+    name, breaking, _ = next(each for each in BROKEN if BY_NAME[each[0]].group == "problems")
+    breakable.breaker.current = breaking
+    with Device(breakable.served.url, timeout_s=SHORT_S) as device:
+        report = run(device, only(name), rate=lambda device: HALF)
+
+    assert report.results[0].outcome == "failed"
+    assert report.slow is None
+
+
+def test_the_rate_is_that_of_frames_that_arrive(daemon: Breakable) -> None:
+    with Device(daemon.served.url, timeout_s=LONG_S) as device:
+        rate = measured_rate(device)
+        assert rate.stated_hz == device.sequence["frame_rate_hz"]
+
+    assert 0 < rate.delivered_hz < 1.5 * rate.stated_hz
+
+
+def test_a_quick_run_leaves_out_whole_groups() -> None:
+    groups = {each.group for each in chosen([], quick=True)}
+
+    assert set(SLOW) < set(GROUPS)
+    assert groups == set(GROUPS) - set(SLOW)
+    assert {each.group for each in chosen([SLOW[0]], quick=True)} == {SLOW[0]}
 
 
 def test_every_check_has_a_daemon_that_fails_it() -> None:
@@ -122,7 +185,7 @@ def test_a_broken_promise_about_tokens_fails_its_check(
     daemon.breaker.current = breaking
     try:
         with Device(daemon.served.url, token=tokens[Role.ADMIN], timeout_s=SHORT_S) as device:
-            result = run(device, only(name)).results[0]
+            result = run(device, only(name), rate=lambda device: KEPT).results[0]
     finally:
         daemon.breaker.current = NOTHING
 

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from transientcam.cli.options import TokenOption, UrlArgument
-from transientcam.conformance import CHECKS, Check, Device, Report, Result, chosen, run
+from transientcam.conformance import CHECKS, SLOW, Check, Device, Report, Result, chosen, run
 
 _MARKS = {
     "passed": "[green]passed [/]",
@@ -28,6 +28,10 @@ def conformance(
         list[str] | None,
         typer.Option(metavar="GROUP", help="Only the checks of this group; may be repeated."),
     ] = None,
+    quick: Annotated[
+        bool,
+        typer.Option("--quick", help=f"Leave out what takes long: {', '.join(SLOW)}."),
+    ] = False,
     timeout_s: Annotated[
         float,
         typer.Option("--timeout", min=1.0, help="How long what happens by itself may take, in s."),
@@ -37,9 +41,10 @@ def conformance(
     """Check a running camera, simulated or real, against the documented interface.
 
     It takes the lease, changes the sequence, records, unplugs a simulated camera, and sets
-    everything back. Exit code 0: every promise is kept, or was skipped for the reason printed.
+    everything back. Exit code 0: every promise is kept, or was skipped for the reason printed. What
+    rests on frames that arrive in time is skipped where the camera does not keep its rate.
     """
-    checks = chosen(only or ())
+    checks = chosen(only or (), quick=quick)
     to_standard_output = report is not None and str(report) == "-"
     console = Console(stderr=to_standard_output, highlight=False)
     width = max(len(each.name) for each in CHECKS)
@@ -74,4 +79,8 @@ def _summary(report: Report) -> str:
     counts = ", ".join(f"{count} {name}" for name, count in report.counts.items())
     camera = report.camera
     what = f"{camera['model']} {camera['serial']} at {report.url}" if camera else report.url
-    return f"{what}: {counts}, in {report.duration_s:.0f} s"
+    summary = f"{what}: {counts}, in {report.duration_s:.0f} s"
+    if report.slow is None:
+        return summary
+    slow = f"{report.slow}; what rests on it could not be tried"
+    return f"{summary}\n{slow[0].upper()}{slow[1:]}."

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from transientcam.conformance.check import Check
+from transientcam.conformance.rate import Rate
 
 Outcome = Literal["passed", "failed", "skipped"]
 
@@ -48,6 +49,8 @@ class Report:
         they could not be read.
     began_s
         Unix time.
+    slow
+        The camera's rate where it did not keep it, and checks were skipped for that.
     """
 
     url: str
@@ -55,6 +58,7 @@ class Report:
     began_s: float
     duration_s: float
     results: Sequence[Result]
+    slow: Rate | None = None
 
     @property
     def counts(self) -> dict[str, int]:
@@ -75,5 +79,6 @@ class Report:
             "began_s": self.began_s,
             "duration_s": round(self.duration_s, 3),
             **self.counts,
+            "slow": None if self.slow is None else self.slow.to_document(),
             "checks": [each.to_document() for each in self.results],
         }

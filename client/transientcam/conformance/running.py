@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 from transientcam.conformance import (
@@ -20,6 +21,7 @@ from transientcam.conformance import (
 )
 from transientcam.conformance.check import Check
 from transientcam.conformance.device import API, Device
+from transientcam.conformance.rate import Rate, measured_rate
 from transientcam.conformance.report import Outcome, Report, Result
 from transientcam.errors import CheckSkipped, ParameterError, TransientcamError
 
@@ -39,6 +41,10 @@ CHECKS: Final[tuple[Check, ...]] = (
 )
 """Every check, in the order they are run."""
 GROUPS: Final = tuple(dict.fromkeys(each.group for each in CHECKS))
+SLOW: Final = ("slow-readers", "resume", "sizes", "recording", "unplug")
+"""Groups that take long, and that ``quick`` leaves out."""
+_TIMED: Final = ("stream", "slow-readers", "resume", "recording")
+"""Groups whose promises can be tried only where frames arrive at about their rate."""
 _LEFT: Final = Check(
     "afterwards",
     "the-camera-is-left-as-it-was",
@@ -49,8 +55,8 @@ _MALFORMED: Final = (KeyError, IndexError, TypeError, ValueError, AttributeError
 """Errors of reading a document that has not the form it should have."""
 
 
-def chosen(groups: Collection[str]) -> tuple[Check, ...]:
-    """Return the checks of some groups; of all, where none is named.
+def chosen(groups: Collection[str], *, quick: bool = False) -> tuple[Check, ...]:
+    """Return the checks of some groups; of all, where none is named, or all quick ones.
 
     Raises
     ------
@@ -60,7 +66,8 @@ def chosen(groups: Collection[str]) -> tuple[Check, ...]:
     for each in groups:
         if each not in GROUPS:
             raise ParameterError("only", each, f"one of {', '.join(GROUPS)}")
-    return tuple(each for each in CHECKS if not groups or each.group in groups)
+    wanted = groups or [each for each in GROUPS if not (quick and each in SLOW)]
+    return tuple(each for each in CHECKS if each.group in wanted)
 
 
 def run(
@@ -69,12 +76,15 @@ def run(
     *,
     begin: Callable[[Check], object] = lambda check: None,
     end: Callable[[Result], object] = lambda result: None,
+    rate: Callable[[Device], Rate] = measured_rate,
     clock: Callable[[], float] = time.monotonic,
     unix_s: Callable[[], float] = time.time,
 ) -> Report:
     """Try every check in turn, and report.
 
-    ``begin`` and ``end`` are called with each check and its result.
+    ``begin`` and ``end`` are called with each check and its result. Where a check fails whose
+    promise rests on frames that arrive in time, ``rate`` measures whether they do; it is skipped,
+    and the report says so, where the camera (or a laden machine) does not keep its rate.
 
     Raises
     ------
@@ -84,15 +94,31 @@ def run(
     began_s, start_s = unix_s(), clock()
     camera = _identity(device)
     before = _settings(device)
-    results = []
+    results: list[Result] = []
+    slow: Rate | None = None
     for check in checks:
         begin(check)
-        results.append(_try(check, device, clock))
-        end(results[-1])
+        result = _try(check, device, clock)
+        if result.outcome == "failed" and check.group in _TIMED:
+            found = _slow_rate(rate, device)
+            if found is not None:
+                slow = found
+                result = replace(result, outcome="skipped", reason=f"{slow}. {result.reason}")
+        results.append(result)
+        end(result)
     begin(_LEFT)
     results.append(_left_as(before, device))
     end(results[-1])
-    return Report(device.address.url, camera, began_s, clock() - start_s, results)
+    return Report(device.address.url, camera, began_s, clock() - start_s, results, slow)
+
+
+def _slow_rate(rate: Callable[[Device], Rate], device: Device) -> Rate | None:
+    """Return the rate where it is not kept; None where it is, or nothing can be said of it."""
+    try:
+        found = rate(device)
+    except (TransientcamError, *_MALFORMED):
+        return None  # no frame at all is no slow one
+    return None if found.kept else found
 
 
 def _try(check: Check, device: Device, clock: Callable[[], float]) -> Result:

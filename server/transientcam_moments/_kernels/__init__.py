@@ -38,7 +38,15 @@ from typing import Any
 
 import numpy as np
 
-from transientcam_moments._kernels.registry import LEAST_PIXELS, PRECISIONS, REGISTRY, Key
+from transientcam_moments._kernels.automatic import want
+from transientcam_moments._kernels.parallel import Spread
+from transientcam_moments._kernels.registry import (
+    HEAVY_PIXELS,
+    LEAST_PIXELS,
+    PRECISIONS,
+    REGISTRY,
+    Key,
+)
 
 __all__ = ["accelerated", "find", "lookup"]
 
@@ -67,13 +75,14 @@ def accelerated(
 
     def decorate(planar: Planar) -> Planar:
         @wraps(planar)
-        def run(planes: Any, *rest: Any) -> Any:
+        def run(planes: Any, *rest: Any, spread: Spread | None = None) -> Any:
             lane = None
             if isinstance(planes, np.ndarray) and planes.ndim:
                 precision = PRECISIONS.get(planes.dtype.char) if of is None else "f"
                 if precision is not None and of in (None, planes.dtype.char):
                     lane = _of(name, order(planes, *rest), planes[0].size, precision)
-            found = None if lane is None else lane(planes, *rest)
+            how = {} if spread is None else {"spread": spread}
+            found = None if lane is None else lane(planes, *rest, **how)
             return planar(planes, *rest) if found is None else found
 
         return run
@@ -96,7 +105,8 @@ def find(name: str, planes: object) -> Callable[..., Any] | None:
     -------
     lane
         Callable as in the table, or None where the planar statement is to be used: the lane isn't
-        compiled in this process (yet), kernels are off, or there are fewer than 64 pixels.
+        compiled in this process (yet), kernels are off, or there are fewer than 64 pixels. A call
+        with many pixels that does not find it has it made ready in the background.
     """
     if not isinstance(planes, np.ndarray) or planes.ndim == 0:
         return None
@@ -110,4 +120,10 @@ def lookup(name: str, m: int, pixels: int) -> Callable[..., Any] | None:
 
 
 def _of(name: str, m: int, pixels: int, precision: str) -> Callable[..., Any] | None:
-    return None if pixels < LEAST_PIXELS else REGISTRY.compiled.get(Key(name, m, precision))
+    if pixels < LEAST_PIXELS:
+        return None
+    key = Key(name, m, precision)
+    lane = REGISTRY.compiled.get(key)
+    if lane is None and pixels >= HEAVY_PIXELS:
+        want(key)
+    return lane

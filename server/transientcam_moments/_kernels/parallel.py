@@ -1,9 +1,13 @@
 """Parts of an image for several threads: kernels release the interpreter while they run."""
 
 import itertools
+import os
+import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from typing import Protocol
+
+from transientcam_moments.errors import ParameterError
 
 _BLOCK = 1 << 14
 
@@ -39,6 +43,64 @@ def over(executor: Executor, parts: int) -> Spread:
             future.result()
 
     return spread
+
+
+class _Here(threading.local):
+    """How many threads calls on this thread use where they do not say."""
+
+    threads: int | None = None
+
+
+class _Shared:
+    """The threads that all calls of a process share: made when they are first needed."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.executor: Executor | None = None
+
+    def get(self) -> Executor:
+        with self.lock:
+            if self.executor is None:
+                others = max(1, _cores() - 1)
+                self.executor = ThreadPoolExecutor(others, thread_name_prefix=SHARED_THREADS)
+            return self.executor
+
+    def forget(self) -> None:
+        """Have none: a child process inherits the object, but not its threads."""
+        self.__init__()  # type: ignore[misc]  # the lock may be held by a thread that is gone
+
+
+SHARED_THREADS = "transientcam-lane"
+"""How the names of the shared threads begin."""
+_HERE, _SHARED = _Here(), _Shared()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_SHARED.forget)
+
+
+def use_one_thread() -> None:
+    """Let calls on this thread use no other, unless they say so: as on the workers of a pool."""
+    _HERE.threads = 1
+
+
+def on_threads(threads: int | None) -> Spread:
+    """Return a way to do an image on so many threads, or on all cores, of which one is this.
+
+    Raises
+    ------
+    ParameterError
+        For less than one thread.
+    """
+    if threads is None:
+        threads = _HERE.threads or _cores()
+    elif isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        raise ParameterError("threads", threads, "an integer of at least 1")
+    return at_once if threads == 1 else over(_SHARED.get(), threads)
+
+
+def _cores() -> int:
+    """Return how many cores this process may use; not every system can say."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return (os.cpu_count() or 1) if affinity is None else len(affinity(0))
 
 
 def blocks(start: int, stop: int) -> Iterator[tuple[int, int]]:

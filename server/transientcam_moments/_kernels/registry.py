@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 PRECISIONS = {"f": "f", "F": "f", "d": "d", "D": "d"}  # of an array's type, by its character
 LEAST_PIXELS = 64  # what the widest lane takes at a time
+HEAVY_PIXELS = 4096  # from which a call is worth a lane that it does not find
 PRECISION_NAMES = {"float32": "f", "float64": "d"}
 
 
@@ -30,9 +31,13 @@ class Registry:
     """
 
     def __init__(self, environ: Mapping[str, str]) -> None:
-        """Read ``TRANSIENTCAM_KERNELS``: "off" (or 0, no, false) leaves everything to NumPy."""
+        """Read ``TRANSIENTCAM_KERNELS``: "off" (or 0, no, false) leaves everything to NumPy.
+
+        With "manual" there is nothing but what the process itself compiles.
+        """
         setting = environ.get("TRANSIENTCAM_KERNELS", "on").strip().lower()
         self.enabled = setting not in ("off", "0", "no", "false")
+        self.automatic = self.enabled and setting != "manual"
         self.lock = threading.Lock()
         self.compiled: dict[Key, Callable[..., Any]] = {}
         self.compiling: Key | None = None

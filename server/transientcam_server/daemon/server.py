@@ -16,6 +16,7 @@ from typing import Any, Final
 import uvicorn
 from fastapi import FastAPI
 
+import transientcam_moments as tm
 from transientcam.cli import INTERRUPTED
 from transientcam.wire import MAX_CLIENT_MESSAGE_BYTES
 from transientcam_server import logs
@@ -234,20 +235,25 @@ def exit_without_joining() -> Iterator[Callable[[threading.Thread], None]]:
     not is lost in any case. Where nothing is at work the process ends as any other.
     """
     at_work: list[threading.Thread] = []
+
+    def working() -> bool:
+        return any(each.is_alive() for each in (*at_work, *_left_behind()))
+
     code = 0
     try:
         yield at_work.append
     except KeyboardInterrupt:
-        if not any(each.is_alive() for each in (*at_work, *_workers())):
+        if not working():
             raise
         code = INTERRUPTED
-    if any(each.is_alive() for each in (*at_work, *_workers())):
+    if working():
         logging.shutdown()
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
         os._exit(code)
 
 
-def _workers() -> list[threading.Thread]:
-    """Return those that were left behind: they compute what nobody waits for any more."""
-    return [each for each in threading.enumerate() if each.name.startswith(WORKER_THREADS)]
+def _left_behind() -> list[threading.Thread]:
+    """Return threads that compile, or compute what no client waits for any more."""
+    names = (WORKER_THREADS, tm.kernels.THREAD)
+    return [each for each in threading.enumerate() if each.name.startswith(names)]

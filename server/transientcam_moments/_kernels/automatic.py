@@ -1,0 +1,103 @@
+"""Lanes that calls look for and do not find: made ready on a thread, which nobody waits for."""
+
+import logging
+import threading
+from typing import Final
+
+from transientcam_moments._kernels.registry import REGISTRY, Key
+
+THREAD: Final = "transientcam-compile"
+"""Name of every thread that compiles."""
+MOST_ROOTS: Final = 8
+"""The largest m with lanes for eigenvalues and returns."""
+_SINGLE_ONLY: Final = ("smooth", "measure", "separate", "reconstruct")
+_FEW_ROOTS: Final = ("pisarenko", "smallest_eigenvalue", "reconstruct")
+_log = logging.getLogger("transientcam_moments")
+
+
+class _Wanted:
+    """What is wanted, in the order of the calls; once each."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.seen: set[Key] = set()
+        self.waiting: list[Key] = []
+        self.thread: threading.Thread | None = None
+        self.said = False
+
+
+_WANTED = _Wanted()
+
+
+def want(key: Key) -> None:
+    """Have a lane made ready in the background; returns at once, also where it cannot be.
+
+    The lane for returns in single precision brings along that for double precision, which redoes
+    the pixels that single precision is not enough for.
+    """
+    if not REGISTRY.automatic or key in _WANTED.seen:
+        return
+    keys = [key]
+    if key.name == "pisarenko" and key.precision == "f":
+        keys.append(Key(key.name, key.harmonics, "d"))
+    with _WANTED.lock:
+        new = [each for each in keys if each not in _WANTED.seen and is_offered(each)]
+        _WANTED.seen.update(keys)
+        if not new:
+            return
+        if not _WANTED.said:
+            _WANTED.said = True
+            _log.info(
+                "kernels are loaded from the cache, or compiled in the background; until then "
+                "NumPy computes the same (TRANSIENTCAM_KERNELS=off leaves everything to it)"
+            )
+        _WANTED.waiting += new
+        if _WANTED.thread is None:
+            # not a daemon: those are frozen at exit wherever they are, which a compiler
+            # doesn't survive
+            _WANTED.thread = threading.Thread(target=_work, name=THREAD)
+            _WANTED.thread.start()
+
+
+def is_offered(key: Key) -> bool:
+    """Say whether there is such a lane; the planar statement does all orders."""
+    if key.name in _SINGLE_ONLY and key.precision != "f":
+        return False
+    # a characteristic polynomial with more roots underflows where they cluster
+    return key.harmonics <= MOST_ROOTS or key.name not in _FEW_ROOTS
+
+
+def _is_long(key: Key) -> bool:
+    """Say whether a lane takes many times as long to compile as the others."""
+    return key.name == "reconstruct"
+
+
+def _work() -> None:
+    """Compile what is wanted until nothing is, or the process ends."""
+    main = threading.main_thread()
+    while True:
+        with _WANTED.lock:
+            if not _WANTED.waiting or not main.is_alive():
+                _WANTED.thread = None
+                return
+            _WANTED.waiting.sort(key=_is_long)  # stable: what is ready soon goes first
+            key = _WANTED.waiting.pop(0)
+        compile_one(key)
+
+
+def compile_one(key: Key) -> None:
+    """Compile a lane or load it from the cache, unless that was done or failed before."""
+    with REGISTRY.lock:
+        if key in REGISTRY.compiled or key in REGISTRY.failed:
+            return
+        REGISTRY.compiling = key
+        try:
+            from transientcam_moments._kernels.compiler import compile_lane
+
+            REGISTRY.compiled[key] = compile_lane(key)
+        except Exception as error:
+            # whatever stops a compiler (a missing one, a full disk, an unknown processor) must
+            # stop nothing else: the planar statement goes on serving
+            REGISTRY.failed[key] = f"{type(error).__name__}: {error}".splitlines()[0]
+        finally:
+            REGISTRY.compiling = None

@@ -1,0 +1,199 @@
+"""Calls have their lanes made ready in the background, and use all cores; no call waits."""
+
+import logging
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from tests.moments.kernel_lanes import CACHE, lanes, without_lanes
+from transientcam_moments._kernels import automatic
+from transientcam_moments._kernels.parallel import on_threads
+from transientcam_moments._kernels.registry import HEAVY_PIXELS, REGISTRY, Key
+
+
+def moments(m: int, pixels: int = HEAVY_PIXELS) -> NDArray[np.complex64]:
+    """Two returns a pixel, and a uniform part."""
+    random = np.random.default_rng(m)
+    phase_rad = random.uniform(0, 2 * np.pi, (2, pixels))
+    weight = np.array([[700.0], [200.0]])
+    b = np.stack([(weight * np.exp(1j * j * phase_rad)).sum(axis=0) for j in range(m + 1)])
+    b[0] += 100
+    return b.astype(np.complex64)
+
+
+class Compiler:
+    """Stands in for the compiler: waits until it may go on, and notes what it is asked for."""
+
+    def __init__(self) -> None:
+        self.go_on = threading.Event()
+        self.keys: list[Key] = []
+
+    def __call__(self, key: Key) -> None:
+        assert self.go_on.wait(10)
+        self.keys.append(key)
+
+    def finish(self) -> list[Key]:
+        """Let it do everything, and return what that was."""
+        self.go_on.set()
+        for thread in threading.enumerate():
+            if thread.name == automatic.THREAD:
+                thread.join()
+        return self.keys
+
+
+@pytest.fixture
+def compiler(monkeypatch: pytest.MonkeyPatch) -> Iterator[Compiler]:
+    made = Compiler()
+    monkeypatch.setattr(automatic, "_WANTED", automatic._Wanted())
+    monkeypatch.setattr(automatic, "compile_one", made)
+    monkeypatch.setattr(REGISTRY, "automatic", True)
+    with without_lanes():
+        yield made
+        made.finish()
+
+
+def test_a_heavy_call_returns_while_its_lane_is_being_compiled(compiler: Compiler) -> None:
+    b = moments(3)
+
+    first = tm.levinson(b)  # would never return if it waited
+    tm.levinson(b)
+
+    assert np.isfinite(first.error).all()
+    assert compiler.keys == []
+    assert compiler.finish() == [Key("levinson", 3, "f")]
+
+
+def test_small_calls_are_not_worth_a_compiler(compiler: Compiler) -> None:
+    tm.levinson(moments(3, HEAVY_PIXELS - 1))
+
+    assert compiler.finish() == []
+
+
+def test_returns_bring_the_lane_that_redoes_them_in_double_precision(compiler: Compiler) -> None:
+    tm.pisarenko(moments(4))
+
+    keys = compiler.finish()
+    assert {Key("pisarenko", 4, "f"), Key("pisarenko", 4, "d")} <= set(keys)
+
+
+def test_an_order_that_has_no_lane_is_left_to_numpy(compiler: Compiler) -> None:
+    tm.pisarenko(moments(9))
+
+    assert "pisarenko" not in {key.name for key in compiler.finish()}
+
+
+def test_what_takes_long_to_compile_comes_last(compiler: Compiler) -> None:
+    for name in ("levinson", "reconstruct", "density", "smooth"):
+        automatic.want(Key(name, 3, "f"))
+
+    # the first may have begun before the others were wanted
+    assert [key.name for key in compiler.finish()] == [
+        "levinson",
+        "density",
+        "smooth",
+        "reconstruct",
+    ]
+
+
+def test_one_line_says_so_once(compiler: Compiler, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO, "transientcam_moments"):
+        for m in (3, 4):
+            tm.density(tm.levinson(moments(m)), [0.0])
+
+    assert len(caplog.records) == 1
+    assert "TRANSIENTCAM_KERNELS=off" in caplog.text
+
+
+def in_fresh_process(setting: str) -> str:
+    code = (
+        "import sys, threading, numpy as np, transientcam_moments as tm\n"
+        "b = np.ones((2, 4096), np.complex64); b[0] = 3\n"
+        "before = tm.levinson(b)\n"
+        "[each.join() for each in threading.enumerate() if each.name == 'transientcam-compile']\n"
+        "after = tm.levinson(b)\n"
+        "assert np.allclose(before.polynomial, after.polynomial, rtol=1e-6)\n"
+        "print(tm.kernels.state()['compiled'], 'numba' in sys.modules)\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        env={**os.environ, "TRANSIENTCAM_KERNELS": setting, "NUMBA_CACHE_DIR": str(CACHE)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stdout.strip()
+
+
+def test_a_fresh_process_changes_over_by_itself() -> None:
+    assert in_fresh_process("on") == "['levinson m=1 float32'] True"
+
+
+@pytest.mark.parametrize("setting", ["off", "manual"])
+def test_where_it_is_not_wanted_nothing_is_compiled(setting: str) -> None:
+    assert in_fresh_process(setting) == "[] False"
+
+
+def test_orders_and_precisions_are_given_by_position(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Key] = []
+    monkeypatch.setattr(tm.kernels, "compile_one", asked.append)
+
+    tm.kernels.compile([3, 4], ["float32"])
+
+    assert {key.harmonics for key in asked} == {3, 4}
+    assert {key.precision for key in asked} == {"f"}
+
+
+# -- threads ---------------------------------------------------------------------------------------
+
+
+def everything(b: NDArray[np.complex64], threads: int | None) -> list[NDArray[np.float32]]:
+    c = tm.levinson(b, threads=threads)
+    density = tm.density(c, np.linspace(0, 6, 7), threads=threads)
+    found = tm.pisarenko(b, threads=threads)
+    return [c.error, c.polynomial, density, found.phase_rad, found.weight]
+
+
+@pytest.mark.parametrize("threads", [None, 2, 5])
+def test_no_digit_depends_on_the_number_of_threads(threads: int | None) -> None:
+    b = moments(3, 5000)
+    with lanes(3):
+        for alone, together in zip(everything(b, 1), everything(b, threads), strict=True):
+            np.testing.assert_array_equal(alone, together)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda threads: tm.levinson(moments(3, 64), threads=threads),
+        lambda threads: tm.pisarenko(moments(3, 64), threads=threads),
+        lambda threads: tm.density(tm.levinson(moments(3, 64)), [0.0], threads=threads),
+        lambda threads: tm.reconstruct(moments(3, 64), threads=threads),
+    ],
+)
+@pytest.mark.parametrize("threads", [0, -1, 1.5, True])
+def test_less_than_one_thread_is_refused(call: Callable[[object], object], threads: object) -> None:
+    with pytest.raises(tm.ParameterError, match="threads"):
+        call(threads)
+
+
+def test_a_worker_uses_no_other_thread_unless_it_says_so() -> None:
+    found: list[object] = []
+
+    def work() -> None:
+        tm.kernels.use_one_thread()
+        found.extend((on_threads(None), on_threads(3)))
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    worker.join()
+
+    assert found[0] is tm.kernels.at_once
+    assert found[1] is not tm.kernels.at_once
