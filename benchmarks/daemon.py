@@ -31,7 +31,7 @@ class Process:
             line = self._process.stdout.readline()
             if not line:
                 raise RuntimeError("the program ended before it said where it serves")
-            found = re.search(r"(http|ws)://\S+", line)
+            found = re.search(r"(http|ws)s?://\S+", line)
         self.url = found.group()
         self.address_s = self.age_s()
 

@@ -109,21 +109,22 @@ class Acceptor:
         self._admission = Admission(limits, clock=self._loop.time)
         self._handshakes: set[asyncio.Task[None]] = set()
         self._pause: asyncio.TimerHandle | None = None
-        self._closed = False
 
     def open(self) -> None:
         """Accept from now on."""
         self._pause = None
         self._loop.add_reader(self._listener, self._accept)
 
-    def close(self) -> None:
-        """Accept nothing more; connections that stand are left alone."""
-        self._closed = True
+    async def close(self) -> None:
+        """Accept nothing more, and give handshakes up; connections that stand are left alone."""
         if self._pause is not None:
             self._pause.cancel()
         self._loop.remove_reader(self._listener)
-        for task in self._handshakes:
-            task.cancel()
+        if self._tls is not None:
+            # without TLS they are done at once; uvloop would not tell their protocols of the end
+            for task in self._handshakes:
+                task.cancel()
+        await asyncio.gather(*self._handshakes, return_exceptions=True)
 
     def _accept(self) -> None:
         for _ in range(AT_ONCE):
