@@ -93,7 +93,7 @@ def served(checkout: Path | None, *, tls: bool) -> Iterator[Process]:
             environment["PYTHONPATH"] = ":".join(str(checkout / part) for part in parts)
         if tls:
             command += ["--tls-certificate", _certificate(Path(name))]
-        process = Process(command, environment)
+        process = Process(command, environment, log=subprocess.DEVNULL)
         try:
             yield process
         finally:

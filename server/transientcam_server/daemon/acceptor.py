@@ -107,6 +107,7 @@ class Acceptor:
         self._limits = limits
         self._turns = Turns(self._loop)
         self._admission = Admission(limits, clock=self._loop.time)
+        self._refusals: dict[str, bytes] = {}
         self._handshakes: set[asyncio.Task[None]] = set()
         self._pause: asyncio.TimerHandle | None = None
 
@@ -149,9 +150,18 @@ class Acceptor:
             return
         with contextlib.suppress(OSError):
             if self._tls is None:
-                connection.send(refusal(problem))
+                connection.send(self._refusal(problem))
                 connection.recv(self._turns.buffer.nbytes)  # unread, it would reset the connection
         connection.close()
+
+    def _refusal(self, problem: Problem) -> bytes:
+        """Return an answer that a flood asks for again and again."""
+        known = self._refusals.get(problem.detail)
+        if known is None:
+            if len(self._refusals) >= _REMEMBERED_ADDRESSES:
+                self._refusals.clear()
+            known = self._refusals[problem.detail] = refusal(problem)
+        return known
 
     async def _connect(self, connection: socket.socket, host: str) -> None:
         """Hand a connection to a protocol once its handshake is done."""
