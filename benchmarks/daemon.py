@@ -17,12 +17,19 @@ CLOCK_TICKS_S = 1 / os.sysconf("SC_CLK_TCK")
 class Process:
     """A program that prints where it serves."""
 
-    def __init__(self, command: Sequence[str | Path], environment: Mapping[str, str]) -> None:
+    def __init__(
+        self,
+        command: Sequence[str | Path],
+        environment: Mapping[str, str],
+        *,
+        log: int | None = None,
+    ) -> None:
         self.started_s = time.perf_counter()
         self._process = subprocess.Popen(
             command,
             env=os.environ | _QUIET | dict(environment),
             stdout=subprocess.PIPE,
+            stderr=log,
             text=True,
         )
         assert self._process.stdout is not None
@@ -31,7 +38,7 @@ class Process:
             line = self._process.stdout.readline()
             if not line:
                 raise RuntimeError("the program ended before it said where it serves")
-            found = re.search(r"(http|ws)://\S+", line)
+            found = re.search(r"(http|ws)s?://\S+", line)
         self.url = found.group()
         self.address_s = self.age_s()
 

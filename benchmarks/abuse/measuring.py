@@ -28,6 +28,8 @@ _PROBE_EVERY_S = 0.2
 _COMPILED_WITHIN_S = 900.0
 _LIGHT_OFF_S: Final = 1.5
 _COMES_BACK_S: Final = 5.0
+_HISTORY_S: Final = 12.0
+"""The frames of the last 10 s are kept: memory grows until then."""
 
 
 @dataclass
@@ -93,7 +95,7 @@ def served(checkout: Path | None, *, tls: bool) -> Iterator[Process]:
             environment["PYTHONPATH"] = ":".join(str(checkout / part) for part in parts)
         if tls:
             command += ["--tls-certificate", _certificate(Path(name))]
-        process = Process(command, environment)
+        process = Process(command, environment, log=subprocess.DEVNULL)
         try:
             yield process
         finally:
@@ -181,6 +183,7 @@ def prepare(client: httpx.Client) -> float:
         time.sleep(0.5)
     # what is made once is made now, so that it does not count as growth
     client.get("/api/v1/frames/latest/transient", params={"bins": 100, "wait_s": 10.0})
+    time.sleep(_HISTORY_S)
     return float(applied["frame_rate_hz"])
 
 

@@ -178,8 +178,8 @@ async def product_answer(
     if planned is None:
         data = await found.encoded(chosen, encoding, view)
     else:
-        bands = found.bands(planned)
-        head = await anext(bands)  # what can go wrong goes wrong before the answer has begun
+        bands = await found.bands(planned)
+        head = await anext(bands)
     headers = {"Cache-Control": "no-store", "Vary": "Accept"}
     if encoding is not MSGPACK:  # which holds it
         meta = found.meta() | view.crop.to_meta(*found.shape)

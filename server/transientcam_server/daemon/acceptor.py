@@ -107,23 +107,25 @@ class Acceptor:
         self._limits = limits
         self._turns = Turns(self._loop)
         self._admission = Admission(limits, clock=self._loop.time)
+        self._refusals: dict[str, bytes] = {}
         self._handshakes: set[asyncio.Task[None]] = set()
         self._pause: asyncio.TimerHandle | None = None
-        self._closed = False
 
     def open(self) -> None:
         """Accept from now on."""
         self._pause = None
         self._loop.add_reader(self._listener, self._accept)
 
-    def close(self) -> None:
-        """Accept nothing more; connections that stand are left alone."""
-        self._closed = True
+    async def close(self) -> None:
+        """Accept nothing more, and give handshakes up; connections that stand are left alone."""
         if self._pause is not None:
             self._pause.cancel()
         self._loop.remove_reader(self._listener)
-        for task in self._handshakes:
-            task.cancel()
+        if self._tls is not None:
+            # without TLS they are done at once; uvloop would not tell their protocols of the end
+            for task in self._handshakes:
+                task.cancel()
+        await asyncio.gather(*self._handshakes, return_exceptions=True)
 
     def _accept(self) -> None:
         for _ in range(AT_ONCE):
@@ -148,9 +150,18 @@ class Acceptor:
             return
         with contextlib.suppress(OSError):
             if self._tls is None:
-                connection.send(refusal(problem))
+                connection.send(self._refusal(problem))
                 connection.recv(self._turns.buffer.nbytes)  # unread, it would reset the connection
         connection.close()
+
+    def _refusal(self, problem: Problem) -> bytes:
+        """Return an answer that a flood asks for again and again."""
+        known = self._refusals.get(problem.detail)
+        if known is None:
+            if len(self._refusals) >= _REMEMBERED_ADDRESSES:
+                self._refusals.clear()
+            known = self._refusals[problem.detail] = refusal(problem)
+        return known
 
     async def _connect(self, connection: socket.socket, host: str) -> None:
         """Hand a connection to a protocol once its handshake is done."""

@@ -77,6 +77,13 @@ class BoundedConnection(HttpToolsProtocol):
             self._stall_timer.end()
         super().resume_writing()
 
+    def shutdown(self) -> None:
+        """End with the service: a request that has not arrived yet is waited for no more."""
+        if self._unanswered and self.cycle.more_body:
+            self._refuse(Problem(kinds.SHUTTING_DOWN, "The service is shutting down."))
+        else:
+            super().shutdown()
+
     # -- of the parser -------------------------------------------------------------------------
 
     def on_header(self, name: bytes, value: bytes) -> None:

@@ -144,7 +144,7 @@ class Server(uvicorn.Server):
         """Close every stream, then stop."""
         await self._around.aclose()
         if self._acceptor is not None:
-            self._acceptor.close()
+            await self._acceptor.close()
         await self._service.close_streams()
         await super().shutdown(sockets)
 

@@ -63,7 +63,7 @@ class Banded:
         """Size of the array."""
         return math.prod(self.shape) * np.dtype(self.product.description.dtype).itemsize
 
-    def head(self, meta: dict[str, Any], extra: dict[str, Any], *, encode_s: float) -> bytes:
+    def head(self, meta: dict[str, Any], extra: dict[str, Any]) -> bytes:
         """Return what is sent before the data."""
         dtype = self.product.description.dtype
         if self.encoding is NPY:
@@ -77,7 +77,6 @@ class Banded:
             unit=described.unit,
             axes=described.axes,
             meta=meta,
-            encode_s=encode_s,
             extra=extra,
         )
         return array_head(document, dtype, self.shape, self.data_bytes)

@@ -10,8 +10,9 @@ import math
 import time
 from collections import OrderedDict
 from collections.abc import AsyncIterator, Callable, Coroutine, Hashable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
+from types import SimpleNamespace
 from typing import Any, Final, TypeVar, cast
 
 import numpy as np
@@ -225,29 +226,24 @@ class Frame:
         return data
 
     async def bands(self, planned: Banded) -> AsyncIterator[bytes]:
-        """Compute a product band by band, each once the one before was taken; the head first.
+        """Return the bytes of a product: its head, then each band once the one before was taken.
+
+        They keep what they are computed from, and not the frame: a client may take long.
 
         Raises
         ------
         Problem
-            As `product`.
+            As `product`; later, while the bands are computed, ``product-failed``.
         """
         product, view = planned.product, planned.view
         self._require_size(product, view, MAX_ANSWER_BYTES)
-        given = await self._input(product)
-        sent = False
-        for band in planned.bands:
-            with self._failure_of(product.name):
-                array, elapsed_s = await self._workers.run_long(
-                    product.compute, self.recipe, given, band.view
-                )
-            if not sent:
-                sent = True
-                meta = self.meta() | view.crop.to_meta(*self.shape)
-                extra = product.with_fields(self.recipe, self.raw, view)
-                yield planned.head(meta, extra, encode_s=elapsed_s)
-            yield band.of(array, product.description.dtype)
-        self._workers.note_success(product.name)
+        with self._failure_of(product.name):
+            found = await self._input(product)
+        given = SimpleNamespace(**{name: getattr(found, name) for name in product.reads})
+        meta = self.meta() | view.crop.to_meta(*self.shape)
+        head = planned.head(meta, product.with_fields(self.recipe, self.raw, view))
+        failure_of = partial(_failure_of, self._workers, self.number)
+        return _banded(planned, head, self.recipe, given, self._workers, failure_of)
 
     async def _compute_product(self, product: Product, view: View) -> _Array:
         self._require_size(product, view, min(MAX_WHOLE_BYTES, MAX_ANSWER_BYTES))
@@ -315,30 +311,8 @@ class Frame:
         while len(self._crops) > _REMEMBERED_CROPS:
             self._crops.popitem(last=False)
 
-    @contextmanager
-    def _failure_of(self, name: str) -> Iterator[None]:
-        """Turn what goes wrong with a product into that product's problem alone."""
-        try:
-            yield
-        except Problem:
-            raise
-        except tm.ParameterError as error:
-            # started with another estimator than its sequence allows, or of a recording's sequence
-            raise Problem(
-                kinds.ESTIMATOR_MISFIT,
-                f"There is no {name} of frame {self.number}: {error}.",
-                field=error.field,
-                value=error.value,
-                limit=error.limit,
-            ) from error
-        except Exception as error:
-            self._workers.note_failure(name, self.number)
-            raise Problem(
-                kinds.PRODUCT_FAILED,
-                f"Computing {name} of frame {self.number} failed.",
-                product=name,
-                frame=self.number,
-            ) from error
+    def _failure_of(self, name: str) -> AbstractContextManager[None]:
+        return _failure_of(self._workers, self.number, name)
 
     def _require_size(self, product: Product, view: View, most_bytes: int) -> None:
         if not product.over_time:
@@ -355,6 +329,51 @@ class Frame:
                 value=times,
                 limit=f"at most {limit}",
             )
+
+
+async def _banded(
+    planned: Banded,
+    head: bytes,
+    recipe: Recipe,
+    given: SimpleNamespace,
+    workers: Workers,
+    failure_of: Callable[[str], AbstractContextManager[None]],
+) -> AsyncIterator[bytes]:
+    product = planned.product
+    yield head
+    for band in planned.bands:
+        with failure_of(product.name):
+            array, _ = await workers.run_long(product.compute, recipe, given, band.view)
+            data = band.of(array, product.description.dtype)
+            del array
+        yield data
+    workers.note_success(product.name)
+
+
+@contextmanager
+def _failure_of(workers: Workers, number: int, name: str) -> Iterator[None]:
+    """Turn what goes wrong with a product into that product's problem alone."""
+    try:
+        yield
+    except Problem:
+        raise
+    except tm.ParameterError as error:
+        # started with another estimator than its sequence allows, or of a recording's sequence
+        raise Problem(
+            kinds.ESTIMATOR_MISFIT,
+            f"There is no {name} of frame {number}: {error}.",
+            field=error.field,
+            value=error.value,
+            limit=error.limit,
+        ) from error
+    except Exception as error:
+        workers.note_failure(name, number)
+        raise Problem(
+            kinds.PRODUCT_FAILED,
+            f"Computing {name} of frame {number} failed.",
+            product=name,
+            frame=number,
+        ) from error
 
 
 def _size(value: object) -> int:

@@ -55,6 +55,9 @@ class Product:
         Whether it is evaluated at times of flight that the request names.
     of_row
         Whether it is one row of the picture, which the request may name.
+    reads
+        Attributes of its input that a product over time is computed from; it may be computed for
+        long, and the rest of the frame need not stay for that.
     of_noise
         Whether it is predicted from the noise of the sensor, which must be known.
     steps
@@ -72,6 +75,7 @@ class Product:
     over_time: bool = False
     of_row: bool = False
     of_noise: bool = False
+    reads: tuple[str, ...] = ()
     steps: Steps | None = None
     fields: Callable[[Recipe, RawFrame, View], dict[str, Any]] = _no_fields
     archive: Callable[[Recipe, RawFrame, View], dict[str, Any]] = _no_fields
@@ -234,6 +238,7 @@ def _intrinsics(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
     return {"intrinsics": asdict(recipe.lens(height, width))}
 
 
+_POLYNOMIAL: Final = ("coefficients",)
 _MILLIMETRES: Final = Steps(1e3, "mm")
 _WIRE: Final = wire.PRODUCTS
 
@@ -250,19 +255,36 @@ PRODUCTS: Final[dict[str, Product]] = {
         Product(_WIRE["coefficients"], "coefficients", _coefficient_planes),
         Product(_WIRE["moments"], "moments", _property("moments")),
         Product(_WIRE["raw"], "raw", _images, fields=_labels, archive=_evaluation),
-        Product(_WIRE["transient"], "coefficients", _transient, over_time=True),
-        Product(_WIRE["density_std"], "moments", _density_std, over_time=True, of_noise=True),
-        Product(_WIRE["cumulative"], "coefficients", _cumulative, over_time=True),
+        Product(_WIRE["transient"], "coefficients", _transient, over_time=True, reads=_POLYNOMIAL),
+        Product(
+            _WIRE["density_std"],
+            "moments",
+            _density_std,
+            over_time=True,
+            of_noise=True,
+            reads=("smoothed",),
+        ),
+        Product(
+            _WIRE["cumulative"], "coefficients", _cumulative, over_time=True, reads=_POLYNOMIAL
+        ),
         Product(
             _WIRE["streak"],
             "coefficients",
             _streak,
             over_time=True,
+            reads=_POLYNOMIAL,
             of_row=True,
             steps=Steps(1e-7, "1e7 DN/s"),
             fields=_row,
         ),
-        Product(_WIRE["bounds"], "moments", _bounds, over_time=True, fields=_radius),
+        Product(
+            _WIRE["bounds"],
+            "moments",
+            _bounds,
+            over_time=True,
+            reads=("moments",),
+            fields=_radius,
+        ),
         Product(_WIRE["returns"], "returns", _return_planes),
         Product(_WIRE["pointcloud"], "returns", _pointcloud, fields=_intrinsics),
         Product(_WIRE["truth"], "truth", _true_range, steps=_MILLIMETRES),

@@ -22,7 +22,7 @@ MIB = 1024 * 1024
 @pytest.fixture(scope="module")
 def stopped() -> Iterator[Served]:
     """A daemon that has a frame and captures no more, so that all requests are about one frame."""
-    limits = {"answers_bytes": 3 * MIB, "answers_bytes_per_address": 3 * MIB}
+    limits = {"answers_bytes": 5 * MIB, "answers_bytes_per_address": 5 * MIB}
     with serving("sim:mirrors?noise=off", limits=limits) as daemon:
         daemon.start_all_workers()
         with httpx.Client(base_url=daemon.url, timeout=60.0) as client:
@@ -104,7 +104,7 @@ def test_all_clients_together_have_a_budget_and_each_one_of_its_own() -> None:
             stack.enter_context(answers.reserved("a", 1))
         stack.enter_context(answers.reserved("b", 4 * MIB))
         with pytest.raises(Problem) as of_all:
-            stack.enter_context(answers.reserved("c", 3 * MIB))
+            stack.enter_context(answers.reserved("c", 5 * MIB))
         assert answers.total_bytes == 8 * MIB
 
     assert (of_one.value.extensions["limit"], of_all.value.extensions["limit"]) == (

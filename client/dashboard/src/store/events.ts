@@ -54,6 +54,10 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
       return { words: notice.reason ? `The camera was lost: ${notice.reason}` : "The camera was lost.", tone: "bad" };
     case "camera-back":
       return { words: "The camera is back.", tone: "good" };
+    case "light-held":
+      return { words: `The light was switched off${notice.reason ? `: ${notice.reason}` : ""}.`, tone: "bad" };
+    case "light-released":
+      return { words: "The light is on again.", tone: "good" };
     case "sequence-changed": {
       const { harmonics, exposure_s, images, base_frequency_hz } = notice.sequence;
       const figures = `${engineering(base_frequency_hz, "Hz")}, m = ${harmonics}, ${engineering(exposure_s, "s")}, ${images} images`;

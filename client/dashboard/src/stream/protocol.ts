@@ -65,7 +65,7 @@ export interface SequenceDocument {
 }
 
 /** What the camera is doing, in the service's words. */
-export type CameraState = "starting" | "streaming" | "stopped" | "calibrating" | "lost";
+export type CameraState = "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
 
 /** What `GET /api/v1/camera` answers. */
 export interface CameraDocument {
@@ -179,6 +179,8 @@ export type Notice =
   | { readonly type: "notice"; readonly kind: "lost-images"; readonly count: number }
   | { readonly type: "notice"; readonly kind: "camera-lost"; readonly reason?: string }
   | { readonly type: "notice"; readonly kind: "camera-back" }
+  | { readonly type: "notice"; readonly kind: "light-held"; readonly reason?: string }
+  | { readonly type: "notice"; readonly kind: "light-released" }
   | { readonly type: "notice"; readonly kind: "sequence-changed"; readonly sequence: AppliedSequence }
   | {
       readonly type: "notice";

@@ -15,12 +15,14 @@ PART_BYTES: Final = 256 * 1024
 """Handed to the connection at once: the next part follows when it has taken this one."""
 FREE_BYTES: Final = 64 * 1024
 """Answers in parts of no more than this are not counted."""
+_KEPT_PARTS: Final = 4
 
 
 class AnswerBudget:
     """Counts bytes of answers from when they are computed until their connections take them.
 
-    An answer in parts counts as two of them: one is on its way, one is being computed.
+    An answer in parts counts as several of them: one is on its way, one is being computed, and what
+    it is computed from is kept.
     """
 
     def __init__(self, limits: LimitSettings) -> None:
@@ -111,7 +113,8 @@ class _Answer:
         body, more = message.get("body", b""), message.get("more_body", False)
         if self._start is not None:
             start, self._start = self._start, None
-            self._reserve(len(body) * (2 if more else 1))
+            if len(body) > FREE_BYTES:
+                self._reserve(len(body) * (_KEPT_PARTS if more else 1))
             await self._send(start)
         await self._send_parts(message, body)
 
@@ -122,8 +125,6 @@ class _Answer:
             self._reserved = None
 
     def _reserve(self, size_bytes: int) -> None:
-        if size_bytes <= FREE_BYTES:
-            return
         reserved = self._budget.reserved(self._client, size_bytes)
         try:
             reserved.__enter__()
