@@ -47,6 +47,7 @@ ROW_AXIS: Final = "frame"
 _AXES: Final = ("frame", "image", "y", "x")
 _LABELS: Final = {each.name: each.type for each in fields(ImageLabel)}
 _LABEL_DTYPES: Final[dict[object, str]] = {int: "<i4", float: "<f8", bool: "|u1"}
+_LAST_S: Final = datetime(9999, 12, 31, tzinfo=UTC).timestamp()
 _CAPABILITIES: Final = TypeAdapter(Capabilities)
 
 
@@ -93,6 +94,11 @@ class Header:
     )
 
 
+def utc(unix_s: float) -> datetime:
+    """Return a Unix time as a date, the last or first one that there is if it lies beyond."""
+    return datetime.fromtimestamp(min(max(unix_s, 0.0), _LAST_S), UTC)
+
+
 def checksum(images: NDArray[np.uint16]) -> int:
     """Return the CRC-32 of images as they are stored."""
     return isal_zlib.crc32(np.ascontiguousarray(images, dtype="<u2").data.cast("B"))
@@ -112,7 +118,7 @@ def _create(file: swmr.File, header: Header, annotations: Mapping[str, Any]) -> 
             "Conventions": "CF-1.11",
             "title": header.name,
             "recording_id": header.recording_id,
-            "started": datetime.fromtimestamp(header.started_s, UTC).isoformat(),
+            "started": utc(header.started_s).isoformat(),
             "started_s": header.started_s,
             "sequence": json.dumps(header.applied.to_document()),
             "capabilities": json.dumps(asdict(capabilities)),

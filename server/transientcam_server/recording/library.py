@@ -9,7 +9,6 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
@@ -273,7 +272,7 @@ class Library:
     # -- inside --------------------------------------------------------------------------------
 
     def _recorder(self, options: RecordingOptions, started_s: float) -> Recorder:
-        moment = datetime.fromtimestamp(started_s, UTC)
+        moment = layout.utc(started_s)
         recording_id = f"{moment:%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
         name = options.name or f"Recording of {moment:%Y-%m-%d %H:%M:%S} UTC"
         header = self._header(recording_id, name, started_s)

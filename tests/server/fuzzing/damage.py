@@ -28,7 +28,7 @@ def lookup3(data: bytes) -> int:
     """
     a = b = c = (0xDEADBEEF + len(data)) & _MASK
     full = max(0, (len(data) - 1) // 12)
-    words = struct.unpack(f"<{3 * full}I", data[: 12 * full])
+    words: tuple[int, ...] = struct.unpack(f"<{3 * full}I", data[: 12 * full])
     for x, y, z in zip(words[::3], words[1::3], words[2::3], strict=True):
         a, b, c = (a + x) & _MASK, (b + y) & _MASK, (c + z) & _MASK
         a = ((a - c) ^ _rotated(c, 4)) & _MASK
@@ -46,7 +46,7 @@ def lookup3(data: bytes) -> int:
     tail = data[12 * full :]
     if not tail:
         return c
-    x, y, z = struct.unpack("<3I", tail.ljust(12, b"\0"))
+    x, y, z = (_u32(tail.ljust(12, b"\0"), at) for at in (0, 4, 8))
     a, b, c = (a + x) & _MASK, (b + y) & _MASK, (c + z) & _MASK
     c = ((c ^ b) - _rotated(b, 14)) & _MASK
     a = ((a ^ c) - _rotated(c, 11)) & _MASK

@@ -30,7 +30,7 @@ _NUMBERS: Final = (
     1e-320,
     1e308,
 )
-_STRANGE: Final = (None, True, [], {}, [1], {"a": 1}, float("nan"), float("inf"))
+_STRANGE: Final[tuple[Any, ...]] = (None, True, [], {}, [1], {"a": 1}, float("nan"), float("inf"))
 _DOCUMENTS: Final = (
     "sequence",
     "capabilities",

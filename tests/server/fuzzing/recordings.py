@@ -1,7 +1,8 @@
 """Recordings of strangers in a service's directory: listed, described, read, replayed, deleted.
 
-``python -m tests.server.fuzzing.recordings DIRECTORY FIRST LAST`` tries these cases, in a process
-that libhdf5 may crash, and prints a line of JSON before and after each.
+``python -m tests.server.fuzzing.recordings DIRECTORY FIRST LAST EVERY`` tries these cases in
+a process that libhdf5 may crash, and writes a line of JSON before and after each. Every so many
+cases it goes over HTTP, else straight to what answers there.
 """
 
 import asyncio
@@ -20,15 +21,17 @@ from typing import Any, Final
 import h5py
 import httpx
 import numpy as np
+from fastapi import FastAPI
 
 from tests.server.fuzzing.damage import DAMAGES, lookup3
-from tests.server.fuzzing.forgery import FORGERIES
+from tests.server.fuzzing.forgery import BOMB_BYTES, FORGERIES, bomb
 from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, frame, header, record
 from transientcam_driver import DriverError, open_camera
 from transientcam_server.api.app import build_app
+from transientcam_server.api.documents.recording import document
 from transientcam_server.errors.exceptions import RecordingError
-from transientcam_server.recording import RecordingWriter, ReplayCamera, recover
-from transientcam_server.settings import Settings
+from transientcam_server.recording import Library, RecordingWriter, ReplayCamera, recover
+from transientcam_server.settings import CalibrationSettings, RecordingSettings, Settings
 
 FRAMES: Final = 3
 NAME: Final = "case"
@@ -36,6 +39,8 @@ GOOD: Final = "good"
 ADDRESS: Final = f"/api/v1/recordings/{NAME}"
 MEMORY_BYTES: Final = 2 * 1024**3
 """May be taken beyond what there is before the first case, by the kernel's own limit."""
+BEYOND_BYTES: Final = 64 * 1024**2
+"""More than any case has to take: the largest chunk of a series and a frame."""
 READS: Final = (
     "frames",
     "frames/1",
@@ -64,6 +69,11 @@ class Outcome:
     state: str
     wrong: list[str]
     grown_bytes: int
+
+
+def in_memory() -> str | None:
+    """Return a directory whose files are in memory, where the system has one."""
+    return "/dev/shm" if Path("/dev/shm").is_dir() else None
 
 
 def seeds(directory: Path) -> list[Path]:
@@ -121,15 +131,20 @@ class Subject:
         shutil.copyfile(self._seeds[0], self.kept / f"{GOOD}.h5")
         shutil.copyfile(self._seeds[0], self.kept / "other.h5")
         self._camera = open_camera("sim:wall?noise=off")
-        usual = {"recordings": {"directory": self.kept}, "calibrations": {"directory": directory}}
-        self._app = build_app(self._camera, Settings(camera="sim:wall?noise=off", **usual))
+        settings = Settings(
+            camera="sim:wall?noise=off",
+            recordings=RecordingSettings(directory=self.kept),
+            calibrations=CalibrationSettings(directory=directory),
+        )
+        self._app: FastAPI = build_app(self._camera, settings)
+        self._library: Library = self._app.state.service.recordings
 
     def close(self) -> None:
         """Close the camera, and end the workers."""
         self._app.state.service._executor.shutdown()
         self._camera.close()
 
-    async def attempt(self, number: int) -> Outcome:
+    async def attempt(self, number: int, *, over_http: bool) -> Outcome:
         """Make a case and do with it all that a client can."""
         draw = random.Random(number)
         kind = KINDS[number % len(KINDS)]
@@ -138,43 +153,60 @@ class Subject:
         forge(seed, target, kind, draw)
         wrong: list[str] = []
         before_bytes = _reset_peak()
-        async with httpx.AsyncClient(
-            transport=httpx.ASGITransport(self._app, raise_app_exceptions=False),
-            base_url="http://127.0.0.1:8000",
-        ) as client:
-            state = await self._read(client, wrong)
+        state = await self._read_over_http(wrong) if over_http else self._read(wrong)
+        if state != "damaged" or draw.random() < 0.25:  # of these each takes the same way out
             wrong += _replayed(target)
-            if target.name.endswith(".part") and draw.random() < 0.5:
-                with _only(wrong, "recover", RecordingError, OSError):
-                    recover(target)
-            await self._deleted(client, wrong)
+        if target.name.endswith(".part") and draw.random() < 0.5:
+            with _only(wrong, "recover", RecordingError, OSError):
+                recover(target)
+        await self._delete(wrong, over_http=over_http)
         grown = _peak_bytes() - before_bytes
-        if grown > MEMORY_BYTES // 2:
-            wrong.append(f"took {grown} bytes")
         for left in self.kept.glob(f"{NAME}*"):
             wrong.append(f"{left.name} is left")
             left.unlink()
         return Outcome(kind, state, wrong, grown)
 
-    async def _read(self, client: httpx.AsyncClient, wrong: list[str]) -> str:
-        state = "not listed"
-        listed = await client.get("/api/v1/recordings")
-        _expect(listed, {200}, wrong)
-        if listed.status_code == 200:
-            states = {each["id"]: each["state"] for each in listed.json()["recordings"]}
-            state = states.get(NAME, state)
-            if states.get(GOOD) != "complete":
-                wrong.append(f"the good one is {states.get(GOOD)}")
-        if state == "not listed":
-            wrong.append(state)
-        _expect(await client.get(ADDRESS), {200}, wrong)
-        for path in READS:
-            _expect(await client.get(f"{ADDRESS}/{path}"), {200, 404, 409}, wrong)
-        return state
+    async def _read_over_http(self, wrong: list[str]) -> str:
+        async with self._client() as client:
+            listed = await client.get("/api/v1/recordings")
+            _expect(listed, {200}, wrong)
+            found = listed.json()["recordings"] if listed.status_code == 200 else []
+            _expect(await client.get(ADDRESS), {200}, wrong)
+            for path in READS:
+                _expect(await client.get(f"{ADDRESS}/{path}"), {200, 404, 409}, wrong)
+        return _state(found, wrong)
 
-    async def _deleted(self, client: httpx.AsyncClient, wrong: list[str]) -> None:
-        _expect(await client.delete(ADDRESS), {200}, wrong)
-        _expect(await client.get(ADDRESS), {404}, wrong)
+    def _read(self, wrong: list[str]) -> str:
+        found: list[Any] = []
+        with _only(wrong, "list"):
+            found = [document(each) for each in self._library.describe_all()]
+            for each in found:
+                _require_json(each.model_dump_json())
+        with _only(wrong, "describe"):
+            document(self._library.describe(NAME))
+        return _state([{"id": each.id, "state": each.state} for each in found], wrong)
+
+    async def _delete(self, wrong: list[str], *, over_http: bool) -> None:
+        if not over_http:
+            with _only(wrong, "delete"):
+                self._library.delete(NAME)
+            return
+        async with self._client() as client:
+            _expect(await client.delete(ADDRESS), {200}, wrong)
+            _expect(await client.get(ADDRESS), {404}, wrong)
+
+    def _client(self) -> httpx.AsyncClient:
+        transport = httpx.ASGITransport(self._app, raise_app_exceptions=False)
+        return httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1:8000")
+
+
+def _state(found: list[dict[str, Any]], wrong: list[str]) -> str:
+    states = {each["id"]: str(each["state"]) for each in found}
+    if states.get(GOOD) != "complete":
+        wrong.append(f"the good one is {states.get(GOOD)}")
+    if NAME not in states:
+        wrong.append("it is not listed")
+    return states.get(NAME, "not listed")
 
 
 def _expect(answer: httpx.Response, wanted: set[int], wrong: list[str]) -> None:
@@ -182,10 +214,12 @@ def _expect(answer: httpx.Response, wanted: set[int], wrong: list[str]) -> None:
         wrong.append(f"{answer.request.method} {answer.request.url.path}: {answer.status_code}")
         return
     if "json" in answer.headers["Content-Type"]:
-        try:
-            json.loads(answer.content, parse_constant=_no_json)
-        except ValueError as error:
-            wrong.append(f"{answer.request.url.path}: {error}")
+        with _only(wrong, str(answer.request.url.path)):
+            _require_json(answer.content)
+
+
+def _require_json(text: str | bytes) -> None:
+    json.loads(text, parse_constant=_no_json)
 
 
 def _no_json(constant: str) -> None:
@@ -235,20 +269,23 @@ def _peak_bytes() -> int:
     return _status_bytes("VmHWM:")
 
 
-async def _attempt_all(subject: Subject, first: int, last: int) -> None:
+async def _attempt_all(subject: Subject, first: int, last: int, every: int) -> None:
     for number in range(first, last):
         os.write(1, b'{"begin": %d}\n' % number)
-        outcome: dict[str, Any] = vars(await subject.attempt(number)) | {"number": number}
-        os.write(1, json.dumps(outcome).encode() + b"\n")
+        outcome = await subject.attempt(number, over_http=number % every == 0)
+        os.write(1, json.dumps(vars(outcome) | {"number": number}).encode() + b"\n")
 
 
 def main() -> None:
     """Try cases with a limit on the memory of this process."""
-    subject = Subject(Path(sys.argv[1]))
-    asyncio.run(subject.attempt(0))  # what is imported and started once is no one case's
+    directory, *numbers = sys.argv[1:]
+    first, last, every = map(int, numbers)
+    subject = Subject(Path(directory))
+    bomb(BOMB_BYTES)
+    asyncio.run(subject.attempt(0, over_http=True))  # what is loaded once is no one case's
     limit = _status_bytes("VmSize:") + MEMORY_BYTES
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    asyncio.run(_attempt_all(subject, int(sys.argv[2]), int(sys.argv[3])))
+    asyncio.run(_attempt_all(subject, first, last, every))
     subject.close()
 
 

@@ -152,3 +152,17 @@ def test_a_directory_that_was_removed_while_recording_is_said(tmp_path: Path) ->
     library.delete(running)
     assert library.describe_all() == []
     library.close()
+
+
+def test_a_clock_beyond_the_year_9999_can_be_recorded_by(tmp_path: Path) -> None:
+    library = Library(
+        RecordingSettings(directory=tmp_path, min_free_bytes=0),
+        header=new_header,
+        unix_s=lambda: 3e11,
+    )
+
+    running = library.start(RecordingOptions())
+    library.close()
+
+    assert running["started_s"] == 3e11
+    assert library.describe(running["id"])["state"] == "complete"
