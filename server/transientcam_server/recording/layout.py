@@ -115,6 +115,7 @@ def _create(file: swmr.File, header: Header, annotations: Mapping[str, Any]) -> 
         {
             "format": FORMAT,
             "format_version": FORMAT_VERSION,
+            "seals": 1,  # see `transientcam_server.recording.seal`
             "Conventions": "CF-1.11",
             "title": header.name,
             "recording_id": header.recording_id,
@@ -194,8 +195,8 @@ def row(raw: RawFrame, *, dropped_frames: int) -> dict[str, object]:
     }
 
 
-def read_header(storage: Storage) -> Header:
-    """Return what `image` holds.
+def read_header(storage: Storage, *, with_images: bool = True) -> Header:
+    """Return what `image` holds; ``with_images`` is false where those cannot be read.
 
     Raises
     ------
@@ -213,10 +214,10 @@ def read_header(storage: Storage) -> Header:
         Sequence.from_document(document), epoch=int(document["sequence_id"])
     )
     _finite("sequence", *(v for v in applied.to_document().values() if isinstance(v, float)))
-    shape = storage.dataset("raw", axes=4, dtype="<u2").shape[1:]
-    stated = applied.images, capabilities.height, capabilities.width
-    if shape != stated or not all(shape):
-        raise ValueError(f"its images have shape {shape}, not {stated}")
+    shape = applied.images, capabilities.height, capabilities.width
+    found = storage.dataset("raw", axes=4, dtype="<u2").shape[1:] if with_images else shape
+    if found != shape or min(shape) < 1:
+        raise ValueError(f"its images have shape {found}, not {shape}")
     if np.prod(shape, dtype=float) * np.dtype("<u2").itemsize > MAX_CHUNK_BYTES:
         raise ValueError(f"its frames have more than {MAX_CHUNK_BYTES} bytes")
     planes, bad = _calibration(storage, (applied.sequence.harmonics + 1, *shape[1:]))

@@ -9,7 +9,8 @@ from typing import Final
 from transientcam_server.errors.exceptions import DamagedFrame, NotARecording, RecordingInUse
 from transientcam_server.recording import layout, lock, swmr
 from transientcam_server.recording.reader import Recording
-from transientcam_server.recording.salvage import salvage
+from transientcam_server.recording.salvage import rebuild, salvage
+from transientcam_server.recording.seal import sealed_frames
 
 _log = logging.getLogger(__name__)
 SCRATCH_SUFFIX: Final = ".recovering"
@@ -78,11 +79,11 @@ def _copied(part: Path) -> Path:
     """Copy what is whole of an unfinished recording; the copy is on the disk."""
     copy = part.with_name(part.name.removesuffix(".part") + SCRATCH_SUFFIX)
     try:
-        with Recording(part) as recording:
-            frames = _whole_frames(recording)
         _require_room(part)
-        with swmr.open_unfinished(part) as source:
-            salvage(source, copy, frames, row_axis=layout.ROW_AXIS)
+        sealed = sealed_frames(part)
+        frames = len(sealed) if sealed else _salvaged(part, copy)
+        if sealed:
+            rebuild(part, copy, sealed)
         with Recording(copy) as made:
             if made.frames != frames:
                 raise NotARecording(str(part), "its copy lacks frames")
@@ -92,6 +93,19 @@ def _copied(part: Path) -> Path:
             raise
         raise NotARecording(str(part), str(error)) from error  # h5py's, of a damaged one
     return copy
+
+
+def _salvaged(part: Path, copy: Path) -> int:
+    """Copy a recording that has no frame yet, or is of a version without seals."""
+    try:
+        with Recording(part) as recording:
+            frames = _whole_frames(recording)
+    except NotARecording:  # torn before its first frame was on the disk
+        rebuild(part, copy, [])
+        return 0
+    with swmr.open_unfinished(part) as source:
+        salvage(source, copy, frames, row_axis=layout.ROW_AXIS)
+    return frames
 
 
 def _whole_frames(recording: Recording) -> int:

@@ -1,9 +1,14 @@
-"""Copies what is consistent of an unfinished file into a new one that any HDF5 reader opens."""
+"""Makes of an unfinished file a new one that any HDF5 reader opens, with all that is whole."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from transientcam_server.recording import swmr
+import numpy as np
+
+from transientcam_server.errors.exceptions import NotARecording
+from transientcam_server.recording import layout, swmr
+from transientcam_server.recording.seal import SealedFrame, seal
 from transientcam_server.recording.storage import Storage, is_one_chunk_a_row
 
 _SCALE_ATTRIBUTES: Final = frozenset(
@@ -44,6 +49,38 @@ def salvage(source: swmr.File, target: Path, rows: int, *, row_axis: str) -> Non
                 _copy_blocks(dataset, copy, rows)
             _copy_attributes(dataset, copy[name])
         _restore_scales(datasets, copy)
+    swmr.synchronise(target)
+
+
+def rebuild(part: Path, target: Path, frames: Sequence[SealedFrame]) -> None:
+    """Make a recording anew of frames found in an unfinished one, and bring it to the disk.
+
+    Raises
+    ------
+    NotARecording
+        If what was known before the first frame cannot be read, or its frames have no seals.
+    OSError
+        If it cannot be written.
+    """
+    try:
+        with swmr.open_unfinished(part) as source:
+            storage = Storage(source, part.stat().st_size)
+            storage.attribute("seals")
+            header = layout.read_header(storage, with_images=False)
+            annotations = layout.read_document(storage, "annotations")
+    except Exception as error:  # h5py raises anything of a damaged file
+        raise NotARecording(str(part), str(error)) from error
+    target.write_bytes(layout.image(header, annotations))
+    with swmr.open_file(target, "r+", libver=swmr.LIBVER) as file, part.open("rb") as stream:
+        raw = file["raw"]
+        raw.resize(len(frames), 0)
+        for row, frame in enumerate(frames):
+            stream.seek(frame.offset)
+            chunk = stream.read(frame.size)
+            raw.id.write_direct_chunk((row, 0, 0, 0), chunk + seal(row, chunk, frame.values))
+        for name, (kind, _) in layout.SERIES.items():
+            file[name].resize(len(frames), 0)
+            file[name][:] = np.array([frame.values[name] for frame in frames], kind)
     swmr.synchronise(target)
 
 

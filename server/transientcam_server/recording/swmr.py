@@ -26,6 +26,7 @@ File: TypeAlias = Any
 """An open h5py.File."""
 Dataset: TypeAlias = Any
 """An h5py.Dataset."""
+Seal: TypeAlias = Callable[[int, bytes, Mapping[str, object]], bytes]
 open_file: Final[Callable[..., Any]] = h5py.File
 """Opens a file; h5py has no types, so that files and datasets are `Any`."""
 
@@ -151,9 +152,20 @@ class Appender:
     blocks, series
         Names of the datasets that grow by one each row; ``series`` in the order of writing, the
         one whose length counts the rows last.
+    seal
+        Returns, for a row, a chunk of it and its values of the series, what is written behind the
+        chunk.
     """
 
-    def __init__(self, file: File, blocks: Sequence[str], series: Sequence[str]) -> None:
+    def __init__(
+        self,
+        file: File,
+        blocks: Sequence[str],
+        series: Sequence[str],
+        *,
+        seal: Seal = lambda row, chunk, values: b"",
+    ) -> None:
+        self._seal = seal
         self._file = file
         self._blocks = {name: file[name] for name in blocks}
         self._series = {name: file[name] for name in series}
@@ -176,7 +188,9 @@ class Appender:
         for name, dataset in self._blocks.items():
             block = np.ascontiguousarray(blocks[name], dtype=dataset.dtype)
             dataset.resize(row + 1, 0)
-            dataset.id.write_direct_chunk((row, *(0,) * block.ndim), compressed(block))
+            chunk = compressed(block)
+            sealed = chunk + self._seal(row, chunk, series)
+            dataset.id.write_direct_chunk((row, *(0,) * block.ndim), sealed)
             dataset.flush()
         for name, dataset in self._series.items():
             dataset.resize(row + 1, 0)

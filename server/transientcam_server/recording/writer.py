@@ -8,6 +8,7 @@ from typing import Any
 from transientcam_driver import RawFrame
 from transientcam_server.recording import layout, lock, swmr
 from transientcam_server.recording.layout import Header
+from transientcam_server.recording.seal import seal
 
 
 class RecordingWriter:
@@ -36,7 +37,8 @@ class RecordingWriter:
         try:
             _write(self._lock.descriptor, empty)
             swmr.synchronise(path.parent)
-            self._rows = swmr.Appender(swmr.open_to_append(self.part), ["raw"], list(layout.SERIES))
+            file = swmr.open_to_append(self.part)
+            self._rows = swmr.Appender(file, ["raw"], list(layout.SERIES), seal=seal)
         except BaseException:
             self.part.unlink(missing_ok=True)
             self._lock.close()
