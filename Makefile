@@ -22,7 +22,7 @@ serve: .venv/serve.stamp dashboard  ## Run the daemon and its dashboard (PORT=80
 
 test: check debian-packages dashboard  ## Run every check and every test
 	npm --prefix client/dashboard test
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 check: .venv/test.stamp client/dashboard/node_modules/.package-lock.json  ## Lint, types, import laws
 	$(BIN)/ruff format --check .
@@ -47,6 +47,7 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 	$(BIN)/python -m benchmarks.estimators --write
 	$(BIN)/python -m benchmarks.simulation --write
 	$(BIN)/python -m benchmarks.recording --write
+	$(BIN)/python -m benchmarks.by_hand --write
 	$(BIN)/python -m benchmarks.first_light --write
 	$(BIN)/python -m benchmarks.stream_load --write
 	$(BIN)/python -m benchmarks.robustness --write

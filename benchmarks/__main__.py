@@ -24,7 +24,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "benchmarks.md"
 
 
 def main() -> None:
-    """Measure the topics asked for, print tables, and write docs/benchmarks.md if told to."""
+    """Measure the topics asked for, print tables, and write docs/benchmarks.md where requested."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("topics", nargs="*", metavar="TOPIC", help=f"of {', '.join(TOPICS)}")
     parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name} anew")

@@ -50,6 +50,7 @@ def range_errors(
         images, truth_m, gain = _captured(camera, harmonics)
         settings = tm.Settings(
             base_frequency_hz=BASE_FREQUENCY_HZ,
+            zeroth=Sequence().zeroth,
             takes=TAKES,
             estimator=estimator,
             smoothing_sigma_px=smoothing_sigma_px,

@@ -45,6 +45,12 @@ class Process:
         fields = stat.rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) * CLOCK_TICKS_S
 
+    def loop_cpu_s(self) -> float:
+        """Return the processor time of its first thread, which runs the event loop, in s."""
+        pid = self._process.pid
+        stat = Path(f"/proc/{pid}/task/{pid}/schedstat").read_text(encoding="utf-8")
+        return int(stat.split()[0]) * 1e-9
+
     def resident_bytes(self) -> int:
         """Return the memory it occupies."""
         status = Path(f"/proc/{self._process.pid}/status").read_text(encoding="utf-8")
@@ -64,6 +70,17 @@ class Process:
         """End it wherever it is, with SIGKILL."""
         self._process.kill()
         self._process.communicate()
+
+    def end_within(self, limit_s: float) -> float | None:
+        """Ask it to end; return how long that took, or None and kill it where it takes longer."""
+        begin_s = time.perf_counter()
+        self._process.send_signal(signal.SIGTERM)
+        try:
+            self._process.communicate(timeout=limit_s)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            return None
+        return time.perf_counter() - begin_s
 
     def end(self) -> None:
         """Ask it to end, and wait until it has."""

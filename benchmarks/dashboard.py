@@ -70,7 +70,7 @@ def _processor_s(pids: set[int]) -> float:
 
 
 def _heap_mb(page: Page) -> float:
-    """Return the memory of the page's scripts after collecting what nobody holds."""
+    """Return the memory of the page's scripts after a garbage collection."""
     session = page.context.new_cdp_session(page)
     session.send("HeapProfiler.collectGarbage")
     used = session.send("Runtime.getHeapUsage")

@@ -17,6 +17,8 @@ from transientcam_moments.smoothing import gaussian_taps
 
 Array = NDArray[Any]
 CORES = len(os.sched_getaffinity(0))
+BASE_FREQUENCY_HZ = 23e6
+SETTINGS = tm.Settings(BASE_FREQUENCY_HZ, "low-frequency", takes=1)
 PAPER = (120, 163)
 VGA = (480, 640)
 
@@ -42,14 +44,14 @@ def images(m: int, shape: tuple[int, int]) -> Array:
 
 def moments(m: int, shape: tuple[int, int], dtype: type = np.complex64) -> Array:
     """Biased moments (m + 1, H, W) of the same images."""
-    reconstruction = tm.reconstruct(images(m, shape), tm.Settings())
+    reconstruction = tm.reconstruct(images(m, shape), SETTINGS, calibration=np.ones(m + 1))
     return np.asarray(reconstruction.moments, dtype)
 
 
 def reconstructor(m: int) -> tm.Reconstructor:
     """Return a reconstructor with the paper's settings, whose pass has to be compiled."""
     one_pass(m, PAPER)
-    return tm.Reconstructor(tm.Settings())
+    return tm.Reconstructor(SETTINGS, calibration=np.ones(m + 1))
 
 
 def one_pass(m: int, shape: tuple[int, int]) -> OnePass:
@@ -63,10 +65,9 @@ def one_pass(m: int, shape: tuple[int, int]) -> OnePass:
 
 def constants(m: int) -> Constants:
     """Return what such a pass is made with."""
-    settings = tm.Settings()
-    range_per_rad_m = float(tm.range_m(np.float64(1), settings.base_frequency_hz))
-    taps = gaussian_taps(settings.smoothing_sigma_px)
-    return Constants(settings, np.ones(m + 1, np.complex128), taps, range_per_rad_m)
+    range_per_rad_m = float(tm.range_m(np.float64(1), BASE_FREQUENCY_HZ))
+    taps = gaussian_taps(SETTINGS.smoothing_sigma_px)
+    return Constants(SETTINGS, np.ones(m + 1, np.complex128), taps, range_per_rad_m)
 
 
 @contextmanager

@@ -122,7 +122,7 @@ def report(cold: list[Start], warm: list[Start], streamed: Streamed) -> str:
         "Streaming range and coefficients to one client at the paper's video setting",
         "(m = 3, 0.5 ms, 12 images a frame, 163 x 120), simulation included:",
         "",
-        "| for | frames/s | frames missing | drops told | daemon's share of one core "
+        "| for | frames/s | frames missing | drops reported | daemon's share of one core "
         "| last image's arrival to client, median / 99 % |",
         "|---|---|---|---|---|---|",
         f"| {streamed.duration_s:.0f} s | {streamed.rate_hz:.2f} | {streamed.missing} "

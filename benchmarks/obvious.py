@@ -76,6 +76,6 @@ def reconstruct(images: Array, settings: tm.Settings) -> Estimate:
         first = enough.argmax(axis=1)[:, None]
         direct = np.take_along_axis(weight, first, axis=1)[:, 0]
         range_m = tm.range_m(
-            np.take_along_axis(phase, first, axis=1)[:, 0], settings.base_frequency_hz
+            np.take_along_axis(phase, first, axis=1)[:, 0], settings.base_frequency_hz or 0.0
         )
         return Estimate(solved, range_m, direct, weight.sum(axis=1) - direct, smallest / b0)

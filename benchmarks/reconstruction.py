@@ -16,6 +16,7 @@ from benchmarks import obvious
 from benchmarks.data import (
     CORES,
     PAPER,
+    SETTINGS,
     VGA,
     Array,
     images,
@@ -67,7 +68,7 @@ def _ways(raw: Array) -> Iterator[tuple[str, Callable[[], object]]]:
         yield f"lanes, {CORES} cores", lambda: _read(made(raw, spread=spread))
     with numpy_alone():
         yield "planar NumPy", lambda: _read(made(raw))
-    yield "batched LAPACK (solve, eigh, eigvals)", partial(obvious.reconstruct, raw, tm.Settings())
+    yield "batched LAPACK (solve, eigh, eigvals)", partial(obvious.reconstruct, raw, SETTINGS)
 
 
 def _read(found: tm.Reconstruction) -> tuple[object, ...]:

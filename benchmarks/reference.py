@@ -80,9 +80,9 @@ def _usage(parameter: Any) -> str:
 
 def _row(parameter: Any) -> str:
     help_, default = _one_line(parameter.help or ""), ""
-    told = _DEFAULT_IN_HELP.search(help_)
-    if told:
-        default, help_ = told.group(1), _DEFAULT_IN_HELP.sub("", help_)
+    stated = _DEFAULT_IN_HELP.search(help_)
+    if stated:
+        default, help_ = stated.group(1), _DEFAULT_IN_HELP.sub("", help_)
     elif parameter.required:
         default = "required"
     elif parameter.default not in (None, False, (), ""):

@@ -184,7 +184,7 @@ def report(
             f"{_growth(unplugs.memory_bytes) / 2**20:+.1f} MiB of memory, "
             f"{_growth(unplugs.descriptors):+d} descriptors, "
             f"{_growth(unplugs.threads):+d} threads.",
-            "Frames that a viewer neither received nor was told of: "
+            "Frames that a viewer neither received nor had reported as dropped: "
             f"{max(unplugs.missing)} at most. Frames in the recording: {unplugs.recorded}.",
             "",
             "## Ended by SIGTERM",

@@ -213,7 +213,7 @@ def report(result: Soak) -> str:
             f"| frames captured, of those due | {result.frames} of {result.expected:.0f} |",
             f"| frames a viewer missed, median / most | {statistics.median(result.missing):g} "
             f"/ {max(result.missing)} |",
-            f"| of these told as dropped | {sum(result.dropped)} of {sum(result.missing)} |",
+            f"| of these reported as dropped | {sum(result.dropped)} of {sum(result.missing)} |",
             f"| photon to client, p50 / p99 | {latencies[49]:.1f} / {latencies[98]:.1f} ms |",
             f"| recordings, frames in them, frames dropped | {result.recordings}, "
             f"{result.recorded}, {result.recording_dropped} |",

@@ -29,7 +29,7 @@ from matplotlib import pyplot as plt
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 Complex = NDArray[np.complexfloating]
 Worst = dict[str, tuple[float, int]]
-COLOURS = {"float32": "#d55e00", "float64": "#0072b2"}  # told apart by everybody
+COLOURS = {"float32": "#d55e00", "float64": "#0072b2"}  # distinct to colour-blind readers, too
 
 INTRODUCTION = """\
 # Numerical stability

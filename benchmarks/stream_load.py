@@ -54,7 +54,7 @@ def subscribe(start: int | None = None) -> dict[str, Any]:
 
 
 class Endless(History):
-    """A past without end of one and the same frame: whoever resumes takes it as fast as it can."""
+    """An endless history of one frame: a client that resumes reads it as fast as it can."""
 
     @property
     def first(self) -> int | None:
@@ -313,7 +313,8 @@ def _loads(loads: Sequence[Load]) -> list[str]:
         "Stuck ones subscribe and then never read.",
         "",
         "| viewers | of them stuck | for | frames/s, slowest / median | frames missing "
-        "| drops told | latency, 50 / 99 / 100 % | daemon's share of one core | daemon's memory |",
+        "| drops reported | latency, 50 / 99 / 100 % | daemon's share of one core "
+        "| daemon's memory |",
         "|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
         *(_load(load) for load in loads),
         "",

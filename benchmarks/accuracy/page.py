@@ -106,7 +106,7 @@ _KIND = {
     "wall": "One return a pixel.",
     "corner": "Diffuse light comes back close behind the direct return.",
     "mirrors": "Three sharp returns in most pixels.",
-    "visitor": "Somebody moves before a bright wall while the images are taken.",
+    "visitor": "A person moves before a bright wall while the images are taken.",
     "composite": "Three returns of different sharpness, measured with single photons.",
 }
 

@@ -8,6 +8,7 @@ from transientcam.density import density, transient
 from transientcam.discovery import FoundCamera, discover
 from transientcam.errors import (
     FrameTimeout,
+    MissingExtra,
     ParameterError,
     ProblemError,
     ProtocolError,
@@ -17,6 +18,7 @@ from transientcam.errors import (
 )
 from transientcam.frame import Frame
 from transientcam.lease import AsyncLease, Lease
+from transientcam.opening import RecordedFrame, Recording, open  # noqa: A004 - as of gzip
 from transientcam.stream import Stream
 from transientcam.stream_state import Reconnect
 from transientcam.wire import Notice, Subscription
@@ -32,11 +34,14 @@ __all__ = [
     "Frame",
     "FrameTimeout",
     "Lease",
+    "MissingExtra",
     "Notice",
     "ParameterError",
     "ProblemError",
     "ProtocolError",
     "Reconnect",
+    "RecordedFrame",
+    "Recording",
     "ServerUnreachable",
     "Stream",
     "StreamClosed",
@@ -45,5 +50,6 @@ __all__ = [
     "__version__",
     "density",
     "discover",
+    "open",
     "transient",
 ]

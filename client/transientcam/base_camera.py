@@ -184,13 +184,18 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         return self._ask(frames.pixel(which, x=x, y=y, bins=bins))
 
     def simulate(
-        self, scene: str | None = None, *, effects: Mapping[str, str] | None = None
+        self,
+        scene: str | None = None,
+        *,
+        effects: Mapping[str, str] | None = None,
+        diffusor: bool | None = None,
     ) -> _Document:
         """Put a simulated camera before a built-in scene; capturing goes on meanwhile.
 
-        ``effects`` replaces all earlier choices: "auto", "on" or "off" by name.
+        ``effects`` replaces all earlier choices: "auto", "on" or "off" by name. ``diffusor`` puts
+        filter and diffusor before the lens, to measure a calibration, or takes them away.
         """
-        return self._ask(changes.set_simulation(scene, effects))
+        return self._ask(changes.set_simulation(scene, effects, diffusor))
 
     def cause(self, fault: str) -> _Document:
         """Inject a fault into the simulation: unplug, replug, corrupt-image or drop-image."""

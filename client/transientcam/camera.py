@@ -8,8 +8,10 @@ from typing import Any, TypeVar
 import httpx
 
 from transientcam.base_camera import BaseCamera
+from transientcam.errors import TransientcamError
 from transientcam.frame import Frame
 from transientcam.lease import Lease, OnLapse
+from transientcam.notebook import table_html
 from transientcam.requests import Request, document, problem
 from transientcam.requests.changes import set_reconstruction, set_sequence
 from transientcam.requests.jobs import PROGRESS_EVERY_S, WAIT_S, OnProgress, ended
@@ -271,6 +273,13 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
 
     def __repr__(self) -> str:
         return f"<Camera {self.url}>"
+
+    def _repr_html_(self) -> str:
+        """Return the sequence that is captured as a table, for notebooks; it asks the daemon."""
+        try:
+            return table_html(repr(self), self.sequence)
+        except TransientcamError as error:
+            return table_html(repr(self), {"problem": str(error)})
 
     def _ask(self, request: Request[_T]) -> _T:
         with translated(self.url):

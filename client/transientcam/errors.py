@@ -11,6 +11,7 @@
     │   ├── ProtocolError     bytes that are not the protocol of docs/stream.md
     │   └── ParameterError    an argument given here that cannot be used; a ValueError too
     ├── CommandUnavailable    a verb of the command line whose packages are not installed
+    ├── MissingExtra          a function whose packages are not installed
     ├── PromiseBroken         a camera does not do what is documented (transientcam conformance)
     └── CheckSkipped          a promise that cannot be tried on this camera (the same)
 
@@ -159,6 +160,18 @@ class CommandUnavailable(_DataError):  # noqa: N818 - the same
     def __str__(self) -> str:
         remedy = f": pip install 'transientcam[{self.extra}]'" if self.extra else ""
         return f"'transientcam {self.verb}' needs {self.module}, which is not installed{remedy}"
+
+
+@dataclass(eq=False, repr=False)
+class MissingExtra(_DataError):  # noqa: N818 - the same
+    """``what`` needs ``module``, which comes with ``extra``."""
+
+    what: str
+    module: str
+    extra: str
+
+    def __str__(self) -> str:
+        return f"{self.what} needs {self.module}: pip install 'transientcam[{self.extra}]'"
 
 
 @dataclass(eq=False, repr=False)

@@ -4,12 +4,13 @@ import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from transientcam.errors import ParameterError
+from transientcam.notebook import map_html, table_html
 
 
 class PixelCounts(TypedDict):
@@ -23,6 +24,8 @@ class PixelCounts(TypedDict):
     non_finite: int
     degenerate: int
     replaced: int
+    contradictory: NotRequired[int]
+    """More than noise explains; absent from daemons that do not look for it."""
 
 
 class PredictedStd(TypedDict):
@@ -145,6 +148,13 @@ class Frame:
         shape = " x ".join(str(length) for length in self.array.shape)
         return f"<Frame {self.frame} {self.product} [{shape}] {self._values()}>"
 
+    def _repr_html_(self) -> str:
+        """Return an image as a map with its scale, another product as a table, for notebooks."""
+        if self.array.ndim == 2 and self.array.dtype.kind != "c" and self.axes == ("y", "x"):
+            return map_html(self.array, title=f"{self.product}, frame {self.frame}", unit=self.unit)
+        lengths = dict(zip(self.axes, self.array.shape, strict=True))
+        return table_html(repr(self), {"unit": self.unit, **lengths})
+
     def _values(self) -> str:
         if self.array.dtype.kind == "c":
             return f"complex {self.unit}"
@@ -160,8 +170,7 @@ def npz_bytes(frame: Frame) -> bytes:
     """Return a frame and its metadata as an .npz file, which `numpy.load` reads.
 
     It holds ``array``, ``product``, ``unit``, ``axes``, ``meta`` (JSON) and the parts that only
-    some products have: numbers and lists of numbers as arrays (``time_s``), all else as JSON
-    (``labels``).
+    some products have: numbers and arrays as arrays (``time_s``), all else as JSON (``labels``).
     """
     parts: dict[str, Any] = {
         "array": frame.array,
@@ -177,6 +186,8 @@ def npz_bytes(frame: Frame) -> bytes:
 
 
 def _part(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value
     numbers = value if isinstance(value, list) else [value]
     if all(isinstance(each, int | float) for each in numbers):
         return np.asarray(value)

@@ -137,7 +137,18 @@ class Simulation(Protocol):
         """Choices of effects, "auto", "on" or "off", that `change` made in place of the scene's."""
         ...
 
-    def change(self, *, scene: str | None = None, effects: Mapping[str, str] | None = None) -> None:
+    @property
+    def diffusor(self) -> bool:
+        """Whether filter and diffusor are before the lens."""
+        ...
+
+    def change(
+        self,
+        *,
+        scene: str | None = None,
+        effects: Mapping[str, str] | None = None,
+        diffusor: bool | None = None,
+    ) -> None:
         """Put the camera in front of another scene, or choose other effects; images go on.
 
         Returns once the scene is prepared, which may take seconds. The camera stays the same
@@ -152,6 +163,9 @@ class Simulation(Protocol):
         effects
             "auto", "on" or "off" by an effect's name, in place of all earlier choices; by default
             these stay.
+        diffusor
+            Puts filter and diffusor before the lens, so that the light shines at the sensor as in
+            a calibration (Sec. 4.2), or takes them away; by default they stay.
 
         Raises
         ------

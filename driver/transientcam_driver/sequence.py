@@ -18,6 +18,7 @@ PHASE_STEPS_RAD = (0.0, math.pi / 2, math.pi, 3 * math.pi / 2)
 Zeroth = Literal["low-frequency", "on-off", "estimated"]
 Scheme = Literal["arccos", "harmonic-cancellation", "none"]
 TakeOrder = Literal["sequential", "interleaved"]
+Kind = Literal["off", "on", "modulated"]
 
 DERIVED_FIELDS = (
     "images",
@@ -95,6 +96,13 @@ class ImageLabel:
     phase_rad: float
     exposure_s: float
     illumination: bool = True
+
+    @property
+    def kind(self) -> Kind:
+        """What the light does: it is off, on without modulation, or modulated."""
+        if not self.illumination:
+            return "off"
+        return "modulated" if self.frequency_hz > 0 else "on"
 
 
 @dataclass(frozen=True, slots=True)

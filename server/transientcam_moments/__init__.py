@@ -6,7 +6,7 @@ of pixels after them, single or double precision, NumPy, JAX or CuPy. ::
 
     import transientcam_moments as tm
 
-    b = tm.calibrate(tm.measure(images), calibration)
+    b = tm.calibrate(tm.measure(images, zeroth="on-off"), calibration)
     b, biased = tm.bias(tm.smooth(b))
     h = tm.density(tm.levinson(b), phase_rad)
     direct, indirect, phase_rad = tm.separate(tm.pisarenko(b))
@@ -23,9 +23,15 @@ from transientcam_moments.biasing import (
 from transientcam_moments.bounds import bounds, smoothed_density
 from transientcam_moments.calibration import calibrate, calibration_of, nominal_calibration
 from transientcam_moments.cumulative import cumulative
-from transientcam_moments.errors import MomentsError, ParameterError, ShapeError
+from transientcam_moments.errors import (
+    MomentsError,
+    ParameterError,
+    ShapeError,
+    UnlabelledImages,
+)
 from transientcam_moments.flags import INVALID, Flags, flags
 from transientcam_moments.four_bucket import four_bucket, measure, saturated
+from transientcam_moments.labels import Labels
 from transientcam_moments.levinson import (
     Coefficients,
     extend,
@@ -50,6 +56,7 @@ __all__ = [
     "Biased",
     "Coefficients",
     "Flags",
+    "Labels",
     "MomentsError",
     "ParameterError",
     "Peaks",
@@ -59,6 +66,7 @@ __all__ = [
     "Separation",
     "Settings",
     "ShapeError",
+    "UnlabelledImages",
     "average_takes",
     "bias",
     "bounds",

@@ -86,7 +86,8 @@ def nominal_calibration(
     harmonics: int,
     sub_phases_rad: Sequence[float] = (0.0,),
     weights: Sequence[float] | None = None,
-    zeroth: str = "low-frequency",
+    *,
+    zeroth: str,
 ) -> Array:
     """Return the gains that sub-phases alone give an ideal sinusoidal correlation.
 

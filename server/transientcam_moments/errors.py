@@ -2,7 +2,8 @@
 
 MomentsError
 ├── ShapeError (also a ValueError)
-└── ParameterError (also a ValueError)
+├── ParameterError (also a ValueError)
+└── UnlabelledImages (also a ValueError)
 """
 
 from dataclasses import dataclass, fields
@@ -51,3 +52,25 @@ class ParameterError(MomentsError, ValueError):
     def __str__(self) -> str:
         """Name the argument, its value and the limit."""
         return f"{self.field} = {self.value!r} is outside of its limit: {self.limit}"
+
+
+@dataclass(eq=False)
+class UnlabelledImages(MomentsError, ValueError):  # noqa: N818 - says what is wrong
+    """Raw images, or moments, come without what their evaluation needs; nothing is assumed for it.
+
+    ``missing`` names it: labels of the images, settings or gains.
+    """
+
+    missing: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """Name what is missing, and show a call that has everything."""
+        return (
+            f"the data do not say what they show; missing: {', '.join(self.missing)}. "
+            "With the labels of a recording: transientcam_moments.reconstruct(images, "
+            "harmonic=..., phase_rad=..., frequency_hz=..., illumination=..., take=..., "
+            "calibration=gain), each a dataset of the file; without: reconstruct(images, "
+            "Settings(base_frequency_hz=..., zeroth=..., takes=...), "
+            "calibration=nominal_calibration(m, sub_phases_rad, weights, zeroth=...)); "
+            "transientcam.open(file) evaluates a recording by itself"
+        )

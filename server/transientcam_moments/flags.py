@@ -1,4 +1,4 @@
-"""Flags of pixels: biased, dark, saturated, not finite, replaced."""
+"""Flags of pixels: biased, dark, saturated, not finite, replaced, contradictory."""
 
 from enum import IntFlag
 
@@ -13,7 +13,10 @@ class Flags(IntFlag):
 
     VALID = 0
     BIASED = 1
-    """The moments contradicted each other or had too little uniform part and were biased."""
+    """The moments had too little uniform part and were biased (Sec. 4.3).
+
+    Few sharp returns leave none, and noise takes it from others: normal.
+    """
     NO_SIGNAL = 2
     """No light: b_0 is not above the least brightness."""
     SATURATED = 4
@@ -24,6 +27,13 @@ class Flags(IntFlag):
     """The Toeplitz matrix is singular or indefinite, so that the density is not determined."""
     REPLACED = 32
     """A bad pixel, which shows the mean of its neighbours."""
+    CONTRADICTORY = 64
+    """The moments contradict each other by more than noise explains: something is wrong.
+
+    Gains that drifted or are of another camera, light that moved while it was captured, images that
+    lost their synchronisation. Only who knows the noise can set it; never where b_0 is
+    estimated, as that makes any moments agree.
+    """
 
 
 INVALID = Flags.NO_SIGNAL | Flags.NON_FINITE

@@ -54,7 +54,7 @@ def four_bucket(images: Array) -> Array:
 def measure(
     images: Array | Sequence[Array],
     *,
-    zeroth: str = "low-frequency",
+    zeroth: str,
     takes: int = 1,
 ) -> Array:
     """Turn the images of one capture into uncalibrated moments.

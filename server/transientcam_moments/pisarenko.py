@@ -44,6 +44,17 @@ class Returns(NamedTuple):
     uniform: Array
     count: Array
 
+    def __repr__(self) -> str:
+        """State order, pixels and how many returns they have."""
+        count = np.asarray(self.count)
+        pixels = " x ".join(map(str, count.shape)) or "1"
+        numbers, pixels_of = np.unique(count, return_counts=True)
+        shares = (
+            f"{number} in {share:.1%}"
+            for number, share in zip(numbers, pixels_of / max(count.size, 1), strict=True)
+        )
+        return f"<Returns m = {len(self.weight)}, pixels {pixels}; returns: {', '.join(shares)}>"
+
 
 class Separation(NamedTuple):
     """Direct and indirect light of each pixel (Sec. 5.1).

@@ -11,7 +11,7 @@ from transientcam_moments._kernels.one_pass import Planes
 from transientcam_moments.biasing import EPSILON, bias, estimate_zeroth, smallest_eigenvalue
 from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
 from transientcam_moments.cumulative import cumulative
-from transientcam_moments.errors import ParameterError
+from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.flags import INVALID, Flags, flags
 from transientcam_moments.four_bucket import ZEROTH_IMAGES
 from transientcam_moments.levinson import Coefficients, levinson
@@ -45,12 +45,13 @@ class Settings:
 
     Attributes
     ----------
-    base_frequency_hz : float
-        f, of the first harmonic.
-    zeroth : {"low-frequency", "on-off", "estimated"}
-        How b_0 was measured (Sec. 4.3).
-    takes : int
-        Captures in the images, averaged without outliers.
+    base_frequency_hz : float, optional
+        f, of the first harmonic. Ranges and times of flight need it.
+    zeroth : {"low-frequency", "on-off", "estimated"}, optional
+        How b_0 was measured (Sec. 4.3). Raw images need it; moments whose b_0 is 0 since it was
+        not measured are "estimated".
+    takes : int, optional
+        Captures in the images, averaged without outliers. Raw images need it.
     epsilon : float
         Least uniform part relative to b_0 (Sec. 4.3), 0 <= epsilon < 1.
     keep : {"harmonics", "brightness"}
@@ -69,9 +70,9 @@ class Settings:
         Largest value of a raw image; pixels that reach it are saturated.
     """
 
-    base_frequency_hz: float = 23e6
-    zeroth: str = "low-frequency"
-    takes: int = 1
+    base_frequency_hz: float | None = None
+    zeroth: str | None = None
+    takes: int | None = None
     epsilon: float = EPSILON
     keep: str = "harmonics"
     smoothing_sigma_px: float = SIGMA_PX
@@ -82,10 +83,11 @@ class Settings:
 
     def __post_init__(self) -> None:
         """Refuse what no stage could work with (ParameterError)."""
-        if not 0 < self.base_frequency_hz < float("inf"):
+        if self.base_frequency_hz is not None and not 0 < self.base_frequency_hz < float("inf"):
             raise ParameterError("base_frequency_hz", self.base_frequency_hz, "> 0 and finite")
-        chosen("zeroth", self.zeroth, tuple(ZEROTH_IMAGES))
-        if self.takes < 1:
+        if self.zeroth is not None:
+            chosen("zeroth", self.zeroth, tuple(ZEROTH_IMAGES))
+        if self.takes is not None and self.takes < 1:
             raise ParameterError("takes", self.takes, ">= 1")
         in_range("epsilon", self.epsilon, 0.0, float(np.nextafter(1.0, 0.0)), "0 <= epsilon < 1")
         chosen("keep", self.keep, ("harmonics", "brightness"))
@@ -97,6 +99,10 @@ class Settings:
     def least_harmonics(self) -> int:
         """The smallest m that the estimator gives a range of."""
         return TECHNIQUES[self.estimator].least_harmonics
+
+
+_SHOWN = ("smoothed", "flags", "coefficients", "returns", "range_m")
+"""Properties that the short text of a reconstruction names once they are computed."""
 
 
 class Reconstruction:
@@ -205,6 +211,19 @@ class Reconstruction:
             found = found | xp.where(xp.asarray(self._bad), int(Flags.REPLACED), 0)
         return found.astype(xp.uint8)
 
+    def add_flag(self, flag: Flags, where: Array) -> None:
+        """Add a flag to pixels, of which something is known that the moments do not show.
+
+        Parameters
+        ----------
+        flag
+            Such as `Flags.CONTRADICTORY`, which rests on the noise of the sensor.
+        where : boolean array, shape (...)
+        """
+        xp = namespace(self.flags)
+        added = xp.where(xp.asarray(where), int(flag), 0)
+        self.flags = (self.flags | added).astype(xp.uint8)
+
     @property
     def has_range(self) -> Array:
         """Where there is light and all moments are finite."""
@@ -291,19 +310,47 @@ class Reconstruction:
 
     @cached_property
     def range_m(self) -> Array:
-        """Range in m; NaN where there is none."""
-        return range_m(self.phase_rad, self.settings.base_frequency_hz)
+        """Range in m; NaN where there is none.
+
+        Raises UnlabelledImages where the settings have no base frequency.
+        """
+        return range_m(self.phase_rad, self._base_frequency_hz)
 
     def density(self, time_s: Array, *, evaluation: str = "modulus") -> Array:
         """Return the density (T, ...) in the unit of the moments per second at times of flight."""
-        turn = 2 * np.pi * self.settings.base_frequency_hz
+        turn = 2 * np.pi * self._base_frequency_hz
         time = np.asarray(time_s, dtype=float)
         return turn * density(self.coefficients, turn * time, evaluation=evaluation)
 
     def cumulative(self, time_s: Array) -> Array:
         """Return the brightness (T, ...) that has come back until times of flight in s."""
-        turn = 2 * np.pi * self.settings.base_frequency_hz
+        turn = 2 * np.pi * self._base_frequency_hz
         return cumulative(self.coefficients, turn * np.asarray(time_s, dtype=float))
+
+    @property
+    def _base_frequency_hz(self) -> float:
+        if self.settings.base_frequency_hz is None:
+            raise UnlabelledImages(("base_frequency_hz",))
+        return self.settings.base_frequency_hz
+
+    def __repr__(self) -> str:
+        """State order, pixels, light and how far it was computed; nothing is computed for it."""
+        known = vars(self)
+        order, shape = self._shape
+        frequency_hz = self.settings.base_frequency_hz
+        at = "" if frequency_hz is None else f" at {frequency_hz / 1e6:g} MHz"
+        parts = [f"m = {order}{at}", f"pixels {' x '.join(map(str, shape)) or '1'}"]
+        parts += [f"estimator {self.settings.estimator}"]
+        if "range_m" in known:
+            parts.append(_spread(self.range_m))
+        computed = [name for name in _SHOWN if name in known]
+        return f"<Reconstruction {', '.join(parts)}; computed: {', '.join(computed) or 'nothing'}>"
+
+    @property
+    def _shape(self) -> tuple[int, tuple[int, ...]]:
+        """Order m, and the shape of the pixels."""
+        planes = self._measured
+        return planes.shape[0] - 1, tuple(planes.shape[1:])
 
 
 class PassedReconstruction(Reconstruction):
@@ -338,12 +385,17 @@ class PassedReconstruction(Reconstruction):
         self.uniform = planes.uniform
         self.direct = planes.direct
         self.indirect = planes.indirect
-        self.range_m = planes.range_m
+        if settings.base_frequency_hz is not None:
+            self.range_m = planes.range_m
 
     @cached_property
     def measured(self) -> Array:
         """Calibrated moments (m + 1, ...), not smoothed; read from the data once more."""
         return self._measure()
+
+    @property
+    def _shape(self) -> tuple[int, tuple[int, ...]]:
+        return self.smoothed.shape[0] - 1, tuple(self.smoothed.shape[1:])
 
     @cached_property
     def _biased(self) -> tuple[Array, Array]:
@@ -353,3 +405,15 @@ class PassedReconstruction(Reconstruction):
         moments = self.smoothed.copy()
         moments[0] = self.brightness
         return moments, biased
+
+
+def _spread(range_m: Array) -> str:
+    """Return the least, middle and greatest range in words."""
+    values = np.asarray(range_m)
+    there = values[np.isfinite(values)]
+    if not there.size:
+        return "no range"
+    low, middle, high = there.min(), np.median(there), there.max()
+    without = 1 - there.size / values.size
+    gaps = f", {without:.1%} without" if without else ""
+    return f"range {low:.3f} to {high:.3f} m, median {middle:.3f} m{gaps}"

@@ -14,7 +14,9 @@ from transientcam_moments._kernels.padding import LEAST_WIDTH
 from transientcam_moments._kernels.parallel import Spread, at_once
 from transientcam_moments.bad_pixels import Replacement, checked_mask, fill_bad_pixels
 from transientcam_moments.calibration import calibrate, inverse_gains
+from transientcam_moments.errors import UnlabelledImages
 from transientcam_moments.four_bucket import harmonics_of, measure, saturated, takes_first
+from transientcam_moments.labels import Labels
 from transientcam_moments.ranging import range_m
 from transientcam_moments.reconstruction import PassedReconstruction, Reconstruction, Settings
 from transientcam_moments.smoothing import gaussian_taps, smooth
@@ -32,9 +34,11 @@ class Reconstructor:
     Parameters
     ----------
     settings : Settings, optional
-        The paper's, when left out.
+        The paper's, when left out. Raw images need ``zeroth`` and ``takes`` in them, and a range
+        ``base_frequency_hz``: these have no default.
     calibration : array, shape (m + 1,) or (m + 1, ...), optional
-        Gains to divide by, as `calibrate` takes them.
+        Gains to divide by, as `calibrate` takes them. Raw images need them; moments without are
+        taken to be calibrated.
     bad_pixels : boolean array, shape (H, W), optional
         Pixels that show the mean of their neighbours instead, and are flagged.
     """
@@ -82,13 +86,16 @@ class Reconstructor:
         ShapeError
             When the data have no shape that belongs to images or moments, or calibration or bad
             pixels have another one.
+        UnlabelledImages
+            When the data are raw images, and settings or gains leave open what they show.
         """
         data = data if isinstance(data, Sequence) else as_array(data)
         if not isinstance(data, Sequence) and np.dtype(data.dtype).kind == "c":
             moments = data if self._bad is None else fill_bad_pixels(data, self._bad)
             return self._of_moments(self._calibrated(moments), saturated_pixels, None, spread)
-        takes = takes_first(data, self.settings.takes)
-        one_pass = self._pass_of_images(takes)
+        zeroth, count = self._require_labels()
+        takes = takes_first(data, count)
+        one_pass = self._pass_of_images(takes, zeroth)
         if one_pass is not None:
             planes = one_pass.images(takes[0], saturated_pixels, spread)
             return PassedReconstruction(planes, self.settings, lambda: self._measured(takes)[0])
@@ -99,6 +106,14 @@ class Reconstructor:
             if self._bad is not None:  # their own values are not used
                 saturated_pixels = saturated_pixels & ~self._bad
         return self._of_moments(moments, saturated_pixels, kept, spread)
+
+    def _require_labels(self) -> tuple[str, int]:
+        """Return how b_0 was measured and the number of takes, where raw images can be read."""
+        settings, calibration = self.settings, self._calibration
+        stated = {"zeroth": settings.zeroth, "takes": settings.takes, "calibration": calibration}
+        if settings.zeroth is None or settings.takes is None or calibration is None:
+            raise UnlabelledImages(tuple(name for name, each in stated.items() if each is None))
+        return settings.zeroth, settings.takes
 
     def _of_moments(
         self, moments: Array, saturated_pixels: Array | None, kept: Array | None, spread: Spread
@@ -120,7 +135,8 @@ class Reconstructor:
         average, kept = average_takes(takes)
         if self._bad is not None:
             average = fill_bad_pixels(average, self._bad)
-        return self._calibrated(measure(average, zeroth=self.settings.zeroth)), kept
+        zeroth, _ = self._require_labels()
+        return self._calibrated(measure(average, zeroth=zeroth)), kept
 
     def _calibrated(self, moments: Array) -> Array:
         return moments if self._calibration is None else calibrate(moments, self._calibration)
@@ -132,8 +148,8 @@ class Reconstructor:
     # needs, or else (several takes, other images, moments) behind the smoothing. All else goes
     # stage by stage, each computed when it is first read.
 
-    def _pass_of_images(self, takes: Array) -> OnePass | None:
-        m = harmonics_of(takes.shape[1], self.settings.zeroth)
+    def _pass_of_images(self, takes: Array, zeroth: str) -> OnePass | None:
+        m = harmonics_of(takes.shape[1], zeroth)
         shape = tuple(takes.shape[2:])
         raw = isinstance(takes, np.ndarray) and takes.dtype == np.uint16 and takes.shape[0] == 1
         wide = self._taps(shape) is None or shape[1] >= LEAST_WIDTH
@@ -168,11 +184,12 @@ class Reconstructor:
     def _constants(self, m: int, shape: tuple[int, ...]) -> Constants:
         calibration = np.ones(m + 1) if self._calibration is None else self._calibration
         bad, replaced = self._replacement(shape)
+        frequency_hz = self.settings.base_frequency_hz
         return Constants(
             self.settings,
             inverse_gains(calibration, (m + 1, *shape)),
             self._taps(shape),
-            float(range_m(np.float64(1.0), self.settings.base_frequency_hz)),
+            math.nan if frequency_hz is None else float(range_m(np.float64(1.0), frequency_hz)),
             bad,
             replaced,
         )
@@ -188,6 +205,8 @@ class Reconstructor:
             return np.flatnonzero(mask), None
         replacement = Replacement(mask)
         zeroth = self.settings.zeroth
+        if zeroth is None:  # moments, whose bad pixels are replaced already
+            return replacement.places, None
         return replacement.places, lambda raw: measure(replacement.values(raw), zeroth=zeroth)
 
 
@@ -195,14 +214,80 @@ def reconstruct(
     data: Array | Sequence[Array],
     settings: Settings | None = None,
     *,
+    harmonic: Array | None = None,
+    phase_rad: Array | None = None,
+    frequency_hz: Array | None = None,
+    illumination: Array | None = None,
+    take: Array | None = None,
     calibration: Array | None = None,
     saturated_pixels: Array | None = None,
     bad_pixels: Array | None = None,
 ) -> Reconstruction:
-    """Reconstruct one frame of raw images or of moments.
+    """Reconstruct one frame of labelled raw images, or of moments.
 
-    As ``Reconstructor(settings, calibration=..., bad_pixels=...)(data, saturated_pixels=...)``,
-    which see; for many frames keep the `Reconstructor`.
+    ::
+
+        with h5py.File("corner.h5") as file:
+            names = ("harmonic", "phase_rad", "frequency_hz", "illumination", "take")
+            labels = {name: file[name][()] for name in names}
+            found = tm.reconstruct(file["raw"][0], **labels, calibration=file["gain"][()])
+
+    With labels as ``Reconstructor(settings, calibration=..., bad_pixels=...)`` of the images in the
+    order that `measure` takes, and of settings with what the labels say; for many frames keep a
+    `Reconstructor`.
+
+    Parameters
+    ----------
+    data : array
+        Real images (N, ...) in any order, or complex moments (m + 1, ...).
+    settings : Settings, optional
+        Of smoothing, biasing and estimator: the paper's, when left out.
+    harmonic, phase_rad, frequency_hz, illumination, take : array, shape (N,), optional
+        What each image shows, see `Labels`. Raw images need them, or else ``zeroth``, ``takes`` and
+        ``base_frequency_hz`` in the settings and the order of `measure`.
+    calibration : array, shape (m + 1,) or (m + 1, ...), optional
+        Gains, as `calibrate` takes them; `nominal_calibration` where none were measured. Raw images
+        need them.
+    saturated_pixels : boolean array, shape (...), optional
+        Pixels to be flagged; found in images by themselves.
+    bad_pixels : boolean array, shape (H, W), optional
+        Pixels that show the mean of their neighbours instead, and are flagged.
+
+    Raises
+    ------
+    UnlabelledImages
+        When raw images do not say what they show: nothing is assumed for it.
+    ParameterError
+        When the labels are of no capture there is, or contradict the settings.
+    ShapeError
+        When shapes do not fit each other.
     """
-    reconstructor = Reconstructor(settings, calibration=calibration, bad_pixels=bad_pixels)
+    chosen = Settings() if settings is None else settings
+    given = {"harmonic": harmonic, "phase_rad": phase_rad}
+    if not isinstance(data, Sequence):
+        data = as_array(data)
+    raw = isinstance(data, Sequence) or np.dtype(data.dtype).kind != "c"
+    if harmonic is not None and phase_rad is not None:
+        labels = Labels(harmonic, phase_rad, frequency_hz, illumination, take)
+        chosen = labels.settings(chosen)
+        data = labels.in_order(data) if raw else data
+    elif raw:
+        _require_stated(chosen, given, calibration)
+    if raw and (chosen.base_frequency_hz is None or calibration is None):
+        needed = {"frequency_hz": chosen.base_frequency_hz, "calibration": calibration}
+        raise UnlabelledImages(tuple(name for name, value in needed.items() if value is None))
+    reconstructor = Reconstructor(chosen, calibration=calibration, bad_pixels=bad_pixels)
     return reconstructor(data, saturated_pixels=saturated_pixels)
+
+
+def _require_stated(
+    settings: Settings, labels: dict[str, Array | None], calibration: Array | None
+) -> None:
+    """Refuse images without labels, unless the settings state all that labels would say."""
+    physics = (settings.base_frequency_hz, settings.zeroth, settings.takes)
+    if None not in physics:
+        return
+    missing = [name for name, value in labels.items() if value is None]
+    if settings.base_frequency_hz is None:
+        missing.append("frequency_hz")
+    raise UnlabelledImages((*missing, *(["calibration"] if calibration is None else [])))

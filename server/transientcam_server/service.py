@@ -23,9 +23,19 @@ from transientcam_server.camera import (
     Jobs,
     LeaseManager,
 )
-from transientcam_server.camera.events import Back, Captured, Event, Lost, SequenceChanged
+from transientcam_server.camera.calibration_store import load_given
+from transientcam_server.camera.events import (
+    Back,
+    Captured,
+    Event,
+    Held,
+    Lost,
+    Released,
+    SequenceChanged,
+)
 from transientcam_server.camera.jobs import Job
 from transientcam_server.camera.lease import Change, Lease, Timer
+from transientcam_server.camera.light import LightGuard
 from transientcam_server.camera.source import sensor_of
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import (
@@ -48,6 +58,10 @@ from transientcam_server.settings import ReconstructionSettings, Settings
 _log = logging.getLogger(__name__)
 VERSION: Final = version("transientcam")
 _CLOSING_S = 1.0
+_TURN_S = 0.2
+_WORKERS_END_S = 1.0
+WORKER_THREADS: Final = "worker"
+"""What the names of their threads begin with."""
 
 
 class Observer(Protocol):
@@ -83,7 +97,7 @@ class Service:
         self.mjpeg_clients = 0
         self.observers: list[Observer] = []
         self._superseded: list[Frame] = []
-        self._executor = ThreadPoolExecutor(settings.workers, thread_name_prefix="worker")
+        self._executor = ThreadPoolExecutor(settings.workers, thread_name_prefix=WORKER_THREADS)
         self.workers = Workers(self._executor, count=settings.workers)
         sensor = sensor_of(camera, settings.sensor)
         self.planner = Planner(camera.capabilities, sensor, settings.reconstruction)
@@ -100,7 +114,8 @@ class Service:
             self.planner, self.workers, simulated=camera.simulation is not None
         )
         self._loop: asyncio.AbstractEventLoop | None = None
-        self.acquisition = Acquisition(camera, report=self._from_acquisition)
+        self._light = LightGuard(unserved_s=settings.limits.unserved_s)
+        self.acquisition = Acquisition(camera, report=self._from_acquisition, light=self._light)
         self.applied: AppliedSequence = camera.applied
         self.jobs = Jobs(report=self._job_changed)
         self.calibrations = Calibrator(
@@ -113,7 +128,9 @@ class Service:
             history=self.history,
             notify=partial(self.hub.notify, "calibration-changed"),
         )
-        self.lease = LeaseManager(report=self._lease_changed, call_later=self._call_later)
+        self.lease = LeaseManager(
+            report=self._lease_changed, call_later=self._call_later, due=self._lease_due
+        )
         self.recordings = Library(
             settings.recordings, header=self._recording_header, notify=self._notify_from_thread
         )
@@ -127,21 +144,28 @@ class Service:
         """Capture from entry to exit."""
         self._loop = asyncio.get_running_loop()
         await asyncio.to_thread(self.recordings.open)
+        self._light.turned()
         self.acquisition.start()
+        turning = asyncio.create_task(self._keep_light())
         try:
             yield
         finally:
+            turning.cancel()
+            self.planner.close()
             self.lease.close()
             self.hub.close()
             self.jobs.cancel_all()
             await self._loop.run_in_executor(self._executor, self.acquisition.stop)
             await self.jobs.close()
             await self._loop.run_in_executor(self._executor, self.recordings.close)
-            await self.workers.close()
-            self._executor.shutdown(wait=True, cancel_futures=True)
+            ended = await self.workers.close(within_s=_WORKERS_END_S)
+            if not ended:
+                _log.warning("a worker does not end; what it computes is dropped")
+            self._executor.shutdown(wait=ended, cancel_futures=True)
 
     async def close_streams(self) -> None:
         """Tell every stream that it ends, and give those that listen the time to hear it."""
+        self.planner.close()
         self.hub.close()
         self.jobs.cancel_all()
         with contextlib.suppress(TimeoutError):
@@ -170,6 +194,8 @@ class Service:
         reasons = []
         if status.state == "lost":
             reasons.append(f"the camera is lost: {status.reason}")
+        if status.state == "held":
+            reasons.append(f"the light is held off: {status.reason}")
         if status.state in ("starting", "streaming") and not status.frames:
             reasons.append("the camera is starting")
         if status.stalled:
@@ -260,6 +286,10 @@ class Service:
                 self.hub.notify("camera-lost", {"reason": reason})
             case Back():
                 self.hub.notify("camera-back", {})
+            case Held(reason):
+                self.hub.notify("light-held", {"reason": reason})
+            case Released():
+                self.hub.notify("light-released", {})
             case SequenceChanged(applied):
                 before, self.applied = self.applied, applied
                 self._notify_sequence_changed()
@@ -275,6 +305,16 @@ class Service:
                 for observer in self.observers:
                     observer.superseded(frame.meta())
         self._superseded = computing
+
+    async def _keep_light(self) -> None:
+        """Prove to the thread of the camera, again and again, that clients are served."""
+        while True:
+            self._light.turned()
+            await asyncio.sleep(_TURN_S)
+
+    def _lease_due(self, lease: Lease | None) -> None:
+        stops = lease is not None and lease.on_lapse == "stop"
+        self._light.lapses_at(lease.expires_s if lease is not None and stops else None)
 
     def _call_later(self, delay_s: float, callback: Callable[[], None]) -> Timer:
         return asyncio.get_running_loop().call_later(delay_s, callback)
@@ -328,7 +368,7 @@ def _calibration(camera: Camera, settings: Settings, kept: CalibrationStore) -> 
     path = settings.calibration
     if path is None:
         return _last_active(camera, kept)
-    loaded = load_calibration(path)
+    loaded = load_given(path)
     misfit = loaded.capture.misfit(camera.applied, camera.capabilities)
     if misfit is not None and misfit.field in DEVICE_FIELDS:
         raise misfit

@@ -30,6 +30,25 @@ else:
     ]
 
 
+class SequenceSettings(_Group):
+    """What the camera captures from the start, until a client sets something else.
+
+    The default is on the front of accuracy against time (docs/default-sequence.md). A camera that
+    cannot do it does what is nearest.
+    """
+
+    base_frequency_hz: _Finite = Field(default=23e6, gt=0.0)
+    """Modulation frequencies are this and its multiples."""
+    harmonics: int = Field(default=4, ge=1, le=32)
+    """m: how many multiples."""
+    zeroth: Literal["low-frequency", "on-off", "estimated"] = "estimated"
+    """Where the zeroth moment comes from; costs four, two or no images (Sec. 4.3)."""
+    exposure_s: _Finite = Field(default=0.00192, gt=0.0)
+    """Of one image."""
+    takes: int = Field(default=1, ge=1, le=10_000)
+    """How often each image is captured, for averaging."""
+
+
 class ReconstructionSettings(_Group):
     """How images become moments and moments become returns."""
 
@@ -101,8 +120,9 @@ class StreamSettings(_Group):
     max_subscriptions: int = Field(default=MAX_SUBSCRIPTIONS, ge=1, le=MAX_SUBSCRIPTIONS)
     """Products that one client may have at the same time."""
     max_messages_hz: _Finite = Field(default=50.0, ge=1.0, le=100_000.0)
-    """Messages a second that are read of one client, beside one for each frame it was sent; those
-    of two seconds may come at once. A client that sends more is disconnected."""
+    """WebSocket frames a second that are read of one client, of every kind, beside one for each
+    message it was sent; those of two seconds may come at once. Each KiB counts as one more. A
+    client that sends more is disconnected."""
 
 
 class HistorySettings(_Group):
@@ -158,14 +178,24 @@ class LimitSettings(_Group):
     """Connections open at the same time, streams included."""
     max_connections_per_address: int = Field(default=256, ge=1, le=100_000)
     """The same, of one address; a proxy is one address."""
+    max_connects_hz: _Finite = Field(default=100.0, gt=0.0, le=1e6)
+    """New connections a second from one address; max_connections_per_address may come at once."""
+    unserved_s: _Finite = Field(default=1.0, ge=0.5, le=60.0)
+    """Time without any client being served, after which the light is switched off until they are:
+    nobody could switch it off meanwhile."""
     head_s: _Finite = Field(default=10.0, gt=0.0, le=3600.0)
-    """Time for the head of a request to arrive."""
+    """Time for the head of a request to arrive, and for a handshake of TLS."""
     body_s: _Finite = Field(default=30.0, gt=0.0, le=3600.0)
     """Time for its body."""
+    answers_bytes: int = Field(default=48 * 1024**2, ge=1024**2)
+    """Of answers on their way to clients, together; one more is refused, to try again later."""
+    answers_bytes_per_address: int = Field(default=24 * 1024**2, ge=1024**2)
+    """The same, of one address; a single answer may be larger."""
     stalled_s: _Finite = Field(default=20.0, gt=0.0, le=3600.0)
     """Time for a client to take anything of what waits for it; then its connection is cut."""
     head_bytes: int = Field(default=128 * 1024, ge=1024, le=16 * 1024 * 1024)
-    """Length of request line and headers; the line alone may have 64 KiB whatever this is."""
+    """Length of request line and headers; the line alone may have 64 KiB whatever this is. What is
+    sent beside a body in chunks may have as much more than the body."""
 
 
 class Settings(_Group):
@@ -205,6 +235,7 @@ class Settings(_Group):
     """``auto`` is text on a terminal and JSON elsewhere."""
     workers: int = Field(default_factory=lambda: max(2, os.cpu_count() or 2), ge=2, le=256)
     """Threads that reconstruct and encode; at least 2, so that one long answer delays no other."""
+    sequence: SequenceSettings = SequenceSettings()
     reconstruction: ReconstructionSettings = ReconstructionSettings()
     sensor: SensorSettings = SensorSettings()
     lens: LensSettings = LensSettings()

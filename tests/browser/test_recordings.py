@@ -71,9 +71,9 @@ def test_a_recording_is_started_watched_and_stopped(page: Page, served: Served) 
     row = panel.locator("[data-recording]")
     expect(row).to_contain_text("corner at 3 m")
     expect(page.locator("[data-field=recording-sign]")).to_have_count(0)
-    told = recordings(served)[0]
-    assert (told["state"], told["reason"]) == ("complete", "stopped")
-    expect(row.locator("[data-field=frames]")).to_have_text(f"{told['frames']} frames")
+    reported = recordings(served)[0]
+    assert (reported["state"], reported["reason"]) == ("complete", "stopped")
+    expect(row.locator("[data-field=frames]")).to_have_text(f"{reported['frames']} frames")
     expect(row.locator("[data-field=size]")).to_have_text(re.compile(r"^\d+(\.\d+)?\u202f[kM]B$"))
     expect(page.locator(".toast").last).to_have_text("The recording stopped.")
 
@@ -145,11 +145,11 @@ def test_all_views_show_the_frame_that_is_scrubbed_to(page: Page, served: Served
         coefficients, recorded(served, recording, 4, "coefficients").ravel()[:500]
     )
     url = f"{served.url}/api/v1/recordings/{recording}/frames/4/pixel"
-    told = httpx.get(url, params={"x": 40, "y": 50, "bins": 1}).json()
+    reported = httpx.get(url, params={"x": 40, "y": 50, "bins": 1}).json()
     page.wait_for_function(
         "([range, brightness]) => { const told = transientcam.store.details.document.peek();"
         " return told?.range_m === range && told.brightness === brightness; }",
-        arg=[told["range_m"], told["brightness"]],
+        arg=[reported["range_m"], reported["brightness"]],
     )
     page.get_by_role("button", name="Back to live").click()
     expect(page.locator(".replay")).to_have_count(0)

@@ -82,10 +82,10 @@ def test_the_cumulative_curve_is_that_of_the_moments_package(page: Page, served:
 
 def test_returns_truth_and_flags_are_told(page: Page, served: Served) -> None:
     select(page, served)
-    told = pixel_of(served)
-    truth = told["truth"]
+    reported = pixel_of(served)
+    truth = reported["truth"]
     assert isinstance(truth, dict)
-    for name, listed in (("returns", told["returns"]), ("truth", truth["returns"])):
+    for name, listed in (("returns", reported["returns"]), ("truth", truth["returns"])):
         assert isinstance(listed, list)
         rows = page.locator(f".listing-{name} tbody tr")
         expect(rows).to_have_count(len(listed))
@@ -98,8 +98,8 @@ def test_returns_truth_and_flags_are_told(page: Page, served: Served) -> None:
             assert range_m == pytest.approx(299_792_458 * each["time_s"] / 2, abs=0.006)
             assert weight == pytest.approx(each["weight"], abs=0.6)
     flags = text(page, ".panel-response", "flags")
-    assert isinstance(told["flags"], list)
-    expected = [WORDS[flag] for flag in told["flags"]] or ["Nothing was wrong"]
+    assert isinstance(reported["flags"], list)
+    expected = [WORDS[flag] for flag in reported["flags"]] or ["Nothing was wrong"]
     assert all(words in flags for words in expected)
 
 

@@ -39,11 +39,11 @@ def test_the_reconstruction_is_set_within_its_limits(page: Page, served: Served)
     panel.get_by_label("Range by").select_option("maximum-entropy")
     panel.get_by_role("button", name="Apply").click()
     expect(panel.get_by_role("button", name="Apply")).to_have_count(0)
-    told = reconstruction(served)
-    assert (told["smoothing_px"], told["estimator"]) == (2.5, "maximum-entropy")
+    reported = reconstruction(served)
+    assert (reported["smoothing_px"], reported["estimator"]) == (2.5, "maximum-entropy")
     page.wait_for_function(
         "(id) => transientcam.store.frames.of('range').peek()?.meta.reconstruction_id === id",
-        arg=told["reconstruction_id"],
+        arg=reported["reconstruction_id"],
     )
     panel.get_by_role("button", name="The paper's values").click()
     expect(smoothing).to_have_value("0.6")
@@ -104,6 +104,48 @@ class TestCalibrations:
         expect(row.locator("[data-field=misfit]")).to_contain_text("harmonics")
         expect(row).to_contain_text("waits for its sequence")
         expect(page.locator(".toast", has_text="Nominal gains")).to_be_visible()
+
+    def test_one_of_a_scene_is_used_only_on_a_second_click_and_undone(
+        self, page: Page, served: Served
+    ) -> None:
+        httpx.put(f"{served.url}/api/v1/simulation", json={"scene": "mirrors"}).raise_for_status()
+        open_page(page)
+        choose(page, "response", "Calibration")
+        panel = page.locator(".panel-calibration")
+        outcome = panel.locator("[data-field=calibration-outcome]")
+        panel.get_by_label("Frames, with and without light").fill("3")
+        panel.get_by_role("button", name="Measure").click()
+        expect(outcome).to_contain_text("a scene, not a diffusor", timeout=PATIENCE_MS)
+        row = panel.locator("[data-calibration]").nth(1)
+        expect(row.locator("[data-field=verdict]")).to_have_text("of a scene")
+        expect(panel.locator("[data-calibration=nominal]")).to_contain_text("in use")
+        row.get_by_role("button", name="Use").click()
+        expect(row.locator("[data-field=doubt]")).to_contain_text("unlike a diffusor")
+        expect(row.get_by_role("img")).to_be_visible()
+        expect(panel.locator("[data-calibration=nominal]")).to_contain_text("in use")
+        row.get_by_role("button", name="Use anyway").click()
+        expect(row).to_contain_text("in use")
+        panel.get_by_role("button", name="Return to the nominal gains").click()
+        expect(panel.locator("[data-calibration=nominal]")).to_contain_text("in use")
+
+    def test_the_diffusor_of_a_simulated_camera_is_put_before_the_lens(
+        self, page: Page, served: Served
+    ) -> None:
+        httpx.put(f"{served.url}/api/v1/simulation", json={"scene": "mirrors"}).raise_for_status()
+        open_page(page)
+        choose(page, "response", "Calibration")
+        panel = page.locator(".panel-calibration")
+        panel.get_by_role("button", name="Put the diffusor before the lens").click()
+        taking = panel.get_by_role("button", name="Take the diffusor away")
+        expect(taking).to_be_visible(timeout=PATIENCE_MS)
+        panel.get_by_label("Frames, with and without light").fill("3")
+        panel.get_by_role("button", name="Measure").click()
+        outcome = panel.locator("[data-field=calibration-outcome]")
+        expect(outcome).to_contain_text("Measured: ", timeout=PATIENCE_MS)
+        expect(panel.locator("[data-calibration]").nth(1)).to_contain_text("in use")
+        taking.click()
+        expect(panel.get_by_role("button", name="Put the diffusor before the lens")).to_be_visible()
+        assert httpx.get(f"{served.url}/api/v1/simulation").json()["scene"] == "mirrors"
 
     def test_one_is_exported_deleted_and_imported(
         self, page: Page, served: Served, tmp_path: Path

@@ -17,8 +17,17 @@ from transientcam.wire.codec import pack_with_array
 
 F_HZ = 23e6
 BINS = 256
-FLAG_COLOURS = {8: "cc79a7", 2: "1b2a6b", 4: "d55e00", 32: "e6c700", 16: "009e73", 1: "56a9dc"}
+FLAG_COLOURS = {
+    8: "cc79a7",
+    2: "1b2a6b",
+    4: "e69f00",
+    64: "d55e00",
+    32: "f0e442",
+    16: "009e73",
+    1: "7f93a3",
+}
 NAMES = {1: "biased", 2: "no_signal", 4: "saturated", 8: "non_finite", 16: "degenerate"}
+NAMES |= {64: "contradictory"}
 
 
 def show(page: Page, served: Served, title: str, canvas: str) -> None:
@@ -103,7 +112,7 @@ def test_the_validity_map_says_what_is_wrong_where_and_how_often(
     page: Page, served: Served
 ) -> None:
     show(page, served, "Validity", "flags")
-    assert np.all(painted_flags(page)[..., :3] == [86, 169, 220]), "without noise all are biased"
+    assert np.all(painted_flags(page)[..., :3] == [127, 147, 163]), "without noise all are biased"
     bits = np.array([0, 0, *FLAG_COLOURS, 1 | 4, 2 | 16, 8 | 1], np.uint8)
     flags = np.random.default_rng(7).choice(bits, (120, 163))
     show_message(page, "flags", flags)

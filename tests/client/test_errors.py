@@ -10,6 +10,7 @@ from transientcam.errors import (
     CheckSkipped,
     CommandUnavailable,
     FrameTimeout,
+    MissingExtra,
     ParameterError,
     ProblemError,
     PromiseBroken,
@@ -27,6 +28,7 @@ _TREE = [
     FrameTimeout(0.5),
     ParameterError("f", 1, "2"),
     CommandUnavailable("serve", "fastapi", "server"),
+    MissingExtra("transientcam.open", "h5py", "server"),
     PromiseBroken("PUT /sequence is answered with 500"),
     CheckSkipped("the camera is a real one"),
 ]
@@ -59,6 +61,7 @@ def test_every_error_is_in_the_tree_drawn_at_the_top() -> None:
                 "f is 1, but must be 2",
                 "'transientcam serve' needs fastapi, which is not installed: "
                 "pip install 'transientcam[server]'",
+                "transientcam.open needs h5py: pip install 'transientcam[server]'",
                 "PUT /sequence is answered with 500",
                 "the camera is a real one",
             ],

@@ -19,11 +19,14 @@ def test_the_public_names_are_these() -> None:
         "Frame",
         "FrameTimeout",
         "Lease",
+        "MissingExtra",
         "Notice",
         "ParameterError",
         "ProblemError",
         "ProtocolError",
         "Reconnect",
+        "RecordedFrame",
+        "Recording",
         "ServerUnreachable",
         "Stream",
         "StreamClosed",
@@ -32,6 +35,7 @@ def test_the_public_names_are_these() -> None:
         "__version__",
         "density",
         "discover",
+        "open",
         "transient",
     ]
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
+import httpx
 import pytest
 
 import transientcam
@@ -70,6 +71,17 @@ def test_what_cannot_be_an_id_never_leaves_the_client(daemon: Served) -> None:
         for name in ("", "../a", "a/b", "a?b"):
             with pytest.raises(transientcam.ParameterError):
                 camera.recording(name)
+
+
+def test_the_verb_records_nothing_into_a_file_of_another_format(
+    daemon: Served, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = len(httpx.get(f"{daemon.url}/api/v1/recordings").json()["recordings"])
+
+    assert run(["record", daemon.url, "--frames", "1", "-o", str(tmp_path / "a.npz")]) == 2
+
+    assert ".h5 or .hdf5" in " ".join(capsys.readouterr().err.replace("│", " ").split())
+    assert len(httpx.get(f"{daemon.url}/api/v1/recordings").json()["recordings"]) == before
 
 
 def test_the_verb_records_downloads_and_tells(

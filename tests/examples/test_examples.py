@@ -141,10 +141,10 @@ def test_transientcam_frame_in_octave(served: Served) -> None:
     with httpx.Client(base_url=served.url, timeout=60.0) as http:
         answer = http.get("/api/v1/frames/latest/range.npy")
     range_m = np.load(io.BytesIO(answer.content))
-    told = re.search(r"range 120 x 163, ([\d.]+) to ([\d.]+) m, median ([\d.]+) m", lines[2])
-    assert told is not None
+    reported = re.search(r"range 120 x 163, ([\d.]+) to ([\d.]+) m, median ([\d.]+) m", lines[2])
+    assert reported is not None
     expected = np.nanmin(range_m), np.nanmax(range_m), np.nanmedian(range_m)
-    np.testing.assert_allclose([float(each) for each in told.groups()], expected, atol=2e-3)
+    np.testing.assert_allclose([float(each) for each in reported.groups()], expected, atol=2e-3)
     assert lines[3].startswith("transient 2 x 120 x 163, brightest ")
     pixel_m = float(lines[4].split()[3])
     assert pixel_m == pytest.approx(range_m[60, 80], abs=2e-3)

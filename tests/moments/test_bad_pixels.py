@@ -125,10 +125,10 @@ def test_a_reconstruction_replaces_and_flags_bad_pixels() -> None:
     images[:, 2, 3] = 4095  # stuck at the end of its scale
     mask = np.zeros(SHAPE, dtype=bool)
     mask[2, 3] = True
-    settings = tm.Settings(zeroth="on-off", smoothing_sigma_px=0.0)
+    settings = tm.Settings(23e6, "on-off", takes=1, smoothing_sigma_px=0.0)
 
-    found = tm.reconstruct(images, settings, bad_pixels=mask)
-    untouched = tm.reconstruct(images, settings)
+    found = tm.reconstruct(images, settings, calibration=np.ones(2), bad_pixels=mask)
+    untouched = tm.reconstruct(images, settings, calibration=np.ones(2))
 
     assert found.flags[2, 3] & tm.Flags.REPLACED
     assert not found.flags[2, 3] & tm.Flags.SATURATED
@@ -142,7 +142,7 @@ def test_a_reconstruction_tells_how_many_images_it_left_out() -> None:
     images = images_of(2.0, takes=10) + noise
     images[13] *= 0.7  # two takes, one image each
     images[44] *= 1.2
-    settings = tm.Settings(zeroth="on-off", takes=10)
+    ten, one = (tm.Settings(23e6, "on-off", takes) for takes in (10, 1))
 
-    assert tm.reconstruct(images, settings).rejected_images == 2
-    assert tm.reconstruct(images[:6], tm.Settings(zeroth="on-off")).rejected_images == 0
+    assert tm.reconstruct(images, ten, calibration=np.ones(2)).rejected_images == 2
+    assert tm.reconstruct(images[:6], one, calibration=np.ones(2)).rejected_images == 0

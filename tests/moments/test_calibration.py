@@ -34,9 +34,10 @@ def test_the_nominal_gain_is_that_of_the_sub_phases() -> None:
     phases, weights = SUB_PHASES.phases_rad, SUB_PHASES.weights
     gain = np.exp(-1j * np.array(phases)).mean()
 
-    assert np.allclose(tm.nominal_calibration(2, phases, weights), [abs(gain), gain, gain])
-    assert np.allclose(tm.nominal_calibration(1, phases, weights, "on-off"), [1, gain])
-    assert np.allclose(tm.nominal_calibration(1, (0.0,), None, "estimated"), [1, 1])
+    low = tm.nominal_calibration(2, phases, weights, zeroth="low-frequency")
+    assert np.allclose(low, [abs(gain), gain, gain])
+    assert np.allclose(tm.nominal_calibration(1, phases, weights, zeroth="on-off"), [1, gain])
+    assert np.allclose(tm.nominal_calibration(1, (0.0,), None, zeroth="estimated"), [1, 1])
 
 
 def test_arccos_sampling_takes_a_quarter_pi_of_the_amplitude() -> None:
@@ -65,8 +66,8 @@ def test_wrong_shapes_and_arguments_are_refused() -> None:
     with pytest.raises(tm.ShapeError, match=r"calibration is of shape \(3,\)"):
         tm.calibrate(np.ones((2, 4), complex), np.ones(3))
     with pytest.raises(tm.ParameterError, match="harmonics = 0"):
-        tm.nominal_calibration(0)
+        tm.nominal_calibration(0, zeroth="on-off")
     with pytest.raises(tm.ParameterError, match="weights"):
-        tm.nominal_calibration(1, (0.0, 1.0), (1.0,))
+        tm.nominal_calibration(1, (0.0, 1.0), (1.0,), zeroth="on-off")
     with pytest.raises(tm.ParameterError, match="zeroth"):
         tm.nominal_calibration(1, zeroth="dark")

@@ -8,7 +8,11 @@ import transientcam_moments as tm
 
 
 def test_everything_raised_is_a_moments_error_and_a_value_error() -> None:
-    for error in (tm.ShapeError("b", "of shape (1,)", "more"), tm.ParameterError("n", 0, "> 0")):
+    for error in (
+        tm.ShapeError("b", "of shape (1,)", "more"),
+        tm.ParameterError("n", 0, "> 0"),
+        tm.UnlabelledImages(("harmonic",)),
+    ):
         assert isinstance(error, tm.MomentsError)
         assert isinstance(error, ValueError)
 

@@ -1,11 +1,14 @@
 """Raw images to moments."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 import transientcam_moments as tm
 
 SHAPE = (3, 5)
+measured = partial(tm.measure, zeroth="low-frequency")
 
 
 def images_of(b: np.ndarray, *, zeroth: str, dark: float = 7.0) -> np.ndarray:
@@ -50,14 +53,14 @@ def test_unsigned_images_do_not_wrap_around() -> None:
 def test_measure_inverts_the_image_formation(zeroth: str, m: int) -> None:
     b = moments(m)
 
-    measured = tm.measure(images_of(b, zeroth=zeroth), zeroth=zeroth)
+    found = tm.measure(images_of(b, zeroth=zeroth), zeroth=zeroth)
 
     expected = b.copy()
     if zeroth == "estimated":
         expected[0] = 0
-    assert measured.shape == b.shape
-    assert np.allclose(measured, expected)
-    assert np.all(measured[0].imag == 0)
+    assert found.shape == b.shape
+    assert np.allclose(found, expected)
+    assert np.all(found[0].imag == 0)
 
 
 def test_the_low_frequency_modulus_does_not_depend_on_the_phase_of_the_electronics() -> None:
@@ -67,17 +70,17 @@ def test_the_low_frequency_modulus_does_not_depend_on_the_phase_of_the_electroni
     low = b[0].real * np.exp(2.2j)
     turned[:4] = [7 + (b[0].real + (low * 1j**-k).real) / 2 for k in range(4)]
 
-    assert np.allclose(tm.measure(images)[0], tm.measure(turned)[0])
+    assert np.allclose(measured(images)[0], measured(turned)[0])
 
 
 def test_all_layouts_of_takes_mean_the_same() -> None:
     b = moments(2)
     takes = np.stack([images_of(b, zeroth="low-frequency") + k for k in range(3)])
 
-    flat = tm.measure(takes.reshape(-1, *SHAPE), takes=3)
+    flat = measured(takes.reshape(-1, *SHAPE), takes=3)
 
-    assert np.allclose(flat, tm.measure(takes.reshape(3, 3, 4, *SHAPE)))
-    assert np.allclose(flat, tm.measure(list(takes.reshape(-1, *SHAPE)), takes=3))
+    assert np.allclose(flat, measured(takes.reshape(3, 3, 4, *SHAPE)))
+    assert np.allclose(flat, measured(list(takes.reshape(-1, *SHAPE)), takes=3))
     assert np.allclose(flat, b)
 
 
@@ -94,7 +97,7 @@ def test_a_pixel_with_a_nan_changes_no_other() -> None:
     poisoned = images.copy()
     poisoned[5, 1, 1] = np.nan
 
-    clean, touched = tm.measure(images), tm.measure(poisoned)
+    clean, touched = measured(images), measured(poisoned)
 
     others = np.ones(SHAPE, bool)
     others[1, 1] = False
@@ -113,7 +116,7 @@ def test_saturated_pixels_are_found_in_any_image() -> None:
 @pytest.mark.parametrize("count", [0, 3, 4, 7, 4 * 34])
 def test_a_wrong_number_of_images_is_refused(count: int) -> None:
     with pytest.raises(tm.ShapeError, match="images"):
-        tm.measure(np.zeros((count, 2, 2)))
+        measured(np.zeros((count, 2, 2)))
 
 
 def test_wrong_arguments_are_refused_by_name() -> None:
@@ -121,10 +124,10 @@ def test_wrong_arguments_are_refused_by_name() -> None:
     with pytest.raises(tm.ParameterError, match=r"zeroth = 'dark'.*low-frequency"):
         tm.measure(images, zeroth="dark")
     with pytest.raises(tm.ParameterError, match="takes = 0"):
-        tm.measure(images, takes=0)
+        measured(images, takes=0)
     with pytest.raises(tm.ShapeError, match="multiple of the 3 takes"):
-        tm.measure(images, takes=3)
+        measured(images, takes=3)
     with pytest.raises(tm.ShapeError, match=r"\(F, 4, ...\)"):
         tm.four_bucket(np.zeros((2, 3)))
     with pytest.raises(tm.ShapeError, match="takes, F, 4"):
-        tm.measure(np.zeros((1, 2, 3, 2, 2)))
+        measured(np.zeros((1, 2, 3, 2, 2)))

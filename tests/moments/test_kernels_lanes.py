@@ -442,10 +442,11 @@ def test_raw_images_are_measured_as_by_the_planar_statement(m: int, zeroth: str)
 def test_takes_are_averaged_by_the_planar_statement() -> None:
     raw = np.random.default_rng(0).integers(0, 4096, (3, 16, 9, 40)).astype(np.uint16)
 
-    found = tm.measure(raw.reshape(48, 9, 40), takes=3)
+    found = tm.measure(raw.reshape(48, 9, 40), zeroth="low-frequency", takes=3)
 
     with without_lanes():
-        assert np.array_equal(found, tm.measure(raw.reshape(48, 9, 40), takes=3))
+        planar = tm.measure(raw.reshape(48, 9, 40), zeroth="low-frequency", takes=3)
+    assert np.array_equal(found, planar)
 
 
 @pytest.mark.parametrize("sigma_px", [0.3, 0.6, 2.5])

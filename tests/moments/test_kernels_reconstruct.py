@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import lanes, without_lanes
 from transientcam_moments._kernels.registry import REGISTRY
+from transientcam_moments.four_bucket import harmonics_of
 from transientcam_moments.reconstruction import PassedReconstruction
 
 ORDERS = (3, 4, 8)
@@ -25,6 +26,12 @@ Array = NDArray[Any]
 def compiled() -> Iterator[None]:
     with lanes(*ORDERS, precisions=("float32",)):
         yield
+
+
+def settings_of(**changes: Any) -> tm.Settings:
+    """Return the paper's settings with all that raw images need, one take at a low frequency."""
+    labels: dict[str, Any] = {"base_frequency_hz": 23e6, "zeroth": "low-frequency", "takes": 1}
+    return tm.Settings(**(labels | changes))
 
 
 @contextmanager
@@ -48,7 +55,7 @@ def raw_images(
     phase_rad = np.stack([1 + 1.5 * x + 0.5 * y, 2.5 + x * y, 4 + x])
     weight = np.stack([800 + 600 * np.sin(6 * x), 300 + 300 * y, 150 + 0 * x])
     b = np.stack([(weight * np.exp(1j * j * phase_rad)).sum(0) for j in range(m + 1)])
-    images = digitised(b, settings.zeroth, seed=seed)
+    images = digitised(b, str(settings.zeroth), seed=seed)
     images[:, 3, 5] = 0  # a dead pixel
     images[2, 7, 7] = 4095  # a saturated one
     images[:, 20:24, 30:40] = 50  # darkness
@@ -70,10 +77,10 @@ def digitised(b: Array, zeroth: str, *, seed: int = 0) -> Array:
     return np.clip(np.round(images), 0, 4095).astype(np.uint16)
 
 
-def gains(kind: str, m: int = M, shape: tuple[int, ...] = SHAPE) -> Array | None:
+def gains(kind: str, m: int = M, shape: tuple[int, ...] = SHAPE) -> Array:
     rng = np.random.default_rng(1)
     if kind == "none":
-        return None
+        return np.ones(m + 1)
     gain = 1 + 0.1 * (rng.normal(size=m + 1) + 1j * rng.normal(size=m + 1))
     gain[0] = gain[0].real
     if kind == "frequencies":
@@ -93,10 +100,25 @@ def bad_pixels(kind: str) -> Array | None:
     return bad
 
 
+def with_gains(data: Any, settings: tm.Settings, prepared: dict[str, Any]) -> dict[str, Any]:
+    """Return what a reconstructor is prepared with, raw images without a gain with one of 1."""
+    if np.iscomplexobj(data):
+        return prepared
+    m = harmonics_of(len(data) // (settings.takes or 1), str(settings.zeroth))
+    return {"calibration": np.ones(m + 1)} | prepared
+
+
+def reconstructed(data: Any, settings: tm.Settings, **kwargs: Any) -> tm.Reconstruction:
+    saturated = kwargs.pop("saturated_pixels", None)
+    prepared = with_gains(data, settings, kwargs)
+    return tm.reconstruct(data, settings, saturated_pixels=saturated, **prepared)
+
+
 def in_one_pass(
     data: Any, settings: tm.Settings, saturated: Array | None = None, **kwargs: Any
 ) -> tm.Reconstruction:
-    found = tm.Reconstructor(settings, **kwargs)(data, saturated_pixels=saturated)
+    prepared = with_gains(data, settings, kwargs)
+    found = tm.Reconstructor(settings, **prepared)(data, saturated_pixels=saturated)
     assert isinstance(found, PassedReconstruction)
     return found
 
@@ -143,13 +165,13 @@ def assert_same(found: tm.Reconstruction, expected: tm.Reconstruction) -> None:
 
 
 SETTINGS = [
-    tm.Settings(),
-    tm.Settings(smoothing_sigma_px=0.0),
-    tm.Settings(smoothing_sigma_px=1.3, epsilon=0.05),
-    tm.Settings(zeroth="on-off", minimum_brightness=500.0),
-    tm.Settings(zeroth="estimated"),
-    tm.Settings(zeroth="estimated", smoothing_sigma_px=0.0),
-    tm.Settings(threshold=0.6, base_frequency_hz=11e6, full_scale=900.0),
+    settings_of(),
+    settings_of(smoothing_sigma_px=0.0),
+    settings_of(smoothing_sigma_px=1.3, epsilon=0.05),
+    settings_of(zeroth="on-off", minimum_brightness=500.0),
+    settings_of(zeroth="estimated"),
+    settings_of(zeroth="estimated", smoothing_sigma_px=0.0),
+    settings_of(threshold=0.6, base_frequency_hz=11e6, full_scale=900.0),
 ]
 
 
@@ -165,19 +187,19 @@ def test_a_pass_gives_what_the_stages_give(
     found = in_one_pass(images, settings, **prepared)
 
     with stage_by_stage():
-        assert_same(found, tm.reconstruct(images, settings, **prepared))
+        assert_same(found, reconstructed(images, settings, **prepared))
 
 
 @pytest.mark.parametrize("zeroth", ["low-frequency", "on-off", "estimated"])
 @pytest.mark.parametrize("m", [4, 8])
 def test_every_order_has_its_pass(m: int, zeroth: str) -> None:
-    settings = tm.Settings(zeroth=zeroth)
+    settings = settings_of(zeroth=zeroth)
     images, gain = raw_images(settings, m), gains("pixels", m)
 
     found = in_one_pass(images, settings, calibration=gain)
 
     with stage_by_stage():
-        assert_same(found, tm.reconstruct(images, settings, calibration=gain))
+        assert_same(found, reconstructed(images, settings, calibration=gain))
 
 
 @pytest.mark.parametrize("settings", SETTINGS, ids=range(len(SETTINGS)))
@@ -187,7 +209,7 @@ def test_a_pass_gives_what_numpy_gives(settings: tm.Settings) -> None:
     found = in_one_pass(images, settings, calibration=gain)
 
     with without_lanes():
-        expected = tm.reconstruct(images, settings, calibration=gain)
+        expected = reconstructed(images, settings, calibration=gain)
         flags, count = expected.flags, expected.returns.count
         stages = {
             "validity": (expected.validity, 1.0),
@@ -220,13 +242,13 @@ def test_measured_light_is_reconstructed_alike(m: int, zeroth: str, data_dir: Pa
     weight = np.stack([0.1 + x, 0.5 - 0.4 * y, 0.6 * x * y]) * 1500
     turn = np.exp(2j * np.pi * 23e6 * np.arange(m + 1)[:, None, None] * (3e-9 + 8e-9 * x))
     b = sum(s[:, None, None] * w * turn for s, w in zip(spectra, weight, strict=True))
-    settings = tm.Settings(zeroth=zeroth)
+    settings = settings_of(zeroth=zeroth)
     images = digitised(np.asarray(b), zeroth)
 
     found = in_one_pass(images, settings)
 
     with stage_by_stage():
-        assert_same(found, tm.reconstruct(images, settings))
+        assert_same(found, reconstructed(images, settings))
     assert np.mean(found.has_range) == 1
 
 
@@ -239,13 +261,13 @@ def test_a_measured_scan_is_reconstructed_alike(data_dir: Path, smoothing_px: fl
     time_s = bin_s * np.arange(counts.shape[-1])
     turn = np.exp(2j * np.pi * 100e6 * np.arange(5)[:, None] * time_s)
     b = np.einsum("yxt,jt->jyx", counts, turn) * (2000 / counts.sum(axis=-1).max())
-    settings = tm.Settings(base_frequency_hz=100e6, smoothing_sigma_px=smoothing_px)
-    images = digitised(b, settings.zeroth)
+    settings = settings_of(base_frequency_hz=100e6, smoothing_sigma_px=smoothing_px)
+    images = digitised(b, str(settings.zeroth))
 
     found = in_one_pass(images, settings)
 
     with stage_by_stage():
-        assert_same(found, tm.reconstruct(images, settings))
+        assert_same(found, reconstructed(images, settings))
 
 
 def spectrum(path: Path, m: int) -> Array:
@@ -260,8 +282,8 @@ def spectrum(path: Path, m: int) -> Array:
 
 def varied_moments(dtype: type = np.complex64) -> Array:
     """Moments of a frame, with pixels that are not finite, dark or contradictory."""
-    settings = tm.Settings(smoothing_sigma_px=0.0)
-    b: Array = np.array(tm.reconstruct(raw_images(settings), settings).measured, dtype)
+    settings = settings_of(smoothing_sigma_px=0.0)
+    b: Array = np.array(reconstructed(raw_images(settings), settings).measured, dtype)
     b[0, 9, 9] = np.nan
     b[2, 9, 19] = np.inf
     b[:, 9, 29] = 0
@@ -278,7 +300,7 @@ def test_moments_are_reconstructed_alike(settings: tm.Settings, bad: str) -> Non
     found = in_one_pass(b, settings, given_saturation(), bad_pixels=mask)
 
     with stage_by_stage():
-        expected = tm.reconstruct(b, settings, saturated_pixels=given_saturation(), bad_pixels=mask)
+        expected = reconstructed(b, settings, saturated_pixels=given_saturation(), bad_pixels=mask)
         assert_same(found, expected)
     assert np.array_equal(b, before, equal_nan=True), "the caller's moments stay as they are"
 
@@ -293,12 +315,12 @@ def given_saturation() -> Array:
 def test_moments_whose_density_overflows_are_flagged_alike(plane: int) -> None:
     b = varied_moments()
     b[plane, 5, :] = np.geomspace(1e28, 3e38, SHAPE[1])
-    settings = tm.Settings(smoothing_sigma_px=0.0)
+    settings = settings_of(smoothing_sigma_px=0.0)
 
     found = in_one_pass(b, settings)
 
     with stage_by_stage():
-        assert np.array_equal(found.flags, tm.reconstruct(b, settings).flags)
+        assert np.array_equal(found.flags, reconstructed(b, settings).flags)
     non_finite = (found.flags[5] & int(tm.Flags.NON_FINITE)) > 0
     assert non_finite.any()
     assert not non_finite.all()
@@ -306,37 +328,37 @@ def test_moments_whose_density_overflows_are_flagged_alike(plane: int) -> None:
 
 @pytest.mark.parametrize("zeroth", ["low-frequency", "estimated"])
 def test_pixels_in_a_row_are_reconstructed_alike(zeroth: str) -> None:
-    settings = tm.Settings(zeroth=zeroth)
+    settings = settings_of(zeroth=zeroth)
     images = raw_images(settings)
     row = images.reshape((len(images), -1))
 
     found = in_one_pass(row, settings)
 
     with stage_by_stage():
-        assert_same(found, tm.reconstruct(row, settings))
+        assert_same(found, reconstructed(row, settings))
 
 
 @pytest.mark.parametrize("bad", ["none", "some"])
 def test_takes_and_other_images_join_behind_the_smoothing(bad: str) -> None:
-    settings = tm.Settings(takes=4)
+    settings = settings_of(takes=4)
     takes = np.concatenate([raw_images(settings, seed=seed) for seed in range(4)])
     takes[5] //= 2  # an outlier
     prepared = {"calibration": gains("pixels"), "bad_pixels": bad_pixels(bad)}
-    narrow = np.ascontiguousarray(raw_images(tm.Settings())[:, :, :20])
+    narrow = np.ascontiguousarray(raw_images(settings_of())[:, :, :20])
 
     found = in_one_pass(takes, settings, **prepared)
-    floats = in_one_pass(takes[:16].astype(np.float32), tm.Settings(), **prepared)
-    narrowed = in_one_pass(narrow, tm.Settings())
+    floats = in_one_pass(takes[:16].astype(np.float32), settings_of(), **prepared)
+    narrowed = in_one_pass(narrow, settings_of())
 
     with stage_by_stage():
-        assert_same(found, tm.reconstruct(takes, settings, **prepared))
-        assert_same(floats, tm.reconstruct(takes[:16], tm.Settings(), **prepared))
-        assert_same(narrowed, tm.reconstruct(narrow, tm.Settings()))
+        assert_same(found, reconstructed(takes, settings, **prepared))
+        assert_same(floats, reconstructed(takes[:16], settings_of(), **prepared))
+        assert_same(narrowed, reconstructed(narrow, settings_of()))
     assert found.rejected_images == 1
 
 
 def test_saturated_pixels_can_be_given() -> None:
-    settings = tm.Settings(full_scale=100.0)
+    settings = settings_of(full_scale=100.0)
     images = raw_images(settings)
 
     found = in_one_pass(images, settings, given_saturation(), bad_pixels=bad_pixels("some"))
@@ -346,7 +368,7 @@ def test_saturated_pixels_can_be_given() -> None:
 
 
 def test_light_is_complete() -> None:
-    found = in_one_pass(raw_images(tm.Settings()), tm.Settings())
+    found = in_one_pass(raw_images(settings_of()), settings_of())
 
     total = found.direct + found.indirect + found.uniform
     assert np.allclose(total, found.brightness, rtol=1e-4, atol=1e-2)
@@ -355,9 +377,9 @@ def test_light_is_complete() -> None:
 
 @pytest.mark.parametrize("parts", [2, 3])
 def test_threads_within_a_frame_change_nothing(parts: int) -> None:
-    settings = tm.Settings()
+    settings = settings_of()
     images = raw_images(settings, shape=(120, 163))
-    reconstructor = tm.Reconstructor(settings)
+    reconstructor = tm.Reconstructor(settings, calibration=np.ones(M + 1))
     alone = reconstructor(images)
 
     with ThreadPoolExecutor(2) as executor:
@@ -375,10 +397,10 @@ def assert_equal(one: tm.Reconstruction, other: tm.Reconstruction) -> None:
 
 
 def test_frames_at_the_same_time_do_not_disturb_each_other() -> None:
-    settings = tm.Settings()
+    settings = settings_of()
     frames = [raw_images(settings, shape=(120, 163), seed=seed) for seed in range(4)]
-    reconstructor = tm.Reconstructor(settings)
-    alone = [tm.reconstruct(images, settings) for images in frames]
+    reconstructor = tm.Reconstructor(settings, calibration=np.ones(M + 1))
+    alone = [reconstructed(images, settings) for images in frames]
 
     with ThreadPoolExecutor(4) as executor:
         together = list(executor.map(reconstructor, frames * 4))
@@ -388,8 +410,8 @@ def test_frames_at_the_same_time_do_not_disturb_each_other() -> None:
 
 
 def test_a_result_stays_as_it_is_while_later_frames_come() -> None:
-    settings = tm.Settings()
-    reconstructor = tm.Reconstructor(settings)
+    settings = settings_of()
+    reconstructor = tm.Reconstructor(settings, calibration=np.ones(M + 1))
     images = raw_images(settings)
     first = reconstructor(images)
     kept = {name: read(first).copy() for name, read in PROPERTIES.items()}
@@ -404,49 +426,49 @@ def test_a_result_stays_as_it_is_while_later_frames_come() -> None:
     assert_equal(reconstructor(images), first)
 
 
-def test_frames_of_several_shapes_and_orders_take_turns() -> None:
-    settings = tm.Settings()
+def test_frames_of_several_shapes_take_turns() -> None:
+    settings = settings_of()
     shapes = [(37, 53), (8, 40), (40, 33), (9, 64), (10, 65), (37, 53)]
-    reconstructor = tm.Reconstructor(settings)
     for m in (3, 4):
+        reconstructor = tm.Reconstructor(settings, calibration=np.ones(m + 1))
         for shape in shapes:
             images = np.ascontiguousarray(raw_images(settings, m)[:, : shape[0], : shape[1]])
             images = np.resize(images, (len(images), *shape))
-            assert_equal(reconstructor(images), tm.reconstruct(images, settings))
+            assert_equal(reconstructor(images), reconstructed(images, settings))
 
 
 @pytest.mark.parametrize(
     "settings",
     [
-        tm.Settings(keep="brightness"),
-        tm.Settings(estimator="single-frequency"),
-        tm.Settings(estimator="maximum-entropy"),
+        settings_of(keep="brightness"),
+        settings_of(estimator="single-frequency"),
+        settings_of(estimator="maximum-entropy"),
     ],
 )
 def test_what_a_pass_cannot_do_is_left_to_the_stages(settings: tm.Settings) -> None:
-    found = tm.Reconstructor(settings)(raw_images(settings))
+    found = tm.Reconstructor(settings, calibration=np.ones(M + 1))(raw_images(settings))
 
     assert not isinstance(found, PassedReconstruction)
     with without_lanes():
-        expected = tm.reconstruct(raw_images(settings), settings)
+        expected = reconstructed(raw_images(settings), settings)
         assert np.array_equal(found.flags, expected.flags)
         assert np.nanmax(np.abs(found.direct - expected.direct)) < 1
 
 
 def test_double_precision_few_pixels_and_other_orders_are_left_to_the_stages() -> None:
-    plain = tm.Settings()
+    plain = settings_of()
     for data in (
         varied_moments(np.complex128),
         varied_moments()[:, :7, :9],
         raw_images(plain, 5),
         raw_images(plain).astype(np.float64),
     ):
-        assert not isinstance(tm.Reconstructor(plain)(data), PassedReconstruction)
+        assert not isinstance(reconstructed(data, plain), PassedReconstruction)
 
 
 def test_a_reconstructor_changes_over_when_its_kernel_is_there() -> None:
-    reconstructor = tm.Reconstructor(tm.Settings())
-    images = raw_images(tm.Settings())
+    reconstructor = tm.Reconstructor(settings_of(), calibration=np.ones(M + 1))
+    images = raw_images(settings_of())
 
     with without_lanes():
         before = reconstructor(images)
@@ -458,26 +480,28 @@ def test_a_reconstructor_changes_over_when_its_kernel_is_there() -> None:
 
 @pytest.mark.parametrize("shape", [(M,), (M + 1, 3, 3), (M + 2, *SHAPE)])
 def test_a_calibration_of_another_shape_is_refused(shape: tuple[int, ...]) -> None:
-    reconstructor = tm.Reconstructor(tm.Settings(), calibration=np.ones(shape))
+    reconstructor = tm.Reconstructor(settings_of(), calibration=np.ones(shape))
 
     with pytest.raises(tm.ShapeError) as caught:
-        reconstructor(raw_images(tm.Settings()))
+        reconstructor(raw_images(settings_of()))
 
     assert caught.value.name == "calibration"
 
 
 @pytest.mark.parametrize("mask", [np.ones((3, 3), bool), np.ones(SHAPE), np.ones(53, bool)])
 def test_a_mask_of_another_shape_or_type_is_refused(mask: Array) -> None:
-    reconstructor = tm.Reconstructor(tm.Settings(), bad_pixels=mask)
+    reconstructor = tm.Reconstructor(settings_of(), calibration=np.ones(M + 1), bad_pixels=mask)
 
     with pytest.raises(tm.ShapeError) as caught:
-        reconstructor(raw_images(tm.Settings()))
+        reconstructor(raw_images(settings_of()))
 
     assert caught.value.name == "bad"
 
 
 def test_another_number_of_images_is_refused() -> None:
+    reconstructor = tm.Reconstructor(settings_of(), calibration=np.ones(M + 1))
+
     with pytest.raises(tm.ShapeError) as caught:
-        tm.Reconstructor(tm.Settings())(np.zeros((M * 4 + 1, *SHAPE), np.uint16))
+        reconstructor(np.zeros((M * 4 + 1, *SHAPE), np.uint16))
 
     assert caught.value.name == "images"

@@ -1,6 +1,7 @@
 """JAX arrays, eagerly and under jit: the same results as NumPy."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import jax
@@ -11,6 +12,8 @@ import transientcam_moments as tm
 from tests.moments import oracles
 
 PHASE = np.linspace(0.1, 6.0, 7)
+gains = partial(tm.nominal_calibration, sub_phases_rad=(0.0, 0.5), zeroth="on-off")
+low = partial(tm.measure, zeroth="low-frequency")
 
 STAGES: dict[str, Callable[[Any], Any]] = {
     "levinson": tm.levinson,
@@ -31,11 +34,11 @@ STAGES: dict[str, Callable[[Any], Any]] = {
     "smoothed_density": lambda b: tm.smoothed_density(tm.levinson(b), PHASE),
     "flags": tm.flags,
     "smooth": lambda b: tm.smooth(b.reshape(b.shape[0], 4, 5)),
-    "calibrate": lambda b: tm.calibrate(b, tm.nominal_calibration(b.shape[0] - 1, (0.0, 0.5))),
+    "calibrate": lambda b: tm.calibrate(b, gains(b.shape[0] - 1)),
     "range_m": lambda b: tm.range_m(b[0].real, 23e6),
-    "reconstruct": lambda b: tm.reconstruct(b.reshape(b.shape[0], 4, 5)).range_m,
+    "reconstruct": lambda b: tm.reconstruct(b.reshape(b.shape[0], 4, 5), tm.Settings(23e6)).range_m,
     "average_takes": lambda b: tm.average_takes(abs(b)[None].repeat(4, axis=0)),
-    "measure": lambda b: tm.measure(abs(b)[np.array([0, 1, 2, 3, 1, 2, 3, 0])]),
+    "measure": lambda b: low(abs(b)[np.array([0, 1, 2, 3, 1, 2, 3, 0])]),
 }
 
 

@@ -80,7 +80,7 @@ def calibration_of(sequence: Sequence) -> Array:
     sub_phases = sequence.sub_phases
     return np.asarray(
         tm.nominal_calibration(
-            sequence.harmonics, sub_phases.phases_rad, sub_phases.weights, sequence.zeroth
+            sequence.harmonics, sub_phases.phases_rad, sub_phases.weights, zeroth=sequence.zeroth
         )
     )
 

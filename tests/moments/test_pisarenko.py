@@ -161,10 +161,10 @@ def test_a_known_eigenvalue_is_not_searched_for_again() -> None:
     b = oracles.random_moments(np.random.default_rng(7), 3, 50, noise=0.1)
     b[:, 3] = 0
 
-    told, found = tm.pisarenko(b, eigenvalue=tm.smallest_eigenvalue(b)), tm.pisarenko(b)
+    reported, found = tm.pisarenko(b, eigenvalue=tm.smallest_eigenvalue(b)), tm.pisarenko(b)
 
-    assert np.allclose(told.phase_rad, found.phase_rad, equal_nan=True, atol=1e-9)
-    assert np.allclose(told.uniform, found.uniform)
+    assert np.allclose(reported.phase_rad, found.phase_rad, equal_nan=True, atol=1e-9)
+    assert np.allclose(reported.uniform, found.uniform)
 
 
 def test_christoffel_function_is_the_quadratic_form_of_the_inverse() -> None:

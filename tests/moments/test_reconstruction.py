@@ -1,5 +1,7 @@
 """The stages together."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -61,7 +63,7 @@ def test_every_estimator_finds_a_single_return(estimator: str) -> None:
     phase = np.linspace(0.1, 6.1, 20)
     b = oracles.moments_of_returns(phase[None], np.full((1, 20), 100.0), 3)
 
-    result = tm.reconstruct(b, tm.Settings(estimator=estimator))
+    result = tm.reconstruct(b, tm.Settings(FREQUENCY_HZ, estimator=estimator))
 
     assert oracles.around(result.phase_rad - phase).max() < 1e-6
 
@@ -81,7 +83,7 @@ def test_a_rival_gives_the_range_image_and_no_light_is_lost(
     b[0] += 5
     b[1, 0, 1] = np.nan
 
-    result = tm.reconstruct(b, tm.Settings(estimator=estimator, smoothing_sigma_px=0))
+    result = tm.reconstruct(b, tm.Settings(FREQUENCY_HZ, estimator=estimator, smoothing_sigma_px=0))
 
     seen = np.isfinite(result.range_m)
     assert np.array_equal(seen, result.has_range)
@@ -103,7 +105,7 @@ def test_an_estimator_without_enough_harmonics_says_how_many_it_needs(estimator:
         return
     b = scene(least - 1)[0]
 
-    result = tm.reconstruct(b, tm.Settings(estimator=estimator))
+    result = tm.reconstruct(b, tm.Settings(FREQUENCY_HZ, estimator=estimator))
 
     for name in ("range_m", "direct", "uniform"):
         with pytest.raises(tm.ParameterError, match=estimator) as caught:
@@ -136,10 +138,11 @@ def test_images_go_through_calibration_to_range() -> None:
         images += [(b[0].real + (plane * gain * 1j**-k).real) / 2 for k in range(4)]
     raw = np.round(np.stack(images)).astype(np.uint16)
     raw[5, 2, 2] = 4095
-    calibration = tm.nominal_calibration(3, steps.phases_rad)
+    calibration = tm.nominal_calibration(3, steps.phases_rad, zeroth="low-frequency")
+    settings = replace(PLAIN, zeroth="low-frequency", takes=1)
 
-    result = tm.reconstruct(raw, PLAIN, calibration=calibration)
-    listed = tm.reconstruct(list(raw), PLAIN, calibration=calibration)
+    result = tm.reconstruct(raw, settings, calibration=calibration)
+    listed = tm.reconstruct(list(raw), settings, calibration=calibration)
 
     others = np.ones(SHAPE, bool)
     others[2, 2] = False

@@ -127,7 +127,7 @@ def test_what_clients_do_wrong_is_no_error_of_the_service() -> None:
             pass
 
     documents = [json.loads(line) for line in lines(stream)]
-    told = [each for each in documents if each["message"] in logs._CLIENT_MISTAKES]
-    assert [each["level"] for each in told] == ["INFO", "INFO"]
+    reported = [each for each in documents if each["message"] in logs._CLIENT_MISTAKES]
+    assert [each["level"] for each in reported] == ["INFO", "INFO"]
     assert not any("exception" in each for each in documents)
     assert all(each["level"] in ("INFO", "WARNING") for each in documents)

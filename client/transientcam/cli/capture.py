@@ -64,7 +64,8 @@ def capture(
         "wait_s": wait_s if recording is None else None,
     }
     with Camera(url, token=token) as camera:
-        if form in MADE_BY_DAEMON:
+        # of raw images the daemon alone has the gains that belong into the file
+        if form in MADE_BY_DAEMON or (form is Format.NPZ and product == "raw"):
             data = camera.file(product, form.value, colour=colour, **options)
             report: dict[str, object] = {"product": product}
         else:

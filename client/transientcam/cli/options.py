@@ -1,5 +1,6 @@
 """Arguments and options that several verbs share."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -26,3 +27,10 @@ TokenOption = Annotated[
     typer.Option(envvar="TRANSIENTCAM_TOKEN", help="Bearer token, where the daemon requires one."),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
+
+
+def require_suffix(path: Path | None, *suffixes: str, hint: str = "--output") -> None:
+    """Refuse a file whose suffix names another format than the one that is written (usage)."""
+    if path is not None and path.suffix.lower() not in suffixes:
+        known = " or ".join(suffixes)
+        raise typer.BadParameter(f"{path} must end in {known}, which is written", param_hint=hint)

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from transientcam.camera import Camera
-from transientcam.cli.options import JsonOption, TokenOption, UrlArgument
+from transientcam.cli.options import JsonOption, TokenOption, UrlArgument, require_suffix
 
 _LOOK_S = 0.5
 
@@ -35,6 +35,7 @@ def record(
     as_json: JsonOption = False,
 ) -> None:
     """Record raw frames where the daemon runs, until the time is over or Ctrl-C."""
+    require_suffix(output, ".h5", ".hdf5")
     annotations = None if note is None else {"note": note}
     with Camera(url, token=token) as camera, _bars() as bars:
         running = camera.record(

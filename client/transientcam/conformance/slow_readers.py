@@ -40,13 +40,14 @@ def who_does_not_acknowledge_gets_no_more_than_its_credits(device: Device) -> No
     """No more frames than the credits are on their way unacknowledged."""
     with (
         device.capturing(),
-        device.stream("flags") as steady,
+        device.stream("range") as steady,
         device.stream("range", credit=2) as slow,
     ):
         first, second = slow.frame(), slow.frame()
-        steady.frame(lambda each: each.frame >= second.frame + 4)
+        newest = steady.frame(lambda each: each.frame >= second.frame + 4)
         slow.acknowledge(second.frame)
-        expect(slow.frame().frame > second.frame + 1, "frames were sent beyond the credits")
+        # one sent before the acknowledgement is older, whichever a busy daemon left out
+        expect(slow.frame().frame >= newest.frame, "frames were sent beyond the credits")
         expect(first.frame < second.frame, "frames come twice")
 
 

@@ -41,25 +41,39 @@ class Calibrations(Generic[_Document, _Bytes]):
         """Return the description of one."""
         return self._ask(document(_path(calibration_id)))
 
-    def measure(self, *, name: str = "", frames: int = 40, activate: bool = False) -> _Document:
+    def measure(
+        self, *, name: str = "", frames: int = 40, activate: bool = False, force: bool = False
+    ) -> _Document:
         """Start measuring one with the present sequence; returns the job.
 
-        Put filter and diffusor before the lens first, so that the light shines at the sensor.
+        Put filter and diffusor before the lens first, so that the light shines at the sensor. The
+        job's result says in ``verdict`` whether the images look so; what was measured on a scene
+        is not used, and ``activated`` false, unless with ``force``.
         """
-        body = {"name": name, "frames": frames, "activate": activate}
+        body = {"name": name, "frames": frames, "activate": activate, "force": force}
         return self._ask(document("calibrations", method="POST", body=body))
 
     def active(self) -> _Document:
         """Return which one is active, and which one frames are calibrated with at present."""
         return self._ask(document("calibrations/active"))
 
-    def activate(self, calibration_id: str) -> _Document:
-        """Use one, or ``"nominal"`` for none, from the next frame on."""
-        body = {"id": calibration_id}
+    def activate(self, calibration_id: str, *, force: bool = False) -> _Document:
+        """Use one, or ``"nominal"`` for none, from the next frame on.
+
+        One that was not measured on a diffusor is refused (``calibration-doubted``) unless with
+        ``force``.
+        """
+        body = {"id": calibration_id, "force": force}
         return self._ask(
             document(
                 "calibrations/active", method="PUT", body=body, extra_timeout_s=_EXTRA_TIMEOUT_S
             )
+        )
+
+    def undo(self) -> _Document:
+        """Use the one again that was active before the present one, ``former`` of `active`."""
+        return self._ask(
+            document("calibrations/active/undo", method="POST", extra_timeout_s=_EXTRA_TIMEOUT_S)
         )
 
     def export(self, calibration_id: str) -> _Bytes:

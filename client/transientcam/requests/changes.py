@@ -34,9 +34,15 @@ def safe_off() -> Request[dict[str, Any]]:
     return document("acquisition/safe-off", method="POST")
 
 
-def set_simulation(scene: str | None, effects: Mapping[str, str] | None) -> Request[dict[str, Any]]:
+def set_simulation(
+    scene: str | None, effects: Mapping[str, str] | None, diffusor: bool | None = None
+) -> Request[dict[str, Any]]:
     """Build the request that changes the simulated world; None leaves a part as it is."""
-    parts = {"scene": scene, "effects": None if effects is None else dict(effects)}
+    parts: dict[str, object] = {
+        "scene": scene,
+        "effects": None if effects is None else dict(effects),
+    }
+    parts["diffusor"] = diffusor
     body = {key: value for key, value in parts.items() if value is not None}
     return document("simulation", method="PUT", body=body, extra_timeout_s=_SCENE_BUILT_S)
 

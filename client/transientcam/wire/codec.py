@@ -60,6 +60,13 @@ def pack_with_array(document: Mapping[str, Any], array: NDArray[Any]) -> bytes:
     """
     array = wire_array(array)
     data = buffer(array)
+    return b"".join((array_head(document, array.dtype.str, array.shape, len(data)), data))
+
+
+def array_head(
+    document: Mapping[str, Any], dtype: str, shape: tuple[int, ...], data_bytes: int
+) -> bytes:
+    """Return what comes before the data of an array in `pack_with_array`."""
     packer = msgpack.Packer(autoreset=False)
     packer.pack_map_header(len(document) + 2)
     for key, value in document.items():
@@ -70,11 +77,11 @@ def pack_with_array(document: Mapping[str, Any], array: NDArray[Any]) -> bytes:
     packer.reset()
     packer.pack("array")
     packer.pack_map_header(3)
-    for part in ("dtype", array.dtype.str, "shape", list(array.shape), "data"):
+    for part in ("dtype", dtype, "shape", list(shape), "data"):
         packer.pack(part)
-    back = packer.bytes() + bytes((_BIN_32,)) + len(data).to_bytes(4, "big")
+    back = packer.bytes() + bytes((_BIN_32,)) + data_bytes.to_bytes(4, "big")
     padding = -(len(front) + 2 + len(back)) % ALIGNMENT
-    return b"".join((front, bytes((_BIN_8, padding)), bytes(padding), back, data))
+    return b"".join((front, bytes((_BIN_8, padding)), bytes(padding), back))
 
 
 def _string_keys(document: dict[Any, Any]) -> dict[str, Any]:

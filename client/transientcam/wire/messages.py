@@ -190,10 +190,33 @@ def encode_frame(
     ParameterError
         If the array's dtype does not travel.
     """
+    document = frame_document(
+        product=product,
+        unit=unit,
+        axes=axes,
+        meta=meta,
+        encode_s=encode_s,
+        channel=channel,
+        extra=extra,
+    )
+    return pack_with_array(document, array)
+
+
+def frame_document(
+    *,
+    product: str,
+    unit: str,
+    axes: tuple[str, ...],
+    meta: Mapping[str, Any],
+    encode_s: float = 0.0,
+    channel: int | None = None,
+    extra: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Return the map of `encode_frame` without its array."""
     document: dict[str, Any] = {"v": VERSION, "type": "frame"}
     if channel is not None:
         document["channel"] = channel
-    document |= {
+    return document | {
         "product": product,
         "unit": unit,
         "axes": list(axes),
@@ -201,4 +224,3 @@ def encode_frame(
         "encode_s": encode_s,
         **(extra or {}),
     }
-    return pack_with_array(document, array)

@@ -48,6 +48,12 @@ NOTICES: Final[dict[str, NoticeKind]] = {
         NoticeKind("camera-lost", "the camera does not answer", {"reason": "string"}),
         NoticeKind("camera-back", "the camera answers again"),
         NoticeKind(
+            "light-held",
+            "the light was switched off because clients were not served",
+            {"reason": "string"},
+        ),
+        NoticeKind("light-released", "the light goes on again"),
+        NoticeKind(
             "sequence-changed",
             "what is captured from now on",
             {"sequence": "object", "channels": "array"},
@@ -88,7 +94,8 @@ NOTICES: Final[dict[str, NoticeKind]] = {
         NoticeKind(
             "simulation-changed",
             "the simulated camera stands before another scene, or with other effects",
-            {"scene": "string", "effects": "object"},
+            {"scene": "string", "effects": "object", "diffusor": "boolean"},
+            optional=("diffusor",),
         ),
         NoticeKind("job-changed", "a job began or ended", {"job": "object"}),
     )

@@ -34,6 +34,8 @@ from transientcam_driver.simulation.switchable_world import SwitchableWorld
 from transientcam_driver.simulation.world import World
 
 MEASURED = "measured"
+CALIBRATION = "calibration"
+"""The scene that is seen through a diffusor, whatever is behind it."""
 DEFAULT_WIDTH, DEFAULT_HEIGHT = 163, 120
 RESOLUTIONS = ((DEFAULT_WIDTH, DEFAULT_HEIGHT), (320, 240), (640, 480))
 
@@ -147,11 +149,14 @@ def build(
 
     quiet = {each.name: "off" for each in NOISE if scene.effects.get(each.name) == "off"}
 
-    def prepare(name: str, effects: Mapping[str, str]) -> tuple[Scene, World]:
-        found = scene if name == scene.name else find_scene(name)
+    def seen(found: Scene, effects: Mapping[str, str]) -> Scene:
         choices = found.effects | quiet | checked_effects(effects)
-        found = replace(found, sensor=scene.sensor, device=scene.device, effects=choices)
-        return found, world_of_scene(found)
+        return replace(found, sensor=scene.sensor, device=scene.device, effects=choices)
+
+    def prepare(name: str, effects: Mapping[str, str], diffusor: bool) -> tuple[Scene, World]:
+        found = seen(scene if name == scene.name else find_scene(name), effects)
+        behind = seen(find_scene(CALIBRATION), effects) if diffusor else found
+        return found, world_of_scene(behind)
 
     return device, SimulationHandle(scene, world, device, prepare=prepare)
 

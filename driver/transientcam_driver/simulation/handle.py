@@ -12,8 +12,9 @@ from transientcam_driver.simulation.scene import Scene
 from transientcam_driver.simulation.switchable_world import SwitchableWorld
 from transientcam_driver.simulation.world import World
 
-PrepareScene = Callable[[str, Mapping[str, str]], tuple[Scene, World]]
-"""Prepares a scene by its name, with choices of effects."""
+PrepareScene = Callable[[str, Mapping[str, str], bool], tuple[Scene, World]]
+"""Prepares a scene by its name, with choices of effects, and with or without a diffusor before the
+lens."""
 
 
 class SimulationHandle:
@@ -37,6 +38,7 @@ class SimulationHandle:
         self._device = device
         self._prepare = prepare
         self._effects: dict[str, str] = {}
+        self._diffusor = False
         self._changing = threading.Lock()
 
     @property
@@ -54,13 +56,27 @@ class SimulationHandle:
         """Choices that `change` made in place of the scene's."""
         return dict(self._effects)
 
-    def change(self, *, scene: str | None = None, effects: Mapping[str, str] | None = None) -> None:
-        """Prepare another scene or other effects, and switch to it."""
+    @property
+    def diffusor(self) -> bool:
+        """Whether filter and diffusor are before the lens."""
+        return self._diffusor
+
+    def change(
+        self,
+        *,
+        scene: str | None = None,
+        effects: Mapping[str, str] | None = None,
+        diffusor: bool | None = None,
+    ) -> None:
+        """Prepare another scene, other effects or the diffusor, and switch to it."""
         with self._changing:
             chosen = self.effects if effects is None else dict(effects)
-            found, world = self._prepare(self.scene if scene is None else scene, chosen)
+            before_lens = self._diffusor if diffusor is None else diffusor
+            found, world = self._prepare(
+                self.scene if scene is None else scene, chosen, before_lens
+            )
             self._world.change(world)
-            self._scene, self._effects = found, chosen
+            self._scene, self._effects, self._diffusor = found, chosen, before_lens
 
     def truth(self, *, device_time_s: float | None = None) -> Truth:
         """Ground truth of the last image, or at a time."""

@@ -11,6 +11,7 @@ from transientcam_server.api.auth import permissions
 from transientcam_server.api.auth.guard import Authentication, Guard
 from transientcam_server.api.docs import pages
 from transientcam_server.api.metrics import Metrics
+from transientcam_server.api.middleware.answers import AnswerLimit
 from transientcam_server.api.middleware.requests import RequestLog
 from transientcam_server.api.middleware.security import BodyLimit, OriginCheck, SecurityHeaders
 from transientcam_server.api.routes import (
@@ -100,6 +101,7 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     permissions.describe(app, [resource.router for resource in _RESOURCES], prefix=API)
     # the last one added is the first to see a request
     app.add_middleware(BodyLimit, counted_elsewhere=frozenset((f"{API}{calibrations.IMPORT}",)))
+    app.add_middleware(AnswerLimit, limits=settings.limits)
     app.add_middleware(Authentication, guard=guard)
     app.add_middleware(OriginCheck, settings=settings)
     app.add_middleware(RequestLog, metrics=metrics)

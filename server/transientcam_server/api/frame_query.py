@@ -1,16 +1,19 @@
 """Queries of a frame and their answers, whether it is the latest, a former or a recorded one."""
 
 import json
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Literal
 
 from fastapi import Depends, Path, Query, Request, Response
+from fastapi.responses import StreamingResponse
 from pydantic import FiniteFloat
 
 from transientcam import wire
+from transientcam_server.api.middleware.requests import asks_for_head
 from transientcam_server.api.negotiation import negotiate
 from transientcam_server.errors import Problem, kinds
+from transientcam_server.imaging.bands import banded
 from transientcam_server.imaging.encodings.encoding import (
     COLOUR_PNG,
     ENCODINGS,
@@ -21,10 +24,9 @@ from transientcam_server.imaging.encodings.encoding import (
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.pixel import pixel_csv, pixel_json
 from transientcam_server.imaging.products import Product
-from transientcam_server.imaging.view import Crop, View
+from transientcam_server.imaging.view import DEFAULT_BINS, Crop, View, evenly
 
 MAX_BINS: Final = 4096
-DEFAULT_BINS: Final = 64
 MAX_NUMBER: Final = 2**53 - 1
 LATEST: Final = "latest"
 
@@ -65,6 +67,7 @@ class FrameQuery:
     decimation: int | None
     view: Literal["colour"] | None
     accept: str | None
+    head_alone: bool
 
     def view_of(self, product: Product, frame: Frame) -> View:
         """Return which part of the frame's product that is.
@@ -94,9 +97,7 @@ class FrameQuery:
     def _times_s(self, frame: Frame) -> tuple[float, ...]:
         if self.time_s is not None:
             return tuple(self.time_s)
-        count = self.bins or DEFAULT_BINS
-        period_s = 1.0 / frame.recipe.base_frequency_hz
-        return tuple(period_s * index / count for index in range(count))
+        return evenly(frame.recipe.base_frequency_hz, self.bins or DEFAULT_BINS)
 
     def _row(self, crop: Crop, height: int) -> int:
         _, first, _, rows = crop.region or (0, 0, 0, height)
@@ -138,7 +139,8 @@ async def _frame_query(
     ] = None,
 ) -> FrameQuery:
     accept = request.headers.get("accept")
-    return FrameQuery(time_s, bins, y, region, decimation, view, accept)
+    head_alone = asks_for_head(request.scope)
+    return FrameQuery(time_s, bins, y, region, decimation, view, accept, head_alone)
 
 
 FrameQueryOf = Annotated[FrameQuery, Depends(_frame_query)]
@@ -170,7 +172,14 @@ async def product_answer(
     encoding = choose(chosen, suffix if dot else None, query)
     found = await frame()
     view = query.view_of(chosen, found)
-    data = await found.encoded(chosen, encoding, view)
+    height, width = found.shape
+    applied = found.recipe.applied
+    planned = banded(chosen, encoding, view, applied=applied, height=height, width=width)
+    if planned is None:
+        data = await found.encoded(chosen, encoding, view)
+    else:
+        bands = found.bands(planned)
+        head = await anext(bands)  # what can go wrong goes wrong before the answer has begun
     headers = {"Cache-Control": "no-store", "Vary": "Accept"}
     if encoding is not MSGPACK:  # which holds it
         meta = found.meta() | view.crop.to_meta(*found.shape)
@@ -179,7 +188,22 @@ async def product_answer(
             "Transientcam-Unit": _unit(chosen, encoding),
             "Transientcam-Meta": json.dumps(meta, separators=(",", ":")),
         }
-    return Response(data, media_type=encoding.media_type, headers=headers)
+    if planned is None:
+        return Response(data, media_type=encoding.media_type, headers=headers)
+    headers["Content-Length"] = str(len(head) + planned.data_bytes)
+    whole = _one_after_another(head, None if query.head_alone else bands)
+    return StreamingResponse(whole, media_type=encoding.media_type, headers=headers)
+
+
+async def _one_after_another(
+    head: bytes, rest: AsyncIterator[bytes] | None
+) -> AsyncIterator[bytes]:
+    if rest is None:
+        yield head
+        return
+    async for each in rest:
+        yield head + each  # together, so that the first part is as large as the others
+        head = b""
 
 
 def _unit(product: Product, encoding: Encoding) -> str:
@@ -244,5 +268,6 @@ PRODUCT_PROBLEMS: Final = (
     kinds.INVALID_REQUEST,
     kinds.ANSWER_TOO_LARGE,
     kinds.PRODUCT_FAILED,
+    kinds.TOO_MANY_ANSWERS,
 )
 """What can be wrong with a request for a product, whatever its frame."""

@@ -16,6 +16,8 @@ from transientcam_server.imaging.view import WHOLE, Crop
 UNNUMBERED: Final = -1
 """The number of a channel that has none yet."""
 _EARLY_PERIODS = 0.1
+_LONGEST_PERIOD_S = 1e9
+"""Thirty years: after the first frame none is due. The inverse of the least rates is infinite."""
 
 
 @dataclass(slots=True)
@@ -53,7 +55,7 @@ class Channel:
         """Return whether the frame captured at ``time_s`` is due, and count on from there."""
         if self.max_rate_hz is None:
             return True
-        period_s = 1.0 / self.max_rate_hz
+        period_s = min(1.0 / self.max_rate_hz, _LONGEST_PERIOD_S)
         # a little early will do: frames come with jitter, also at the very rate requested
         if time_s < self.next_due_s - _EARLY_PERIODS * period_s:
             return False

@@ -5,6 +5,7 @@ their results are futures.
 """
 
 import logging
+import math
 import queue
 import threading
 import time
@@ -20,7 +21,16 @@ from transientcam_driver import (
     Sequence,
     Status,
 )
-from transientcam_server.camera.events import Back, Captured, Event, Lost, SequenceChanged
+from transientcam_server.camera.events import (
+    Back,
+    Captured,
+    Event,
+    Held,
+    Lost,
+    Released,
+    SequenceChanged,
+)
+from transientcam_server.camera.light import LightGuard
 from transientcam_server.camera.source import Camera
 from transientcam_server.camera.status import AcquisitionStatus, State
 from transientcam_server.errors import kinds
@@ -48,8 +58,10 @@ class Acquisition:
         camera: Camera,
         *,
         report: Callable[[Event], None],
+        light: LightGuard | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
+        self._light = LightGuard(unserved_s=math.inf, clock=clock) if light is None else light
         self._camera = camera
         self._report = report
         self._clock = clock
@@ -63,6 +75,7 @@ class Acquisition:
         self._running = True
         self._connected = True
         self._lost: str | None = None
+        self._held: str | None = None
         self._started = False
         self._attempts = 0
         self._frames = 0
@@ -186,7 +199,7 @@ class Acquisition:
             rate_hz=rate_hz,
             frames=self._frames,
             frame_age_s=age_s,
-            reason=self._lost,
+            reason=self._lost or self._held,
             stalled=state in ("starting", "streaming") and age_s > self._stall_after_s(),
         )
 
@@ -197,6 +210,8 @@ class Acquisition:
             return "calibrating"
         if not self._running:
             return "stopped"
+        if self._held is not None:
+            return "held"
         return "streaming" if self._started else "starting"
 
     def _stall_after_s(self) -> float:
@@ -219,7 +234,9 @@ class Acquisition:
         self._shut_down()
 
     def _step(self) -> None:
-        if not self._connected:
+        if self._light_is_held():
+            self._run_commands(wait_s=READ_TIMEOUT_S)
+        elif not self._connected:
             self._look_for_camera()
         elif self._restored is not None:
             self._configure(self._restored)
@@ -234,6 +251,32 @@ class Acquisition:
             self._moved_s = self._clock()
         else:
             self._read()
+
+    def _light_is_held(self) -> bool:
+        """Switch the light off where it may not stay on; return whether it has to stay off."""
+        self._act_on_lapse()
+        reason = self._light.unserved()
+        if reason is None or not self._running:
+            if self._held is not None:
+                self._held = None
+                self._moved_s = self._clock()
+                self._report(Released())
+            return False
+        if self._held is None:
+            self._held = reason
+            _log.error("the light is switched off: %s", reason)
+            self._arrivals_s.clear()
+            self._report(Held(reason))
+            if self._started:
+                self._started = False
+                self._camera.stop()
+        return True
+
+    def _act_on_lapse(self) -> None:
+        if self._light.lapsed():
+            _log.warning("a lease lapsed, and the loop that serves clients is late to act on it")
+            self._interrupted.set()
+            self._set_running(False)
 
     def _read(self) -> None:
         try:
@@ -277,7 +320,8 @@ class Acquisition:
 
     def _occupy(self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T]) -> _T:
         def go_on() -> None:
-            if self._interrupted.is_set():
+            self._act_on_lapse()
+            if self._interrupted.is_set() or self._light.unserved() is not None:
                 raise JobCancelled(job_id)
             self._run_commands(wait_s=0.0)  # those that do not need the camera, or cancel this job
 

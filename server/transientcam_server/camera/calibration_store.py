@@ -18,7 +18,14 @@ from typing import Any, Final
 from transientcam_driver import CalibrationCapture, CalibrationFileError, CalibrationSubject
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.calibration import NOMINAL_ID
+from transientcam_server.imaging.calibration import (
+    NOMINAL_ID,
+    Calibration,
+    evaluate,
+    load_calibration,
+)
+from transientcam_server.imaging.diffusor import judge
+from transientcam_server.imaging.verdict import Verdict
 from transientcam_server.settings import CalibrationSettings
 
 _log = logging.getLogger(__name__)
@@ -41,6 +48,8 @@ class StoredCalibration:
         When its last image arrived.
     notes
         ``name``, and what else is stored with it.
+    verdict
+        Whether it was measured on a diffusor.
     """
 
     id: str
@@ -51,6 +60,12 @@ class StoredCalibration:
     captured_unix_s: float
     temperature_c: float
     notes: Mapping[str, Any]
+    verdict: Verdict
+
+    @property
+    def usable(self) -> bool:
+        """Whether it may be activated without being forced: trusted, or forced when measured."""
+        return self.verdict.trusted or self.notes.get("forced") is True
 
 
 class CalibrationStore:
@@ -173,20 +188,30 @@ class CalibrationStore:
     @property
     def active_id(self) -> str:
         """The calibration that was active when the service last ran."""
+        return self._remembered().get("id") or NOMINAL_ID
+
+    @property
+    def former_id(self) -> str | None:
+        """The one that was active before that; None where none is known."""
+        return self._remembered().get("former")
+
+    def _remembered(self) -> dict[str, str | None]:
         try:
             document = json.loads((self.directory / _ACTIVE).read_text(encoding="utf-8"))
-            return str(document["id"])
+            former = document.get("former")
+            return {"id": str(document["id"]), "former": None if former is None else str(former)}
         except FileNotFoundError:
-            return NOMINAL_ID
-        except (OSError, ValueError, TypeError, KeyError) as error:
+            return {}
+        except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
             _log.warning("which calibration was active cannot be read: %s", error)
-            return NOMINAL_ID
+            return {}
 
-    def remember_active(self, calibration_id: str) -> None:
-        """Keep it for the next start of the service; a failure of the disk is only logged."""
+    def remember_active(self, calibration_id: str, former_id: str | None) -> None:
+        """Keep both for the next start of the service; a failure of the disk is only logged."""
+        content = json.dumps({"id": calibration_id, "former": former_id})
         try:
             with self._part() as part:
-                part.write_text(json.dumps({"id": calibration_id}), encoding="utf-8")
+                part.write_text(content, encoding="utf-8")
                 part.replace(self.directory / _ACTIVE)
         except (Problem, OSError) as error:
             _log.warning("the active calibration could not be saved for the next start: %s", error)
@@ -290,4 +315,39 @@ def _read(path: Path, size_bytes: int) -> StoredCalibration | None:
         captured_unix_s=capture.captured_unix_s,
         temperature_c=capture.temperature_c,
         notes=dict(capture.notes),
+        verdict=verdict_of(capture),
     )
+
+
+def load_given(path: Path) -> Calibration:
+    """Read and evaluate a file that somebody names, unless it was not measured on a diffusor.
+
+    Raises
+    ------
+    CalibrationFileError
+        The file holds none.
+    Problem
+        ``calibration-doubted``.
+    """
+    calibration = load_calibration(path)
+    verdict = verdict_of(calibration.capture)
+    if not verdict.trusted and calibration.capture.notes.get("forced") is not True:
+        raise doubted(verdict, f"{path}: ")
+    return calibration
+
+
+def doubted(verdict: Verdict, named: str = "") -> Problem:
+    """Return the problem of a calibration that was not measured on a diffusor."""
+    return Problem(
+        kinds.CALIBRATION_DOUBTED,
+        f"{named}{verdict.reason}",
+        field="calibration",
+        verdict=verdict.word,
+        tests=verdict.to_document()["tests"],
+    )
+
+
+def verdict_of(capture: CalibrationCapture) -> Verdict:
+    """Return the verdict that was stored with a measurement, or judge it now."""
+    stored = Verdict.from_document(capture.notes.get("verdict"))
+    return stored or judge(capture, evaluate(capture).gains.bad)

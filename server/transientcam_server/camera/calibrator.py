@@ -5,6 +5,7 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -20,7 +21,12 @@ from transientcam_driver import (
 )
 from transientcam_driver.calibration.capture import DEFAULT_TAKES
 from transientcam_server.camera.acquisition import Acquisition
-from transientcam_server.camera.calibration_store import CalibrationStore, StoredCalibration
+from transientcam_server.camera.calibration_store import (
+    CalibrationStore,
+    StoredCalibration,
+    doubted,
+    verdict_of,
+)
 from transientcam_server.camera.jobs import Job, Jobs
 from transientcam_server.camera.source import Camera
 from transientcam_server.errors import kinds
@@ -32,11 +38,13 @@ from transientcam_server.imaging.calibration import (
     evaluate,
     load_calibration,
 )
+from transientcam_server.imaging.diffusor import judge
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.history import History
-from transientcam_server.imaging.noise import invalid_share, moment_noise
+from transientcam_server.imaging.noise import contradictory_share
 from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.imaging.verdict import Verdict
 
 _log = logging.getLogger(__name__)
 _Array = NDArray[Any]
@@ -51,11 +59,15 @@ _EVALUATING: Final = 0.95  # of the work is done when all is captured
 
 @dataclass(frozen=True, slots=True)
 class CalibrationOptions:
-    """What to measure: ``frames`` of each kind; ``activate`` uses the result at once."""
+    """What to measure: ``frames`` of each kind; ``activate`` uses the result at once.
+
+    ``force`` uses it even where it was not measured on a diffusor.
+    """
 
     name: str = ""
     frames: int = DEFAULT_TAKES
     activate: bool = False
+    force: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,12 +124,18 @@ class Calibrator:
         self._drift_of = NOMINAL_ID
         self._drift_until_s = 0.0
         self._judging = asyncio.Lock()
+        self._former_id = store.former_id
 
     @property
     def active_id(self) -> str:
         """The calibration that is used wherever it fits the sequence."""
         calibration = self._pipeline.calibration
         return calibration_id(None if calibration is None else calibration.gains)
+
+    @property
+    def former_id(self) -> str | None:
+        """The one that was active before; None where none was, or it is deleted."""
+        return self._former_id
 
     @property
     def active_since_s(self) -> float | None:
@@ -144,27 +162,48 @@ class Calibrator:
         """Return why a calibration does not fit a sequence of this camera; None where it does."""
         return stored.subject.misfit(applied, self._camera.capabilities)
 
-    async def activate(self, new_id: str, applied: Callable[[], AppliedSequence]) -> None:
+    async def activate(
+        self, new_id: str, applied: Callable[[], AppliedSequence], *, force: bool = False
+    ) -> None:
         """Use a calibration, or the nominal gains, from the next frame on.
+
+        One that was not measured on a diffusor is used only with ``force``.
 
         Raises
         ------
         Problem
-            ``unknown-calibration``, ``calibration-misfit``.
+            ``unknown-calibration``, ``calibration-misfit``, ``calibration-doubted``.
         """
         calibration = None
         if new_id != NOMINAL_ID:
             stored = await asyncio.to_thread(self.store.get, new_id)
             self._require_fit(self.misfit(stored, applied()))
+            if not (force or stored.usable):
+                raise doubted(stored.verdict)
             loaded, _ = await self._pipeline.workers.run_long(load_calibration, stored.path)
             # the sequence may be another one by now
             loaded.capture.require_fit(applied(), self._camera.capabilities)
             calibration = loaded
         if self.active_id != new_id:
             _log.info("frames are calibrated by %s", new_id)
+            self._former_id = self.active_id
             self._pipeline.calibration = calibration
             self._notify(self.notice(applied()))
-        await asyncio.to_thread(self.store.remember_active, new_id)
+        await asyncio.to_thread(self.store.remember_active, new_id, self._former_id)
+
+    async def restore(self, applied: Callable[[], AppliedSequence]) -> None:
+        """Use the calibration again that was active before the present one.
+
+        Once more, and the present one is used again.
+
+        Raises
+        ------
+        Problem
+            ``no-former-calibration``, ``calibration-misfit``.
+        """
+        if self._former_id is None:
+            raise Problem(kinds.NO_FORMER_CALIBRATION, "There is none to return to.")
+        await self.activate(self._former_id, applied, force=True)  # it was active already
 
     async def delete(self, deleted_id: str) -> StoredCalibration:
         """Delete a calibration that is not active.
@@ -181,7 +220,11 @@ class Calibrator:
                 field="calibration",
                 value=deleted_id,
             )
-        return await asyncio.to_thread(self.store.delete, deleted_id)
+        deleted = await asyncio.to_thread(self.store.delete, deleted_id)
+        if self._former_id == deleted_id:
+            self._former_id = None
+            await asyncio.to_thread(self.store.remember_active, self.active_id, None)
+        return deleted
 
     def measure(self, options: CalibrationOptions, applied: Callable[[], AppliedSequence]) -> Job:
         """Start measuring with the present sequence; the job's result is the calibration.
@@ -216,9 +259,16 @@ class Calibrator:
             share, _ = await self._pipeline.workers.run_long(
                 self._share_of_takes, calibration, takes, once
             )
-            notes = {"name": options.name, "invalid_share": share}
+            verdict = await self._judged(calibration, applied())
+            notes = {
+                "name": options.name,
+                "invalid_share": share,
+                "verdict": verdict.to_document(),
+                "forced": options.force,
+            }
             stored = await asyncio.to_thread(self.store.add, replace(capture, notes=notes))
-            if options.activate:
+            activated = options.activate and stored.usable
+            if activated:
                 await self.activate(stored.id, applied)
             return {
                 "calibration": stored.id,
@@ -226,20 +276,40 @@ class Calibrator:
                 "rejected_images": capture.rejected_images,
                 "images": int(capture.kept.size),
                 "invalid_share": share,
+                "verdict": verdict.to_document(),
+                "activated": activated,
+                "former": self._former_id if activated else None,
             }
 
         return self._jobs.start("calibration", work)
+
+    async def _judged(self, measured: Calibration, applied: AppliedSequence) -> Verdict:
+        """Judge a measurement, compared with the active calibration where that is none of a scene.
+
+        The active one is what the user relies on, forced or not.
+        """
+        reference = self._pipeline.calibration
+        if reference is not None:
+            fits = self._pipeline.misfit(applied) is None
+            of_scene = verdict_of(reference.capture).word == "scene"
+            reference = reference if fits and not of_scene else None
+        full_scale = 2.0**self._camera.capabilities.bits - 1.0
+        judging = partial(judge, full_scale=full_scale, reference=reference)
+        verdict, _ = await self._pipeline.workers.run_long(
+            judging, measured.capture, measured.gains.bad
+        )
+        return verdict
 
     async def drift(self) -> Drift | None:
         """Return the drift of the active calibration; None without one, or without frames of it."""
         async with self._judging:
             if self._drift_of != self.active_id or self._clock() > self._drift_until_s:
-                self._drift = await self._judged()
+                self._drift = await self._drifted()
                 self._drift_of = self.active_id
                 self._drift_until_s = self._clock() + DRIFT_EVERY_S
             return self._drift
 
-    async def _judged(self) -> Drift | None:
+    async def _drifted(self) -> Drift | None:
         calibration = self._pipeline.calibration
         last = self._history.last
         if calibration is None or last is None:
@@ -261,14 +331,11 @@ class Calibrator:
     async def _share_of(self, frame: Frame) -> float | None:
         try:
             found = await frame.reconstruction("moments")
-            share, _ = await self._pipeline.workers.run(self._share, frame.recipe, found)
+            share, _ = await self._pipeline.workers.run(contradictory_share, frame.recipe, found)
         except Exception:  # a frame that cannot be computed is no sign of drift
             _log.exception("frame %d: counting its invalid pixels failed", frame.number)
             return None
         return share
-
-    def _share(self, recipe: Recipe, found: tm.Reconstruction) -> float | None:
-        return invalid_share(found, moment_noise(recipe, found))
 
     def _share_of_takes(
         self, calibration: Calibration, takes: "_Takes", once: AppliedSequence
@@ -286,7 +353,7 @@ class Calibrator:
         for images in takes.frames():
             raw = RawFrame(0, 0, images, once.labels, 0.0, 0.0, 0.0, 0.0, 0)
             found = recipe.reconstruct(raw)
-            if (share := self._share(recipe, found)) is not None:
+            if (share := contradictory_share(recipe, found)) is not None:
                 shares.append(share)
         return min(shares, default=None)
 

@@ -26,10 +26,22 @@ class Back:
 
 
 @dataclass(frozen=True, slots=True)
+class Held:
+    """The light was switched off although frames are to be captured."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Released:
+    """The light goes on again after `Held`."""
+
+
+@dataclass(frozen=True, slots=True)
 class SequenceChanged:
     """Frames from now on are captured with another sequence."""
 
     applied: AppliedSequence
 
 
-Event = Captured | Lost | Back | SequenceChanged
+Event = Captured | Lost | Back | Held | Released | SequenceChanged

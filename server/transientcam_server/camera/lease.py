@@ -69,6 +69,9 @@ class LeaseManager:
         Called with every change; a renewal is not one.
     call_later
         Schedules a call after a delay in seconds.
+    due
+        Called with the lease that is valid from now on, None for none: whoever acts on its end
+        although nothing is scheduled any more.
     """
 
     def __init__(
@@ -76,10 +79,12 @@ class LeaseManager:
         *,
         report: Report,
         call_later: Callable[[float, Callable[[], None]], Timer],
+        due: Callable[[Lease | None], None] = lambda lease: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._report = report
         self._call_later = call_later
+        self._due = due
         self._clock = clock
         self._lease: Lease | None = None
         self._timer: Timer | None = None
@@ -195,11 +200,13 @@ class LeaseManager:
     def _keep(self, lease: Lease) -> Lease:
         self._forget()
         self._lease = replace(lease, expires_s=self._clock() + lease.duration_s)
+        self._due(self._lease)
         self._timer = self._call_later(lease.duration_s, self._timer_fired)
         return self._lease
 
     def _forget(self) -> None:
         self._lease = None
+        self._due(None)
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None

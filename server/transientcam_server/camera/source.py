@@ -1,5 +1,6 @@
 """What the service serves: a camera on USB, a simulated one, or a recording."""
 
+import logging
 from typing import Protocol, Self
 
 import transientcam_driver
@@ -14,7 +15,9 @@ from transientcam_driver import (
     Status,
 )
 from transientcam_server.recording.replay import PREFIX, ReplayCamera, parse_replay
-from transientcam_server.settings import SensorSettings
+from transientcam_server.settings import SensorSettings, SequenceSettings
+
+_log = logging.getLogger(__name__)
 
 
 class Camera(Protocol):
@@ -88,6 +91,20 @@ def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:
         dark_dn=model.dark_dn,
         bits=camera.capabilities.bits,
     )
+
+
+def start_with(camera: Camera, settings: SequenceSettings) -> None:
+    """Set what the camera captures from the start, or what is nearest of that it can do.
+
+    A recording that is replayed stays as it was captured.
+    """
+    if isinstance(camera, ReplayCamera):
+        return
+    wanted = Sequence(**settings.model_dump())
+    nearest = camera.capabilities.nearest(wanted)
+    if nearest != wanted:
+        _log.warning("the camera cannot do %s; it starts with %s", wanted, nearest)
+    camera.configure(nearest)
 
 
 def open_camera(spec: str) -> Camera:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-State = Literal["starting", "streaming", "stopped", "calibrating", "lost"]
+State = Literal["starting", "streaming", "stopped", "calibrating", "lost", "held"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +14,8 @@ class AcquisitionStatus:
     ----------
     state
         ``streaming`` also before the first frame; ``stopped`` on request;
-        ``calibrating`` while a calibration has exclusive use of the camera.
+        ``calibrating`` while a calibration has exclusive use of the camera; ``held`` while the
+        light is off because clients are not served.
     running
         Whether frames are to be captured.
     rate_hz
@@ -24,7 +25,7 @@ class AcquisitionStatus:
     frame_age_s
         Since the last frame, or since the start where there was none.
     reason
-        Why the camera is lost.
+        Why the camera is lost or held.
     stalled
         Whether frames are to be captured and the camera is there, but none came for too long.
     """

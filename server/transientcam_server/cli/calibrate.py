@@ -4,14 +4,16 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 
-from transientcam.cli.options import TokenOption
+from transientcam.cli.options import TokenOption, require_suffix
 
 if TYPE_CHECKING:
     from transientcam_driver import Camera
@@ -45,32 +47,79 @@ def calibrate(
     activate: Annotated[
         bool, typer.Option("--activate", help="Use it in the daemon at once.")
     ] = False,
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Let it be used even if it was not measured on a diffusor."),
+    ] = False,
+    diffusor: Annotated[
+        bool,
+        typer.Option(
+            "--diffusor", help="Put it before the lens of a simulated camera, and take it away."
+        ),
+    ] = False,
+    undo: Annotated[
+        bool,
+        typer.Option("--undo", help="Measure nothing: let the daemon use the former one again."),
+    ] = False,
     token: TokenOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Measure each pixel's gain and phase, while the light shines at the sensor (Sec. 4.2).
 
     Put filter and diffusor before the lens first. A daemon measures with its present sequence and
-    stores the result; without one, the file is meant for `serve --calibration FILE`.
+    stores the result; without one, the file is meant for `serve --calibration FILE`. What does not
+    look like a diffusor is kept, but not used, and the exit code is 1; --force uses it anyway.
     """
+    require_suffix(output, ".npz")
+    if undo:
+        _undo(url, token, as_json=as_json)
+        return
     if output is not None and not output.parent.is_dir():  # checked before anything is captured
         raise typer.BadParameter(f"there is no folder {output.parent}", param_hint="--output")
     if url is None:
         _refuse({"--name": name, "--activate": activate}, "needs the URL of a daemon")
+        if diffusor and not (camera or "usb").startswith("sim:"):
+            raise typer.BadParameter("is for simulated cameras", param_hint="--diffusor")
         if output is None:
             raise typer.BadParameter("names the file to write", param_hint="--output")
-        result = _measured_here(camera or "usb", takes, sequence, output)
+        order = _Order(camera or "usb", takes, sequence, output, force=force, diffusor=diffusor)
+        result = _measured_here(order)
     else:
         _refuse({"--camera": camera, "--sequence": sequence}, "is the daemon's, if there is one")
-        result = _measured_by_daemon(
-            url, {"name": name, "frames": takes, "activate": activate}, output, token
-        )
+        options = {"name": name, "frames": takes, "activate": activate, "force": force}
+        result = _measured_by_daemon(url, options, output, token, diffusor=diffusor)
     if as_json:
         typer.echo(json.dumps(result, indent=2))
     elif url is None:
         _print_capture(result)
     else:
         _print_measured(result)
+    verdict = result["verdict"] if url is None else result["measured"]["verdict"]
+    if verdict["reason"] is not None and not force:
+        raise typer.Exit(code=1)
+
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """What to measure without a daemon."""
+
+    camera: str
+    takes: int
+    sequence: str | None
+    output: Path
+    force: bool
+    diffusor: bool
+
+
+def _undo(url: str | None, token: str | None, *, as_json: bool) -> None:
+    from transientcam import Camera
+
+    if url is None:
+        raise typer.BadParameter("needs the URL of a daemon", param_hint="--undo")
+    with Camera(url, token=token) as camera:
+        active = camera.calibrations.undo()
+    used, former = active["id"], active["former"]
+    typer.echo(json.dumps(active, indent=2) if as_json else f"{used} is in use again, not {former}")
 
 
 def _refuse(options: dict[str, Any], reason: str) -> None:
@@ -80,7 +129,7 @@ def _refuse(options: dict[str, Any], reason: str) -> None:
 
 
 def _measured_by_daemon(
-    url: str, options: dict[str, Any], output: Path | None, token: str | None
+    url: str, options: dict[str, Any], output: Path | None, token: str | None, *, diffusor: bool
 ) -> dict[str, Any]:
     """Measure in a daemon and return its result; Ctrl-C cancels the job there, too."""
     from rich.progress import Progress
@@ -93,12 +142,13 @@ def _measured_by_daemon(
         def show(job: Mapping[str, Any]) -> None:
             shown.update(task, description=job["step"], completed=job["progress"])
 
-        job = camera.calibrations.measure(**options)
-        try:
-            job = camera.wait_for(job["id"], on_progress=show)
-        except KeyboardInterrupt:
-            camera.jobs.cancel(job["id"])
-            raise
+        with _before_lens(camera.simulate) if diffusor else nullcontext():
+            job = camera.calibrations.measure(**options)
+            try:
+                job = camera.wait_for(job["id"], on_progress=show)
+            except KeyboardInterrupt:
+                camera.jobs.cancel(job["id"])
+                raise
         show(job)
         if job["state"] == "cancelled":
             raise typer.Exit(code=1)
@@ -112,16 +162,38 @@ def _measured_by_daemon(
         }
 
 
-def _measured_here(camera: str, takes: int, sequence: str | None, output: Path) -> dict[str, Any]:
-    from transientcam_driver import Sequence, open_camera
+@contextmanager
+def _before_lens(change: Callable[..., object]) -> Iterator[None]:
+    """Put the diffusor before the lens of a simulated camera inside."""
+    change(diffusor=True)
+    try:
+        yield
+    finally:
+        change(diffusor=False)
 
-    requested = Sequence.from_document(_document(sequence)) if sequence is not None else None
-    with open_camera(camera) as opened:
-        if requested is not None:
+
+def _measured_here(order: _Order) -> dict[str, Any]:
+    from transientcam_driver import Sequence, open_camera
+    from transientcam_server.camera import start_with
+    from transientcam_server.imaging.diffusor import judge
+    from transientcam_server.settings import SequenceSettings
+
+    requested = None
+    if order.sequence is not None:
+        requested = Sequence.from_document(_document(order.sequence))
+    with open_camera(order.camera) as opened:
+        if requested is None:
+            start_with(opened, SequenceSettings())
+        else:
             opened.configure(requested)
-        measured = _measure(opened, takes)
-    measured.capture.save(output)
-    return _result(measured, output)
+        simulation = opened.simulation if order.diffusor else None
+        with nullcontext() if simulation is None else _before_lens(simulation.change):
+            measured = _measure(opened, order.takes)
+        full_scale = 2.0**opened.capabilities.bits - 1.0
+    verdict = judge(measured.capture, measured.gains.bad, full_scale=full_scale).to_document()
+    notes = {"verdict": verdict, "forced": order.force}
+    replace(measured.capture, notes=notes).save(order.output)
+    return _result(measured, order.output) | {"verdict": verdict, "forced": order.force}
 
 
 def _measure(camera: "Camera", takes: int) -> "Calibration":
@@ -179,9 +251,22 @@ def _print_capture(result: dict[str, Any]) -> None:
         f"  {result['width']} x {result['height']} pixels of {result['serial']} "
         f"at {result['temperature_c']:.1f} °C, {result['bad_pixels']} of them bad",
         f"  {result['rejected_images']} of {captured} images left out as outliers",
+        *_verdict_lines(result["verdict"]),
     )
     for line in lines:
         typer.echo(line)
+
+
+def _verdict_lines(verdict: Mapping[str, Any]) -> list[str]:
+    """Say whether it was measured on a diffusor, and if not, why, where, and what can be done."""
+    if verdict["reason"] is None:
+        return ["  measured on a diffusor"]
+    what = {"scene": "this is a scene, not a diffusor", "in-doubt": "this may be no diffusor"}
+    lines = [f"  {what[verdict['verdict']]}: {verdict['reason']}"]
+    if any("#" in row for row in verdict["blocks"]):
+        lines.append(f"  unlike a diffusor (#), in blocks of {verdict['block_px']} pixels:")
+        lines += [f"    {row}" for row in verdict["blocks"]]
+    return [*lines, "  it is used only if it is forced (--force)"]
 
 
 def _print_measured(result: dict[str, Any]) -> None:
@@ -193,8 +278,11 @@ def _print_measured(result: dict[str, Any]) -> None:
         f"at {calibration['temperature_c']:.1f} °C, {measured['bad_pixels']} of them bad",
         f"  {measured['rejected_images']} of {measured['images']} images left out as outliers",
     ]
+    lines += _verdict_lines(measured["verdict"])
     if calibration["active"]:
         lines.append("  in use")
+        if measured["former"] is not None:
+            lines.append(f"  before it {measured['former']} was; --undo returns to it")
     if result["file"] is not None:
         lines.append(f"  downloaded into {result['file']}")
     for line in lines:

@@ -4,13 +4,14 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 """
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.console import Console
 
-from transientcam.cli.options import JsonOption
+from transientcam.cli.options import JsonOption, require_suffix
 from transientcam_server.cli.progress import progress_bar, progress_bars
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from transientcam_server.settings import ReconstructionSettings
 
 Background = Literal["none", "median"]
+_OF_MEASUREMENTS = {"smoothing_px": 0.0, "bias": 4e-3, "return_threshold": 0.1}
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
@@ -31,7 +33,9 @@ def reconstruct(
     ],
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", help="The .npz to write; of a recording, the .h5."),
+        typer.Option(
+            "--output", "-o", help="The .npz to write; of a recording .h5, .npz, .nc or .zarr."
+        ),
     ],
     frequency_hz: Annotated[
         float | None, typer.Option(help="Base frequency for impulse responses.  [default: 23e6]")
@@ -42,14 +46,29 @@ def reconstruct(
     ] = None,
     bins: Annotated[int, typer.Option(min=1, max=65536, help="Times of flight.")] = 256,
     bias: Annotated[
-        float, typer.Option(help="Least uniform part of a pixel, over its brightness (Sec. 4.3).")
-    ] = 4e-3,
+        float | None,
+        typer.Option(
+            help="Least uniform part of a pixel, over its brightness (Sec. 4.3).  "
+            "[default: 4e-3; of a recording, as recorded]"
+        ),
+    ] = None,
     smoothing_px: Annotated[
-        float, typer.Option(min=0.0, max=10.0, help="Standard deviation of a Gaussian smoothing.")
-    ] = 0.0,
+        float | None,
+        typer.Option(
+            min=0.0,
+            max=10.0,
+            help="Standard deviation of a Gaussian smoothing.  "
+            "[default: 0; of a recording, as recorded]",
+        ),
+    ] = None,
     threshold: Annotated[
-        float, typer.Option(min=0.0, help="Weight of the first return, over the strongest.")
-    ] = 0.1,
+        float | None,
+        typer.Option(
+            min=0.0,
+            help="Weight of the first return, over the strongest.  "
+            "[default: 0.1; of a recording, as recorded]",
+        ),
+    ] = None,
     background: Annotated[
         Background, typer.Option(help="What to subtract from photon counts first.")
     ] = "none",
@@ -64,26 +83,21 @@ def reconstruct(
 
     Of a recording every frame is reconstructed; a second run goes on where the first stopped.
     """
-    from pydantic import ValidationError
-
     from transientcam_server import offline
     from transientcam_server.offline import plot as pictures
-    from transientcam_server.settings import ReconstructionSettings
 
     if plot is not None:
+        require_suffix(plot, ".png", hint="--plot")
         pictures.require()
-    try:
-        settings = ReconstructionSettings(
-            smoothing_px=smoothing_px, bias=bias, return_threshold=threshold
-        )
-    except ValidationError as error:
-        mistake = error.errors()[0]
-        raise typer.BadParameter(f"{mistake['loc'][0]}: {mistake['msg']}") from error
+    options = {"smoothing_px": smoothing_px, "bias": bias, "return_threshold": threshold}
+    given = {name: value for name, value in options.items() if value is not None}
     if _is_recording(input):
         _reconstruct_recording(
-            input, output, products=product, settings=settings, bins=bins, as_json=as_json
+            input, output, products=product, changes=given, bins=bins, as_json=as_json
         )
         return
+    require_suffix(output, ".npz")
+    settings = _settings(_OF_MEASUREMENTS | given)
     measurement = offline.load_measurement(
         input, frequency_hz=frequency_hz, harmonics=harmonics, background=background
     )
@@ -140,6 +154,19 @@ def _print_cube(console: Console, document: dict[str, Any]) -> None:
             console.print(f"  {count} pixels flagged {flag.replace('_', ' ')}")
 
 
+def _settings(values: Mapping[str, Any]) -> "ReconstructionSettings":
+    """Return settings with these values, or refuse the one that cannot be used."""
+    from pydantic import ValidationError
+
+    from transientcam_server.settings import ReconstructionSettings
+
+    try:
+        return ReconstructionSettings.model_validate(dict(values))
+    except ValidationError as error:
+        mistake = error.errors()[0]
+        raise typer.BadParameter(f"{mistake['loc'][0]}: {mistake['msg']}") from error
+
+
 def _is_recording(path: Path) -> bool:
     """Whether a file is HDF5, which of all inputs only recordings are."""
     with path.open("rb") as file:
@@ -151,7 +178,7 @@ def _reconstruct_recording(
     output: Path,
     *,
     products: list[str] | None,
-    settings: "ReconstructionSettings",
+    changes: dict[str, float],
     bins: int,
     as_json: bool = False,
 ) -> None:
@@ -165,8 +192,9 @@ def _reconstruct_recording(
         if name not in KNOWN_PRODUCTS:
             known = ", ".join(KNOWN_PRODUCTS)
             raise typer.BadParameter(f"{name!r} is none of {known}", param_hint="--product")
-    options = BatchOptions(names, settings, bins)
     with Recording(recording) as opened, progress_bar("reconstructing") as advance:
+        settings = _settings({**opened.header.reconstruction, **changes})
+        options = BatchOptions(names, settings, bins)
         before = reconstruct_recording(opened, output, options, progress=advance)
         frames = opened.frames
     if as_json:

@@ -80,7 +80,7 @@ def serve(
 
     import transientcam_moments as tm
     from transientcam_server.api.app import build_app
-    from transientcam_server.camera import open_camera
+    from transientcam_server.camera import open_camera, start_with
     from transientcam_server.daemon import server
 
     server.configure_logging(settings)
@@ -91,6 +91,7 @@ def serve(
     ):
         url = server.address(listener, tls=settings.tls_certificate is not None)
         with open_camera(settings.camera) as opened:
+            start_with(opened, settings.sequence)
             # NumPy serves until the compiled kernels are ready
             compiling = tm.kernels.compile_in_background()
             leave(compiling)

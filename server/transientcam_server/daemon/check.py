@@ -8,10 +8,10 @@ from pydantic import BaseModel
 
 from transientcam_driver import DriverError
 from transientcam_driver.opening import parse_spec, scene_of
+from transientcam_server.camera.calibration_store import load_given
 from transientcam_server.daemon.configuration import Configuration
 from transientcam_server.errors import ServerError, SettingsError
 from transientcam_server.errors.exceptions import SettingsMistake
-from transientcam_server.imaging.calibration import load_calibration
 from transientcam_server.recording import Recording
 from transientcam_server.recording.replay import PREFIX, parse_replay
 from transientcam_server.settings import Settings
@@ -52,7 +52,7 @@ def _read_camera(settings: Settings) -> None:
 
 def _read_calibration(settings: Settings) -> None:
     if settings.calibration is not None:
-        load_calibration(settings.calibration)
+        load_given(settings.calibration)
 
 
 def to_document(configuration: Configuration) -> dict[str, Any]:

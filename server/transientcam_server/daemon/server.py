@@ -1,5 +1,6 @@
 """The service as a process: its socket, its server, its signals."""
 
+import asyncio
 import gc
 import logging
 import os
@@ -10,7 +11,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import AsyncExitStack, contextmanager
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import uvicorn
 from fastapi import FastAPI
@@ -18,11 +19,13 @@ from fastapi import FastAPI
 from transientcam.cli import INTERRUPTED
 from transientcam.wire import MAX_CLIENT_MESSAGE_BYTES
 from transientcam_server import logs
+from transientcam_server.daemon.acceptor import Acceptor
 from transientcam_server.daemon.announcement import announced
-from transientcam_server.daemon.connections import BoundedConnection, BoundedStream
+from transientcam_server.daemon.connections import BoundedConnection
+from transientcam_server.daemon.streams import BoundedStream
 from transientcam_server.daemon.systemd import ServiceManager, supervised
 from transientcam_server.errors.exceptions import AddressUnavailable
-from transientcam_server.service import Service
+from transientcam_server.service import WORKER_THREADS, Service
 from transientcam_server.settings import Settings
 
 USER_TIMEOUT_MS: Final = 20_000
@@ -30,7 +33,7 @@ USER_TIMEOUT_MS: Final = 20_000
 NOTSENT_LOWAT_BYTES: Final = 128 * 1024
 """What the kernel keeps of a message beyond what is on the wire: frames wait here, not there."""
 PING_S: Final = 10.0
-SHUTDOWN_S: Final = 3
+SHUTDOWN_S: Final = 2
 FREEZING_THREAD: Final = "freezing"
 _BACKLOG = 1024
 
@@ -100,7 +103,9 @@ class Server(uvicorn.Server):
                 http=partial(BoundedConnection, limits=settings.limits),  # type: ignore[arg-type]
                 ssl_certfile=settings.tls_certificate,
                 ssl_keyfile=settings.tls_key,
-                ws=partial(BoundedStream, limits=settings.limits),  # type: ignore[arg-type]
+                ws=partial(  # type: ignore[arg-type]
+                    BoundedStream, limits=settings.limits, stream=settings.stream
+                ),
                 ws_per_message_deflate=False,  # 17 ms a frame for a tenth of its size
                 ws_ping_interval=PING_S,
                 ws_ping_timeout=PING_S,
@@ -117,11 +122,14 @@ class Server(uvicorn.Server):
         self._service: Service = app.state.service
         self._around = AsyncExitStack()
         self._on_listening = on_listening
+        self._acceptor: Acceptor | None = None
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Start, then report it."""
-        await super().startup(sockets)
+        await super().startup([])  # it would accept without counting, and 1024 at once
         if self.started and sockets:
+            self._acceptor = self._accept_from(sockets[0])
+            self._acceptor.open()
             port = sockets[0].getsockname()[1]
             capabilities = self._service.camera.capabilities
             announcement = announced(self._settings, capabilities, port=port)
@@ -141,8 +149,23 @@ class Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Close every stream, then stop."""
         await self._around.aclose()
+        if self._acceptor is not None:
+            self._acceptor.close()
         await self._service.close_streams()
         await super().shutdown(sockets)
+
+    def _accept_from(self, listener: socket.socket) -> Acceptor:
+        make: Any = self.config.http_protocol_class  # the one given above, by keywords
+        protocol = partial(
+            make,
+            config=self.config,
+            server_state=self.server_state,
+            app_state=self.lifespan.state,
+            _loop=asyncio.get_running_loop(),
+        )
+        return Acceptor(
+            listener, protocol=protocol, limits=self._settings.limits, tls=self.config.ssl
+        )
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -222,11 +245,16 @@ def exit_without_joining() -> Iterator[Callable[[threading.Thread], None]]:
     try:
         yield at_work.append
     except KeyboardInterrupt:
-        if not any(each.is_alive() for each in at_work):
+        if not any(each.is_alive() for each in (*at_work, *_workers())):
             raise
         code = INTERRUPTED
-    if any(each.is_alive() for each in at_work):
+    if any(each.is_alive() for each in (*at_work, *_workers())):
         logging.shutdown()
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
         os._exit(code)
+
+
+def _workers() -> list[threading.Thread]:
+    """Return those that were left behind: they compute what nobody waits for any more."""
+    return [each for each in threading.enumerate() if each.name.startswith(WORKER_THREADS)]

@@ -123,6 +123,8 @@ def status_line(status: AcquisitionStatus) -> str:
     match status.state:
         case "lost":
             return f"the camera is lost: {status.reason}"
+        case "held":
+            return f"the light is held off: {status.reason}"
         case "stopped":
             return "the capture is stopped"
         case "calibrating":

@@ -11,7 +11,7 @@
     │   ├── NotARecording    a file cannot be read as one
     │   ├── DamagedFrame     a frame's bytes are not the ones that were written
     │   ├── RecordingInUse   an unfinished recording is being written, recovered or deleted
-    │   └── NotConvertible   the format requested is none that recordings are converted to
+    │   └── NotConvertible   a suffix names no format that something is written in
     ├── TokenFileError       the file of tokens cannot be read or written
     ├── UnknownToken         no token has this id
     ├── JobCancelled         a client cancelled a job
@@ -132,13 +132,16 @@ class RecordingInUse(RecordingError):  # noqa: N818 - says what is wrong
 
 @dataclass(eq=False, repr=False)
 class NotConvertible(RecordingError):  # noqa: N818 - says what is wrong
-    """A file's suffix names no format that recordings are converted to."""
+    """A file's suffix names no format that ``what`` is written in."""
 
     file: str
     known: Sequence[str]
+    what: str
 
     def __str__(self) -> str:
-        return f"{self.file}: recordings are converted to {', '.join(self.known)}"
+        return f"{self.file}: the suffix must be one that {self.what} are written as: " + ", ".join(
+            self.known
+        )
 
 
 @dataclass(eq=False, repr=False)

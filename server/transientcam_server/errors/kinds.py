@@ -37,8 +37,9 @@ ORIGIN_NOT_ALLOWED: Final = ProblemKind(
     "origin-not-allowed",
     403,
     "Origin not allowed",
-    "A page of another origin sent a request that changes something, or opened the stream. Add its "
-    "origin to the setting allowed_origins if that is intended.",
+    "A page of another origin sent a request that changes something, opened the stream, or loads "
+    "something from here as a part of it. Add its origin to the setting allowed_origins if that is "
+    "intended.",
 )
 TOKEN_REQUIRED: Final = ProblemKind(
     "token-required",
@@ -162,6 +163,20 @@ CALIBRATION_MISFIT: Final = ProblemKind(
     "`field` names what differs, `value` is the present value and `limit` the one that the "
     "calibration fits. Frames are computed as before.",
 )
+CALIBRATION_DOUBTED: Final = ProblemKind(
+    "calibration-doubted",
+    409,
+    "Calibration was not measured on a diffusor",
+    "Its measurement does not look like a diffusor's: `detail` says what speaks against it, "
+    "`verdict` is `in-doubt` or `scene`, and `tests` has the figures. Used anyway, ranges may be "
+    "wrong everywhere; `force` does so. Frames are computed as before.",
+)
+NO_FORMER_CALIBRATION: Final = ProblemKind(
+    "no-former-calibration",
+    409,
+    "No former calibration",
+    "No other calibration was active before, or it was deleted.",
+)
 ESTIMATOR_MISFIT: Final = ProblemKind(
     "estimator-misfit",
     409,
@@ -236,6 +251,13 @@ TOO_MANY_CONNECTIONS: Final = ProblemKind(
     "Too many connections",
     "As many connections as limits.max_connections allows are open. Try again in a while.",
 )
+TOO_MANY_ANSWERS: Final = ProblemKind(
+    "too-many-answers",
+    503,
+    "Too many answers on their way",
+    "As many bytes are on their way to clients as limits.answers_bytes allows, or to this address "
+    "as limits.answers_bytes_per_address does. Read what was answered, then try again.",
+)
 TOO_LARGE: Final = ProblemKind(
     "too-large",
     413,
@@ -274,7 +296,8 @@ ANSWER_TOO_LARGE: Final = ProblemKind(
     422,
     "Response too large",
     "The product at this many times of flight would exceed the limit on one response. Request "
-    "fewer times, or take `coefficients` and evaluate them in the client.",
+    "fewer times, or take `coefficients` and evaluate them in the client. As msgpack or npy, which "
+    "are computed while they are sent, an answer may be larger than in other formats.",
 )
 TARGET_UNREACHABLE: Final = ProblemKind(
     "target-unreachable",

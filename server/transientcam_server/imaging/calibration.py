@@ -86,7 +86,7 @@ def nominal_gains(sequence: Sequence) -> _Array:
         sequence.harmonics,
         sequence.sub_phases.phases_rad,
         sequence.sub_phases.weights,
-        sequence.zeroth,
+        zeroth=sequence.zeroth,
     )
     return gains
 

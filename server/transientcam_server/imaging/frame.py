@@ -9,7 +9,7 @@ import asyncio
 import math
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Coroutine, Hashable, Iterator
+from collections.abc import AsyncIterator, Callable, Coroutine, Hashable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from typing import Any, Final, TypeVar, cast
@@ -23,8 +23,9 @@ from transientcam.frame import FrameMeta
 from transientcam_driver import RawFrame, Truth
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.calibration import calibration_id
+from transientcam_server.imaging.bands import STREAMED_BYTES, Banded
 from transientcam_server.imaging.encodings.encoding import Encoding
+from transientcam_server.imaging.meta import frame_meta
 from transientcam_server.imaging.products import PRODUCTS, Product
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.imaging.stages import STAGES, Computed, compute
@@ -36,6 +37,9 @@ _Array = NDArray[Any]
 _Memory = OrderedDict[Hashable, "asyncio.Future[Any]"]
 MAX_ANSWER_BYTES = 512 * 1024 * 1024
 """A product over time with more than this is not computed."""
+MAX_WHOLE_BYTES = 32 * 1024 * 1024
+"""One that is not sent in bands may have no more than this."""
+_REMEMBERED_BYTES: Final = STREAMED_BYTES
 _REMEMBERED_TIME_AXES: Final = 2
 _REMEMBERED_CROPS: Final = 32
 
@@ -105,30 +109,7 @@ class Frame:
 
     def meta(self) -> dict[str, Any]:
         """Return what is known of the frame, as the wire contract has it."""
-        sequence, found = self.recipe.applied.sequence, self._computed.reconstruction
-        height, width = self.shape
-        return {
-            "frame": self.number,
-            "sequence_id": self.raw.epoch,
-            "calibration_id": calibration_id(self.recipe.gains),
-            "reconstruction_id": self.recipe.settings_version,
-            "device_time_s": self.raw.device_time_s,
-            "host_time_s": self.raw.host_time_s,
-            "capture_s": self.raw.capture_s,
-            "reconstruct_s": self._reconstruct_s,
-            "base_frequency_hz": sequence.base_frequency_hz,
-            "harmonics": sequence.harmonics,
-            "zeroth": sequence.zeroth,
-            "exposure_s": sequence.exposure_s,
-            "takes": sequence.takes,
-            "width": width,
-            "height": height,
-            "temperature_c": self.raw.temperature_c,
-            "lost_images": self.raw.lost_images,
-            "rejected_images": None if found is None else found.rejected_images,
-            "pixels": self._computed.pixels,
-            "predicted_range_std_m": self._computed.range_noise,
-        }
+        return frame_meta(self.number, self.raw, self.recipe, self._computed, self._reconstruct_s)
 
     # -- the first hop: stages of the reconstruction -------------------------------------------
 
@@ -243,8 +224,33 @@ class Frame:
         )
         return data
 
+    async def bands(self, planned: Banded) -> AsyncIterator[bytes]:
+        """Compute a product band by band, each once the one before was taken; the head first.
+
+        Raises
+        ------
+        Problem
+            As `product`.
+        """
+        product, view = planned.product, planned.view
+        self._require_size(product, view, MAX_ANSWER_BYTES)
+        given = await self._input(product)
+        sent = False
+        for band in planned.bands:
+            with self._failure_of(product.name):
+                array, elapsed_s = await self._workers.run_long(
+                    product.compute, self.recipe, given, band.view
+                )
+            if not sent:
+                sent = True
+                meta = self.meta() | view.crop.to_meta(*self.shape)
+                extra = product.with_fields(self.recipe, self.raw, view)
+                yield planned.head(meta, extra, encode_s=elapsed_s)
+            yield band.of(array, product.description.dtype)
+        self._workers.note_success(product.name)
+
     async def _compute_product(self, product: Product, view: View) -> _Array:
-        self._require_size(product, view)
+        self._require_size(product, view, min(MAX_WHOLE_BYTES, MAX_ANSWER_BYTES))
         with self._failure_of(product.name):
             given = await self._input(product)
             run = self._workers.run_long if product.over_time else self._run
@@ -255,7 +261,7 @@ class Frame:
         self, product: Product, encoding: Encoding, view: View, channel: int | None
     ) -> bytes:
         """Compute and encode in one hop; an array that is there already is only encoded."""
-        self._require_size(product, view)
+        self._require_size(product, view, min(MAX_WHOLE_BYTES, MAX_ANSWER_BYTES))
         beside = await asyncio.gather(*(self.product(PRODUCTS[name]) for name in encoding.beside))
         run = self._workers.run_long if product.over_time or encoding.slow else self._run
         with self._failure_of(product.name):
@@ -273,7 +279,7 @@ class Frame:
                 extra=extra | dict(zip(encoding.beside, beside, strict=True)),
             )
             (array, data), _ = await run(
-                _made, product, encoding, self.recipe, given, array, view, framed
+                _made, product, encoding, self.recipe, self.raw, given, array, view, framed
             )
         self._remember(product, view, array)
         self._workers.note_success(product.name)
@@ -283,6 +289,8 @@ class Frame:
         return self._over_time if product.over_time else self._whole
 
     def _remember(self, product: Product, view: View, array: _Array) -> None:
+        if product.over_time and array.nbytes > _REMEMBERED_BYTES:
+            return
         future: asyncio.Future[_Array] = asyncio.get_running_loop().create_future()
         future.set_result(array)
         self._arrays(product).setdefault(_array_key(product, view), future)
@@ -296,6 +304,8 @@ class Frame:
             task = memory[key] = self._workers.start(work())
             self._forget_oldest()
         result: _T = await _shared(task)
+        if memory is self._over_time and _size(result) > _REMEMBERED_BYTES:
+            memory.pop(key, None)
         return result
 
     def _forget_oldest(self) -> None:
@@ -330,12 +340,12 @@ class Frame:
                 frame=self.number,
             ) from error
 
-    def _require_size(self, product: Product, view: View) -> None:
+    def _require_size(self, product: Product, view: View, most_bytes: int) -> None:
         if not product.over_time:
             return
         rows, columns = view.crop.shape(*self.shape)
         values = math.prod(product.shape(self.recipe.applied, rows, columns, times=1))
-        limit = MAX_ANSWER_BYTES // (4 * values)
+        limit = most_bytes // (4 * values)
         times = len(view.time_s)
         if times > limit:
             raise Problem(
@@ -345,6 +355,10 @@ class Frame:
                 value=times,
                 limit=f"at most {limit}",
             )
+
+
+def _size(value: object) -> int:
+    return value.nbytes if isinstance(value, np.ndarray) else len(cast("bytes", value))
 
 
 def _array_key(product: Product, view: View) -> Hashable:
@@ -360,6 +374,7 @@ def _made(
     product: Product,
     encoding: Encoding,
     recipe: Recipe,
+    raw: RawFrame,
     given: Any,
     array: _Array | None,
     view: View,
@@ -369,6 +384,8 @@ def _made(
     begin_s = time.perf_counter()
     whole = product.compute(recipe, given, view) if array is None else array
     shown, extra = whole, framed.keywords["extra"]
+    if encoding.archive:
+        extra |= product.archive(recipe, raw, view)
     if not product.over_time:  # those were computed for no more than that
         shown = view.crop.apply(whole, product.description.axes)
         extra |= {name: view.crop.apply(extra[name]) for name in encoding.beside}

@@ -1,5 +1,6 @@
 """The noise of frames: of their moments and of their range, and what it does not explain."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
@@ -103,31 +104,67 @@ def _of_pixels(recipe: Recipe, brightness: _Array) -> tm.noise.MomentNoise:
     )
 
 
-def invalid_share(found: tm.Reconstruction, noise: tm.noise.MomentNoise) -> float | None:
-    """Return the share of a frame's pixels whose moments are invalid, and not by noise alone.
+def contradictions(recipe: Recipe, found: tm.Reconstruction) -> _Array | None:
+    """Return where a frame's moments contradict each other by more than its noise explains.
 
-    Moments of light have a Toeplitz matrix without negative eigenvalues (Proposition 1). Where the
-    smallest one is negative by more than noise explains, gain or phase of the frequencies do not
-    go together any more, as they do after calibration: thermal drift (Sec. 6.4).
+    They do where gain or phase of the frequencies do not go together any more: thermal drift after
+    calibration (Sec. 6.4), images out of step, light that moved.
+
+    Returns
+    -------
+    boolean array, shape (H, W)
+        None where that cannot be known: without a sensor, and where b_0 is estimated, as any
+        moments then agree.
+    """
+    if recipe.sensor is None or recipe.applied.sequence.zeroth == "estimated":
+        return None
+    brightness = np.asarray(found.smoothed[0].real)
+
+    def noise_at(pixels: _Array) -> tm.noise.MomentNoise:
+        noise_of = partial(_of_pixels, recipe)
+        return tm.noise.smoothed_at(noise_of, brightness, pixels, recipe.settings.smoothing_px)
+
+    return beyond_noise(found, noise_at)
+
+
+def beyond_noise(
+    found: tm.Reconstruction, noise_at: Callable[[_Array], tm.noise.MomentNoise]
+) -> _Array:
+    """Return which lit pixels have moments that noise alone does not explain.
+
+    Moments of light have a Toeplitz matrix without negative eigenvalues (Proposition 1); here the
+    smallest one is negative by more than `EXPLAINED_DEVIATIONS`.
 
     Parameters
     ----------
     found
-        Of the frame, (m + 1, H, W).
-    noise
-        Of its smoothed moments.
+        The frame, (m + 1, H, W).
+    noise_at
+        Returns the noise (m + 1, S) of its smoothed moments at S places in the flattened image.
 
     Returns
     -------
-    share
-        Among the pixels with light; None where there are none.
+    boolean array, shape (H, W)
     """
-    lit = np.asarray(found.flags) & (tm.Flags.NO_SIGNAL | tm.Flags.NON_FINITE) == 0
-    lit &= np.asarray(found.flags) & tm.Flags.SATURATED == 0
-    if not lit.any():
-        return None
     eigenvalue = np.asarray(found.validity) * np.asarray(found.smoothed[0].real)
-    variance = np.asarray(noise.variance)
-    # noise moves no eigenvalue by more than the norm of its own Toeplitz matrix
-    std = np.sqrt(len(variance) * variance.mean(axis=0))
-    return float((eigenvalue < -EXPLAINED_DEVIATIONS * std)[lit].mean())
+    beyond = np.zeros(eigenvalue.shape, dtype=bool)
+    suspected = np.flatnonzero((eigenvalue < 0) & _lit(found))
+    if suspected.size:
+        variance = np.asarray(noise_at(suspected).variance)
+        # noise moves no eigenvalue by more than the norm of its own Toeplitz matrix
+        std = np.sqrt(len(variance) * variance.mean(axis=0))
+        beyond.flat[suspected] = eigenvalue.flat[suspected] < -EXPLAINED_DEVIATIONS * std
+    return beyond
+
+
+def contradictory_share(recipe: Recipe, found: tm.Reconstruction) -> float | None:
+    """Return the share of the pixels with light that contradict themselves; None if unknown."""
+    contradictory, lit = contradictions(recipe, found), _lit(found)
+    if contradictory is None or not lit.any():
+        return None
+    return float(contradictory[lit].mean())
+
+
+def _lit(found: tm.Reconstruction) -> _Array:
+    unlit = tm.Flags.NO_SIGNAL | tm.Flags.NON_FINITE | tm.Flags.SATURATED
+    return np.asarray(np.asarray(found.flags) & unlit == 0)

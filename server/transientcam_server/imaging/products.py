@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam import wire
 from transientcam_driver import AppliedSequence, RawFrame, Truth
+from transientcam_server.imaging.labelling import image_columns, in_words, moment_columns
 from transientcam_server.imaging.noise import moment_noise
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.imaging.view import Crop, View
@@ -60,6 +61,9 @@ class Product:
         Of a 16-bit PNG; None for steps of one unit.
     fields
         Called as ``fields(recipe, raw, view)``: what the messages of this product alone hold.
+    archive
+        Called in the same way, on a worker: what an archive of this product holds beside that,
+        arrays of any size.
     """
 
     description: wire.Product
@@ -70,6 +74,7 @@ class Product:
     of_noise: bool = False
     steps: Steps | None = None
     fields: Callable[[Recipe, RawFrame, View], dict[str, Any]] = _no_fields
+    archive: Callable[[Recipe, RawFrame, View], dict[str, Any]] = _no_fields
 
     @property
     def name(self) -> str:
@@ -203,7 +208,17 @@ def _true_range(recipe: Recipe, truth: Truth, view: View) -> _Array:
 
 
 def _labels(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
-    return {"labels": [asdict(label) for label in raw.labels]}
+    return {"labels": [asdict(label) | {"kind": label.kind} for label in raw.labels]}
+
+
+def _evaluation(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
+    """Return what the images show and how they become moments, and the settings of the service."""
+    columns = image_columns(raw.labels)
+    columns |= moment_columns(recipe.applied.sequence, raw.labels, recipe.gains)
+    arrays = {
+        name: view.crop.apply(in_words(column), column.axes) for name, column in columns.items()
+    }
+    return arrays | {"reconstruction": recipe.settings.model_dump()}
 
 
 def _row(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
@@ -234,7 +249,7 @@ PRODUCTS: Final[dict[str, Product]] = {
         Product(_WIRE["flags"], "light", _property("flags")),
         Product(_WIRE["coefficients"], "coefficients", _coefficient_planes),
         Product(_WIRE["moments"], "moments", _property("moments")),
-        Product(_WIRE["raw"], "raw", _images, fields=_labels),
+        Product(_WIRE["raw"], "raw", _images, fields=_labels, archive=_evaluation),
         Product(_WIRE["transient"], "coefficients", _transient, over_time=True),
         Product(_WIRE["density_std"], "moments", _density_std, over_time=True, of_noise=True),
         Product(_WIRE["cumulative"], "coefficients", _cumulative, over_time=True),

@@ -9,7 +9,7 @@ import numpy as np
 
 import transientcam_moments as tm
 from transientcam_driver import RawFrame
-from transientcam_server.imaging.noise import range_noise
+from transientcam_server.imaging.noise import contradictions, range_noise
 from transientcam_server.imaging.recipe import Recipe
 
 _log = logging.getLogger(__name__)
@@ -55,6 +55,7 @@ def compute(before: Computed, recipe: Recipe, raw: RawFrame, stages: Iterable[st
         if computed.reconstruction is None:
             computed.reconstruction = found = recipe.reconstruct(raw)
             _read(found, FIRST)
+            _flag_contradictions(recipe, found)
             computed.pixels = pixel_counts(found)
         else:
             found = computed.reconstruction
@@ -70,6 +71,12 @@ def compute(before: Computed, recipe: Recipe, raw: RawFrame, stages: Iterable[st
     if recipe.sensor is not None and "returns" in requested and "returns" not in computed.failures:
         computed.range_noise = _range_noise(recipe, found, raw.number)
     return computed
+
+
+def _flag_contradictions(recipe: Recipe, found: tm.Reconstruction) -> None:
+    contradictory = contradictions(recipe, found)
+    if contradictory is not None:
+        found.add_flag(tm.Flags.CONTRADICTORY, contradictory)
 
 
 def _read(found: tm.Reconstruction, stage: str) -> None:

@@ -12,6 +12,8 @@ from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 
 _IMAGE: Final = ("y", "x")
+DEFAULT_BINS: Final = 64
+"""Times of flight of a product over time where a request names none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +155,12 @@ class View:
     time_s: tuple[float, ...] = ()
     crop: Crop = WHOLE
     y: int | None = None
+
+
+def evenly(base_frequency_hz: float, bins: int = DEFAULT_BINS) -> tuple[float, ...]:
+    """Return times of flight in s, evenly over one period of the base frequency."""
+    period_s = 1.0 / base_frequency_hz
+    return tuple(period_s * index / bins for index in range(bins))
 
 
 EVERYTHING: Final = View()

@@ -7,7 +7,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable, Coroutine
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future, wait
 from typing import Any, TypeVar
 
 _log = logging.getLogger(__name__)
@@ -24,12 +24,15 @@ class Workers:
         self._executor = executor
         self._long = asyncio.Semaphore(count - 1)
         self._tasks: set[asyncio.Task[Any]] = set()
+        self._running: set[Future[Any]] = set()
         self._failing: set[str] = set()
 
     async def run(self, compute: Callable[..., _T], *arguments: Any) -> tuple[_T, float]:
         """Return the result of ``compute`` on a worker, and the seconds it took there."""
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._executor, _timed, compute, *arguments)
+        future = self._executor.submit(_timed, compute, *arguments)
+        self._running.add(future)
+        future.add_done_callback(self._running.discard)
+        return await asyncio.wrap_future(future)
 
     async def run_long(self, compute: Callable[..., _T], *arguments: Any) -> tuple[_T, float]:
         """Do as `run` does, but never on the last free worker."""
@@ -43,11 +46,13 @@ class Workers:
         task.add_done_callback(self._finished)
         return task
 
-    async def close(self) -> None:
-        """Cancel every task that was started and has not finished."""
+    async def close(self, *, within_s: float) -> bool:
+        """Cancel every task that was started, and return whether all that computed has ended."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
+        running = set(self._running)
+        return not (await asyncio.to_thread(wait, running, timeout=within_s)).not_done
 
     def note_failure(self, product: str, number: int) -> None:
         """Log the failure of a product, the first of a series; call it in an except clause."""

@@ -1,14 +1,13 @@
 """A recording in other formats: NumPy's .npz, netCDF's .nc, a .zarr store, an .mcap.
 
-Images go from file to file one frame at a time, so that a recording may be larger than memory.
+Each carries what the recording says of its images, and how they become moments.
 """
 
 import importlib
+import io
 import json
-import shutil
-import zipfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
@@ -16,15 +15,27 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_server.errors.exceptions import MissingExtra, NotConvertible
+from transientcam_server.imaging.labelling import (
+    Column,
+    image_columns,
+    in_words,
+    moment_columns,
+)
+from transientcam_server.offline.formats import (
+    SINKS,
+    Block,
+    Content,
+    Put,
+    Row,
+    library,
+    sink_of,
+    write,
+)
 from transientcam_server.recording import layout
 from transientcam_server.recording.reader import Recording
 
 Progress = Callable[[int, int], None]
-Put = Callable[[int, NDArray[np.uint16]], None]
-Table = Mapping[str, tuple[tuple[str, ...], NDArray[Any], Mapping[str, str]]]
-"""Arrays by name: axes, values, attributes."""
-AXES: Final = ("frame", "image", "y", "x")
+_AXES: Final = ("frame", "image", "y", "x")
 
 
 def convert_recording(
@@ -45,49 +56,33 @@ def convert_recording(
     OSError
         If the output cannot be written.
     """
-    sink = _SINKS.get(output.suffix.lower())
-    if sink is None:
-        raise NotConvertible(str(output), sorted(_SINKS))
-    if output.exists():
-        raise FileExistsError(17, "it is there already", str(output))
-    scratch = output.with_name(output.name + ".part")
-    _remove(scratch)
-    try:
-        with sink(scratch, recording, _table(recording), _attributes(recording)) as put:
-            for index, raw in enumerate(recording):
-                put(index, raw.images)
-                progress(index + 1, recording.frames)
-        scratch.rename(output)
-    finally:
-        _remove(scratch)
+    sink = sink_of(output, SINKS | {".mcap": _mcap}, what="recordings")
+    blocks = {"raw": Block(_AXES, recording.shape, "<u2", {"units": "DN"})}
+    content = Content(columns_of(recording), blocks, attributes_of(recording))
+    write(output, content, _rows(recording, progress), sink)
 
 
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
+def _rows(recording: Recording, progress: Progress) -> Iterator[Row]:
+    for index, raw in enumerate(recording):
+        yield "raw", index, raw.images
+        progress(index + 1, recording.frames)
 
 
-def _table(recording: Recording) -> Table:
-    """Return everything but the images."""
-    labels = [asdict(label) for label in recording.labels]
-    table: dict[str, tuple[tuple[str, ...], NDArray[Any], Mapping[str, str]]] = {
-        name: (("frame",), recording.series(name), attributes)
+def columns_of(recording: Recording) -> dict[str, Column]:
+    """Return everything but the images; of old files what follows from their sequence."""
+    header, labels = recording.header, recording.labels
+    columns = {
+        name: Column(("frame",), recording.series(name), attributes)
         for name, (_, attributes) in layout.SERIES.items()
     }
-    for name in labels[0].keys() - {"index"}:
-        values = np.asarray([label[name] for label in labels])
-        if values.dtype == bool:
-            values = values.astype(np.uint8)  # netCDF has no boolean
-        table[name] = (("image",), values, {})
-    _, images, height, width = recording.shape
-    for name, size in zip(AXES[1:], (images, height, width), strict=True):
-        table[name] = ((name,), np.arange(size, dtype=np.int32), {})
-    return table
+    for name, size in zip(_AXES[1:], recording.shape[1:], strict=True):
+        columns[name] = Column((name,), np.arange(size, dtype=np.int32))
+    columns |= image_columns(labels)
+    return columns | moment_columns(header.applied.sequence, labels, header.gains)
 
 
-def _attributes(recording: Recording) -> dict[str, str]:
+def attributes_of(recording: Recording) -> dict[str, str]:
+    """Return name, sequence, settings and all other documents of a recording as texts."""
     header = recording.header
     return {
         "title": header.name,
@@ -106,92 +101,32 @@ def _attributes(recording: Recording) -> dict[str, str]:
 
 
 @contextmanager
-def _npz(
-    path: Path, recording: Recording, table: Table, attributes: Mapping[str, str]
-) -> Iterator[Put]:
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        arrays = {name: values for name, (_, values, _) in table.items()}
-        for name, values in (arrays | {k: np.asarray(v) for k, v in attributes.items()}).items():
-            with archive.open(f"{name}.npy", "w") as member:
-                np.lib.format.write_array(member, values, allow_pickle=False)
-        with archive.open("raw.npy", "w", force_zip64=True) as member:
-            described = {"descr": "<u2", "fortran_order": False, "shape": recording.shape}
-            np.lib.format.write_array_header_1_0(member, described)
+def _mcap(path: Path, content: Content) -> Iterator[Put]:
+    """Write each image of a frame to a topic of its own, as Foxglove and ROS programs show them.
 
-            def put(_: int, images: NDArray[np.uint16]) -> None:
-                member.write(images.astype("<u2").tobytes())
-
-            yield put
-
-
-@contextmanager
-def _netcdf(
-    path: Path, recording: Recording, table: Table, attributes: Mapping[str, str]
-) -> Iterator[Put]:
-    h5netcdf = _library("h5netcdf", "a .nc")
-    with h5netcdf.File(path, "w") as file:
-        file.dimensions = dict(zip(AXES, recording.shape, strict=True))
-        file.attrs.update(attributes)
-        for name, (axes, values, described) in table.items():
-            file.create_variable(name, axes, data=values).attrs.update(described)
-        raw = file.create_variable(
-            "raw",
-            AXES,
-            "<u2",
-            chunks=(1, *recording.shape[1:]),
-            compression="gzip",
-            compression_opts=1,
-            shuffle=True,
-        )
-        raw.attrs["units"] = "DN"
-
-        def put(index: int, images: NDArray[np.uint16]) -> None:
-            raw[index] = images
-
-        yield put
-
-
-@contextmanager
-def _zarr(
-    path: Path, recording: Recording, table: Table, attributes: Mapping[str, str]
-) -> Iterator[Put]:
-    zarr = _library("zarr", "a .zarr")
-    group = zarr.create_group(store=str(path), attributes=dict(attributes))
-    for name, (axes, values, described) in table.items():
-        group.create_array(name, data=values, dimension_names=axes, attributes=dict(described))
-    raw = group.create_array(
-        "raw",
-        shape=recording.shape,
-        dtype="<u2",
-        chunks=(1, *recording.shape[1:]),
-        dimension_names=AXES,
-        attributes={"units": "DN"},
-    )
-
-    def put(index: int, images: NDArray[np.uint16]) -> None:
-        raw[index] = images
-
-    yield put
-
-
-@contextmanager
-def _mcap(
-    path: Path, recording: Recording, table: Table, attributes: Mapping[str, str]
-) -> Iterator[Put]:
-    """Write each image of a frame to a topic of its own, as Foxglove and ROS programs show them."""
-    foxglove = _library("foxglove", "an .mcap")
+    The label of an image is the metadata of its topic; all columns are in ``columns.npz``, an
+    attachment, since an .mcap has no arrays.
+    """
+    foxglove = library("foxglove", "an .mcap")
     messages = importlib.import_module("foxglove.messages")
     topic = importlib.import_module("foxglove.channels").RawImageChannel
     context = foxglove.Context()
     topics = [
-        topic(f"/raw/{label.index:03d}", metadata=_texts(asdict(label)), context=context)
-        for label in recording.labels
+        topic(f"/raw/{index:03d}", metadata=_label(content.columns, index), context=context)
+        for index in range(content.blocks["raw"].shape[1])
     ]
-    arrived_ns = np.round(np.asarray(table["host_time_s"][1]) * 1e9).astype(np.int64)
+    arrived_ns = np.round(content.columns["host_time_s"].values * 1e9).astype(np.int64)
     with foxglove.open_mcap(path, context=context) as writer:
-        writer.write_metadata("recording", dict(attributes))
+        writer.write_metadata("recording", dict(content.attributes))
+        writer.attach(
+            log_time=int(arrived_ns[0]) if len(arrived_ns) else 0,
+            create_time=round(float(content.attributes["started_s"]) * 1e9),
+            name="columns.npz",
+            media_type="application/x-npz",
+            data=_archive(content.columns),
+        )
 
-        def put(index: int, images: NDArray[np.uint16]) -> None:
+        def put(_: str, index: int, images: NDArray[Any]) -> None:
             time_ns = int(arrived_ns[index])
             stamp = messages.Timestamp(*divmod(time_ns, 10**9))
             for channel, image in zip(topics, images.astype("<u2"), strict=True):
@@ -210,16 +145,17 @@ def _mcap(
         yield put
 
 
-def _texts(document: Mapping[str, Any]) -> dict[str, str]:
-    return {name: json.dumps(value) for name, value in document.items()}
+def _label(columns: Mapping[str, Column], index: int) -> dict[str, str]:
+    """Return the label of one image, as JSON texts."""
+    own = {name: in_words(each) for name, each in columns.items() if each.axes == ("image",)}
+    label = {name: values[index].item() for name, values in own.items() if name != "image"}
+    weights = columns["weight"].values[:, index]
+    label["weight"] = np.stack([np.real(weights), np.imag(weights)], axis=1).tolist()
+    return {"index": str(index)} | {name: json.dumps(value) for name, value in label.items()}
 
 
-def _library(name: str, what: str) -> Any:
-    try:
-        return importlib.import_module(name)
-    except ModuleNotFoundError as error:
-        raise MissingExtra(f"converting into {what}", name, "convert") from error
-
-
-_Sink = Callable[[Path, Recording, Table, Mapping[str, str]], AbstractContextManager[Put]]
-_SINKS: Final[dict[str, _Sink]] = {".npz": _npz, ".nc": _netcdf, ".zarr": _zarr, ".mcap": _mcap}
+def _archive(columns: Mapping[str, Column]) -> bytes:
+    file = io.BytesIO()
+    arrays = {name: in_words(column) for name, column in columns.items()}
+    np.savez(file, allow_pickle=False, **arrays)
+    return file.getvalue()

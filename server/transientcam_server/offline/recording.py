@@ -4,7 +4,7 @@ A second run goes on after the last frame that is in the file.
 """
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from transientcam_driver import RawFrame
 from transientcam_server.errors.exceptions import InputError
+from transientcam_server.imaging.labelling import Column
 from transientcam_server.imaging.products import PRODUCTS, Product
 from transientcam_server.imaging.recipe import SettingsVersion
-from transientcam_server.imaging.view import EVERYTHING, View
+from transientcam_server.offline.computing import KNOWN, ComputedFrame
+from transientcam_server.offline.formats import SINKS, Block, Content, Row, sink_of, write
 from transientcam_server.recording import swmr
 from transientcam_server.recording.reader import Recording
 from transientcam_server.recording.recipe import recorded_recipe
@@ -24,9 +26,9 @@ from transientcam_server.recording.salvage import salvage
 from transientcam_server.settings import ReconstructionSettings
 
 DEFAULT_PRODUCTS: Final = ("range", "direct", "indirect", "brightness", "validity", "flags")
-KNOWN_PRODUCTS: Final = tuple(
-    name for name, product in PRODUCTS.items() if name not in ("raw", "truth")
-)
+KNOWN_PRODUCTS: Final = tuple(name for name in KNOWN if name != "raw")
+HDF5_SUFFIXES: Final = (".h5", ".hdf5")
+_DESCRIBED: Final = ("units", "long_name")
 _SERIES: Final = ("device_time_s", "host_time_s", "frame")
 Progress = Callable[[int, int], None]
 
@@ -56,13 +58,12 @@ class BatchReconstructor:
 
     def compute(self, raw: RawFrame) -> dict[str, NDArray[Any]]:
         """Return the products of a frame by name."""
-        found = self._recipe.reconstruct(raw)
-        times = View(tuple(self.time_s))
+        frame = ComputedFrame(0, self._recipe, lambda _: raw)
         return {
-            product.name: product.compute(
-                self._recipe, found, times if product.over_time else EVERYTHING
-            )
-            for product in self.products
+            each.name: frame.product(
+                each.name, time_s=self.time_s.tolist() if each.over_time else None
+            ).array
+            for each in self.products
         }
 
 
@@ -75,10 +76,15 @@ def reconstruct_recording(
 ) -> int:
     """Compute products of all frames into ``output``; return how many were there already.
 
-    Until it is complete the file is called ``<output>.part``.
+    The suffix says the format: .h5, .npz, .nc or .zarr. Until it is complete there is an HDF5 file
+    ``<output>.part``, whatever the format, which a second run continues.
 
     Raises
     ------
+    NotConvertible
+        If the suffix names no format.
+    MissingExtra
+        If the format's library is not installed.
     InputError
         If the unfinished file is of another recording, or made with other settings.
     DamagedFrame
@@ -90,6 +96,9 @@ def reconstruct_recording(
     """
     if output.exists():
         raise FileExistsError(17, "it is there already", str(output))
+    sink = None
+    if output.suffix.lower() not in HDF5_SUFFIXES:
+        sink = sink_of(output, SINKS, what="products of a recording", also=HDF5_SUFFIXES)
     reconstructor = BatchReconstructor(recording, options)
     part = output.with_name(output.name + ".part")
     document = _document(recording, options)
@@ -113,9 +122,34 @@ def reconstruct_recording(
         progress(recording.frames, recording.frames)
     finally:
         rows.close()
-    part.rename(output)
+    if sink is None:
+        part.rename(output)
+    else:
+        with swmr.open_file(part, "r") as finished:
+            write(output, _content(finished), _rows(finished), sink)
+        part.unlink()
     swmr.synchronise(output.parent)
     return done
+
+
+def _content(file: swmr.File) -> Content:
+    """Return what a file of products holds, for another format."""
+    columns, blocks = {}, {}
+    for name, dataset in file.items():
+        own = (name,) if dataset.is_scale else None
+        axes = own or tuple(each[0].name.lstrip("/") for each in dataset.dims)
+        attributes = {key: dataset.attrs[key] for key in _DESCRIBED if key in dataset.attrs}
+        if dataset.ndim > 1:
+            blocks[name] = Block(axes, dataset.shape, dataset.dtype.str, attributes)
+        else:
+            columns[name] = Column(axes, dataset[()], attributes)
+    return Content(columns, blocks, dict(file.attrs))
+
+
+def _rows(file: swmr.File) -> Iterator[Row]:
+    for name, dataset in file.items():
+        for index in range(len(dataset) if dataset.ndim > 1 else 0):
+            yield name, index, dataset[index]
 
 
 def _document(recording: Recording, options: BatchOptions) -> dict[str, str]:

@@ -9,7 +9,6 @@ from typing import Any, Final
 from transientcam_driver import AppliedSequence
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.workers import Workers
-from transientcam_server.planning.choice import Choice
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.planner import Planner, range_error
 
@@ -22,7 +21,7 @@ class _CachedFront:
     made_with: tuple[int, int]
     frame: int
     until_s: float
-    choices: list[Choice]
+    choices: list[dict[str, Any]]
 
 
 class FrontCache:
@@ -56,21 +55,21 @@ class FrontCache:
             "compared_by": by,
             "scene_of_frame": cached.frame,
             "current": await self._current(frame),
-            "front": [choice.to_document() for choice in cached.choices],
+            "front": cached.choices,
         }
 
     def forget(self) -> None:
         """Drop the fronts, as when the scene is another one."""
         self._cached.clear()
 
-    async def _predicted(self, frame: Frame, by: str) -> list[Choice]:
+    async def _predicted(self, frame: Frame, by: str) -> list[dict[str, Any]]:
         found = await frame.reconstruction("returns")
         scene, _ = await self._workers.run(self._planner.scene_statistics, frame.recipe, found, 0.0)
         goal = Goal(
             base=frame.recipe.applied.sequence,
             bound_width=_WIDE_BOUNDS if by == "bound_width" else None,
         )
-        choices, _ = await self._workers.run_long(self._planner.front, goal, scene)
+        choices, _ = await self._workers.run_long(self._planner.front_documents, goal, scene)
         return choices
 
     async def _current(self, frame: Frame) -> dict[str, Any]:

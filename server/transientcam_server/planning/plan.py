@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from transientcam.notebook import table_html
 from transientcam_driver import Capabilities, Sequence
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
@@ -19,7 +20,7 @@ from transientcam_server.planning.goal import BUDGETS, Goal
 from transientcam_server.planning.prediction import Predictor
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Plan:
     """A recommendation and its neighbours on the front; None where there is none.
 
@@ -46,6 +47,23 @@ class Plan:
             "half_time": self._neighbour(self.half_time),
             "twice_accuracy": self._neighbour(self.twice_accuracy),
         }
+
+    def __repr__(self) -> str:
+        """State the recommended sequence, and what it takes and gives."""
+        return f"<Plan {_in_words(self.recommended)}>"
+
+    def _repr_html_(self) -> str:
+        """Return the recommendation and its neighbours as a table, for notebooks."""
+        rows = {
+            "recommended": self.recommended,
+            "half the time": self.half_time,
+            "twice the accuracy": self.twice_accuracy,
+        }
+        words = {
+            name: "no sequence does" if each is None else _in_words(each)
+            for name, each in rows.items()
+        }
+        return table_html(f"Plan, compared by {self.leading}", words)
 
     def _neighbour(self, choice: Choice | None) -> dict[str, Any] | None:
         if choice is None:
@@ -97,6 +115,16 @@ def plan(
     else:
         best = min(reached, key=lambda each: (each.error(leading), each.applied.capture_s))
     return Plan(best, *_neighbours(best, choices, leading), leading)
+
+
+def _in_words(choice: Choice) -> str:
+    sequence = choice.applied.sequence
+    return (
+        f"m = {sequence.harmonics} at {sequence.base_frequency_hz / 1e6:g} MHz, "
+        f"zeroth {sequence.zeroth}, {sequence.exposure_s * 1e3:g} ms, takes {sequence.takes}: "
+        f"captures in {choice.applied.capture_s * 1e3:.1f} ms, "
+        f"range to {choice.range_std.median_m * 1e3:.2f} mm"
+    )
 
 
 def _neighbours(

@@ -1,5 +1,8 @@
 """Plans sequences for the scene that a camera sees. Runs on workers."""
 
+import threading
+from typing import Any
+
 import numpy as np
 
 import transientcam_moments as tm
@@ -36,6 +39,7 @@ class Planner:
     ) -> None:
         self._capabilities = capabilities
         self._sensor = sensor
+        self._closing = threading.Event()
         self.reconstruct_with(settings)
 
     def reconstruct_with(self, settings: ReconstructionSettings) -> None:
@@ -74,6 +78,10 @@ class Planner:
         """Recommend a sequence; see `planning.plan`."""
         return plan(goal, self._predictor(scene), self._capabilities, reconstruct_s=self._computing)
 
+    def plan_document(self, goal: Goal, scene: SceneStatistics) -> dict[str, Any]:
+        """Return `plan` as JSON, with intervals by a bootstrap."""
+        return self.plan(goal, scene).to_document()
+
     def front(self, goal: Goal, scene: SceneStatistics) -> list[Choice]:
         """Return all sequences that no other beats, by rising time."""
         choices = candidates(
@@ -81,8 +89,24 @@ class Planner:
         )
         return choices_on_front(choices, goal.leading)
 
+    def front_documents(self, goal: Goal, scene: SceneStatistics) -> list[dict[str, Any]]:
+        """Return `front` as JSON, with intervals by a bootstrap: seconds of computing."""
+        documents = []
+        for choice in self.front(goal, scene):
+            self._go_on()
+            documents.append(choice.to_document())
+        return documents
+
+    def close(self) -> None:
+        """End what is being computed: it raises Problem ``shutting-down``. From any thread."""
+        self._closing.set()
+
     def _predictor(self, scene: SceneStatistics) -> Predictor:
-        return Predictor(scene, self._sensor, self._settings)
+        return Predictor(scene, self._sensor, self._settings, go_on=self._go_on)
+
+    def _go_on(self) -> None:
+        if self._closing.is_set():
+            raise Problem(kinds.SHUTTING_DOWN, "The service is shutting down.")
 
 
 def range_error(found: tm.Reconstruction, truth: Truth) -> dict[str, float] | None:

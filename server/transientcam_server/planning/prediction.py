@@ -6,6 +6,7 @@ Both depend on a pixel only by its relative noise, so that a table over that ser
 and number of takes.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from statistics import NormalDist
@@ -62,6 +63,8 @@ class Predictor:
         Of the reconstruction.
     seed
         Of all draws: the same arguments give the same result.
+    go_on
+        Called several times a second while this computes; whatever it raises ends that.
     """
 
     def __init__(
@@ -71,7 +74,9 @@ class Predictor:
         settings: ReconstructionSettings,
         *,
         seed: int = 0,
+        go_on: Callable[[], None] = lambda: None,
     ) -> None:
+        self._go_on = go_on
         self.scene = scene
         self.sensor = sensor
         self._settings = settings
@@ -104,6 +109,7 @@ class Predictor:
 
     def _deviations(self, sequence: Sequence) -> tuple[_Array, _Array]:
         """Deviation in m of each pixel, and share of first order in it."""
+        self._go_on()
         noise = self._relative_noise(sequence)
         key = (sequence.harmonics, sequence.base_frequency_hz, self._zeroth_of(sequence))
         deviation, holds = self._ranges(*key)
@@ -159,7 +165,7 @@ class Predictor:
             b0,
             self.sensor,
             calibration=tm.nominal_calibration(
-                1, sub_phases.phases_rad, sub_phases.weights, sequence.zeroth
+                1, sub_phases.phases_rad, sub_phases.weights, zeroth=sequence.zeroth
             ),
             zeroth=sequence.zeroth,
             takes=sequence.takes,
@@ -170,6 +176,7 @@ class Predictor:
 
     def _drawn(self, b: _Array, level: float, zeroth: str, draws: int) -> _Array:
         """Draw moments (m + 1, draws, P); b_0 is as noisy as the others if it is measured."""
+        self._go_on()
         random = np.random.default_rng((self._seed, len(b), int(level * 1e9)))
         return np.asarray(tm.noise.draw(b, _white(b, level, zeroth), random, draws=draws))
 

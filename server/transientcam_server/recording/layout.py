@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from transientcam_driver import AppliedSequence, Capabilities, ImageLabel, RawFrame, Sequence
+from transientcam_server.imaging.calibration import Gains
+from transientcam_server.imaging.labelling import Column, image_columns, moment_columns
 from transientcam_server.recording import swmr
 from transientcam_server.recording.storage import MAX_CHUNK_BYTES, Storage
 
@@ -45,8 +47,10 @@ SERIES: Final[dict[str, tuple[str, dict[str, str]]]] = {
 """One value a frame: type and attributes. ``frame`` is written last: it counts the frames."""
 ROW_AXIS: Final = "frame"
 _AXES: Final = ("frame", "image", "y", "x")
-_LABELS: Final = {each.name: each.type for each in fields(ImageLabel)}
 _LABEL_DTYPES: Final[dict[object, str]] = {int: "<i4", float: "<f8", bool: "|u1"}
+_LABELS: Final = {
+    each.name: _LABEL_DTYPES[each.type] for each in fields(ImageLabel) if each.name != "index"
+}
 _LAST_S: Final = datetime(9999, 12, 31, tzinfo=UTC).timestamp()
 _CAPABILITIES: Final = TypeAdapter(Capabilities)
 
@@ -93,6 +97,14 @@ class Header:
         default_factory=lambda: {name: version(name) for name in ("transientcam", "h5py", "numpy")}
     )
 
+    @property
+    def gains(self) -> Gains | None:
+        """The measured gains; None for the nominal ones."""
+        if self.calibration_planes is None:
+            return None
+        name = str(self.calibration.get("id", "recorded"))
+        return Gains(name, self.calibration_planes, self.calibration_bad)
+
 
 def utc(unix_s: float) -> datetime:
     """Return a Unix time as a date, the last or first one that there is if it lies beyond."""
@@ -137,32 +149,29 @@ def _create(file: swmr.File, header: Header, annotations: Mapping[str, Any]) -> 
         file.create_dataset(name, data=np.arange(size, dtype="<i4"))
     for name in _AXES:
         file[name].make_scale(name)
-    for name, kind in _LABELS.items():
-        if name != "index":  # that is the dimension `image`
-            values = [getattr(label, name) for label in labels]
-            file.create_dataset(name, data=np.asarray(values, dtype=_LABEL_DTYPES[kind]))
-    file["frequency_hz"].attrs["units"] = "Hz"
-    file["phase_rad"].attrs["units"] = "rad"
-    file["exposure_s"].attrs["units"] = "s"
+    _create_columns(file, image_columns(labels))
+    _create_columns(file, moment_columns(header.applied.sequence, labels, header.gains))
+    if header.calibration_planes is not None:
+        # names that readers of the first version of this format look for, of the same datasets
+        file["calibration_planes"] = file["gain"]
+        if "bad" in file:
+            file["calibration_bad"] = file["bad"]
     file.create_dataset("annotations", data=encoded(annotations), dtype=f"S{ANNOTATIONS_BYTES}")
     file.create_dataset("end", data=b"", dtype=f"S{END_BYTES}")
-    if header.calibration_planes is not None:
-        _create_calibration(file, header.calibration_planes, header.calibration_bad)
     _scale(file)
 
 
-def _create_calibration(
-    file: swmr.File, planes: NDArray[Any], bad: NDArray[np.bool_] | None
-) -> None:
-    file.create_dataset("moment", data=np.arange(len(planes), dtype="<i4"))
-    file["moment"].make_scale("moment")
-    dataset = file.create_dataset("calibration_planes", data=planes)
-    for axis, name in enumerate(("moment", "y", "x")[: planes.ndim]):
-        dataset.dims[axis].attach_scale(file[name])
-    if bad is not None:
-        file.create_dataset("calibration_bad", data=bad.astype("|u1"))
-        for axis, name in enumerate(("y", "x")):
-            file["calibration_bad"].dims[axis].attach_scale(file[name])
+def _create_columns(file: swmr.File, columns: Mapping[str, Column]) -> None:
+    for name, column in columns.items():
+        dataset = file.create_dataset(name, data=column.values)
+        dataset.attrs.update(column.attributes)
+        if column.axes == (name,):
+            dataset.make_scale(name)
+            continue
+        for axis, (along, size) in enumerate(zip(column.axes, column.values.shape, strict=True)):
+            if along not in file:
+                file.create_dataset(along, data=np.arange(size, dtype="<i4")).make_scale(along)
+            dataset.dims[axis].attach_scale(file[along])
 
 
 def _scale(file: swmr.File) -> None:
@@ -171,8 +180,6 @@ def _scale(file: swmr.File) -> None:
         file["raw"].dims[axis].attach_scale(file[name])
     for name in SERIES.keys() - {ROW_AXIS}:
         file[name].dims[0].attach_scale(file["frame"])
-    for name in _LABELS.keys() - {"index"}:
-        file[name].dims[0].attach_scale(file["image"])
 
 
 def encoded(document: Mapping[str, Any]) -> bytes:
@@ -277,9 +284,7 @@ def read_labels(storage: Storage, applied: AppliedSequence) -> tuple[ImageLabel,
         If they are not.
     """
     columns: dict[str, list[Any]] = {
-        name: storage.values(name, axes=1, dtype=_LABEL_DTYPES[kind]).tolist()
-        for name, kind in _LABELS.items()
-        if name != "index"
+        name: storage.values(name, axes=1, dtype=dtype).tolist() for name, dtype in _LABELS.items()
     }
     if any(len(values) != applied.images for values in columns.values()):
         raise ValueError(f"it has no {applied.images} labels")

@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,14 @@ class Recording:
     One that is still being written, or whose writer died, shows the frames it had when it was
     opened.
 
+    Parameters
+    ----------
+    path
+        Of the file.
+    source
+        An open binary file with what stands at ``path``, where that is elsewhere; closed with the
+        recording.
+
     Raises
     ------
     NotARecording
@@ -30,14 +38,24 @@ class Recording:
         If there is no such file, or it may not be read.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, source: IO[bytes] | None = None) -> None:
         self.path = path
-        with path.open("rb") as stream:  # its errors are clearer than h5py's
-            size_bytes = os.fstat(stream.fileno()).st_size
+        self._source = source
+        try:
+            if source is not None:
+                size_bytes = source.seek(0, os.SEEK_END)
+            else:
+                with path.open("rb") as stream:  # its errors are clearer than h5py's
+                    size_bytes = os.fstat(stream.fileno()).st_size
+        except OSError:
+            self._close_source()
+            raise
         try:
             # the writer of an unfinished one may still run: only SWMR readers may open it
-            unfinished = path.name.endswith(".part")
-            self._file = swmr.open_unfinished(path) if unfinished else swmr.open_file(path, "r")
+            unfinished = source is None and path.name.endswith(".part")
+            self._file = (
+                swmr.open_unfinished(path) if unfinished else swmr.open_file(source or path, "r")
+            )
         except Exception as error:
             raise NotARecording(str(path), _reason(error)) from error
         try:
@@ -76,7 +94,11 @@ class Recording:
             If its bytes are not the ones that were written.
         IndexError
             If there is none.
+        ValueError
+            If the file was closed.
         """
+        if not self._file:
+            raise ValueError(f"{self.path} is closed")
         if not 0 <= index < self.frames:
             raise IndexError(f"frame {index} of {self.frames}")
         images = self._images(index)
@@ -106,6 +128,11 @@ class Recording:
         """Close the file."""
         with contextlib.suppress(Exception):  # of a damaged one
             self._file.close()
+        self._close_source()
+
+    def _close_source(self) -> None:
+        if self._source is not None:
+            self._source.close()
 
     def __enter__(self) -> "Recording":
         return self

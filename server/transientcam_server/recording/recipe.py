@@ -1,6 +1,5 @@
 """How recorded frames are computed: with the gains that were recorded beside them."""
 
-from transientcam_server.imaging.calibration import Gains
 from transientcam_server.imaging.lens import known_intrinsics
 from transientcam_server.imaging.recipe import Recipe, SettingsVersion
 from transientcam_server.recording.layout import Header
@@ -11,16 +10,12 @@ def recorded_recipe(
     header: Header, reconstruction: SettingsVersion, *, lens: LensSettings | None = None
 ) -> Recipe:
     """Return the recipe that reconstructs a recording's frames."""
-    capabilities, planes = header.capabilities, header.calibration_planes
-    gains = None
-    if planes is not None:
-        name = str(header.calibration.get("id", "recorded"))
-        gains = Gains(name, planes, header.calibration_bad)
+    capabilities = header.capabilities
     return Recipe(
         header.applied,
         reconstruction.settings,
         2.0**capabilities.bits - 1.0,
-        gains,
+        header.gains,
         reconstruction.id,
         known_intrinsics(
             lens or LensSettings(),

@@ -38,7 +38,11 @@ def salvage(source: swmr.File, target: Path, rows: int, *, row_axis: str) -> Non
         raise ValueError(f"no series {row_axis}")
     with swmr.open_file(target, "w", libver=swmr.LIBVER) as copy:
         copy.attrs.update(source.attrs)
+        first: dict[swmr.Dataset, str] = {}  # datasets are equal where they are the same one
         for name, dataset in datasets.items():
+            if first.setdefault(dataset, name) != name:  # another name of it
+                copy[name] = copy[first[dataset]]
+                continue
             if name not in growing:
                 copy.create_dataset(name, data=storage.values(name), dtype=dataset.dtype)
             elif dataset.ndim == 1:

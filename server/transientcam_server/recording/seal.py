@@ -67,7 +67,7 @@ def sealed_frames(path: Path) -> list[SealedFrame]:
             while at >= 0:
                 row = _whole(data, at, found)
                 at = data.find(_MAGIC, at + (len(_MAGIC) if row is None else _SEAL.itemsize))
-    frames = []
+    frames: list[SealedFrame] = []
     while len(frames) in found:
         frames.append(found[len(frames)])
     return frames

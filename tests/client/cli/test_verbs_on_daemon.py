@@ -45,6 +45,17 @@ def test_capture_saves_every_format(
     assert len(json.loads((tmp_path / "range.json").read_text())["array"]) == 120
 
 
+def test_raw_images_are_saved_with_what_makes_moments_of_them(
+    served: Served, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["capture", served.url, "raw", "-o", str(tmp_path / "raw.npz")]) == 0
+
+    with np.load(tmp_path / "raw.npz") as parts:
+        assert parts["weight"].shape == (4, len(parts["array"]))
+        assert parts["gain"].shape == (4,)
+        assert set(parts["kind"]) == {"modulated"}
+
+
 def test_capture_takes_times_of_flight(
     served: Served, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -41,6 +41,8 @@ def test_a_camera_measures_uses_and_moves_a_calibration(daemon: Served) -> None:
         camera.calibrations.activate(identity)
         assert camera.calibrations.all()["active"] == identity
         content = camera.calibrations.export(identity)
+        assert camera.calibrations.undo()["id"] == "nominal"
+        assert camera.calibrations.undo()["former"] == "nominal"
         camera.calibrations.activate("nominal")
         camera.calibrations.delete(identity)
         assert camera.calibrations.take_in(content)["name"] == "warm"

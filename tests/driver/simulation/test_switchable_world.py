@@ -164,3 +164,23 @@ def test_a_sequence_set_while_a_world_is_prepared_is_prepared_for_as_well() -> N
 
     assert switchable.world is cast(World, coming)
     assert coming.prepared_for == [first, second]
+
+
+def test_the_diffusor_hides_the_scene_and_comes_off_again(open_virtual: OpenCamera) -> None:
+    camera = open_virtual("sim:mirrors?noise=off")
+    through = open_virtual("sim:calibration?noise=off")
+    simulation = _simulation(camera)
+    camera.start()
+    through.start()
+    before = _frame_after_the_change(camera)
+
+    simulation.change(diffusor=True)
+    behind = _frame_after_the_change(camera)
+    assert (simulation.scene, simulation.diffusor) == ("mirrors", True)
+    np.testing.assert_array_equal(behind, _frame_after_the_change(through))
+
+    simulation.change(effects={})  # what is not named stays
+    assert simulation.diffusor
+    simulation.change(diffusor=False)
+    np.testing.assert_array_equal(_frame_after_the_change(camera), before)
+    assert not simulation.diffusor

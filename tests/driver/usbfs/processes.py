@@ -60,6 +60,11 @@ class EmulatedCamera:
         """Whether the light is on."""
         return bool(self._ask("light"))
 
+    @property
+    def watchdog_tripped(self) -> bool:
+        """Whether the light went off because no heartbeat came."""
+        return bool(self._ask("watchdog"))
+
     def do(self, command: str, *arguments: Any) -> None:
         """Let something happen to the camera."""
         assert self._ask(command, *arguments) == "done"

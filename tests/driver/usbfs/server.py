@@ -21,6 +21,12 @@ def main() -> None:
     device, _ = build(scene, width=163, height=120, seed=1, clock=RealClock())
     mount = UsbfsMount(device, Path(sys.argv[1]))
 
+    def status() -> Status:
+        with device.changed:  # past the bus, which may stall
+            now_s = device.clock.now_s()
+            answer = device._firmware.control_in(Request.GET_STATUS, 0, 0, now_s=now_s)
+        return Status.unpack(answer)
+
     def obey(command: str, *arguments: Any) -> object:
         match command:
             case "unplug":
@@ -38,8 +44,9 @@ def main() -> None:
             case "memory":
                 mount.memory_bytes = arguments[0]
             case "light":
-                status = device.control(0xC0, Request.GET_STATUS, 0, 0, Status.BYTES, b"")
-                return Status.unpack(status).light_on
+                return status().light_on
+            case "watchdog":
+                return status().watchdog_tripped
             case _:
                 return "unknown"
         return "done"

@@ -39,6 +39,7 @@ def test_every_resource_of_the_interface_is_described(document: dict[str, Any]) 
         "POST /api/v1/calibrations",
         "GET /api/v1/calibrations/active",
         "PUT /api/v1/calibrations/active",
+        "POST /api/v1/calibrations/active/undo",
         "POST /api/v1/calibrations/import",
         "GET /api/v1/calibrations/{calibration}",
         "DELETE /api/v1/calibrations/{calibration}",

@@ -148,6 +148,13 @@ def test_a_rate_limit_holds_on_average_and_never_drops(
     assert one.dropped == 0
 
 
+@pytest.mark.parametrize("rate_hz", [1e-3, 1e-308, 5e-324])
+def test_the_least_rates_leave_the_first_frame_alone(rate_hz: float) -> None:
+    one = channel(max_rate_hz=rate_hz)
+
+    assert [one.take(index / 20.0) for index in range(5)] == [True, False, False, False, False]
+
+
 def test_a_rate_limit_does_not_catch_up_after_a_pause() -> None:
     one = channel(max_rate_hz=10.0)
     assert one.take(0.0)
@@ -202,7 +209,7 @@ class FakePast:
         return fake_frame(number)
 
 
-def told(items: list[Item]) -> list[dict[str, Any]]:
+def reported(items: list[Item]) -> list[dict[str, Any]]:
     return [dict(item.details) for item in items if isinstance(item, wire.Notice)]
 
 
@@ -247,7 +254,7 @@ def test_what_the_past_loses_meanwhile_is_told_as_a_gap_in_its_place() -> None:
 
         assert first is not None
         assert numbers([first]) == [1]
-        assert told(items[:1]) == [{"from": 2, "to": 4, "reason": "not kept any more"}]
+        assert reported(items[:1]) == [{"from": 2, "to": 4, "reason": "not kept any more"}]
         assert numbers(items[1:]) == [5, 6, 7, 8, 9]
 
     run(test)
@@ -262,7 +269,9 @@ def test_a_start_in_the_future_is_told_and_not_waited_for(last: int | None) -> N
 
         gap, delivery = waiting(outbox)
 
-        assert told([gap]) == [{"from": (last or 0) + 1, "to": 99, "reason": "not captured yet"}]
+        assert reported([gap]) == [
+            {"from": (last or 0) + 1, "to": 99, "reason": "not captured yet"}
+        ]
         assert numbers([delivery]) == [5]
 
     run(test)
@@ -348,7 +357,7 @@ def test_whatever_happens_a_resuming_client_knows_of_every_frame(
             outbox.acknowledge(2**53)
 
         seen = set(numbers(items))
-        for gap in told(items):
+        for gap in reported(items):
             seen |= set(range(gap["from"], gap["to"] + 1))
         (chosen,) = outbox.channels
         assert past.last is not None

@@ -48,18 +48,27 @@ def test_the_active_one_is_nominal_where_it_cannot_be_known(
 
 def test_the_active_one_is_remembered(tmp_path: Path) -> None:
     settings = CalibrationSettings(directory=tmp_path / "kept")
-    CalibrationStore(settings).remember_active("SIM-1")
+    CalibrationStore(settings).remember_active("SIM-1", "nominal")
 
     assert CalibrationStore(settings).active_id == "SIM-1"
-    assert json.loads((tmp_path / "kept" / "active.json").read_text()) == {"id": "SIM-1"}
+    assert CalibrationStore(settings).former_id == "nominal"
+    remembered = json.loads((tmp_path / "kept" / "active.json").read_text())
+    assert remembered == {"id": "SIM-1", "former": "nominal"}
     assert [path.name for path in (tmp_path / "kept").iterdir()] == ["active.json"]
+
+
+def test_what_an_earlier_version_remembered_is_read(tmp_path: Path) -> None:
+    (tmp_path / "active.json").write_text('{"id": "SIM-1"}')
+    kept = CalibrationStore(CalibrationSettings(directory=tmp_path))
+
+    assert (kept.active_id, kept.former_id) == ("SIM-1", None)
 
 
 def test_a_disk_that_does_not_remember_is_no_reason_to_stop(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     kept = CalibrationStore(CalibrationSettings(directory=tmp_path / "file" / "kept"))
 
-    kept.remember_active("SIM-1")
+    kept.remember_active("SIM-1", None)
 
     assert kept.active_id == NOMINAL_ID
     assert kept.all() == []

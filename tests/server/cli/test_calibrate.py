@@ -35,7 +35,7 @@ def test_the_result_is_printed_as_json(tmp_path: Path, capfd: pytest.CaptureFixt
     sequence.write_text(QUICK)
 
     arguments = ["--takes", "2", "--sequence", str(sequence), "-o", str(out), "--json"]
-    assert run(["calibrate", *CAMERA, *arguments]) == 0
+    assert run(["calibrate", "--camera", "sim:calibration", *arguments]) == 0
 
     result = json.loads(capfd.readouterr().out)
     assert result["calibration_id"] == CalibrationCapture.load(out).id
@@ -68,6 +68,33 @@ def test_what_cannot_be_done_is_said_and_nothing_written(
     assert not out.exists()
 
 
+def test_one_of_a_scene_is_kept_but_served_only_if_forced(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    kept, forced = tmp_path / "kept.npz", tmp_path / "forced.npz"
+    scene = ["calibrate", "--camera", "sim:mirrors?noise=off", "--takes", "2"]
+
+    assert run([*scene, "-o", str(kept)]) == 1
+    assert "this is a scene, not a diffusor" in capfd.readouterr().out
+    assert run([*scene, "-o", str(forced), "--force"]) == 0
+
+    capfd.readouterr()
+    serve = ["serve", "--check", "--camera", "sim:mirrors", "--calibration"]
+    assert run([*serve, str(kept)]) != 0
+    assert "not measured on a diffusor" in capfd.readouterr().err
+    assert run([*serve, str(forced)]) == 0
+
+
+def test_the_diffusor_is_put_before_a_simulated_lens(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = ["--sequence", QUICK, "--takes", "2", "-o", str(tmp_path / "c.npz"), "--diffusor"]
+
+    assert run(["calibrate", "--camera", "sim:mirrors", *out]) == 0
+    assert "measured on a diffusor" in capfd.readouterr().out
+    assert run(["calibrate", "--camera", "usb", *out]) == 2
+
+
 # -- where a daemon has the camera -----------------------------------------------------------------
 
 
@@ -97,9 +124,29 @@ def test_what_a_daemon_measured_is_printed_as_json(capfd: pytest.CaptureFixture[
     assert not result["calibration"]["active"]
 
 
+def test_in_a_daemon_one_of_a_scene_is_not_used_and_the_diffusor_and_undo_are_at_hand(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    with serving("sim:wall?noise=off") as daemon:
+        measure = ["calibrate", daemon.url, "--takes", "2", "--activate"]
+        assert run(measure) == 1
+        assert "this may be no diffusor" in capfd.readouterr().out
+        assert daemon.service.calibrations.active_id == "nominal"
+        assert run([*measure, "--diffusor"]) == 0
+        simulation = daemon.service.camera.simulation
+        assert simulation is not None
+        assert not simulation.diffusor
+        measured = daemon.service.calibrations.active_id
+        assert measured != "nominal"
+        assert run(["calibrate", daemon.url, "--undo"]) == 0
+        assert f"not {measured}" in capfd.readouterr().out
+        assert daemon.service.calibrations.active_id == "nominal"
+
+
 @pytest.mark.parametrize(
     ("arguments", "hint"),
     [
+        (["--undo"], "--undo"),
         (["http://127.0.0.1:1", "--camera", "usb"], "--camera"),
         (["http://127.0.0.1:1", "--sequence", "{}"], "--sequence"),
         (["--activate", "-o", "c.npz"], "--activate"),

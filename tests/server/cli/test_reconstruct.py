@@ -55,6 +55,19 @@ def test_a_picture_is_drawn_where_one_is_asked_for(measurement: Path, tmp_path: 
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [(["-o", "out.h5"], "out.h5 must end in .npz"), (["-o", "a.npz", "--plot", "a.jpg"], ".png")],
+)
+def test_a_suffix_of_another_format_is_refused(
+    measurement: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], named: str
+) -> None:
+    assert run(["reconstruct", str(measurement), *arguments]) == 2
+
+    said = " ".join(capsys.readouterr().err.replace("│", " ").split())
+    assert named in said
+
+
 def test_flagged_pixels_are_counted(
     measurement: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

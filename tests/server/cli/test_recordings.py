@@ -8,6 +8,8 @@ import h5py
 import httpx
 import numpy as np
 import pytest
+import xarray
+from zarr.core.sync import cleanup_resources
 
 from tests.server.recording.made import frame, record
 from tests.server.recording.test_recovery import abandoned
@@ -69,6 +71,62 @@ def test_reconstruct_takes_a_recording(tmp_path: Path, capsys: pytest.CaptureFix
         assert "direct" not in file
     assert run([*command, "--product", "colour"]) == 2
     assert "'colour' is none of" in capsys.readouterr().err
+    assert run([*command, "--product", "density_std"]) == 2
+
+
+@pytest.mark.parametrize("suffix", ["npz", "nc", "zarr"])
+def test_products_are_written_as_the_suffix_says(tmp_path: Path, suffix: str) -> None:
+    source, plain = record(tmp_path / "a.h5", 2), tmp_path / "plain.h5"
+    output = tmp_path / f"products.{suffix}"
+    of = ["--product", "range", "--product", "transient", "--product", "moments", "--bins", "3"]
+
+    assert run(["reconstruct", str(source), "-o", str(plain), *of]) == 0
+    assert run(["reconstruct", str(source), "-o", str(output), *of]) == 0
+
+    with h5py.File(plain) as file:
+        expected = {name: file[name][()] for name in ("range", "transient", "moments", "frame")}
+        title = file.attrs["title"]
+    if suffix == "npz":
+        with np.load(output) as archive:
+            found = {name: archive[name] for name in expected}
+            assert str(archive["title"]) == title
+    else:
+        engine = "zarr" if suffix == "zarr" else "h5netcdf"
+        with xarray.open_dataset(output, engine=engine) as dataset:
+            found = {name: dataset[name].to_numpy() for name in expected}
+            assert dataset["transient"].dims == ("frame", "time", "y", "x")
+            assert dataset["range"].attrs["units"] == "m"
+        cleanup_resources()  # ends the threads of zarr
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values)
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_another_suffix_is_refused_before_anything_is_computed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = record(tmp_path / "a.h5", 1)
+
+    assert run(["reconstruct", str(source), "-o", str(tmp_path / "a.mat")]) == 1
+    assert ".h5, .hdf5, .nc, .npz, .zarr" in capsys.readouterr().err
+    assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
+
+
+def test_a_recording_is_reconstructed_with_what_was_recorded_unless_told_otherwise(
+    tmp_path: Path,
+) -> None:
+    source = record(tmp_path / "a.h5", 1, reconstruction={"bias": 0.05, "smoothing_px": 0.9})
+    one, other = tmp_path / "one.h5", tmp_path / "other.h5"
+
+    assert run(["reconstruct", str(source), "-o", str(one)]) == 0
+    assert run(["reconstruct", str(source), "-o", str(other), "--smoothing-px", "0"]) == 0
+
+    with h5py.File(one) as file:
+        settings = json.loads(file.attrs["reconstruction"])
+        assert (settings["bias"], settings["smoothing_px"]) == (0.05, 0.9)
+    with h5py.File(other) as file:
+        settings = json.loads(file.attrs["reconstruction"])
+        assert (settings["bias"], settings["smoothing_px"]) == (0.05, 0.0)
 
 
 def test_replay_serves_a_recording(tmp_path: Path) -> None:

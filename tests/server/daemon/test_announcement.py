@@ -33,8 +33,8 @@ def test_an_announced_service_is_found_can_be_used_and_is_withdrawn_at_its_end()
         assert found is not None
         with Camera(found.url) as camera:
             capabilities = camera.camera["capabilities"]
-        told = (found.serial, found.firmware, found.api, found.tls)
-        assert told == (capabilities["serial"], str(capabilities["firmware"]), "v1", False)
+        reported = (found.serial, found.firmware, found.api, found.tls)
+        assert reported == (capabilities["serial"], str(capabilities["firmware"]), "v1", False)
         assert capabilities["model"] in found.name
 
     assert found.url not in {each.url for each in discover(timeout_s=0.5, interfaces=LOOPBACK)}
@@ -98,9 +98,9 @@ def test_a_network_that_cannot_be_asked_is_logged_and_the_service_goes_on(
 
 def test_a_service_for_every_client_reports_addresses_that_others_can_use() -> None:
     for host in ("0.0.0.0", "::"):
-        told = _addresses(host)
-        assert told
-        assert not [each for each in told if each.startswith("fe80") or each == "::1"]
+        reported = _addresses(host)
+        assert reported
+        assert not [each for each in reported if each.startswith("fe80") or each == "::1"]
     assert _addresses("192.168.7.5") == ["192.168.7.5"]
 
 

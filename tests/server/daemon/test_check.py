@@ -1,4 +1,4 @@
-"""`transientcam serve --check`: nothing is served, everything is told."""
+"""`transientcam serve --check`: nothing is served, every finding is reported."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Where settings come from, and what is told of those that cannot be used."""
+"""Where settings come from, and the errors for those that cannot be used."""
 
 from pathlib import Path
 
@@ -104,11 +104,11 @@ def test_mistakes_of_every_source_are_reported_together_also_beside_a_broken_fil
     with pytest.raises(SettingsError) as caught:
         load(file=file, environment=environment, port=-1)
 
-    told = {mistake.place: mistake.reason for mistake in caught.value.mistakes}
-    assert set(told) == {str(file), "--port", *environment}
-    assert "line 2" in told[str(file)]
-    assert told["TRANSIENTCAM_PROT"].endswith("did you mean TRANSIENTCAM_PORT?")
-    assert "JSON" in told["TRANSIENTCAM_ALLOWED_HOSTS"]
+    reported = {mistake.place: mistake.reason for mistake in caught.value.mistakes}
+    assert set(reported) == {str(file), "--port", *environment}
+    assert "line 2" in reported[str(file)]
+    assert reported["TRANSIENTCAM_PROT"].endswith("did you mean TRANSIENTCAM_PORT?")
+    assert "JSON" in reported["TRANSIENTCAM_ALLOWED_HOSTS"]
 
 
 def test_what_is_unsafe_and_what_cannot_be_served_are_reported_together(tmp_path: Path) -> None:

@@ -1,7 +1,9 @@
 """Clients that send slowly, half, too much or nothing at all, and the others beside them."""
 
+import asyncio
 import json
 import socket
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any, cast
@@ -13,7 +15,10 @@ from websockets.exceptions import WebSocketException
 
 from tests.server.streaming import streaming
 from tests.serving import Served, serving
-from transientcam_server.daemon.connections import StallTimer
+from transientcam_server.api.middleware.security import SECURITY_HEADERS
+from transientcam_server.daemon.connections import BoundedConnection
+from transientcam_server.daemon.intake import PORTION_BYTES
+from transientcam_server.daemon.stalls import StallTimer
 from transientcam_server.settings import LimitSettings
 
 PATIENCE_S = 60.0
@@ -101,15 +106,16 @@ def test_a_second_request_has_a_deadline_of_its_own() -> None:
     assert status == 408
 
 
-def test_a_body_that_does_not_come_is_given_up_without_an_answer_of_its_own() -> None:
+def test_a_body_that_does_not_come_is_given_up_and_changes_nothing() -> None:
     head = (
         b"PUT /api/v1/sequence HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
         b"Content-Length: 20\r\n\r\n{"
     )
     with limited(body_s=0.2) as served, raw(served, head) as connection:
-        assert rest_of(connection) == b""
+        status, document = problem(rest_of(connection))
         before = httpx.get(f"{served.url}/api/v1/sequence").json()
 
+    assert (status, document["type"], document["limit"]) == (408, "/problems/request-late", 0.2)
     assert before["harmonics"] == 3
 
 
@@ -207,6 +213,154 @@ def test_a_long_poll_outlives_the_deadlines_of_requests() -> None:
         answer = client.get("/api/v1/frames/latest", params=params)
 
     assert answer.json()["type"] == "/problems/no-frame-yet"
+
+
+GET = b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+POST = (
+    b"POST /api/v1/lease HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+    b"Transfer-Encoding: chunked\r\n\r\n"
+)
+MOST_BYTES = 64 * 1024 * 1024
+LAST = b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n"
+
+
+@pytest.fixture(scope="module")
+def plain() -> Iterator[Served]:
+    """A daemon whose heads may be short."""
+    with limited(head_bytes=4096) as served:
+        yield served
+
+
+@pytest.fixture
+def works(plain: Served, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many requests of one connection were in the works whenever one was begun."""
+    counts: list[int] = []
+    begin = BoundedConnection.on_headers_complete
+
+    def noted(connection: BoundedConnection) -> None:
+        unanswered = connection.cycle is not None and not connection.cycle.response_complete
+        counts.append(len(connection.pipeline) + unanswered)
+        begin(connection)
+
+    monkeypatch.setattr(BoundedConnection, "on_headers_complete", noted)
+    return counts
+
+
+def statuses(answers: bytes) -> list[int]:
+    return [int(each[:3]) for each in answers.split(b"HTTP/1.1 ")[1:]]
+
+
+def test_requests_sent_together_are_answered_one_after_the_other(
+    plain: Served, works: list[int]
+) -> None:
+    with raw(plain, 200 * GET + LAST) as connection:
+        answers = rest_of(connection)
+
+    assert statuses(answers) == [200] * 201
+    assert works == [0] * 201
+
+
+@pytest.mark.parametrize("size", [1, 3, 7, 64])
+def test_requests_are_told_apart_wherever_packets_end(
+    plain: Served, works: list[int], size: int
+) -> None:
+    body = b'{"holder": "x", "on_lapse": "\r\n\r\n"}'
+    with_length = (
+        b"POST /api/v1/lease HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json"
+    )
+    with_length += b"\r\nContent-Length: %d\r\n\r\n" % len(body) + body
+    chunked = POST + b"4\r\n\r\n\r\n\r\n%x\r\n" % len(body) + body + b"\r\n0\r\n\r\n"
+    requests = GET + with_length + GET + chunked + LAST
+    with raw(plain) as connection:
+        for begin in range(0, len(requests), size):
+            connection.sendall(requests[begin : begin + size])
+        answers = rest_of(connection)
+
+    assert statuses(answers) == [200, 422, 200, 422, 200]
+    assert works == [0] * 5
+
+
+def test_what_is_pipelined_and_not_answered_stays_in_the_sockets(
+    plain: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    connections: list[BoundedConnection] = []
+    made = BoundedConnection.connection_made
+
+    def noted(connection: BoundedConnection, transport: asyncio.BaseTransport) -> None:
+        connections.append(connection)
+        made(connection, transport)
+
+    monkeypatch.setattr(BoundedConnection, "connection_made", noted)
+    wait = (
+        b"GET /api/v1/frames/latest?wait_s=10&after=%d HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" % 2**50
+    )
+    with raw(plain, wait) as connection:
+        connection.setblocking(False)
+        sent = 0
+        with contextlib.suppress(BlockingIOError):
+            while sent < 64 * 1024 * 1024:
+                sent += connection.send(GET * 1000)
+        (held,) = connections
+
+        assert sent < 64 * 1024 * 1024  # the sockets are full: nothing more is read
+        assert len(held._unparsed) <= PORTION_BYTES
+        assert not held.pipeline
+
+
+@pytest.mark.parametrize(
+    "endless",
+    [b"a: b\r\n", b"x", b"\r\n"],
+    ids=["trailers", "an endless trailer", "empty lines before a head"],
+)
+def test_what_is_beside_the_body_is_counted_with_the_head(plain: Served, endless: bytes) -> None:
+    begun = b"" if endless == b"\r\n" else POST + b"0\r\n" + (b"a: " if endless == b"x" else b"")
+    with raw(plain, begun) as connection:
+        try:
+            for _ in range(1000):
+                connection.sendall(endless * 65536)
+        except (BrokenPipeError, ConnectionResetError):
+            pass
+        else:
+            pytest.fail("the connection took it all")
+
+
+def test_the_sizes_of_chunks_may_be_as_long_as_the_body_and_a_head(plain: Served) -> None:
+    # 5 of 6 bytes are beside the body, so that 4 more of each chunk are than the body has
+    allowed, refused = 4096 // 4 - 20, 4096 // 4 + 20
+    chunk = b"1\r\n \r\n"
+    with raw(plain, POST + allowed * chunk + b"0\r\n\r\n" + LAST) as connection:
+        assert statuses(rest_of(connection)) == [422, 200]
+    with raw(plain, POST + refused * chunk) as connection:
+        status, document = problem(rest_of(connection))
+    assert (status, document["type"]) == (431, "/problems/head-too-large")
+
+
+def test_trailers_are_no_headers(plain: Served) -> None:
+    token = POST + b"2\r\n{}\r\n0\r\nX-Request-ID: smuggled\r\n\r\n" + LAST
+    with raw(plain, token) as connection:
+        answers = rest_of(connection)
+
+    assert statuses(answers) == [422, 200]
+    assert b"smuggled" not in answers
+
+
+@pytest.mark.parametrize(
+    ("request_bytes", "line"),
+    [
+        (b"\x16\x03\x01\r\n\r\n", b"HTTP/1.1 400 Bad Request"),
+        (b"GET /" + b"a" * 5000, b"HTTP/1.1 431 Request Header Fields Too Large"),
+    ],
+)
+def test_refusals_of_the_connection_are_like_any_other_answer(
+    plain: Served, request_bytes: bytes, line: bytes
+) -> None:
+    with raw(plain, request_bytes) as connection:
+        answer = rest_of(connection)
+
+    head = answer.partition(b"\r\n\r\n")[0].lower()
+    assert answer.split(b"\r\n")[0] == line
+    for name, value in SECURITY_HEADERS.items():
+        assert f"{name}: {value}".lower().encode() in head
 
 
 class Timer:

@@ -53,9 +53,9 @@ def test_every_mistake_in_the_settings_is_a_fault_with_its_place(tmp_path: Path)
     faults = [each for each in checks(file) if each[0] == "fault"]
 
     assert [each[1] for each in faults] == ["settings", "settings"]
-    told = " ".join(each[2] for each in faults)
-    assert "port" in told
-    assert "stream.queue_frames" in told
+    reported = " ".join(each[2] for each in faults)
+    assert "port" in reported
+    assert "stream.queue_frames" in reported
 
 
 def test_a_service_that_admits_every_client_is_warned_of(tmp_path: Path) -> None:

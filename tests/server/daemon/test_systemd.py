@@ -228,12 +228,12 @@ def test_the_daemon_reports_ready_fed_unplugged_and_stopping(
     ) as daemon:
         try:
             assert daemon.stdout is not None
-            told: dict[str, Any] = json.loads(daemon.stdout.readline())
+            reported: dict[str, Any] = json.loads(daemon.stdout.readline())
             assert manager.hear()["READY"] == "1"
             manager.hear_until(lambda heard: "Hz" in heard.get("STATUS", ""))
             manager.hear_until(lambda heard: "WATCHDOG" in heard)
             fault = {"fault": "unplug"}
-            httpx.post(f"{told['url']}/api/v1/simulation/faults", json=fault).raise_for_status()
+            httpx.post(f"{reported['url']}/api/v1/simulation/faults", json=fault).raise_for_status()
             manager.hear_until(lambda heard: "lost" in heard.get("STATUS", ""))
             manager.hear_until(lambda heard: "WATCHDOG" in heard)
             daemon.terminate()

@@ -57,7 +57,7 @@ def tell(url: str) -> dict[str, Any]:
     class Stories(workflow):  # type: ignore[misc]  # its class is made while it runs
         def validate_response(self, response: Any, case: Any, **kwargs: Any) -> None:
             answers[f"{case.method} {case.operation.path} {response.status_code}"] += 1
-            # never told again: by then the daemon would be another
+            # never read again: by then the daemon would be another
             try:
                 super().validate_response(response, case, **kwargs)
             except FailureGroup as group:

@@ -280,10 +280,10 @@ def test_the_daemon_calibrates_and_says_when_it_cannot(calibrated: Path) -> None
             frame = next(each for each in frames if each.meta["takes"] == 2)
             assert frame.meta["calibration_id"] == identity
 
-    told = [notice for notice in notices if notice.kind == "calibration-changed"]
-    assert [notice.details["calibration_id"] for notice in told] == [NOMINAL_ID, identity]
-    assert told[0].details["reason"] == "the calibration is for harmonics = 3, not 2"
-    assert told[1].details["reason"] is None
+    reported = [notice for notice in notices if notice.kind == "calibration-changed"]
+    assert [notice.details["calibration_id"] for notice in reported] == [NOMINAL_ID, identity]
+    assert reported[0].details["reason"] == "the calibration is for harmonics = 3, not 2"
+    assert reported[1].details["reason"] is None
 
 
 def test_the_calibration_of_another_camera_is_refused_at_once(calibrated: Path) -> None:

@@ -1,11 +1,17 @@
-"""Invalid pixels are those whose moments contradict each other by more than noise explains."""
+"""Contradictory pixels are those whose moments disagree by more than noise explains."""
+
+from typing import Literal
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_server.imaging.noise import invalid_share
+from transientcam_driver import Sequence, open_camera
+from transientcam_server.camera.source import sensor_of
+from transientcam_server.imaging.noise import beyond_noise, contradictions, contradictory_share
+from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
 SHAPE = (40, 50)
 STD_DN = 2.0
@@ -26,11 +32,17 @@ def moments(phase_error_rad: tuple[float, ...], *, seed: int = 1) -> NDArray[np.
 
 def share(b: NDArray[np.complex64]) -> float | None:
     found = tm.reconstruct(b, tm.Settings(smoothing_sigma_px=0.0))
-    noise = tm.noise.MomentNoise(np.full((len(b), *SHAPE), 2 * STD_DN**2))
-    return invalid_share(found, noise)
+    lit = (found.flags & tm.Flags.NO_SIGNAL) == 0
+
+    def noise_at(pixels: NDArray[np.intp]) -> tm.noise.MomentNoise:
+        return tm.noise.MomentNoise(np.full((len(b), pixels.size), 2 * STD_DN**2))
+
+    beyond = beyond_noise(found, noise_at)
+    assert not beyond[~lit].any()
+    return float(beyond[lit].mean()) if lit.any() else None
 
 
-def test_noise_alone_makes_hardly_any_pixel_invalid() -> None:
+def test_noise_alone_makes_hardly_any_pixel_contradictory() -> None:
     assert share(moments((0.0, 0.0, 0.0, 0.0))) == pytest.approx(0.0, abs=0.005)
 
 
@@ -38,7 +50,7 @@ def test_a_phase_that_all_harmonics_share_alike_is_a_delay_and_no_contradiction(
     assert share(moments((0.0, 0.1, 0.2, 0.3))) == pytest.approx(0.0, abs=0.005)
 
 
-def test_a_harmonic_whose_phase_has_drifted_makes_nearly_all_invalid() -> None:
+def test_a_harmonic_whose_phase_has_drifted_makes_nearly_all_contradictory() -> None:
     """arg b_2 = 2 arg b_1 for one return: 0.1 rad off cannot be the moments of any light."""
     few = share(moments((0.0, 0.0, 0.01, 0.0)))
     most = share(moments((0.0, 0.0, 0.1, 0.0)))
@@ -53,10 +65,10 @@ def test_more_light_than_there_is_is_a_contradiction() -> None:
     b = moments((0.0, 0.0, 0.0, 0.0))
     b[2] *= 1.1  # |b_2| <= b_0
 
-    invalid = share(b)
+    contradictory = share(b)
 
-    assert invalid is not None
-    assert invalid > 0.9
+    assert contradictory is not None
+    assert contradictory > 0.9
 
 
 def test_pixels_without_light_are_not_counted() -> None:
@@ -65,3 +77,42 @@ def test_pixels_without_light_are_not_counted() -> None:
 
     assert share(b) == pytest.approx(0.0, abs=0.005)
     assert share(np.zeros_like(b)) is None
+
+
+def recipe(zeroth: Literal["low-frequency", "estimated"]) -> Recipe:
+    with open_camera("sim:wall") as camera:
+        applied = camera.validate(Sequence(harmonics=3, zeroth=zeroth))
+        sensor = sensor_of(camera, SensorSettings())
+    unsmoothed = ReconstructionSettings(smoothing_px=0.0)
+    return Recipe(applied, unsmoothed, 65535.0, sensor=sensor)
+
+
+def reconstruction(b: NDArray[np.complex64], zeroth: str) -> tm.Reconstruction:
+    return tm.reconstruct(b, tm.Settings(smoothing_sigma_px=0.0, zeroth=zeroth))
+
+
+def test_what_contradicts_itself_is_told_from_what_noise_biased() -> None:
+    """The exact moments of one return have no uniform part: biased, and right."""
+    b = moments((0.0, 0.0, 0.0, 0.0))
+    b[2, :20] *= 1.5
+
+    found = reconstruction(b, "low-frequency")
+    contradictory = contradictions(recipe("low-frequency"), found)
+
+    assert (found.flags & tm.Flags.BIASED > 0).mean() > 0.9
+    assert contradictory is not None
+    assert contradictory[:20].all()
+    assert not contradictory[20:].any()
+    found.add_flag(tm.Flags.CONTRADICTORY, contradictory)
+    assert (found.flags[:20] & tm.Flags.CONTRADICTORY > 0).all()
+    assert found.flags.dtype == np.uint8
+    assert found.has_range.all()
+
+
+def test_an_estimated_zeroth_moment_hides_contradictions_and_says_so() -> None:
+    b = moments((0.0, 0.0, 0.1, 0.0))
+
+    found = reconstruction(b, "estimated")
+
+    assert contradictions(recipe("estimated"), found) is None
+    assert contradictory_share(recipe("estimated"), found) is None

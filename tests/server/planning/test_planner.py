@@ -102,6 +102,19 @@ def test_a_target_gets_the_quickest_sequence_that_reaches_it(capabilities: Capab
     assert best.applied.capture_s == min(choice.applied.capture_s for choice in reaching)
 
 
+def test_a_plan_shows_what_it_recommends(capabilities: Capabilities) -> None:
+    found = planned(Goal(range_std_m=0.02), capabilities)
+
+    m, zeroth = (
+        found.recommended.applied.sequence.harmonics,
+        found.recommended.applied.sequence.zeroth,
+    )
+    assert repr(found).startswith(f"<Plan m = {m} at ")
+    assert f"zeroth {zeroth}" in repr(found)
+    assert repr(found).endswith(" mm>")
+    assert "<th>half the time</th>" in found._repr_html_()
+
+
 def test_a_budget_gets_the_most_accurate_sequence_within_it(capabilities: Capabilities) -> None:
     best = planned(Goal(frame_rate_hz=10.0), capabilities).recommended
 
@@ -290,7 +303,10 @@ def test_deviation_of_one_return_at_one_frequency_is_the_closed_form() -> None:
 
     predicted = predictor.range_std(sequence)
 
-    b0, gain = 400.0, abs(tm.nominal_calibration(1, sequence.sub_phases.phases_rad)[1])
+    b0, gain = (
+        400.0,
+        abs(tm.nominal_calibration(1, sequence.sub_phases.phases_rad, zeroth="on-off")[1]),
+    )
     variance = (b0 / 9.0 + 2 * (30 / 9.0) ** 2 + 1 / 6) / gain**2 / 2
     std_rad = np.sqrt(variance * tm.noise.smoothing_factor(0.6)) / b0
     assert predicted.median_m == pytest.approx(tm.range_m(std_rad, FREQUENCY_HZ), rel=0.02)

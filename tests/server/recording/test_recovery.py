@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 import pytest
 
 from tests.conftest import ROOT
-from tests.server.recording.made import assert_same, frame, header, record
+from tests.server.recording.made import HEIGHT, WIDTH, assert_same, frame, header, record
 from transientcam_server.errors.exceptions import NotARecording, RecordingInUse
 from transientcam_server.recording import Recording, RecordingWriter, layout, lock, recover
 from transientcam_server.recording.recovery import recover_all, unfinished
@@ -70,6 +71,20 @@ def test_a_recovered_recording_is_whole_and_opens_with_anything(tmp_path: Path) 
             assert_same(recording.frame(number), frame(number))
     with h5py.File(path) as file:  # no SWMR, no special version
         assert file["raw"].dims[0][0].name == "/frame"
+
+
+def test_a_recovered_recording_has_its_gains_once_under_both_names(tmp_path: Path) -> None:
+    planes = np.full((3, HEIGHT, WIDTH), 1 - 2j, np.complex64)
+    bad = np.eye(HEIGHT, WIDTH) > 0
+    part = abandoned(tmp_path / "a.h5", 2, calibration_planes=planes, calibration_bad=bad)
+
+    with h5py.File(recover(part)) as file:
+        np.testing.assert_array_equal(file["gain"][()], planes)
+        np.testing.assert_array_equal(file["calibration_bad"][()], bad)
+        assert file["gain"] == file["calibration_planes"]
+        assert file["bad"] == file["calibration_bad"]
+        assert file["gain"].dims[0][0].name == "/moment"
+        assert dict(file["kind"].attrs)["flag_meanings"] == "off on modulated"
 
 
 def test_a_torn_last_frame_is_left_out(tmp_path: Path) -> None:
@@ -196,10 +211,10 @@ def test_recovery_without_room_leaves_everything_as_it_was(tmp_path: Path) -> No
         assert recording.frames == 40
 
 
-def abandoned(path: Path, frames: int) -> Path:
+def abandoned(path: Path, frames: int, **changes: Any) -> Path:
     """What a writer leaves that is killed after so many frames."""
     whole = path.with_name("alive.h5")
-    writer = RecordingWriter(whole, header(), annotations={"kept": True})
+    writer = RecordingWriter(whole, header(**changes), annotations={"kept": True})
     for number in range(frames):
         writer.append(frame(number))
     part = path.with_name(path.name + ".part")

@@ -219,8 +219,14 @@ export class Api {
     return this.#json("POST", "/calibrations", { body: wanted }) as Promise<JobDocument>;
   }
 
-  activateCalibration(id: string): Promise<unknown> {
-    return this.#json("PUT", "/calibrations/active", { body: { id } });
+  /** One that was not measured on a diffusor is refused without force. */
+  activateCalibration(id: string, force: boolean): Promise<unknown> {
+    return this.#json("PUT", "/calibrations/active", { body: { id, force } });
+  }
+
+  /** Returns to the calibration that was active before. */
+  restoreCalibration(): Promise<unknown> {
+    return this.#json("POST", "/calibrations/active/undo");
   }
 
   importCalibration(file: Blob): Promise<CalibrationDocument> {
@@ -243,7 +249,7 @@ export class Api {
   }
 
   /** Answered once the scene is prepared. */
-  setSimulation(wanted: { scene?: string; effects?: Readonly<Record<string, EffectChoice>> }): Promise<SimulationDocument> {
+  setSimulation(wanted: { scene?: string; diffusor?: boolean; effects?: Readonly<Record<string, EffectChoice>> }): Promise<SimulationDocument> {
     return this.#json("PUT", "/simulation", { body: wanted }) as Promise<SimulationDocument>;
   }
 

@@ -1,7 +1,7 @@
 import { signal } from "@preact/signals";
 
 import { type Api, plainWords, RequestError } from "./api";
-import type { CalibrationRequest, CalibrationsDocument, JobDocument } from "./documents";
+import type { CalibrationRequest, CalibrationsDocument, JobDocument, VerdictDocument } from "./documents";
 
 /** How often a measurement is asked how far it is. */
 const LOOK_S = 0.4;
@@ -56,8 +56,15 @@ export class Calibrations {
     if (job !== null) this.#take(await this.#api.cancelJob(job.id));
   }
 
-  async activate(id: string): Promise<void> {
-    await this.#api.activateCalibration(id);
+  async activate(id: string, force = false): Promise<void> {
+    await this.#api.activateCalibration(id, force);
+    await this.refresh();
+  }
+
+  /** Returns to the calibration that was active before. */
+  async restore(): Promise<void> {
+    await this.#api.restoreCalibration();
+    this.outcome.value = null;
     await this.refresh();
   }
 
@@ -112,5 +119,9 @@ function outcomeOf({ state, problem, result }: JobDocument): { words: string; go
   if (state === "cancelled") return { words: "The measurement was cancelled.", good: false };
   if (state === "failed") return { words: problem === null ? "The measurement failed." : plainWords(problem), good: false };
   const [bad, rejected] = [Number(result?.["bad_pixels"] ?? 0), Number(result?.["rejected_images"] ?? 0)];
-  return { words: `Measured: ${bad} bad ${bad === 1 ? "pixel" : "pixels"}, ${rejected} ${rejected === 1 ? "image" : "images"} left out as unlike the others.`, good: true };
+  const words = `${bad} bad ${bad === 1 ? "pixel" : "pixels"}, ${rejected} ${rejected === 1 ? "image" : "images"} left out as unlike the others.`;
+  const verdict = result?.["verdict"] as VerdictDocument | undefined;
+  if (verdict === undefined || verdict.verdict === "diffusor") return { words: `Measured: ${words}`, good: true };
+  const use = result?.["activated"] === true ? "It is used, as it was forced." : "It is kept, but not used.";
+  return { words: `Measured on ${verdict.verdict === "scene" ? "a scene, not a diffusor" : "what may be no diffusor"}: ${use}`, good: false };
 }

@@ -109,6 +109,16 @@ export interface ParameterDocument {
 }
 
 /** A calibration, and whether it is good for what is captured at present. */
+/** Whether a calibration was measured on a diffusor. */
+export interface VerdictDocument {
+  /** Only a diffusor's is used without force. */
+  readonly verdict: "diffusor" | "in-doubt" | "scene";
+  readonly reason: string | null;
+  readonly block_px: number;
+  /** A text for each row of blocks: "." like a diffusor, "#" unlike one, "?" not judged. */
+  readonly blocks: readonly string[];
+}
+
 export interface CalibrationDocument {
   readonly id: string;
   readonly name: string;
@@ -123,6 +133,9 @@ export interface CalibrationDocument {
   /** Why not. */
   readonly reason: string | null;
   readonly active: boolean;
+  readonly verdict: VerdictDocument;
+  /** Whether it was to be used whatever the verdict. */
+  readonly forced: boolean;
   /** Shares of pixels that contradict themselves: now, and when it was measured. */
   readonly drift: { readonly invalid_share: number; readonly invalid_share_at_capture: number | null; readonly frame: number } | null;
 }
@@ -130,6 +143,8 @@ export interface CalibrationDocument {
 export interface CalibrationsDocument {
   /** "nominal" for the gains of an ideal modulation. */
   readonly active: string;
+  /** What was active before; null where nothing was. */
+  readonly former: string | null;
   readonly directory: string;
   /** The newest first. */
   readonly calibrations: readonly CalibrationDocument[];
@@ -150,6 +165,8 @@ export interface SimulationDocument {
   /** What was chosen in place of what the scene says. */
   readonly effects: Readonly<Record<string, EffectChoice>>;
   readonly scenes: readonly { readonly name: string; readonly description: string }[];
+  /** Whether filter and diffusor are before the lens. */
+  readonly diffusor: boolean;
   readonly plugged: boolean;
   readonly faults: readonly Fault[];
 }

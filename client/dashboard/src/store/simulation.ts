@@ -34,6 +34,12 @@ export class Simulation {
     await this.refresh();
   }
 
+  /** Puts filter and diffusor before the lens, or takes them away. */
+  async putDiffusor(diffusor: boolean): Promise<void> {
+    await this.#api.setSimulation({ diffusor });
+    await this.refresh();
+  }
+
   /** Forces an effect on or off, or leaves it to the scene. */
   async choose(effect: string, choice: EffectChoice | null): Promise<void> {
     const { [effect]: _, ...others } = this.world.peek()?.effects ?? {};

@@ -44,6 +44,17 @@ test("a measurement is followed to its end, and the list read anew then", async 
   expect(lists).toBe(1);
 });
 
+test.each([
+  ["scene", false, "Measured on a scene, not a diffusor: It is kept, but not used."],
+  ["in-doubt", false, "Measured on what may be no diffusor: It is kept, but not used."],
+  ["scene", true, "Measured on a scene, not a diffusor: It is used, as it was forced."],
+])("a measurement on what is no diffusor is no success (%s, activated: %s)", async (verdict, activated, words) => {
+  await calibrations.measure({ name: "", frames: 40, activate: true });
+  answers.push(job("done", { result: { bad_pixels: 0, rejected_images: 0, activated, verdict: { verdict, reason: "…", block_px: 8, blocks: ["#"] } } }));
+  await vi.advanceTimersByTimeAsync(500);
+  expect(calibrations.outcome.value).toEqual({ good: false, words });
+});
+
 test("a measurement that failed says why", async () => {
   await calibrations.measure({ name: "", frames: 40, activate: true });
   answers.push(job("failed", { problem: { title: "Camera not connected" } }));

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 
-import { ageOf, driftOf } from "../../src/views/calibration/words";
+import { ageOf, doubtOf, driftOf } from "../../src/views/calibration/words";
 
 test("an age is said as people do", () => {
   expect([5, 600, 7200, 864_000].map(ageOf)).toEqual(["just now", "10 min ago", "2 h ago", "10 days ago"]);
@@ -11,4 +11,11 @@ test("drift is told beside what it was, and called for only where it has grown",
   expect(grown).toEqual({ grown: true, words: "8.1\u202f% of the pixels contradict themselves; 0.4\u202f% when it was measured. It should be measured anew." });
   expect(driftOf({ invalid_share: 0.005, invalid_share_at_capture: 0.001, frame: 9 }).grown).toBe(false);
   expect(driftOf({ invalid_share: 0.4, invalid_share_at_capture: null, frame: 9 })).toEqual({ grown: false, words: "40.0\u202f% of the pixels contradict themselves." });
+});
+
+test("only what was not measured on a diffusor is doubted", () => {
+  const verdict = { reason: null, block_px: 8, blocks: ["."] };
+  expect(doubtOf({ ...verdict, verdict: "diffusor" })).toBeNull();
+  expect(doubtOf({ ...verdict, verdict: "in-doubt" })?.tag).toBe("in doubt");
+  expect(doubtOf({ ...verdict, verdict: "scene" })?.tag).toBe("of a scene");
 });

@@ -1,6 +1,6 @@
 """The JSON documents about calibrations."""
 
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -22,8 +22,9 @@ class DeviceDocument(Document):
 class DriftDocument(Document):
     """How well the active calibration still does.
 
-    A pixel is invalid where its moments contradict each other by more than noise explains, as
-    they do after thermal drift: a share that has grown much calls for a new calibration.
+    A pixel is invalid where its moments contradict each other by more than noise explains (the flag
+    `contradictory`), as they do after thermal drift: a share that has grown much calls for a new
+    calibration.
     """
 
     invalid_share: float = Field(ge=0.0, le=1.0)
@@ -32,6 +33,39 @@ class DriftDocument(Document):
     """The same in the measurement itself; null where it was not counted."""
     frame: int
     """The newest of those frames."""
+
+
+class FindingDocument(Document):
+    """One test of a verdict."""
+
+    test: str
+    """What was tested: shares of the pixels, ranges in metres, phases in radian."""
+    value: float | None
+    """What was found; null where no pixel could be judged."""
+    limit: float
+    """The most that a diffusor may have, either sign."""
+    unit: Literal["share", "m", "rad"]
+    kept: bool
+
+
+class VerdictDocument(Document):
+    """Whether a calibration was measured on a diffusor, by what its images look like.
+
+    Through a diffusor all pixels see one return at the same time; a scene has ranges, and several
+    returns in a pixel.
+    """
+
+    verdict: Literal["diffusor", "in-doubt", "scene"]
+    """Only the first is used without `force`."""
+    reason: str | None
+    """What speaks against a diffusor; null where nothing does."""
+    tests: list[FindingDocument]
+    block_px: int
+    """Side in pixels of the blocks that were judged."""
+    blocks: list[str]
+    """A text for each row of blocks: `.` like a diffusor, `#` unlike one, `?` not judged."""
+    reference: str
+    """What it was compared with: the id of a calibration, or `nominal`."""
 
 
 class CalibrationDocument(Document):
@@ -56,8 +90,12 @@ class CalibrationDocument(Document):
     """Why not."""
     active: bool
     """Whether frames are calibrated by it, as long as it fits."""
+    verdict: VerdictDocument
+    forced: bool
+    """Whether it was to be used whatever the verdict, when it was measured."""
     drift: DriftDocument | None = None
-    """Null where it is not active, or no frame was calibrated by it yet."""
+    """Null where it is not active, no frame was calibrated by it yet, or the zeroth moment is
+    estimated, as drift does not show then."""
 
 
 class ActiveDocument(Document):
@@ -69,6 +107,8 @@ class ActiveDocument(Document):
     """What frames carry: `nominal` also where the active one is not good for the sequence."""
     reason: str | None = None
     """Why it is not."""
+    former: str | None = None
+    """What was active before, to which `POST /calibrations/active/undo` returns."""
 
 
 class CalibrationsDocument(Document):
@@ -76,6 +116,8 @@ class CalibrationsDocument(Document):
 
     active: str
     """Id of the active one, or `nominal`."""
+    former: str | None = None
+    """What was active before; null where nothing was, or it was deleted."""
     directory: str
     """Where the service keeps them."""
     calibrations: list[CalibrationDocument]
@@ -95,7 +137,9 @@ class CalibrationRequest(Document):
     frames: int = Field(default=DEFAULT_TAKES, ge=2, le=10_000)
     """Captured with the light on, and as many in the dark; averaged without outliers."""
     activate: bool = False
-    """Use it at once."""
+    """Use it at once, if it was measured on a diffusor."""
+    force: bool = False
+    """Let it be used whatever the verdict on it."""
 
 
 class ActivationRequest(Document):
@@ -109,3 +153,5 @@ class ActivationRequest(Document):
 
     id: str = Field(max_length=200)
     """`nominal` for none."""
+    force: bool = False
+    """Use it even if it was not measured on a diffusor."""

@@ -22,9 +22,9 @@ class CameraDocument(Document):
         source: Literal["settings", "scene", "recording", "assumed"]
         """Its origin: the settings `[lens]`, the simulated scene, the recording, or none."""
 
-    state: Literal["starting", "streaming", "stopped", "calibrating", "lost"]
+    state: Literal["starting", "streaming", "stopped", "calibrating", "lost", "held"]
     reason: str | None = None
-    """Why it is lost."""
+    """Why it is lost, or its light is held off."""
     simulated: bool
     capabilities: dict[str, Any]
     """As the camera itself states them; units are in the names."""
@@ -40,7 +40,9 @@ class AcquisitionDocument(Document):
     """Whether frames are captured, and how fast."""
 
     running: bool
-    state: Literal["starting", "streaming", "stopped", "calibrating", "lost"]
+    state: Literal["starting", "streaming", "stopped", "calibrating", "lost", "held"]
+    reason: str | None = None
+    """Why the camera is lost, or its light is held off."""
     rate_hz: float | None = None
     """Measured over the last frames; null before there are two."""
     frames: int

@@ -9,11 +9,14 @@ class PixelCountsDocument(Document):
     total: int
     valid: int
     biased: int
+    """Moved to moments that have a density, as sharp returns or noise make it necessary: normal."""
     no_signal: int
     saturated: int
     non_finite: int
     degenerate: int
     replaced: int
+    contradictory: int
+    """Moments that contradict each other by more than noise explains: something is wrong."""
 
 
 class PredictedStdDocument(Document):

@@ -24,6 +24,8 @@ class SimulationDocument(Document):
     """What was chosen for effects by name, in place of the scene's own choice."""
     scenes: list[SceneDocument]
     """What the camera can be put before."""
+    diffusor: bool
+    """Whether filter and diffusor are before the lens, and hide the scene."""
     plugged: bool
     """Whether the simulated cable is in."""
     faults: list[str]
@@ -41,6 +43,8 @@ class SimulationRequest(Document):
     scene: Annotated[str, Field(max_length=64)] | None = None
     effects: Annotated[dict[str, Choice], Field(max_length=64)] | None = None
     """By name, in place of all earlier choices; of the others the scene decides."""
+    diffusor: bool | None = None
+    """Put filter and diffusor before the lens, to measure a calibration, or take them away."""
 
 
 class FaultRequest(Document):

@@ -62,6 +62,7 @@ def _document(service: Service) -> AcquisitionDocument:
     return AcquisitionDocument(
         running=status.running,
         state=status.state,
+        reason=status.reason,
         rate_hz=status.rate_hz,
         frames=status.frames,
         frame_age_s=status.frame_age_s,

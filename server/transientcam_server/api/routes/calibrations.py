@@ -22,6 +22,7 @@ from transientcam_server.api.documents.calibration import (
     CalibrationsDocument,
     DeviceDocument,
     DriftDocument,
+    VerdictDocument,
 )
 from transientcam_server.api.documents.job import JobDocument
 from transientcam_server.api.problems import documented
@@ -65,6 +66,7 @@ async def read_calibrations(service: ServiceOf) -> CalibrationsDocument:
     drift = await desk.drift()
     return CalibrationsDocument(
         active=desk.active_id,
+        former=desk.former_id,
         directory=str(desk.store.directory),
         calibrations=[_document(service, each, drift) for each in stored],
     )
@@ -90,7 +92,9 @@ async def measure_calibration(
 
     Put filter and diffusor before the lens first, so that the light shines at the sensor
     (Sec. 4.2). The job has the camera for itself, so that no frames come meanwhile; switching the
-    light off ends it. Its result holds the id of the calibration, in `calibration`.
+    light off ends it. Its result holds the id of the calibration, in `calibration`, and in
+    `verdict` whether the images look like a diffusor's. If they don't, the calibration is kept, but
+    not used without `force`: `activated` says whether it is.
     """
     running = service.recordings.active_id
     if running is not None:
@@ -115,16 +119,34 @@ async def read_active_calibration(service: ServiceOf) -> ActiveDocument:
         kinds.INVALID_REQUEST,
         kinds.UNKNOWN_CALIBRATION,
         kinds.CALIBRATION_MISFIT,
+        kinds.CALIBRATION_DOUBTED,
         kinds.INVALID_CALIBRATION,
     ),
 )
 async def activate_calibration(service: ServiceOf, wanted: ActivationRequest) -> ActiveDocument:
     """Calibrate frames from the next one on, and after the next start, by this.
 
-    One that is not good for this camera and its present sequence is refused. Streams are sent a
+    One that is not good for this camera and its present sequence is refused, and so is one that was
+    not measured on a diffusor, unless `force` is set. Streams are sent a
     `calibration-changed` notice, and each frame carries the id of its calibration.
     """
-    await service.calibrations.activate(wanted.id, lambda: service.applied)
+    await service.calibrations.activate(wanted.id, lambda: service.applied, force=wanted.force)
+    return _active(service)
+
+
+@router.post(
+    "/calibrations/active/undo",
+    summary="Return to the former calibration",
+    responses=documented(
+        kinds.UNKNOWN_CALIBRATION,
+        kinds.CALIBRATION_MISFIT,
+        kinds.INVALID_CALIBRATION,
+        kinds.NO_FORMER_CALIBRATION,
+    ),
+)
+async def restore_calibration(service: ServiceOf) -> ActiveDocument:
+    """Calibrate frames by what was active before the present calibration; again, and it returns."""
+    await service.calibrations.restore(lambda: service.applied)
     return _active(service)
 
 
@@ -220,7 +242,8 @@ async def _receive(request: Request, part: FilePath, *, limit: int) -> None:
 
 def _active(service: Service) -> ActiveDocument:
     notice = service.calibrations.notice(service.applied)
-    return ActiveDocument(id=service.calibrations.active_id, **notice)
+    desk = service.calibrations
+    return ActiveDocument(id=desk.active_id, former=desk.former_id, **notice)
 
 
 def _document(
@@ -244,5 +267,7 @@ def _document(
         fits=misfit is None,
         reason=None if misfit is None else str(misfit),
         active=active,
+        verdict=VerdictDocument.model_validate(stored.verdict.to_document()),
+        forced=stored.notes.get("forced") is True,
         drift=DriftDocument(**drift.to_document()) if active and drift is not None else None,
     )

@@ -47,8 +47,8 @@ async def make_plan(service: ServiceOf, request: PlanRequest) -> PlanDocument:
         fixed=frozenset(request.fixed),
     )
     scene = await _scene(service, request)
-    made, _ = await service.workers.run_long(service.planner.plan, goal, scene)
-    return PlanDocument.model_validate(made.to_document())
+    made, _ = await service.workers.run_long(service.planner.plan_document, goal, scene)
+    return PlanDocument.model_validate(made)
 
 
 @router.get(

@@ -40,19 +40,30 @@ async def read_simulation(service: ServiceOf) -> SimulationDocument:
     responses=documented(kinds.NOT_SIMULATED, kinds.BAD_REQUEST, kinds.INVALID_REQUEST),
 )
 async def change_simulation(service: ServiceOf, wanted: SimulationRequest) -> SimulationDocument:
-    """Change the scene, or force effects on or off; capturing goes on meanwhile.
+    """Change the scene, force effects on or off, or put the diffusor before the lens.
 
-    Answered once the scene is prepared, which may take seconds. The frame that is captured at that
-    moment may hold images of both. Streams are sent a `simulation-changed` notice.
+    Capturing goes on meanwhile. Answered once the scene is prepared, which may take seconds. The
+    frame that is captured at that moment may hold images of both. Streams are sent a
+    `simulation-changed` notice.
     """
     simulation = _simulation(service)
     if wanted.scene is not None:
         _require_known(wanted.scene, simulation)
-    await asyncio.to_thread(simulation.change, scene=wanted.scene, effects=wanted.effects)
+    await asyncio.to_thread(
+        simulation.change,
+        scene=wanted.scene,
+        effects=wanted.effects,
+        diffusor=wanted.diffusor,
+    )
     service.fronts.forget()
     changed = _document(simulation)
     service.hub.notify(
-        "simulation-changed", {"scene": changed.scene, "effects": dict(changed.effects)}
+        "simulation-changed",
+        {
+            "scene": changed.scene,
+            "effects": dict(changed.effects),
+            "diffusor": changed.diffusor,
+        },
     )
     return changed
 
@@ -94,6 +105,7 @@ def _document(simulation: Simulation) -> SimulationDocument:
             "scene": simulation.scene,
             "effects": simulation.effects,
             "scenes": [{"name": each.name, "description": each.description} for each in _offered()],
+            "diffusor": simulation.diffusor,
             "plugged": simulation.plugged,
             "faults": list(_FAULTS),
         }

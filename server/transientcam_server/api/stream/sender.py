@@ -8,7 +8,6 @@ from fastapi import WebSocket
 
 from transientcam import wire
 from transientcam_server.api.metrics import Metrics
-from transientcam_server.api.stream.rate_limit import RateLimiter
 from transientcam_server.broadcast.channel import Channel
 from transientcam_server.broadcast.outbox import Close, Delivery, Outbox
 from transientcam_server.errors import Problem
@@ -22,11 +21,8 @@ _AT_ONCE = 4
 class Sender:
     """Empties an outbox into a WebSocket."""
 
-    def __init__(
-        self, websocket: WebSocket, outbox: Outbox, metrics: Metrics, rate_limiter: RateLimiter
-    ) -> None:
+    def __init__(self, websocket: WebSocket, outbox: Outbox, metrics: Metrics) -> None:
         self._websocket = websocket
-        self._rate_limiter = rate_limiter
         self._metrics = metrics
         self._outbox = outbox
         self._failing: set[str] = set()
@@ -71,7 +67,6 @@ class Sender:
             await self._report_failed(channel, problem)
             return
         self._failing.discard(channel.product.name)
-        self._rate_limiter.credit()  # for its acknowledgement
         await self._websocket.send_bytes(data)
         self._metrics.sent(time.time() - delivery.frame.raw.host_time_s)
 

@@ -12,7 +12,6 @@ from transientcam import wire
 from transientcam.errors import ProtocolError
 from transientcam_server.api.auth.guard import Guard, Principal, log_refusal
 from transientcam_server.api.problems import problem_response
-from transientcam_server.api.stream.rate_limit import RateLimiter
 from transientcam_server.api.stream.sender import Sender
 from transientcam_server.broadcast.channel import UNNUMBERED, Channel
 from transientcam_server.broadcast.hub import Hub
@@ -80,12 +79,7 @@ class _Client:
         self._service = service
         self._session = secrets.token_hex(8)
         self._outbox = Outbox(depth=service.settings.stream.queue_frames)
-        self._rate_limiter = RateLimiter(
-            service.settings.stream.max_messages_hz, clock=asyncio.get_running_loop().time
-        )
-        self._sender = Sender(
-            websocket, self._outbox, websocket.app.state.metrics, self._rate_limiter
-        )
+        self._sender = Sender(websocket, self._outbox, websocket.app.state.metrics)
 
     async def serve(self) -> None:
         """Subscribe, then send and receive until either end closes."""
@@ -160,9 +154,6 @@ class _Client:
     async def _receive_all(self) -> None:
         while True:
             data = await self._receive()
-            if not self._rate_limiter.allow():
-                await self._close_flooding()
-                return
             try:
                 message = wire.parse_client_message(data)
                 if isinstance(message, wire.Ack):
@@ -235,19 +226,6 @@ class _Client:
             raise Problem(kinds.BAD_MESSAGE, problem.detail, **problem.extensions) from None
         encoding = stream_encoding(wanted.encoding)
         return Channel(UNNUMBERED, product, wanted.max_rate_hz, encoding, crop)
-
-    async def _close_flooding(self) -> None:
-        """End a stream whose client sends more than is read here."""
-        limit_hz = self._service.settings.stream.max_messages_hz
-        problem = Problem(
-            kinds.TOO_MANY_MESSAGES,
-            f"More than {limit_hz:g} messages a second arrived.",
-            limit=limit_hz,
-        )
-        self._outbox.put(wire.ErrorMessage(problem_document(problem)))
-        self._outbox.put(Close(wire.CloseCode.TOO_MANY_MESSAGES, problem.kind.title))
-        # read nothing more; the sender ends the stream
-        await asyncio.Event().wait()
 
     async def _close_with(self, problem: Problem, code: wire.CloseCode) -> None:
         message = wire.ErrorMessage(problem_document(problem))

@@ -20,7 +20,7 @@ class Encoding:
     ``encode`` takes a frame whose array has the type of the contract and holds the pixels that are
     requested. ``fits`` tests whether a product can be written so. ``beside`` names products of the
     same frame that the writer finds in ``extra``. ``slow`` is one that takes as long as much
-    computing.
+    computing. ``archive`` is one that also holds what an archive of a product has.
     """
 
     name: str
@@ -29,6 +29,7 @@ class Encoding:
     fits: Callable[[Product], bool] = lambda product: True
     beside: tuple[str, ...] = ()
     slow: bool = False
+    archive: bool = False
 
 
 def message(frame: Frame) -> bytes:
@@ -65,7 +66,7 @@ def _is_cloud(product: Product) -> bool:
 
 MSGPACK: Final = Encoding("msgpack", wire.MEDIA_TYPE, message)
 NPY: Final = Encoding("npy", "application/x-npy", _npy)
-NPZ: Final = Encoding("npz", "application/x-npz", npz_bytes)
+NPZ: Final = Encoding("npz", "application/x-npz", npz_bytes, archive=True)
 PNG: Final = Encoding("png", "image/png", pictures.png, _is_image)
 COLOUR_PNG: Final = Encoding("colour-png", "image/png", pictures.colour_png, _is_image)
 COLOUR_JPEG: Final = Encoding("colour-jpeg", "image/jpeg", pictures.colour_jpeg, _is_image)

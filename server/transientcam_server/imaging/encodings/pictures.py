@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from transientcam import Frame
+from transientcam.notebook import palette
 from transientcam_server.imaging.products import PRODUCTS
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def _coloured(frame: Frame) -> "Image":
     with np.errstate(invalid="ignore"):  # NaN becomes index 0 below
         index = 1.0 + 254.0 * np.clip((frame.array - low) / max(high - low, 1e-30), 0.0, 1.0)
     image = Image.fromarray(np.nan_to_num(index, nan=0.0).astype(np.uint8), mode="P")
-    image.putpalette(_palette())
+    image.putpalette(palette())
     return image
 
 
@@ -59,13 +60,3 @@ def _colour_range(frame: Frame) -> tuple[float, float]:
         return 0.0, 299_792_458.0 / (2.0 * frame.meta["base_frequency_hz"])
     finite = frame.array[np.isfinite(frame.array)]
     return (0.0, float(np.percentile(finite, 99.5))) if finite.size else (0.0, 1.0)
-
-
-def _palette() -> bytes:
-    """Index 0 (no value) dark grey; then dark blue over green and orange to near white."""
-    stops = np.array([0.0, 0.25, 0.5, 0.75, 1.0]) * 254.0
-    channels = ((30, 30, 40, 235, 255), (20, 90, 170, 160, 250), (90, 200, 130, 50, 220))
-    index = np.arange(255.0)
-    colours = np.stack([np.interp(index, stops, channel) for channel in channels], axis=-1)
-    ramp: bytes = np.rint(colours).astype(np.uint8).tobytes()
-    return bytes((48, 48, 48)) + ramp

@@ -85,6 +85,22 @@ def test_the_own_page_may_open_the_stream(steady_daemon: Served) -> None:
         client.subscribe("flags")
 
 
+def test_a_page_of_another_site_may_link_here_but_load_nothing(steady: httpx.Client) -> None:
+    def status(site: str, mode: str, destination: str) -> int:
+        headers = {
+            "Sec-Fetch-Site": site,
+            "Sec-Fetch-Mode": mode,
+            "Sec-Fetch-Dest": destination,
+        }
+        return steady.get("/api/v1/frames/latest/flags.png", headers=headers).status_code
+
+    assert status("cross-site", "no-cors", "image") == 403
+    assert status("cross-site", "navigate", "iframe") == 403
+    assert status("cross-site", "navigate", "document") == 200
+    assert status("same-origin", "no-cors", "image") == 200
+    assert status("none", "navigate", "document") == 200
+
+
 def test_an_answer_to_another_site_carries_no_leave_to_read_it(steady: httpx.Client) -> None:
     response = steady.get("/api/v1/info", headers={"Origin": "https://evil.example"})
 

@@ -218,6 +218,71 @@ def test_more_than_are_kept_are_refused_before_anything_is_captured(tmp_path: Pa
     assert second["problem"]["type"] == "/problems/calibration-not-stored"
 
 
+def test_one_of_a_scene_is_kept_but_used_only_if_forced_and_undone_at_once(
+    http: httpx.Client,
+) -> None:
+    http.put("/api/v1/simulation", json={"scene": "mirrors"})
+
+    result = measured(http, activate=True)["result"]
+
+    identity = result["calibration"]
+    assert result["verdict"]["verdict"] == "scene"
+    assert not result["activated"]
+    document = http.get(f"{CALIBRATIONS}/{identity}").json()
+    assert document["verdict"] == result["verdict"]
+    assert (document["active"], document["forced"]) == (False, False)
+    refused = http.put(f"{CALIBRATIONS}/active", json={"id": identity})
+    assert refused.status_code == 409
+    problem = refused.json()
+    assert problem["type"] == "/problems/calibration-doubted"
+    assert problem["verdict"] == "scene"
+    assert "unlike a diffusor" in problem["detail"]
+    assert http.get(f"{CALIBRATIONS}/active").json()["id"] == "nominal"
+
+    forced = http.put(f"{CALIBRATIONS}/active", json={"id": identity, "force": True}).json()
+    assert (forced["id"], forced["former"]) == (identity, "nominal")
+    undone = http.post(f"{CALIBRATIONS}/active/undo").json()
+    assert (undone["id"], undone["former"]) == ("nominal", identity)
+
+
+def test_one_of_a_scene_is_no_reference_for_another(http: httpx.Client) -> None:
+    http.put("/api/v1/simulation", json={"scene": "mirrors"})
+    assert measured(http, activate=True, force=True)["result"]["activated"]
+
+    again = measured(http, activate=True)["result"]
+
+    assert (again["verdict"]["verdict"], again["activated"]) == ("scene", False)
+
+
+def test_the_diffusor_is_put_before_the_lens_and_the_scene_is_behind_it(http: httpx.Client) -> None:
+    http.put("/api/v1/simulation", json={"scene": "mirrors"})
+    through = http.put("/api/v1/simulation", json={"diffusor": True}).json()
+    result = measured(http, activate=True)["result"]
+    scene = http.put("/api/v1/simulation", json={"diffusor": False}).json()
+
+    assert (through["scene"], through["diffusor"]) == ("mirrors", True)
+    assert result["verdict"]["verdict"] == "diffusor"
+    assert result["verdict"]["reason"] is None
+    assert (result["activated"], result["former"]) == (True, "nominal")
+    assert (scene["scene"], scene["diffusor"]) == ("mirrors", False)
+
+
+def test_there_is_nothing_to_return_to_before_another_was_used_or_once_it_is_deleted(
+    http: httpx.Client,
+) -> None:
+    first = http.post(f"{CALIBRATIONS}/active/undo")
+    identity = measured(http, activate=True)["result"]["calibration"]
+    http.put(f"{CALIBRATIONS}/active", json={"id": "nominal"})
+    assert http.get(CALIBRATIONS).json()["former"] == identity
+    http.delete(f"{CALIBRATIONS}/{identity}")
+    second = http.post(f"{CALIBRATIONS}/active/undo")
+
+    for refused in (first, second):
+        assert refused.status_code == 409
+        assert refused.json()["type"] == "/problems/no-former-calibration"
+    assert http.get(CALIBRATIONS).json()["former"] is None
+
+
 def test_the_active_one_is_not_deleted_until_it_is_not(http: httpx.Client) -> None:
     identity = measured(http, activate=True)["result"]["calibration"]
 
@@ -362,7 +427,7 @@ def test_streams_are_notified(bench: Served) -> None:
         identity = measured(http, activate=True)["result"]["calibration"]
         next(each for each in frames if each.meta["calibration_id"] == identity)
 
-    told = [each.details["job"]["state"] for each in notices if each.kind == "job-changed"]
-    assert told == ["running", "done"]
+    reported = [each.details["job"]["state"] for each in notices if each.kind == "job-changed"]
+    assert reported == ["running", "done"]
     (changed,) = [each.details for each in notices if each.kind == "calibration-changed"]
     assert changed == {"calibration_id": identity, "reason": None}

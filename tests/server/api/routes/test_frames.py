@@ -9,11 +9,14 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
+import transientcam_moments as tm
 from tests.serving import Served, serving
 from transientcam import Frame, wire
 from transientcam_server.imaging import frame as frames
+from transientcam_server.settings import ReconstructionSettings
 
 LATEST = "/api/v1/frames/latest"
+LABELS = ("harmonic", "phase_rad", "frequency_hz", "illumination", "take")
 
 
 @pytest.fixture
@@ -93,6 +96,25 @@ def test_raw_images_carry_their_labels(served: Served, http: httpx.Client) -> No
     assert labels[5]["phase_rad"] == pytest.approx(np.pi / 2)
     assert labels[5]["frequency_hz"] == pytest.approx(23e6)
     assert all(label["exposure_s"] == served.camera.applied.sequence.exposure_s for label in labels)
+
+
+def test_an_archive_of_raw_images_is_enough_for_the_range(steady: httpx.Client) -> None:
+    number = wait_for_frame(steady)["frame"]
+    base = f"/api/v1/frames/{number}"
+    range_m = npy(steady.get(f"{base}/range.npy"))
+    with np.load(io.BytesIO(steady.get(f"{base}/raw.npz").content)) as raw:
+        settings = ReconstructionSettings(**json.loads(str(raw["reconstruction"])))
+        found = tm.reconstruct(
+            raw["array"],
+            settings.for_moments(),
+            **{name: raw[name] for name in LABELS},
+            calibration=raw["gain"],
+        )
+        assert set(raw["kind"]) == {"modulated"}
+        assert raw["weight"].shape == (4, 16)
+
+    same = np.isclose(found.range_m, range_m, atol=1e-3)
+    assert same.mean() > 0.999  # the compiled pass of the daemon may round otherwise
 
 
 @pytest.mark.parametrize("suffix", ["msgpack", "npy", "png"])

@@ -106,9 +106,9 @@ def test_a_takeover_is_reported_to_every_client_and_logged(
         watcher.subscribe("flags")
         assert http.post(PATH, json={"holder": "bert"}).status_code == 409
         theirs = take(http, holder="bert", takeover=True)
-        told = watcher.notice("lease-changed")
+        reported = watcher.notice("lease-changed")
 
-    assert told.details == {"change": "taken-over", "holder": "bert", "from": "anna"}
+    assert reported.details == {"change": "taken-over", "holder": "bert", "from": "anna"}
     assert "'bert' (anybody) took the lease over from 'anna' (anybody)" in caplog.text
     lost = http.put("/api/v1/acquisition", json={"running": True}, headers=mine).json()
     assert (lost["type"], lost["holder"]) == ("/problems/lease-lost", "bert")

@@ -107,5 +107,5 @@ def test_streams_are_notified_and_a_lease_keeps_others_out(
         frame = next(each for each in frames if each.meta["reconstruction_id"] == 2)
 
     assert frame.meta["reconstruction_id"] == 2
-    told = [each for each in notices if each.kind == "reconstruction-changed"]
-    assert [each.details["reconstruction"]["bias"] for each in told] == [0.02]
+    reported = [each for each in notices if each.kind == "reconstruction-changed"]
+    assert [each.details["reconstruction"]["bias"] for each in reported] == [0.02]

@@ -443,16 +443,16 @@ def test_streams_are_notified_of_recordings(daemon: Served, http: httpx.Client) 
     ):
         stream.receive()
         recording = recorded(http, frames=2)["id"]
-        told: list[wire.Notice] = []
+        reported: list[wire.Notice] = []
         until_s = time.monotonic() + PATIENCE_S
-        while len(told) < 2 and time.monotonic() < until_s:
+        while len(reported) < 2 and time.monotonic() < until_s:
             stream.receive()
-            # a busy machine drops frames, and is told so between
-            told = [each for each in stream.notices if each.kind.startswith("recording-")]
-    assert told[0] == wire.Notice("recording-started", {"recording": recording})
-    assert told[1].kind == "recording-stopped"
-    assert told[1].details["reason"] == "frames"
-    assert told[1].details["frames"] == 2
+            # a busy machine drops frames, and reports it between
+            reported = [each for each in stream.notices if each.kind.startswith("recording-")]
+    assert reported[0] == wire.Notice("recording-started", {"recording": recording})
+    assert reported[1].kind == "recording-stopped"
+    assert reported[1].details["reason"] == "frames"
+    assert reported[1].details["frames"] == 2
 
 
 def test_a_recording_served_as_a_camera_gives_the_same_images_and_refuses_another_sequence(

@@ -112,4 +112,8 @@ def test_streams_are_notified_of_another_scene(served: Served) -> None:
         camera.simulate(effects={})
 
     (changed,) = (each for each in notices if each.kind == "simulation-changed")
-    assert changed.details == {"scene": "mirrors", "effects": {"lens-scatter": "off"}}
+    assert changed.details == {
+        "scene": "mirrors",
+        "effects": {"lens-scatter": "off"},
+        "diffusor": False,
+    }

@@ -1,3 +1,5 @@
+import { useSignal } from "@preact/signals";
+
 import { calibrationPath } from "../../store/api";
 import type { CalibrationDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
@@ -7,7 +9,8 @@ import { engineering, fixed } from "../../ui/format";
 import { Steer } from "../../ui/Steer";
 import type { Task } from "../../ui/useTask";
 import { clock } from "../replay/words";
-import { ageOf, driftOf } from "./words";
+import { Blocks } from "./Blocks";
+import { ageOf, doubtOf, driftOf } from "./words";
 
 /** What is used where no calibration is. */
 export function NominalRow({ active, task }: { active: boolean; task: Task }) {
@@ -39,11 +42,23 @@ export function CalibrationRow({ calibration, task, onDelete }: RowProps) {
   const { id, name, fits, reason, active, drift } = calibration;
   const called = name || id;
   const drifted = drift === null ? null : driftOf(drift);
+  const doubt = doubtOf(calibration.verdict);
+  const warned = useSignal(false);
+  const forcing = doubt !== null && !calibration.forced;
+  const use = (): void => {
+    if (forcing && !warned.peek()) warned.value = true;
+    else void task.run("Switching…", () => calibrations.activate(id, forcing));
+  };
   return (
     <li class={active ? "recording recording-shown" : "recording"} data-calibration={id}>
       <div class="recording-words">
         <p class="recording-name" title={id}>
-          {called} {active && fits && <em class="tag tag-good">in use</em>} {active && !fits && <em class="tag">waits for its sequence</em>}
+          {called} {active && fits && <em class="tag tag-good">in use</em>} {active && !fits && <em class="tag">waits for its sequence</em>}{" "}
+          {doubt !== null && (
+            <em class="tag tag-bad" data-field="verdict" title={calibration.verdict.reason ?? ""}>
+              {doubt.tag}
+            </em>
+          )}
         </p>
         <p class="quiet recording-figures">
           <span title={clock(calibration.created_at)}>{ageOf(calibration.age_s)}</span>
@@ -56,6 +71,14 @@ export function CalibrationRow({ calibration, task, onDelete }: RowProps) {
             Does not fit: {reason}
           </p>
         )}
+        {doubt !== null && (warned.value || active) && (
+          <div class="refusal doubt" role="status" data-field="doubt">
+            <Blocks verdict={calibration.verdict} />
+            <p>
+              {doubt.words} {calibration.verdict.reason} {!active && forcing && "Used anyway, ranges may be wrong everywhere."}
+            </p>
+          </div>
+        )}
         {drifted !== null && (
           <p class={drifted.grown ? "refusal" : "recording-notes"} data-field="drift">
             {drifted.words}
@@ -63,8 +86,8 @@ export function CalibrationRow({ calibration, task, onDelete }: RowProps) {
         )}
       </div>
       {!active && (
-        <Steer title={fits ? "Calibrate frames with it from the next one on" : (reason ?? "It does not fit")} disabled={!fits || task.busy.value !== null} onClick={() => void task.run("Switching…", () => calibrations.activate(id))}>
-          Use
+        <Steer title={fits ? "Calibrate frames with it from the next one on" : (reason ?? "It does not fit")} disabled={!fits || task.busy.value !== null} onClick={use}>
+          {forcing && warned.value ? "Use anyway" : "Use"}
         </Steer>
       )}
       <button type="button" aria-label={`Export ${called}`} title="Its file, to be taken in elsewhere" disabled={task.busy.value !== null} onClick={() => void task.run("Fetching the file…", () => download(api, `${calibrationPath(id)}/file`, `${id}.npz`))}>

@@ -34,6 +34,7 @@ export function CalibrationView() {
             {outcome.words}
           </p>
         )}
+        {known !== null && known.former !== null && job === null && <Undo former={known.former} calibrations={known.calibrations} task={task} />}
         {calibrations.trouble.value !== null && <p class="refusal">{calibrations.trouble.value}</p>}
         {known !== null && (
           <ul class="recording-list" aria-label="Calibrations">
@@ -91,12 +92,39 @@ function MeasureForm({ task }: { task: Task }) {
         </Steer>
       </div>
       <p class="quiet form-wide">
-        Put filter and diffusor before the lens first, so that the light shines at the sensor.{" "}
+        Put filter and diffusor before the lens first, so that the light shines at the sensor. <Diffusor task={task} />{" "}
         <label class="check">
           <input type="checkbox" checked={activate.value} onChange={(event) => (activate.value = event.currentTarget.checked)} /> Use it at once
         </label>
       </p>
     </form>
+  );
+}
+
+/** Puts the diffusor before the lens of a simulated camera, and takes it away; nothing for a real one. */
+function Diffusor({ task }: { task: Task }) {
+  const { simulation } = useStore();
+  useEffect(() => void simulation.refresh(), [simulation]);
+  const world = simulation.world.value;
+  if (world === null) return null;
+  const words = world.diffusor ? "Take the diffusor away" : "Put the diffusor before the lens";
+  return (
+    <Steer title={`${words} of the simulated camera`} disabled={task.busy.value !== null} onClick={() => void task.run(`${words}…`, () => simulation.putDiffusor(!world.diffusor))}>
+      {words}
+    </Steer>
+  );
+}
+
+/** Returns to what was active before. */
+function Undo({ former, calibrations: all, task }: { former: string; calibrations: readonly CalibrationDocument[]; task: Task }) {
+  const { calibrations } = useStore();
+  const called = former === "nominal" ? "the nominal gains" : all.find(({ id }) => id === former)?.name || former;
+  return (
+    <p class="calibration-undo">
+      <Steer title="Calibrate frames by what was active before" disabled={task.busy.value !== null} onClick={() => void task.run("Switching…", () => calibrations.restore())}>
+        Return to {called}
+      </Steer>
+    </p>
   );
 }
 

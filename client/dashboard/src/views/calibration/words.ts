@@ -1,4 +1,4 @@
-import type { CalibrationDocument } from "../../store/documents";
+import type { CalibrationDocument, VerdictDocument } from "../../store/documents";
 import { fixed } from "../../ui/format";
 
 /** How old something is, as people say it. */
@@ -7,6 +7,12 @@ export function ageOf(age_s: number): string {
   if (age_s < 5400) return `${Math.round(age_s / 60)} min ago`;
   if (age_s < 172_800) return `${Math.round(age_s / 3600)} h ago`;
   return `${Math.round(age_s / 86_400)} days ago`;
+}
+
+/** What is said of a calibration that was not measured on a diffusor; null where it was. */
+export function doubtOf({ verdict }: VerdictDocument): { tag: string; words: string } | null {
+  if (verdict === "diffusor") return null;
+  return verdict === "scene" ? { tag: "of a scene", words: "It was measured on a scene, not on a diffusor." } : { tag: "in doubt", words: "It may not have been measured on a diffusor." };
 }
 
 /** From this growth on, in shares of the pixels and as a factor, a calibration should be measured anew. */

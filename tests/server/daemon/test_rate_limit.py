@@ -1,11 +1,11 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from transientcam_server.api.stream.rate_limit import BURST_S, MOST_ANSWERS, RateLimiter
+from transientcam_server.daemon.rate_limit import BURST_S, MOST_ANSWERS, RateLimiter
 
 
 class Clock:
-    """Time that passes when told to."""
+    """A clock that the test sets."""
 
     def __init__(self) -> None:
         self.now_s = 0.0

@@ -1,0 +1,60 @@
+"""Whether clients can take the service away from others: ``python -m benchmarks.abuse [--write]``.
+
+Each attack goes on at full speed from 1 and from 16 connections against a daemon of its own, with
+the simulated camera at the paper's video setting (Sec. 6.3: 18.6 Hz). Meanwhile a viewer streams
+range, /livez is asked, a lease lapses, the light is switched off, and SIGTERM ends it.
+``--against CHECKOUT`` attacks the daemon of another checkout too, for comparison; ``--quick`` is
+short and from 16 connections only; ``--minutes 10`` mixes all attacks for so long instead.
+"""
+
+import argparse
+from pathlib import Path
+
+from benchmarks.abuse.attacks import ATTACKS
+from benchmarks.abuse.measuring import measure
+from benchmarks.abuse.page import PAGE, mixed_page, page, row
+from benchmarks.abuse.soaking import soak
+
+CONNECTIONS = (1, 16)
+DURATION_S = 10.0
+QUICK_S = 3.0
+
+
+def main() -> None:
+    """Attack, print, and with ``--write`` keep the page."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.abuse", description=__doc__)
+    parser.add_argument("attacks", nargs="*", metavar="ATTACK", help=f"of {', '.join(ATTACKS)}")
+    parser.add_argument("--against", type=Path, help="another checkout, measured first")
+    parser.add_argument("--quick", action="store_true", help="short, from 16 connections only")
+    parser.add_argument("--minutes", type=float, help="a mix of all attacks for so long instead")
+    parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
+    arguments = parser.parse_args()
+    for name in arguments.attacks:
+        if name not in ATTACKS:
+            parser.error(f"unknown attack {name!r}, choose from {', '.join(ATTACKS)}")
+    if arguments.minutes is not None:
+        text = mixed_page(soak(minutes=arguments.minutes))
+        print(text)
+        if arguments.write:
+            PAGE.with_name("abuse-soak.md").write_text(text, encoding="utf-8")
+        return
+    duration_s = QUICK_S if arguments.quick else DURATION_S
+    found = []
+    for name in arguments.attacks or ATTACKS:
+        for connections in CONNECTIONS[-1:] if arguments.quick else CONNECTIONS:
+            before = None
+            if arguments.against is not None:
+                before = measure(
+                    name, connections, duration_s=duration_s, checkout=arguments.against
+                )
+            now = measure(name, connections, duration_s=duration_s)
+            found.append((name, connections, before, now))
+            print(row(*found[-1]), flush=True)
+    text = page(found, duration_s=duration_s)
+    print(text)
+    if arguments.write:
+        PAGE.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,77 @@
+"""All attacks mixed for minutes: whether memory, descriptors and threads stay as they are."""
+
+import statistics
+import time
+from dataclasses import dataclass
+from typing import Final
+
+import httpx
+
+from benchmarks.abuse.measuring import GIVE_UP_S, RANGE, attacked, prepare, served, stream_url
+from benchmarks.soak import Samples
+from benchmarks.viewers import Viewer, cut, watch
+
+CONNECTIONS: Final = 8
+SAMPLE_S: Final = 2.0
+REST_S: Final = 20.0
+_MIB = 2**20
+
+
+@dataclass(frozen=True)
+class Soak:
+    """What a daemon held before, during and after the attacks."""
+
+    minutes: float
+    frames: int
+    expected: float
+    before: Samples
+    during: Samples
+    after: Samples
+
+    def rows(self) -> list[tuple[str, list[str]]]:
+        """Return a line for each of what it holds."""
+        minute = max(1, round(60.0 / SAMPLE_S))
+        found = []
+        for name, attribute, unit in (
+            ("memory, MiB", "memory_bytes", _MIB),
+            ("descriptors", "descriptors", 1),
+            ("threads", "threads", 1),
+        ):
+            before, during, after = (
+                [each / unit for each in getattr(samples, attribute)]
+                for samples in (self.before, self.during, self.after)
+            )
+            values = (
+                statistics.mean(before),
+                statistics.mean(during[:minute]),
+                statistics.mean(during[-minute:]),
+                max(during),
+                statistics.mean(after[-3:]),
+            )
+            found.append((name, [f"{each:.0f}" for each in values]))
+        return found
+
+
+def soak(*, minutes: float) -> Soak:
+    """Attack in every way, one after the other, and look at the daemon all the while."""
+    before, during, after = Samples(), Samples(), Samples()
+    with (
+        served(None, tls=False) as process,
+        httpx.Client(base_url=process.url, timeout=GIVE_UP_S) as client,
+    ):
+        rate_hz = prepare(client)
+        viewer = Viewer(stream_url(process), RANGE)
+        watch([viewer], duration_s=REST_S, every_s=SAMPLE_S, meanwhile=lambda: before.take(process))
+        count = len(viewer.seen.numbers)
+        with attacked("mixed", process.url, CONNECTIONS):
+            took_s = watch(
+                [viewer],
+                duration_s=60.0 * minutes,
+                every_s=SAMPLE_S,
+                meanwhile=lambda: during.take(process),
+            )
+        frames = len(viewer.seen.numbers) - count
+        time.sleep(1.0)
+        watch([viewer], duration_s=REST_S, every_s=SAMPLE_S, meanwhile=lambda: after.take(process))
+        cut([viewer.connection])
+    return Soak(minutes, frames, rate_hz * took_s, before, during, after)

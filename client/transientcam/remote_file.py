@@ -1,0 +1,126 @@
+"""A file behind HTTP that is read in pieces, as far as it is needed."""
+
+import io
+from collections import OrderedDict
+from typing import Final
+
+import httpx
+
+from transientcam.errors import ProtocolError
+from transientcam.requests import problem
+from transientcam.transport import answer_of, http_options, translated
+
+_BLOCK_BYTES: Final = 256 * 1024
+_BLOCKS: Final = 128
+
+
+class RemoteFile(io.RawIOBase):
+    """A file on a server that answers with ranges; it keeps the blocks that were read last.
+
+    Parameters
+    ----------
+    url
+        Of the file.
+    token
+        Bearer token, where the server requires one.
+    timeout_s
+        How long to wait for a connection and for each answer.
+    transport
+        How httpx sends requests, for tests and unusual networks.
+
+    Raises
+    ------
+    ServerUnreachable, ProblemError
+        If there is no such file, as of every read.
+    ProtocolError
+        If the server has no ranges, or the file changed while it was open, as of every read.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        token: str | None = None,
+        timeout_s: float = 10.0,
+        transport: httpx.BaseTransport | None = None,
+    ) -> None:
+        super().__init__()
+        self.url = url
+        options = http_options(token=token, timeout_s=timeout_s)
+        # bytes of a range count as they are stored
+        options["headers"]["accept-encoding"] = "identity"
+        self._http = httpx.Client(**options, transport=transport)
+        self._blocks: OrderedDict[int, bytes] = OrderedDict()
+        self._place = 0
+        self._tag: str | None = None
+        self.size = 0
+        """In bytes."""
+        try:
+            self._block(0)
+        except BaseException:
+            self.close()
+            raise
+
+    def readable(self) -> bool:
+        """Return True."""
+        return True
+
+    def seekable(self) -> bool:
+        """Return True."""
+        return True
+
+    def tell(self) -> int:
+        """Return where the next read begins."""
+        return self._place
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        """Move to a place, and return it."""
+        start = {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self.size}[whence]
+        self._place = max(0, start + offset)
+        return self._place
+
+    def readinto(self, buffer: "memoryview[int]") -> int:  # type: ignore[override]  # a buffer
+        """Fill a buffer as far as the file goes; return how many bytes that were."""
+        view = memoryview(buffer).cast("B")
+        done = 0
+        while done < len(view) and self._place < self.size:
+            number, begin = divmod(self._place, _BLOCK_BYTES)
+            piece = self._block(number)[begin : begin + len(view) - done]
+            view[done : done + len(piece)] = piece
+            done += len(piece)
+            self._place += len(piece)
+        return done
+
+    def close(self) -> None:
+        """Close the connection."""
+        if not self.closed:
+            self._http.close()
+        super().close()
+
+    def _block(self, number: int) -> bytes:
+        found = self._blocks.get(number)
+        if found is None:
+            found = self._blocks[number] = self._request(number * _BLOCK_BYTES)
+            while len(self._blocks) > _BLOCKS:
+                self._blocks.popitem(last=False)
+        self._blocks.move_to_end(number)
+        return found
+
+    def _request(self, first: int) -> bytes:
+        headers = {"range": f"bytes={first}-{first + _BLOCK_BYTES - 1}"}
+        if self._tag is not None:
+            headers["if-range"] = self._tag
+        with translated(self.url), self._http.stream("GET", self.url, headers=headers) as response:
+            if response.status_code == httpx.codes.OK:  # the whole file, which is not read
+                limit = "the part requested" if self._tag is None else "the file that was opened"
+                raise ProtocolError("answer", "the whole of a file", limit)
+            response.read()
+        if response.status_code != httpx.codes.PARTIAL_CONTENT:
+            raise problem(answer_of(response))
+        _, _, total = response.headers.get("content-range", "").partition("/")
+        if not total.isdecimal():
+            raise ProtocolError("content-range", total, "bytes first-last/size")
+        self.size, self._tag = int(total), response.headers.get("etag")
+        if len(response.content) != min(_BLOCK_BYTES, self.size - first):
+            raise ProtocolError("answer", f"{len(response.content)} bytes", "those requested")
+        return response.content

@@ -1,0 +1,204 @@
+"""What raw images show: the labels from which their order, their weights and b_0 follow."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+
+from transientcam_moments._arrays import MAX_HARMONICS, Array
+from transientcam_moments.errors import ParameterError, ShapeError
+from transientcam_moments.reconstruction import Settings
+
+STEPS: Final = 4
+_STEP_WEIGHTS: Final = np.array([1, 1j, -1, -1j])
+_SAME_FREQUENCY: Final = 1e-6  # relative
+
+
+class Labels:
+    """What each of N raw images of a frame shows, in the order of capture.
+
+    Parameters
+    ----------
+    harmonic : integer array, shape (N,)
+        Modulated at this multiple of the base frequency; 0 for images of the zeroth moment.
+    phase_rad : array, shape (N,)
+        Phase step of the modulation: 0, pi / 2, pi or 3 pi / 2.
+    frequency_hz : array, shape (N,), optional
+        Of the modulation; 0 where nothing is modulated. The base frequency follows from it.
+    illumination : boolean array, shape (N,), optional
+        False where the light is off; needed where b_0 is measured with the light on and off.
+    take : integer array, shape (N,), optional
+        Which of several captures of the same images; one capture, when left out.
+
+    Raises
+    ------
+    ShapeError
+        When the labels are not of one length.
+    ParameterError
+        When the images are not one of each phase step of every harmonic 1 .. m in every take, and
+        four, two or none of the zeroth moment, or when the frequencies are not multiples of one.
+
+    Notes
+    -----
+    Sec. 3.1 and 4.3: b_0 is measured by four phase steps at a low frequency, by an image with and
+    one without light, or not at all.
+    """
+
+    def __init__(
+        self,
+        harmonic: Array,
+        phase_rad: Array,
+        frequency_hz: Array | None = None,
+        illumination: Array | None = None,
+        take: Array | None = None,
+    ) -> None:
+        count = np.size(harmonic)
+        lit = np.ones(count, bool) if illumination is None else illumination
+        takes = np.zeros(count, int) if take is None else take
+        self.harmonic = _column("harmonic", harmonic, count, np.int64)
+        self.phase_rad = _column("phase_rad", phase_rad, count, float)
+        self.frequency_hz = (
+            None if frequency_hz is None else _column("frequency_hz", frequency_hz, count, float)
+        )
+        self.illumination = _column("illumination", lit, count, bool)
+        self.take = _column("take", takes, count, np.int64)
+        self._require_a_capture()
+
+    @property
+    def harmonics(self) -> int:
+        """Order m."""
+        return int(self.harmonic.max())
+
+    @property
+    def takes(self) -> int:
+        """How many captures of the same images there are."""
+        return len(np.unique(self.take))
+
+    @property
+    def zeroth(self) -> str:
+        """How b_0 was measured: "low-frequency", "on-off" or "estimated"."""
+        images = int(np.count_nonzero(self.harmonic == 0)) // self.takes
+        return {STEPS: "low-frequency", 2: "on-off", 0: "estimated"}[images]
+
+    @property
+    def base_frequency_hz(self) -> float | None:
+        """f; None where no frequencies are given."""
+        if self.frequency_hz is None:
+            return None
+        return float(self.frequency_hz[self.harmonic == 1][0])
+
+    @cached_property
+    def order(self) -> Array:
+        """Places (N,) of the images in the order that `measure` takes them in."""
+        return np.lexsort((self._steps, ~self.illumination, self.harmonic, self.take))
+
+    def in_order(self, images: Any) -> Any:
+        """Return images (N, ...) in the order that `measure` takes them in.
+
+        Raises
+        ------
+        ShapeError
+            When there is not one label for each image.
+        """
+        count = len(self.harmonic)
+        if len(images) != count:
+            raise ShapeError("images", f"{len(images)} of them", f"{count}: one for each label")
+        if np.array_equal(self.order, np.arange(count)):
+            return images
+        if isinstance(images, Sequence):
+            return [images[index] for index in self.order]
+        return images[self.order]
+
+    @cached_property
+    def weight(self) -> Array:
+        """Weights (m + 1, N), complex128: b_j is sum_i weight_ji image_i, before division by gains.
+
+        Those of a moment add up to 0, so that dark level and ambient light cancel; those of takes
+        are of their mean. b_0 at a low frequency is the modulus of that sum (see `modulus`), and
+        all weights of one that was not measured are 0.
+        """
+        weights = np.zeros((self.harmonics + 1, len(self.harmonic)), dtype=np.complex128)
+        weights[self.harmonic, np.arange(len(self.harmonic))] = _STEP_WEIGHTS[self._steps]
+        if self.zeroth == "on-off":
+            weights[0] = np.where(self.harmonic == 0, np.where(self.illumination, 2.0, -2.0), 0.0)
+        return weights / self.takes
+
+    @property
+    def modulus(self) -> Array:
+        """Which moments (m + 1,) are the modulus of their sum: b_0 at a low frequency."""
+        taken = np.zeros(self.harmonics + 1, dtype=bool)
+        taken[0] = self.zeroth == "low-frequency"
+        return taken
+
+    def settings(self, given: Settings) -> Settings:
+        """Return settings with what the labels say filled in.
+
+        Raises
+        ------
+        ParameterError
+            When the settings say something else.
+        """
+        found: dict[str, Any] = {
+            "zeroth": self.zeroth,
+            "takes": self.takes,
+            "base_frequency_hz": self.base_frequency_hz,
+        }
+        known = {name: value for name, value in found.items() if value is not None}
+        for name, value in known.items():
+            stated = getattr(given, name)
+            if stated not in (None, value):
+                raise ParameterError(name, stated, f"{value!r}, as the labels of the images say")
+        return replace(given, **known)
+
+    @cached_property
+    def _steps(self) -> Array:
+        """Phase steps (N,) as integers 0 to 3."""
+        steps = np.rint(self.phase_rad / (np.pi / 2))
+        if not np.allclose(self.phase_rad, steps * (np.pi / 2), atol=1e-6):
+            wrong = self.phase_rad[~np.isclose(self.phase_rad, steps * (np.pi / 2), atol=1e-6)]
+            raise ParameterError("phase_rad", float(wrong[0]), "0, pi / 2, pi or 3 pi / 2")
+        return steps.astype(np.int64) % STEPS
+
+    def _require_a_capture(self) -> None:
+        m = self.harmonics if self.harmonic.size else 0
+        if not 1 <= m <= MAX_HARMONICS or self.harmonic.min() < 0:
+            raise ParameterError("harmonic", self.harmonic.tolist(), "0 .. m, with m from 1 to 32")
+        lit = self.illumination
+        for take in np.unique(self.take):
+            for j in range(m + 1):
+                here = (self.take == take) & (self.harmonic == j)
+                steps, on = sorted(self._steps[here]), sorted(lit[here])
+                four = steps == list(range(STEPS)) and all(on)
+                if not four and not (j == 0 and (not steps or on == [False, True])):
+                    place = f"of harmonic {j} in take {int(take)}"
+                    shown = np.degrees(self.phase_rad[here]).tolist(), lit[here].tolist()
+                    raise ParameterError(
+                        f"phase_rad {place}, in degrees, and illumination",
+                        shown,
+                        "0, 90, 180 and 270 degrees once each with the light on"
+                        + ("; one with and one without light; or none" if j == 0 else ""),
+                    )
+        zeroths = {int(np.sum((self.take == t) & (self.harmonic == 0))) for t in self.take}
+        if len(zeroths) > 1:
+            raise ParameterError("harmonic", self.harmonic.tolist(), "the same images in each take")
+        self._require_multiples()
+
+    def _require_multiples(self) -> None:
+        base_hz = self.base_frequency_hz
+        if base_hz is None or self.frequency_hz is None:
+            return
+        of = self.harmonic > 0
+        found, multiples = self.frequency_hz[of], self.harmonic[of] * base_hz
+        if not base_hz > 0 or not np.allclose(found, multiples, rtol=_SAME_FREQUENCY):
+            raise ParameterError(
+                "frequency_hz", found.tolist(), "harmonic times one frequency above 0"
+            )
+
+
+def _column(name: str, values: Array, count: int, dtype: Any) -> Array:
+    column = np.asarray(values)
+    if column.shape != (count,):
+        raise ShapeError(name, f"of shape {column.shape}", f"({count},): one for each image")
+    return column.astype(dtype)

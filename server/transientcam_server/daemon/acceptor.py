@@ -1,0 +1,173 @@
+"""Accepts connections, and counts them from there on: how many, and how fast they come."""
+
+import asyncio
+import contextlib
+import logging
+import socket
+import ssl
+from collections import Counter
+from collections.abc import Callable
+from typing import Final
+
+from transientcam_server.daemon.intake import Intake, Turns
+from transientcam_server.daemon.rate_limit import RateLimiter
+from transientcam_server.daemon.refusals import refusal
+from transientcam_server.errors import Problem, kinds
+from transientcam_server.settings import LimitSettings
+
+_log = logging.getLogger(__name__)
+AT_ONCE: Final = 16
+"""Connections accepted before other tasks run."""
+PAUSE_S: Final = 0.5
+"""Before the next one is accepted where the system has no descriptors left."""
+_REMEMBERED_ADDRESSES: Final = 1024
+
+
+class Admission:
+    """Decides which connections are let in.
+
+    Parameters
+    ----------
+    limits
+        How many there may be, together and of one address, and how fast new ones may come.
+    clock
+        Time in s.
+    """
+
+    def __init__(self, limits: LimitSettings, *, clock: Callable[[], float]) -> None:
+        self._limits = limits
+        self._clock = clock
+        self._open: Counter[str] = Counter()
+        self._rates: dict[str, RateLimiter] = {}
+
+    @property
+    def open(self) -> int:
+        """How many are open."""
+        return self._open.total()
+
+    def admit(self, host: str) -> Problem | None:
+        """Count a connection from an address, or return why it is refused."""
+        most, most_of_one = self._limits.max_connections, self._limits.max_connections_per_address
+        rate_hz = self._limits.max_connects_hz
+        if not self._rate(host).allow():
+            detail = f"More than {rate_hz:g} connections a second came from {host}."
+            return Problem(kinds.TOO_MANY_FROM_ONE_ADDRESS, detail, limit=rate_hz)
+        if self.open >= most:
+            return Problem(kinds.TOO_MANY_CONNECTIONS, f"{most} connections are open.", limit=most)
+        if self._open[host] >= most_of_one:
+            detail = f"{most_of_one} connections are open from {host}."
+            return Problem(kinds.TOO_MANY_FROM_ONE_ADDRESS, detail, limit=most_of_one)
+        self._open[host] += 1
+        return None
+
+    def release(self, host: str) -> None:
+        """Count a connection no more."""
+        self._open[host] -= 1
+        if not self._open[host]:
+            del self._open[host]
+
+    def _rate(self, host: str) -> RateLimiter:
+        found = self._rates.get(host)
+        if found is None:
+            if len(self._rates) >= _REMEMBERED_ADDRESSES:
+                self._rates = {key: each for key, each in self._rates.items() if not each.full}
+            found = self._rates[host] = RateLimiter(
+                self._limits.max_connects_hz,
+                burst=self._limits.max_connections_per_address,
+                clock=self._clock,
+            )
+        return found
+
+
+class Acceptor:
+    """Accepts the connections of a listening socket from `open` to `close`.
+
+    Parameters
+    ----------
+    listener
+        It stays the caller's.
+    protocol
+        Makes the protocol of a connection.
+    tls
+        With what connections are encrypted; None for not at all.
+    """
+
+    def __init__(
+        self,
+        listener: socket.socket,
+        *,
+        protocol: Callable[[], asyncio.Protocol],
+        limits: LimitSettings,
+        tls: ssl.SSLContext | None = None,
+    ) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._listener = listener
+        self._protocol = protocol
+        self._tls = tls
+        self._limits = limits
+        self._turns = Turns(self._loop)
+        self._admission = Admission(limits, clock=self._loop.time)
+        self._handshakes: set[asyncio.Task[None]] = set()
+        self._pause: asyncio.TimerHandle | None = None
+        self._closed = False
+
+    def open(self) -> None:
+        """Accept from now on."""
+        self._pause = None
+        self._loop.add_reader(self._listener, self._accept)
+
+    def close(self) -> None:
+        """Accept nothing more; connections that stand are left alone."""
+        self._closed = True
+        if self._pause is not None:
+            self._pause.cancel()
+        self._loop.remove_reader(self._listener)
+        for task in self._handshakes:
+            task.cancel()
+
+    def _accept(self) -> None:
+        for _ in range(AT_ONCE):
+            try:
+                connection, address = self._listener.accept()
+            except (BlockingIOError, InterruptedError, ConnectionAbortedError):
+                return
+            except OSError as error:
+                _log.warning("no connection can be accepted for %g s: %s", PAUSE_S, error)
+                self._loop.remove_reader(self._listener)
+                self._pause = self._loop.call_later(PAUSE_S, self.open)
+                return
+            connection.setblocking(False)
+            self._begin(connection, str(address[0]))
+
+    def _begin(self, connection: socket.socket, host: str) -> None:
+        problem = self._admission.admit(host)
+        if problem is None:
+            task = self._loop.create_task(self._connect(connection, host))
+            self._handshakes.add(task)
+            task.add_done_callback(self._handshakes.discard)
+            return
+        with contextlib.suppress(OSError):
+            if self._tls is None:
+                connection.send(refusal(problem))
+                connection.recv(self._turns.buffer.nbytes)  # unread, it would reset the connection
+        connection.close()
+
+    async def _connect(self, connection: socket.socket, host: str) -> None:
+        """Hand a connection to a protocol once its handshake is done."""
+        counted = contextlib.ExitStack()
+        counted.callback(self._admission.release, host)
+        try:
+            await self._loop.connect_accepted_socket(
+                lambda: Intake(self._protocol(), self._turns, lost=counted.close),
+                connection,
+                ssl=self._tls,
+                ssl_handshake_timeout=None if self._tls is None else self._limits.head_s,
+            )
+        except (OSError, EOFError) as error:  # those of TLS among them
+            _log.debug("no handshake with %s: %s", host, error)
+            counted.close()
+            connection.close()
+        except BaseException:
+            counted.close()
+            connection.close()
+            raise

@@ -1,0 +1,38 @@
+"""What is known of a frame, as the wire contract has it."""
+
+from typing import Any
+
+from transientcam_driver import RawFrame
+from transientcam_server.imaging.calibration import calibration_id
+from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.imaging.stages import Computed
+
+
+def frame_meta(
+    number: int, raw: RawFrame, recipe: Recipe, computed: Computed, reconstruct_s: float | None
+) -> dict[str, Any]:
+    """Return the metadata of a frame, as far as it was computed; `FrameMeta` of the client."""
+    sequence, found = recipe.applied.sequence, computed.reconstruction
+    height, width = raw.images.shape[-2:]
+    return {
+        "frame": number,
+        "sequence_id": raw.epoch,
+        "calibration_id": calibration_id(recipe.gains),
+        "reconstruction_id": recipe.settings_version,
+        "device_time_s": raw.device_time_s,
+        "host_time_s": raw.host_time_s,
+        "capture_s": raw.capture_s,
+        "reconstruct_s": reconstruct_s,
+        "base_frequency_hz": sequence.base_frequency_hz,
+        "harmonics": sequence.harmonics,
+        "zeroth": sequence.zeroth,
+        "exposure_s": sequence.exposure_s,
+        "takes": sequence.takes,
+        "width": width,
+        "height": height,
+        "temperature_c": raw.temperature_c,
+        "lost_images": raw.lost_images,
+        "rejected_images": None if found is None else found.rejected_images,
+        "pixels": computed.pixels,
+        "predicted_range_std_m": computed.range_noise,
+    }

@@ -1,0 +1,173 @@
+"""An open recording as a sequence of frames whose products are computed when they are read.
+
+The arithmetic is the daemon's: the same recipe, stages and products. `transientcam.open` finds
+`open_recording` by its entry point and says in its protocols what users find here.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, overload
+
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from transientcam.notebook import table_html
+from transientcam_driver import RawFrame
+from transientcam_server.errors.exceptions import InputError
+from transientcam_server.imaging.calibration import nominal_gains
+from transientcam_server.imaging.labelling import image_columns, in_words
+from transientcam_server.imaging.recipe import Recipe, SettingsVersion
+from transientcam_server.offline.computing import ComputedFrame
+from transientcam_server.offline.images import ByFrame
+from transientcam_server.recording.reader import Recording
+from transientcam_server.recording.recipe import recorded_recipe
+from transientcam_server.settings import ReconstructionSettings
+
+if TYPE_CHECKING:
+    import xarray
+
+_RECORDED_ID = 0
+"""Id, in the metadata, of settings that are those of a file."""
+
+
+def open_recording(
+    place: str, *, source: IO[bytes] | None = None, settings: Mapping[str, Any] | None = None
+) -> "OpenedRecording":
+    """Open the recording at a path, or in an open binary file.
+
+    Parameters
+    ----------
+    place
+        Path of the file; only a name where there is a ``source``.
+    settings
+        Of the reconstruction, in place of the recorded ones.
+
+    Raises
+    ------
+    NotARecording
+        If it cannot be read as one.
+    InputError
+        If its settings cannot be used.
+    OSError
+        If there is no such file, or it may not be read.
+    """
+    recording = Recording(Path(place), source=source)
+    try:
+        return OpenedRecording(recording, settings)
+    except BaseException:
+        recording.close()
+        raise
+
+
+class OpenedRecording(Sequence[ComputedFrame]):
+    """A recording as a sequence of its frames; see `transientcam.Recording`."""
+
+    def __init__(self, recording: Recording, settings: Mapping[str, Any] | None = None) -> None:
+        self._recording = recording
+        header = recording.header
+        given = dict(header.reconstruction if settings is None else settings)
+        try:
+            chosen = ReconstructionSettings.model_validate(given)
+        except ValidationError as error:
+            mistake = error.errors()[0]
+            place = ".".join(map(str, mistake["loc"]))
+            raise InputError(
+                str(recording.path),
+                f"reconstruction.{place}",
+                repr(mistake.get("input")),
+                f"usable ({mistake['msg']}); transientcam.open(..., settings={{...}}) sets others",
+            ) from error
+        self.recipe: Recipe = recorded_recipe(header, SettingsVersion(_RECORDED_ID, chosen))
+        self.sequence: dict[str, Any] = header.applied.to_document()
+        self.settings: dict[str, Any] = chosen.model_dump()
+        self.gains: NDArray[Any] = (
+            nominal_gains(header.applied.sequence) if header.gains is None else header.gains.planes
+        )
+        columns = image_columns(recording.labels)
+        self.labels: dict[str, NDArray[Any]] = {
+            name: in_words(column) for name, column in columns.items()
+        }
+
+    @property
+    def frames(self) -> "OpenedRecording":
+        """The recording itself, as a sequence of frames."""
+        return self
+
+    @property
+    def raw(self) -> ByFrame:
+        """All images (frames, N, H, W), uint16 in DN; what is indexed is read and checked."""
+        return ByFrame(self._recording.shape, "<u2", lambda index: self._read(index).images)
+
+    @property
+    def annotations(self) -> dict[str, Any]:
+        """What people wrote about it."""
+        return self._recording.annotations
+
+    def series(self, name: str) -> NDArray[Any]:
+        """Return one value a frame: ``device_time_s``, ``temperature_c`` ... (docs/recordings.md).
+
+        Raises
+        ------
+        KeyError
+            If there is none of that name.
+        """
+        return self._recording.series(name)
+
+    def to_xarray(self, *products: str) -> "xarray.Dataset":
+        """Return an xarray.Dataset of images, labels and series, and of these products.
+
+        Images are read, and products computed, when they are indexed.
+
+        Raises
+        ------
+        MissingExtra
+            If xarray is not installed.
+        ParameterError
+            If a recording has no such product.
+        """
+        from transientcam_server.offline.in_xarray import dataset
+
+        return dataset(self, self._recording, products)
+
+    @overload
+    def __getitem__(self, index: int) -> ComputedFrame: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[ComputedFrame]: ...
+    def __getitem__(self, index: int | slice) -> ComputedFrame | list[ComputedFrame]:
+        """Return a frame, counted from 0 or backwards from the end, or several."""
+        if isinstance(index, slice):
+            return [self[each] for each in range(*index.indices(len(self)))]
+        place = range(len(self))[index]
+        return ComputedFrame(place, self.recipe, self._read)
+
+    def __len__(self) -> int:
+        return self._recording.frames
+
+    def __iter__(self) -> Iterator[ComputedFrame]:
+        return (self[index] for index in range(len(self)))
+
+    def close(self) -> None:
+        """Close the file; frames that were read stay."""
+        self._recording.close()
+
+    def __enter__(self) -> "OpenedRecording":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        height, width = self._recording.shape[2:]
+        return (
+            f"<Recording {self._recording.header.name!r}: {len(self)} frames of "
+            f"{width} x {height} pixels, m = {self.sequence['harmonics']} at "
+            f"{self.sequence['base_frequency_hz'] / 1e6:g} MHz, zeroth {self.sequence['zeroth']}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """Return name, sequence and settings as a table, for notebooks."""
+        rows = {"calibration": self._recording.header.calibration.get("id", "nominal")}
+        return table_html(repr(self), rows | self.sequence | self.settings)
+
+    def _read(self, index: int) -> RawFrame:
+        return self._recording.frame(index)

@@ -1,0 +1,207 @@
+"""Portions and turns: what arrives is handed over in turn, for so much of the loop's time."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any, cast
+
+from transientcam_server.daemon.intake import BURST_S, PORTION_BYTES, SHARE, Intake, Turns
+
+
+class Loop:
+    """A loop whose clocks the test moves: real time, and the processor's."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+        self.spent_s = 0.0
+        self.timers: list[tuple[float, Callable[[], None]]] = []
+
+    def call_later(self, delay_s: float, callback: Callable[[], None]) -> object:
+        self.timers.append((self.now_s + delay_s, callback))
+        return object()
+
+    def pass_s(self, duration_s: float) -> None:
+        self.now_s += duration_s
+        due = [each for each in self.timers if each[0] <= self.now_s]
+        self.timers = [each for each in self.timers if each[0] > self.now_s]
+        for _, callback in due:
+            callback()
+
+    def turns(self) -> Turns:
+        return Turns(
+            cast("asyncio.AbstractEventLoop", self),
+            clock=lambda: self.now_s,
+            spent=lambda: self.spent_s,
+        )
+
+
+class Transport:
+    """Counts how often it is paused, and refuses what a transport refuses."""
+
+    def __init__(self) -> None:
+        self.reading = True
+        self.closing = False
+
+    def pause_reading(self) -> None:
+        assert self.reading
+        self.reading = False
+
+    def resume_reading(self) -> None:
+        assert not self.reading
+        self.reading = True
+
+    def is_closing(self) -> bool:
+        return self.closing
+
+    def write(self, data: bytes) -> None: ...
+
+    def writelines(self, data: list[bytes]) -> None: ...
+
+
+class Protocol(asyncio.Protocol):
+    """Takes its time, and notes what it was handed."""
+
+    def __init__(self, loop: Loop, *, costs_s: float = 0.0) -> None:
+        self.loop = loop
+        self.costs_s = costs_s
+        self.received: list[bytes] = []
+        self.transport: Any = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self.transport = transport
+
+    def data_received(self, data: bytes) -> None:
+        self.received.append(data)
+        self.loop.spent_s += self.costs_s
+
+
+class Connection:
+    """A client's end of an intake."""
+
+    def __init__(self, loop: Loop, turns: Turns, *, costs_s: float = 0.0) -> None:
+        self.protocol = Protocol(loop, costs_s=costs_s)
+        self.transport = Transport()
+        self.lost = 0
+        self.intake = Intake(self.protocol, turns, lost=self._count)
+        self.intake.connection_made(cast("asyncio.Transport", self.transport))
+
+    def _count(self) -> None:
+        self.lost += 1
+
+    def send(self, data: bytes) -> None:
+        """Send as much as is read."""
+        while data and self.transport.reading:
+            buffer = self.intake.get_buffer(-1)
+            portion, data = data[: len(buffer)], data[len(buffer) :]
+            buffer[: len(portion)] = portion
+            self.intake.buffer_updated(len(portion))
+
+
+def test_what_arrives_is_handed_over_at_once_in_portions() -> None:
+    loop = Loop()
+    connection = Connection(loop, loop.turns())
+
+    connection.send(b"x" * (2 * PORTION_BYTES + 10))
+
+    assert [len(each) for each in connection.protocol.received] == [PORTION_BYTES] * 2 + [10]
+    assert connection.transport.reading
+    assert not loop.timers
+
+
+def test_a_flood_is_read_for_its_share_of_the_time_and_no_more() -> None:
+    loop = Loop()
+    cost_s = 0.003
+    flooding = Connection(loop, loop.turns(), costs_s=cost_s)
+    flood = b"x" * (1000 * PORTION_BYTES)
+    for _ in range(1000):
+        flooding.send(flood)
+        loop.pass_s(0.001)
+
+    allowed_s = BURST_S + SHARE * loop.now_s
+    assert allowed_s - 2 * cost_s <= loop.spent_s <= allowed_s + cost_s
+    assert not flooding.transport.reading
+
+
+def test_beside_a_flood_each_connection_has_its_turn() -> None:
+    loop = Loop()
+    turns = loop.turns()
+    flooding = [Connection(loop, turns, costs_s=0.003) for _ in range(16)]
+    healthy = Connection(loop, turns)
+    flood = b"x" * (1000 * PORTION_BYTES)
+    for each in flooding:
+        each.send(flood)
+    healthy.send(b"GET")
+    before = [len(each.protocol.received) for each in flooding]
+    while not healthy.protocol.received:
+        for each in flooding:
+            each.send(flood)
+        loop.pass_s(0.001)
+
+    beside = [len(each.protocol.received) for each in flooding]
+    assert all(now - then <= 2 for now, then in zip(beside, before, strict=True))
+    assert healthy.protocol.received == [b"GET"]
+
+
+def test_a_protocol_that_pauses_is_handed_nothing_until_it_resumes() -> None:
+    loop = Loop()
+    connection = Connection(loop, loop.turns())
+    connection.protocol.transport.pause_reading()
+    connection.protocol.transport.pause_reading()  # as often as it likes
+    assert not connection.transport.reading
+
+    # of TLS, a portion may be on its way already
+    connection.transport.reading = True
+    connection.send(b"late")
+    connection.transport.reading = False
+    assert connection.protocol.received == []
+
+    connection.protocol.transport.resume_reading()
+    assert connection.protocol.received == [b"late"]
+    assert connection.transport.reading
+
+
+def test_what_is_held_is_read_on_after_the_work_that_it_waited_for() -> None:
+    loop = Loop()
+    connection = Connection(loop, loop.turns())
+    valve = connection.protocol.transport
+    valve.hold()
+    valve.resume_reading()  # which does not release it
+    assert not connection.transport.reading
+
+    rounds = []
+
+    def work() -> None:
+        rounds.append(connection.transport.reading)
+        if len(rounds) == 1:
+            valve.hold()  # there is more of it
+
+    valve.release(work)
+    assert (rounds, connection.transport.reading) == ([False], False)
+    valve.release(work)
+    assert (rounds, connection.transport.reading) == ([False, False], True)
+
+
+def test_a_connection_that_is_closing_is_handed_nothing_more() -> None:
+    loop = Loop()
+    turns = loop.turns()
+    busy = Connection(loop, turns, costs_s=1.0)
+    waiting = Connection(loop, turns)
+    busy.send(b"x")
+    waiting.send(b"too late")
+    waiting.transport.closing = True
+    loop.pass_s(10.0)
+
+    assert waiting.protocol.received == []
+    waiting.intake.connection_lost(None)
+    assert waiting.lost == 1
+
+
+def test_another_protocol_takes_over_what_arrives_from_then_on() -> None:
+    loop = Loop()
+    connection = Connection(loop, loop.turns())
+    other = Protocol(loop)
+    connection.send(b"head")
+    connection.protocol.transport.set_protocol(other)
+    connection.send(b"frames")
+
+    assert (connection.protocol.received, other.received) == ([b"head"], [b"frames"])
+    assert connection.protocol.transport.get_protocol() is other

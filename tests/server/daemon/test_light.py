@@ -1,0 +1,202 @@
+"""What switches the light off: the table of docs/operations.md, line by line.
+
+The camera is a process of its own and the daemon is another one, which reaches it by real calls of
+libusb, so that the daemon can be stopped and killed. Nothing here is timed: each test waits until
+the device itself says that its light is off, and asks why.
+"""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.driver.usbfs.processes import EmulatedCamera, emulated_camera
+from tests.server.streaming import Client, streaming
+
+QUICK = {"harmonics": 1, "zeroth": "estimated", "exposure_s": 0.0005}
+PATIENCE_S = 60.0
+LEASE = {"holder": "a test", "duration_s": 1.0, "on_lapse": "stop"}
+
+
+class Daemon:
+    """A daemon whose loop can be stopped, before an emulated camera."""
+
+    def __init__(self, camera: EmulatedCamera) -> None:
+        self.camera = camera
+        self.process = subprocess.Popen(
+            [
+                *(sys.executable, Path(__file__).with_name("stuck_daemon.py")),
+                *("serve", "--camera", "usb", "--port", "0", "--log-level", "error"),
+            ],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            env=camera.environment | {"NUMBA_DISABLE_JIT": "1", "COLUMNS": "200"},
+        )
+        assert self.process.stdout is not None
+        found = re.search(r"http://\S+", self.process.stdout.readline())
+        assert found is not None
+        self.client = httpx.Client(base_url=found.group(), timeout=PATIENCE_S)
+        self.stream_url = found.group().replace("http", "ws", 1) + "/api/v1/stream"
+        self.put("sequence", QUICK)
+
+    def put(self, path: str, document: dict[str, Any]) -> None:
+        self.client.put(f"/api/v1/{path}", json=document).raise_for_status()
+
+    def state(self) -> str:
+        return str(self.client.get("/api/v1/acquisition").json()["state"])
+
+    @contextmanager
+    def stuck(self, directory: Path) -> Iterator[None]:
+        """Stop the event loop to the end of the block."""
+        fifo = directory / "fifo"
+        os.mkfifo(fifo)
+        asking = threading.Thread(
+            target=self.client.get, args=("/stuck",), kwargs={"params": {"fifo": str(fifo)}}
+        )
+        asking.start()
+        with fifo.open("wb"):  # opens once the other end is open: the loop stands still
+            yield
+        asking.join()
+
+    def close(self) -> None:
+        assert self.process.stdout is not None
+        self.client.close()
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end_s, "it did not happen"
+        time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def running() -> Iterator[Daemon]:
+    with emulated_camera() as camera:
+        daemon = Daemon(camera)
+        try:
+            yield daemon
+        finally:
+            daemon.close()
+
+
+@pytest.fixture
+def lit(running: Daemon) -> Daemon:
+    """The daemon, capturing with the light on."""
+    running.put("acquisition", {"running": True})
+    until(lambda: running.state() == "streaming" and running.camera.lit)
+    return running
+
+
+@pytest.fixture
+def watching(lit: Daemon) -> Iterator[Client]:
+    with streaming(lit.stream_url) as client:
+        client.subscribe("flags")
+        client.frame()
+        yield client
+
+
+def goes_off(daemon: Daemon) -> None:
+    until(lambda: not daemon.camera.lit)
+
+
+def test_a_client_that_is_gone_leaves_a_lease_that_lapses(lit: Daemon) -> None:
+    with httpx.Client(base_url=lit.client.base_url) as client:
+        client.post("/api/v1/lease", json=LEASE).raise_for_status()
+
+    goes_off(lit)
+    until(lambda: lit.state() == "stopped")
+    assert not lit.camera.watchdog_tripped
+
+
+def test_a_loop_that_is_stuck_puts_the_light_out_and_it_is_back_with_the_loop(
+    lit: Daemon, watching: Client, tmp_path: Path
+) -> None:
+    with lit.stuck(tmp_path):
+        goes_off(lit)
+        assert not lit.camera.watchdog_tripped  # it was switched off, not left alone
+    held = watching.notice("light-held")
+    watching.notice("light-released")
+
+    assert "no client was served for 1 s" in held.details["reason"]
+    until(lambda: lit.camera.lit)
+    assert lit.state() in ("starting", "streaming")
+
+
+def test_a_lease_that_lapses_while_the_loop_is_stuck_keeps_the_light_off(
+    lit: Daemon, tmp_path: Path
+) -> None:
+    lit.client.post("/api/v1/lease", json=LEASE).raise_for_status()
+    with lit.stuck(tmp_path):
+        goes_off(lit)
+        lapsed = threading.Event()
+        lapsed.wait(2.0 * LEASE["duration_s"])  # type: ignore[operator]  # a number
+
+    assert lit.state() == "stopped"
+    assert not lit.camera.lit
+    assert lit.client.get("/api/v1/lease").json()["held"] is False
+
+
+def test_safe_off_needs_nothing_but_a_request(lit: Daemon) -> None:
+    lit.client.post("/api/v1/acquisition/safe-off").raise_for_status()
+
+    assert not lit.camera.lit
+
+
+def test_an_open_interlock_puts_the_light_out_by_itself(lit: Daemon) -> None:
+    lit.camera.do("interlock", False)
+
+    assert not lit.camera.lit
+    until(lambda: lit.state() == "lost")
+    lit.camera.do("interlock", True)
+    until(lambda: lit.camera.lit)
+
+
+def test_without_the_cable_there_is_no_light_and_with_it_again_there_is(lit: Daemon) -> None:
+    lit.camera.do("unplug")
+    until(lambda: lit.state() == "lost")
+    lit.camera.do("replug")
+
+    until(lambda: lit.camera.lit)
+
+
+def test_requests_that_stall_put_the_light_out(lit: Daemon) -> None:
+    lit.camera.do("stall", 10**6)
+
+    goes_off(lit)
+    lit.camera.do("unplug")
+    lit.camera.do("replug")
+    until(lambda: lit.state() == "streaming")
+
+
+def test_a_host_that_hangs_is_missed_by_the_device(lit: Daemon) -> None:
+    lit.process.send_signal(signal.SIGSTOP)
+    try:
+        goes_off(lit)
+        assert lit.camera.watchdog_tripped
+    finally:
+        lit.process.send_signal(signal.SIGCONT)
+
+    until(lambda: lit.camera.lit)
+
+
+def test_a_daemon_that_is_killed_is_missed_by_the_device(lit: Daemon) -> None:
+    """The last one: nothing is left to test after it."""
+    lit.process.kill()
+
+    goes_off(lit)
+    assert lit.camera.watchdog_tripped

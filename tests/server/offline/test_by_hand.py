@@ -1,0 +1,52 @@
+"""The files of every mode are enough for the daemon's range: by the documented formula, labels,
+`transientcam.open`."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from benchmarks.by_hand import MODES, Mode, differences, example, recorded
+from tests.serving import serving
+from transientcam import Camera
+
+ROUNDING_M = 1e-6
+THRESHOLD_SHARE = 2e-3
+"""Share of pixels in which another rounding may make another return the first one."""
+
+
+@pytest.fixture(scope="module")
+def camera(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Camera]:
+    kept = {"directory": tmp_path_factory.mktemp("kept"), "min_free_bytes": 0}
+    with (
+        serving("sim:mirrors?seed=1", recordings=kept) as served,
+        Camera(served.url, timeout_s=60.0) as opened,
+    ):
+        served.start_all_workers()
+        yield opened
+
+
+@pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.name)
+def test_a_file_of_every_mode_is_enough_for_the_daemons_range(
+    camera: Camera, mode: Mode, tmp_path: Path
+) -> None:
+    ranges = recorded(camera, mode, tmp_path)
+
+    (path,) = tmp_path.iterdir()
+    with h5py.File(path) as file:
+        assert file["gain"].ndim == (3 if mode.calibrated else 1)
+    assert np.isfinite(ranges.daemon).mean() > 0.9
+    assert np.nanmax(ranges.daemon) - np.nanmin(ranges.daemon) > 0.1
+    for way in (ranges.example, ranges.labelled, ranges.opened):
+        median_m, _, apart = differences(ranges.daemon, way)
+        assert median_m < ROUNDING_M
+        assert apart <= THRESHOLD_SHARE
+
+
+def test_the_documented_example_is_short_and_needs_nothing_but_the_file() -> None:
+    code = example()
+
+    assert len(code.splitlines()) < 20
+    assert code.count('"corner.h5"') == 1
