@@ -31,10 +31,13 @@
 from both or raises one of the others.
 """
 
+import reprlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
+_SHOWN = reprlib.Repr()  # of a value that may be of any size and depth
+_SHOWN.maxstring = _SHOWN.maxother = _SHOWN.maxlong = 200
 UDEV_RULES_FILE = "/etc/udev/rules.d/60-transientcam.rules"
 
 
@@ -61,7 +64,9 @@ class FieldError(DriverError):
     field: str
     value: object
     limit: str
-    _sentence = "{field} = {value!r}: must be {limit}"
+
+    def __str__(self) -> str:
+        return f"{self.field} = {_SHOWN.repr(self.value)}: must be {self.limit}"
 
 
 class SequenceError(FieldError):

@@ -223,7 +223,7 @@ class Service:
         Problem
             As `Library.start`.
         """
-        if history_s is None:
+        if not history_s:
             return await asyncio.to_thread(self.recordings.start, options)
         # it waits for its past, also where the client is gone
         return await asyncio.shield(self.workers.start(self._record_past(options, history_s)))

@@ -178,8 +178,8 @@ class CalibrationCapture:
                         path, "the file", f"{size} bytes unpacked", f"at most {max_bytes}"
                     )
                 content = {
-                    name.removesuffix(".npy"): _unpacked(archive.read(name))
-                    for name in archive.namelist()
+                    each.filename.removesuffix(".npy"): _unpacked(_read(archive, each))
+                    for each in archive.infolist()
                 }
         except _UNREADABLE as error:
             raise CalibrationFileError(path, "the file", str(error), "an .npz") from error
@@ -209,6 +209,17 @@ _UNREADABLE = (
     *(SyntaxError, tokenize.TokenError),  # an array's header is Python
 )
 """Exceptions of reading a file with other content."""
+
+
+def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
+    """Return a file of an archive, of the stated size at most however much it would unpack to."""
+    if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise ValueError("a file that is neither stored nor deflated")
+    with archive.open(member) as stream:
+        data = stream.read(member.file_size)
+    if len(data) != member.file_size:
+        raise ValueError(f"{len(data)} bytes of {member.file_size}")
+    return data
 
 
 def _unpacked(data: bytes) -> NDArray[Any]:

@@ -7,10 +7,13 @@ from typing import Annotated, Any, Final
 
 from fastapi import Header
 from fastapi.responses import FileResponse
+from starlette.types import Receive, Scope, Send
 
 from transientcam_server.errors import Problem, kinds
 
-_RANGES: Final = re.compile(r"bytes=\s*(\d+-\d*|-\d+)(\s*,\s*(\d+-\d*|-\d+))*\s*", re.ASCII)
+_RANGES: Final = re.compile(
+    r"bytes=\s*({0}-{0}?|-{0})(\s*,\s*({0}-{0}?|-{0}))*\s*".replace("{0}", r"(\d{1,18})"), re.ASCII
+)
 Range = Annotated[
     str | None,
     Header(alias="range", description="which bytes, to go on with a broken download"),
@@ -28,43 +31,28 @@ def documented_file(media_type: str) -> dict[int | str, dict[str, Any]]:
 async def answer(path: Path, wanted: str | None, *, media_type: str, filename: str) -> FileResponse:
     """Return a file, or the range of it that is wanted.
 
+    A header that is no range is ignored, as RFC 9110 (Sec. 14.2) has it.
+
     Raises
     ------
     Problem
-        ``invalid-request`` or ``range-not-satisfiable``.
+        ``range-not-satisfiable``.
     """
-    _check_range(wanted, (await asyncio.to_thread(path.stat)).st_size)
-    return _File(path, media_type=media_type, filename=filename)
+    usable = _is_usable(wanted, (await asyncio.to_thread(path.stat)).st_size)
+    return _File(path, media_type=media_type, filename=filename, ranges=usable)
 
 
-def _check_range(wanted: str | None, size: int) -> None:
-    """Refuse ranges that cannot be served, which would be answered with plain text."""
-    if wanted is None:
-        return
-    if not _RANGES.fullmatch(wanted.strip()):
-        limit = "bytes=first-last"
-        raise Problem(
-            kinds.INVALID_REQUEST,
-            "The range is no range.",
-            field="range",
-            value=wanted,
-            limit=limit,
-        )
-    for each in wanted.partition("=")[2].split(","):
-        first, _, last = each.strip().partition("-")
-        if (first and int(first) >= size) or (not first and not int(last)):
-            detail = f"The file has {size} bytes."
-            raise Problem(
-                kinds.RANGE_NOT_SATISFIABLE, detail, field="range", value=wanted, limit=size
-            )
-        if first and last and int(last) < int(first):
-            raise Problem(
-                kinds.INVALID_REQUEST,
-                "The range ends before it begins.",
-                field="range",
-                value=wanted,
-                limit="bytes=first-last",
-            )
+def _is_usable(wanted: str | None, size: int) -> bool:
+    """Return whether a Range header is one; refuse one that lies beyond the end."""
+    if wanted is None or not _RANGES.fullmatch(wanted.strip()):
+        return False
+    ranges = [each.strip().partition("-") for each in wanted.partition("=")[2].split(",")]
+    if any(first and last and int(last) < int(first) for first, _, last in ranges):
+        return False
+    if any(int(first) >= size if first else not int(last) for first, _, last in ranges):
+        detail = f"The file has {size} bytes."
+        raise Problem(kinds.RANGE_NOT_SATISFIABLE, detail, field="range", value=wanted, limit=size)
+    return True
 
 
 class _File(FileResponse):
@@ -72,5 +60,13 @@ class _File(FileResponse):
 
     chunk_size = 1024 * 1024
 
-    def __init__(self, path: Path, *, media_type: str, filename: str) -> None:
+    def __init__(self, path: Path, *, media_type: str, filename: str, ranges: bool) -> None:
         super().__init__(path, media_type=media_type, filename=filename)
+        self._ranges = ranges
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer; the framework would refuse a header that is no range."""
+        if not self._ranges:
+            headers = [each for each in scope["headers"] if each[0] != b"range"]
+            scope = {**scope, "headers": headers}
+        await super().__call__(scope, receive, send)

@@ -90,6 +90,10 @@ def describe(app: FastAPI) -> None:
         document = generate()
         schema = ProblemDocument.model_json_schema()
         document.setdefault("components", {}).setdefault("schemas", {})["ProblemDocument"] = schema
+        for path, operations in document["paths"].items():
+            for operation in operations.values() if "{" in path else ():
+                if "400" not in operation["responses"]:  # control characters are no HTTP
+                    document_problems(operation, kinds.BAD_REQUEST)
         return document
 
     app.openapi = openapi  # type: ignore[method-assign]  # as FastAPI's documentation extends it
@@ -134,14 +138,21 @@ def _of_http(error: HTTPException, request: Request) -> Problem:
 
 
 def _allowed(request: Request) -> str:
-    """Return every method of a path; the framework names only those of the first route."""
+    """Return every method of a path; the framework names only those of the first route.
+
+    A path that the OpenAPI document names as it is has the methods that stand there, also where
+    a pattern fits it: `/calibrations/active` is no id.
+    """
     app: FastAPI = request.app
+    documented_there = app.openapi()["paths"].get(request.url.path)
 
     def answered(method: str) -> bool:
         scope = {**request.scope, "method": method}
         return any(route.matches(scope)[0] is Match.FULL for route in app.routes)
 
     methods = {method for method in ("DELETE", "GET", "PATCH", "POST", "PUT") if answered(method)}
+    if documented_there is not None:
+        methods &= {name.upper() for name in documented_there}
     return ", ".join(sorted(methods | ({"HEAD"} if "GET" in methods else set())))
 
 

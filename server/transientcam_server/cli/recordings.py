@@ -3,11 +3,7 @@
 What is heavy is imported when a verb runs, so that ``transientcam --help`` stays quick.
 """
 
-import fcntl
 import json
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -29,11 +25,10 @@ def recover(
     """Recover the unfinished recordings of a killed service; its next start does the same."""
     from transientcam_server.recording import recovery
 
-    directory = path if path.is_dir() else path.parent
-    with _exclusive(directory), Console(stderr=True).status("recovering"):
+    with Console(stderr=True).status("recovering"):
         if path.is_dir():
             parts = recovery.unfinished(path)
-            recovered = recovery.recover_all(path)
+            recovered = recovery.recover_all(parts)
         else:
             parts, recovered = [path], [recovery.recover(path)]
     if as_json:
@@ -45,22 +40,6 @@ def recover(
         typer.echo(f"{len(recovered)} of {len(parts)} recovered")
     if len(recovered) < len(parts):
         raise typer.Exit(code=1)
-
-
-@contextmanager
-def _exclusive(directory: Path) -> Iterator[None]:
-    """Refuse while a service uses the directory: it may still write the unfinished files."""
-    descriptor = os.open(directory, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise OSError(
-                16, "a service records there; it recovers them when it starts", str(directory)
-            ) from None
-        yield
-    finally:
-        os.close(descriptor)
 
 
 def convert(

@@ -140,6 +140,13 @@ class Server(uvicorn.Server):
         if self.started:
             self._on_listening()
 
+    async def on_tick(self, counter: int) -> bool:
+        """Do what is due every 0.1 s; a Date header has no words for the years from 10000 on."""
+        try:
+            return await super().on_tick(counter)
+        except (ValueError, OverflowError):
+            return self.should_exit
+
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Close every stream, then stop."""
         await self._around.aclose()

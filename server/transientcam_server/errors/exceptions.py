@@ -10,6 +10,7 @@
     ├── RecordingError       something about a recording
     │   ├── NotARecording    a file cannot be read as one
     │   ├── DamagedFrame     a frame's bytes are not the ones that were written
+    │   ├── RecordingInUse   an unfinished recording is being written, recovered or deleted
     │   └── NotConvertible   a suffix names no format that something is written in
     ├── TokenFileError       the file of tokens cannot be read or written
     ├── UnknownToken         no token has this id
@@ -119,6 +120,14 @@ class DamagedFrame(RecordingError):  # noqa: N818 - says what is wrong
     frame: int
     reason: str
     _sentence = "{file}: frame {frame} is damaged: {reason}"
+
+
+@dataclass(eq=False, repr=False)
+class RecordingInUse(RecordingError):  # noqa: N818 - says what is wrong
+    """An unfinished recording is being written, recovered or deleted by another service."""
+
+    file: str
+    _sentence = "{file} is being written, recovered or deleted by another program"
 
 
 @dataclass(eq=False, repr=False)

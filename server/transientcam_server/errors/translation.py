@@ -20,6 +20,7 @@ from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 
 _SHOWN_CHARACTERS = 200
+_SHOWN_LEVELS = 8
 
 
 class ProblemDocument(BaseModel):
@@ -102,8 +103,8 @@ def problem_of(error: Exception) -> Problem:
             return Problem(kinds.INTERNAL_ERROR, "The service failed; its log has the details.")
 
 
-def plain(value: object) -> object:
-    """Return a value as JSON can carry it: no NaN, nothing long, no foreign type."""
+def plain(value: object, *, levels: int = _SHOWN_LEVELS) -> object:
+    """Return a value as JSON can carry it: no NaN, nothing long or deep, no foreign type."""
     match value:
         case None | bool() | int():
             return value
@@ -111,10 +112,13 @@ def plain(value: object) -> object:
             return value if math.isfinite(value) else str(value)
         case str():
             return shortened(value)
+        case dict() | list() | tuple() if levels == 0:
+            return "…"
         case dict():
-            return {str(key): plain(each) for key, each in list(value.items())[:64]}
+            shown = list(value.items())[:64]
+            return {shortened(str(key)): plain(each, levels=levels - 1) for key, each in shown}
         case list() | tuple():
-            return [plain(each) for each in value[:64]]
+            return [plain(each, levels=levels - 1) for each in value[:64]]
         case _:
             return shortened(str(value))
 

@@ -22,7 +22,7 @@ from transientcam_server.offline.formats import SINKS, Block, Content, Row, sink
 from transientcam_server.recording import swmr
 from transientcam_server.recording.reader import Recording
 from transientcam_server.recording.recipe import recorded_recipe
-from transientcam_server.recording.writer import synchronise_directory
+from transientcam_server.recording.salvage import salvage
 from transientcam_server.settings import ReconstructionSettings
 
 DEFAULT_PRODUCTS: Final = ("range", "direct", "indirect", "brightness", "validity", "flags")
@@ -128,7 +128,7 @@ def reconstruct_recording(
         with swmr.open_file(part, "r") as finished:
             write(output, _content(finished), _rows(finished), sink)
         part.unlink()
-    synchronise_directory(output.parent)
+    swmr.synchronise(output.parent)
     return done
 
 
@@ -199,11 +199,11 @@ def _resumed(part: Path, document: Mapping[str, str]) -> swmr.File:
     """Open an unfinished file to append to, repaired first."""
     scratch = part.with_name(part.name + ".resuming")
     try:
-        with swmr.open_file(part, "r", libver="latest", swmr=True) as begun:
+        with swmr.open_unfinished(part) as begun:
             _require_same(part, begun.attrs, document)
             products: Sequence[str] = json.loads(document["products"])[:-1]
             rows = min(len(begun[name]) for name in (*products, *_SERIES))
-            swmr.salvage(begun, scratch, rows, row_axis="frame")
+            salvage(begun, scratch, rows, row_axis="frame")
         scratch.rename(part)
     except (KeyError, RuntimeError) as error:
         raise InputError(str(part), "its content", swmr.in_words(error), "products") from error

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from transientcam_server.errors.exceptions import NotARecording
+from transientcam_server.recording import lock
 from transientcam_server.recording.directory import id_of
 from transientcam_server.recording.layout import Header
 from transientcam_server.recording.reader import Recording
@@ -47,7 +48,10 @@ class Descriptions:
             status = path.stat()
         except FileNotFoundError:  # deleted, or recovered, this moment
             return None
-        return self._of_content(path, status) | {"size_bytes": status.st_size}
+        document = self._of_content(path, status) | {"size_bytes": status.st_size}
+        if document["state"] == "interrupted" and lock.is_taken(path):
+            document["state"] = "recording"  # by another service
+        return document
 
     def keep(self, ids: Set[str]) -> None:
         """Forget all but these recordings."""
@@ -82,6 +86,23 @@ def of_recorder(recorder: Recorder, part: Path) -> dict[str, Any]:
     except (NotARecording, OSError):  # it was finished this moment
         document["annotations"] = {}
     return document
+
+
+def of_removed(recorder: Recorder) -> dict[str, Any]:
+    """Describe a recording that failed because its file was removed."""
+    progress = recorder.progress
+    return (
+        _UNREADABLE
+        | _of_header(recorder.header)
+        | {
+            "state": "damaged",
+            "size_bytes": 0,
+            "dropped_frames": progress.dropped_frames,
+            "duration_s": progress.duration_s,
+            "reason": progress.reason,
+            "problem": progress.problem,
+        }
+    )
 
 
 def _of_header(header: Header) -> dict[str, Any]:

@@ -1,16 +1,14 @@
-"""The directory of the recordings: its files, its free space, and the lock that marks it in use."""
+"""The directory of the recordings: its files and its free space."""
 
-import fcntl
-import logging
-import os
+import contextlib
 import re
 import shutil
 from pathlib import Path
 from typing import Final
 
-from transientcam_server.recording import layout
+from transientcam_server.recording import layout, lock, swmr
+from transientcam_server.recording.recovery import SCRATCH_SUFFIX
 
-_log = logging.getLogger(__name__)
 _ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,127}")
 
 
@@ -19,10 +17,9 @@ class Directory:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._lock: int | None = None
 
     def make(self) -> None:
-        """Create it, and lock it so that no other service recovers what is written in it.
+        """Create it.
 
         Raises
         ------
@@ -30,7 +27,6 @@ class Directory:
             If it cannot be created.
         """
         self.path.mkdir(parents=True, exist_ok=True)
-        self.share()
 
     def free_bytes(self) -> int:
         """Return the free space of its disk.
@@ -71,36 +67,25 @@ class Directory:
         found = [path for path in self.files() if id_of(path) == recording_id]
         return min(found, key=lambda path: len(path.name), default=None)  # the finished one first
 
-    def is_ours_alone(self) -> bool:
-        """Return whether no other service records here; one that does may still write its files."""
-        try:
-            descriptor = os.open(self.path, os.O_RDONLY)
-        except OSError as error:
-            _log.warning("recordings cannot be read: %s", error)
-            return False
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            _log.info("another service records in %s; recovery is left to it", self.path)
-            return False
-        finally:
-            os.close(descriptor)
-        return True
+    def remove(self, recording_id: str) -> None:
+        """Delete all files of a recording, finished or not, for good.
 
-    def share(self) -> None:
-        """Lock it, so that no other service takes a file being written for abandoned."""
-        if self._lock is None:
-            try:
-                self._lock = os.open(self.path, os.O_RDONLY)
-                fcntl.flock(self._lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            except OSError as error:  # some file systems have no locks
-                _log.info("%s cannot be locked: %s", self.path, error)
-
-    def close(self) -> None:
-        """Release the lock."""
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        Raises
+        ------
+        RecordingInUse
+            If it is being written or recovered.
+        OSError
+            If one cannot be deleted.
+        """
+        path = self.new(recording_id)
+        part = path.with_name(path.name + ".part")
+        with contextlib.ExitStack() as held:
+            with contextlib.suppress(FileNotFoundError):
+                held.enter_context(lock.take(part))
+            # the finished one last: of an unfinished one the next start would make it anew
+            for each in (part, path.with_name(path.name + SCRATCH_SUFFIX), path):
+                each.unlink(missing_ok=True)
+            swmr.synchronise(self.path)
 
 
 def id_of(path: Path) -> str:

@@ -4,20 +4,23 @@ docs/recordings.md describes the same for other programs.
 """
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from datetime import UTC, datetime
 from importlib.metadata import version
-from typing import Any, Final, get_type_hints
+from typing import Any, Final
 
 import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
+from pydantic import TypeAdapter, ValidationError
 
 from transientcam_driver import AppliedSequence, Capabilities, ImageLabel, RawFrame, Sequence
 from transientcam_server.imaging.calibration import Gains
 from transientcam_server.imaging.labelling import Column, image_columns, moment_columns
 from transientcam_server.recording import swmr
+from transientcam_server.recording.storage import MAX_CHUNK_BYTES, Storage
 
 FORMAT: Final = "transientcam recording"
 FORMAT_VERSION: Final = 1
@@ -25,6 +28,10 @@ SUFFIX: Final = ".h5"
 PART_SUFFIX: Final = ".h5.part"
 ANNOTATIONS_BYTES: Final = 16 * 1024
 END_BYTES: Final = 4 * 1024
+MAX_DEPTH: Final = 64
+"""Levels of annotations and other JSON documents."""
+BITS: Final = 16
+"""Of a pixel, at most."""
 
 SERIES: Final[dict[str, tuple[str, dict[str, str]]]] = {
     "epoch": ("<u4", {"long_name": "configuration epoch of the device"}),
@@ -40,7 +47,12 @@ SERIES: Final[dict[str, tuple[str, dict[str, str]]]] = {
 """One value a frame: type and attributes. ``frame`` is written last: it counts the frames."""
 ROW_AXIS: Final = "frame"
 _AXES: Final = ("frame", "image", "y", "x")
-_LABELS: Final = tuple(each.name for each in fields(ImageLabel) if each.name != "index")
+_LABEL_DTYPES: Final[dict[object, str]] = {int: "<i4", float: "<f8", bool: "|u1"}
+_LABELS: Final = {
+    each.name: _LABEL_DTYPES[each.type] for each in fields(ImageLabel) if each.name != "index"
+}
+_LAST_S: Final = datetime(9999, 12, 31, tzinfo=UTC).timestamp()
+_CAPABILITIES: Final = TypeAdapter(Capabilities)
 
 
 @dataclass(frozen=True)
@@ -94,22 +106,32 @@ class Header:
         return Gains(name, self.calibration_planes, self.calibration_bad)
 
 
+def utc(unix_s: float) -> datetime:
+    """Return a Unix time as a date, the last or first one that there is if it lies beyond."""
+    return datetime.fromtimestamp(min(max(unix_s, 0.0), _LAST_S), UTC)
+
+
 def checksum(images: NDArray[np.uint16]) -> int:
     """Return the CRC-32 of images as they are stored."""
     return isal_zlib.crc32(np.ascontiguousarray(images, dtype="<u2").data.cast("B"))
 
 
-def create(file: swmr.File, header: Header, annotations: Mapping[str, Any]) -> None:
-    """Lay out an empty recording, complete but for its frames."""
+def image(header: Header, annotations: Mapping[str, Any]) -> bytes:
+    """Return the bytes of an empty recording, complete but for its frames."""
+    return swmr.image_of(lambda file: _create(file, header, annotations))
+
+
+def _create(file: swmr.File, header: Header, annotations: Mapping[str, Any]) -> None:
     capabilities, labels = header.capabilities, header.applied.labels
     file.attrs.update(
         {
             "format": FORMAT,
             "format_version": FORMAT_VERSION,
+            "seals": 1,  # see `transientcam_server.recording.seal`
             "Conventions": "CF-1.11",
             "title": header.name,
             "recording_id": header.recording_id,
-            "started": datetime.fromtimestamp(header.started_s, UTC).isoformat(),
+            "started": utc(header.started_s).isoformat(),
             "started_s": header.started_s,
             "sequence": json.dumps(header.applied.to_document()),
             "capabilities": json.dumps(asdict(capabilities)),
@@ -180,66 +202,186 @@ def row(raw: RawFrame, *, dropped_frames: int) -> dict[str, object]:
     }
 
 
-def read_header(file: swmr.File) -> Header:
-    """Return what `create` wrote.
+def read_header(storage: Storage, *, with_images: bool = True) -> Header:
+    """Return what `image` holds; ``with_images`` is false where those cannot be read.
 
     Raises
     ------
-    KeyError, TypeError, ValueError, DriverError
-        If the file is no recording, or one of a newer format.
+    KeyError, TypeError, ValueError, RecursionError, DriverError
+        If the file is no recording, or one of a newer format; h5py may raise anything else of a
+        damaged one.
     """
-    attributes = file.attrs
-    if attributes["format"] != FORMAT:
-        raise ValueError(f"its format is {attributes['format']!r}")
-    if int(attributes["format_version"]) != FORMAT_VERSION:
-        raise ValueError(f"its format has version {attributes['format_version']}")
-    capabilities = _capabilities(json.loads(attributes["capabilities"]))
-    document = json.loads(attributes["sequence"])
+    if storage.attribute("format") != FORMAT:
+        raise ValueError(f"its format is {storage.attribute('format')!r}")
+    if storage.attribute("format_version") != FORMAT_VERSION:
+        raise ValueError(f"its format has version {storage.attribute('format_version')}")
+    capabilities = _capabilities(parsed(storage.attribute("capabilities")))
+    document = parsed(storage.attribute("sequence"))
     applied = capabilities.describe(
         Sequence.from_document(document), epoch=int(document["sequence_id"])
     )
-    planes = file["calibration_planes"][()] if "calibration_planes" in file else None
-    bad = file["calibration_bad"][()].astype(bool) if "calibration_bad" in file else None
+    _finite("sequence", *(v for v in applied.to_document().values() if isinstance(v, float)))
+    shape = applied.images, capabilities.height, capabilities.width
+    found = storage.dataset("raw", axes=4, dtype="<u2").shape[1:] if with_images else shape
+    if found != shape or min(shape) < 1:
+        raise ValueError(f"its images have shape {found}, not {shape}")
+    if np.prod(shape, dtype=float) * np.dtype("<u2").itemsize > MAX_CHUNK_BYTES:
+        raise ValueError(f"its frames have more than {MAX_CHUNK_BYTES} bytes")
+    planes, bad = _calibration(storage, (applied.sequence.harmonics + 1, *shape[1:]))
+    versions = parsed(storage.attribute("versions"))
     return Header(
-        recording_id=str(attributes["recording_id"]),
-        name=str(attributes["title"]),
-        started_s=float(attributes["started_s"]),
+        recording_id=str(storage.attribute("recording_id")),
+        name=str(storage.attribute("title")),
+        started_s=_finite("started_s", float(storage.attribute("started_s"))),
         applied=applied,
         capabilities=capabilities,
-        camera=json.loads(attributes["camera"]),
-        calibration=json.loads(attributes["calibration"]),
+        camera=parsed(storage.attribute("camera")),
+        calibration=parsed(storage.attribute("calibration")),
         calibration_planes=planes,
         calibration_bad=bad,
-        reconstruction=json.loads(attributes["reconstruction"]),
-        versions=json.loads(attributes["versions"]),
+        reconstruction=parsed(storage.attribute("reconstruction")),
+        versions={name: str(value) for name, value in versions.items()},
     )
 
 
 def _capabilities(document: Mapping[str, Any]) -> Capabilities:
-    names = get_type_hints(Capabilities)
-    given: dict[str, Any] = {
-        name: tuple(value) if isinstance(value, list) else value  # JSON has no tuples
-        for name, value in document.items()
-        if name in names
+    try:
+        capabilities = _CAPABILITIES.validate_python(document)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise ValueError(f"its capabilities have {place} = {first['input']!r}") from error
+    if not 1 <= capabilities.bits <= BITS:
+        raise ValueError(f"its images have {capabilities.bits} bits")
+    return capabilities
+
+
+def _calibration(
+    storage: Storage, shape: tuple[int, ...]
+) -> tuple[NDArray[Any] | None, NDArray[np.bool_] | None]:
+    """Return gains, one a moment or one a moment and pixel, and bad pixels, as far as it has them.
+
+    ``shape`` is (moments, H, W).
+    """
+    planes = bad = None
+    if "calibration_planes" in storage:
+        planes = storage.values("calibration_planes")
+        if planes.dtype.kind != "c" or planes.shape not in (shape, shape[:1]):
+            raise ValueError(f"its gains are {planes.dtype} of shape {planes.shape}")
+    if "calibration_bad" in storage:
+        bad = storage.values("calibration_bad", axes=2, dtype="|u1").astype(bool)
+        if bad.shape != shape[1:]:
+            raise ValueError(f"its bad pixels have shape {bad.shape}")
+    return planes, bad
+
+
+def read_labels(storage: Storage, applied: AppliedSequence) -> tuple[ImageLabel, ...]:
+    """Return what each image shows; takes and harmonics are those of the sequence.
+
+    Raises
+    ------
+    KeyError, ValueError
+        If they are not.
+    """
+    columns: dict[str, list[Any]] = {
+        name: storage.values(name, axes=1, dtype=dtype).tolist() for name, dtype in _LABELS.items()
     }
-    return Capabilities(**given)
-
-
-def read_labels(file: swmr.File) -> tuple[ImageLabel, ...]:
-    """Return what each image shows."""
-    columns = {name: file[name][()].tolist() for name in _LABELS}
-    columns["index"] = list(range(file["raw"].shape[1]))
+    if any(len(values) != applied.images for values in columns.values()):
+        raise ValueError(f"it has no {applied.images} labels")
+    for name in ("frequency_hz", "phase_rad", "exposure_s"):
+        _finite(name, *columns[name])
+    columns["index"] = list(range(applied.images))
     columns["illumination"] = [bool(lit) for lit in columns["illumination"]]
-    return tuple(
+    labels = tuple(
         ImageLabel(**{name: values[k] for name, values in columns.items()})
         for k in columns["index"]
     )
+    for label, wanted in zip(labels, applied.labels, strict=True):
+        if (label.take, label.harmonic) != (wanted.take, wanted.harmonic):
+            raise ValueError(f"image {label.index} is labelled otherwise than its sequence")
+    return labels
 
 
-def read_document(file: swmr.File, name: str) -> dict[str, Any]:
+def read_series(storage: Storage) -> dict[str, NDArray[Any]]:
+    """Return `SERIES`; one may be longer than another while the file is written.
+
+    Raises
+    ------
+    KeyError, ValueError
+        If one is not there, or is a time that is no number.
+    """
+    found = {name: storage.values(name, axes=1, dtype=kind) for name, (kind, _) in SERIES.items()}
+    for name in ("host_time_s", "device_time_s", "capture_s"):
+        _finite(name, *found[name][~np.isfinite(found[name])])
+    return found
+
+
+def read_document(storage: Storage, name: str) -> dict[str, Any]:
     """Return a JSON document in a scalar dataset; empty where none was written or it is torn."""
+    text = storage.text(name)
     try:
-        document = json.loads(bytes(file[name][()]).rstrip(b"\0") or b"{}")
-    except ValueError:
+        return parsed(text or b"{}")
+    except (ValueError, RecursionError):
         return {}
-    return document if isinstance(document, dict) else {}
+
+
+def read_end(storage: Storage) -> dict[str, Any]:
+    """Return how the recording ended; empty while it has not.
+
+    Raises
+    ------
+    ValueError
+        If it says so in another way than a recorder does.
+    """
+    end = read_document(storage, "end")
+    for name in ("reason", "problem"):
+        if not isinstance(end.get(name), str | None):
+            raise ValueError(f"end.{name} is {end[name]!r}")
+    if "duration_s" in end and type(end["duration_s"]) not in (int, float):
+        raise ValueError(f"end.duration_s is {end['duration_s']!r}")
+    return end
+
+
+def parsed(text: str | bytes) -> dict[str, Any]:
+    """Return a JSON object that can be sent on: without NaN, half characters, or great depth.
+
+    Raises
+    ------
+    ValueError, RecursionError
+        If it is something else.
+    """
+    document = json.loads(text)
+    if not isinstance(document, dict):
+        raise ValueError(f"it has {str(document)[:40]!r} for a JSON object")
+    require_plain(document)
+    return document
+
+
+def require_plain(document: Mapping[str, Any]) -> None:
+    """Refuse a JSON document that cannot be sent on.
+
+    Raises
+    ------
+    ValueError, RecursionError
+        If it has NaN, half a character, or more than `MAX_DEPTH` levels.
+    """
+    json.dumps(document, ensure_ascii=False, allow_nan=False).encode()
+    level: list[Any] = [document]
+    for _ in range(MAX_DEPTH):
+        level = [
+            each
+            for value in level
+            for each in (value.values() if isinstance(value, dict) else value)
+            if isinstance(each, dict | list)
+        ]
+        if not level:
+            return
+    raise ValueError(f"it has more than {MAX_DEPTH} levels")
+
+
+def _finite(name: str, *values: float) -> float:
+    """Return the first value."""
+    for value in values:
+        if not math.isfinite(value):
+            raise ValueError(f"{name} is {value}")
+    return values[0] if values else 0.0

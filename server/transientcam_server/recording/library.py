@@ -3,20 +3,20 @@
 An id from a client never becomes a path: it is looked up among the files that exist.
 """
 
+import logging
 import secrets
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
 from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors.exceptions import Problem, RecordingInUse
 from transientcam_server.recording import layout, recovery
-from transientcam_server.recording.descriptions import Descriptions, of_recorder
+from transientcam_server.recording.descriptions import Descriptions, of_recorder, of_removed
 from transientcam_server.recording.directory import Directory, id_of
 from transientcam_server.recording.layout import Header
 from transientcam_server.recording.problems import (
@@ -29,7 +29,10 @@ from transientcam_server.recording.recorder import Limits, Recorder, Totals
 from transientcam_server.recording.writer import RecordingWriter, annotate
 from transientcam_server.settings import RecordingSettings
 
+_log = logging.getLogger(__name__)
 _STOP_WITHIN_S: Final = 60.0
+_REMOVED: Final = 16
+"""How many recordings whose files were removed are remembered."""
 Notify = Callable[[str, Mapping[str, Any]], None]
 
 
@@ -71,6 +74,7 @@ class Library:
         self._starting = threading.Lock()
         self._active: Recorder | None = None
         self._problems: dict[str, dict[str, Any]] = {}
+        self._removed: dict[str, dict[str, Any]] = {}
         self._descriptions = Descriptions()
         self._counted: tuple[Totals, Recorder | None] = Totals(), None
         self._recovering: frozenset[str] = frozenset()
@@ -84,8 +88,11 @@ class Library:
         directory = self._directory
         if not directory.path.is_dir():
             return
-        parts = recovery.unfinished(directory.path) if directory.is_ours_alone() else []
-        directory.share()
+        try:
+            parts = recovery.unfinished(directory.path)
+        except OSError as error:
+            _log.warning("recordings cannot be recovered: %s", error)
+            return
         if parts:
             self._recovering = frozenset(map(id_of, parts))
             self._recovery = threading.Thread(
@@ -102,7 +109,6 @@ class Library:
             recorder.join()
         if self._recovery is not None:
             self._recovery.join()
-        self._directory.close()
 
     # -- recording -----------------------------------------------------------------------------
 
@@ -186,7 +192,7 @@ class Library:
         """Describe all recordings, the newest first."""
         ids = self._directory.ids()
         self._descriptions.keep(ids)
-        documents = [self._described(each) for each in ids]
+        documents = [self._described(each) for each in ids | self._removed.keys()]
         found = [document for document in documents if document is not None]
         return sorted(found, key=lambda each: (each["started_s"] or 0.0, each["id"]), reverse=True)
 
@@ -252,13 +258,13 @@ class Library:
         if self._recorder_of(recording_id) is not None or recording_id in self._recovering:
             raise unfinished(recording_id)
         document = self.describe(recording_id)
-        path = self._directory.find(recording_id)
-        if path is None:
-            raise unknown(recording_id)
-        try:
-            path.unlink(missing_ok=True)
-        except OSError as error:
-            raise not_stored(path, error) from error
+        if self._removed.pop(recording_id, None) is None:
+            try:
+                self._directory.remove(recording_id)
+            except RecordingInUse:
+                raise unfinished(recording_id) from None
+            except OSError as error:
+                raise not_stored(self.directory, error) from error
         self._problems.pop(recording_id, None)
         self._descriptions.keep(self._directory.ids())
         return document
@@ -266,7 +272,7 @@ class Library:
     # -- inside --------------------------------------------------------------------------------
 
     def _recorder(self, options: RecordingOptions, started_s: float) -> Recorder:
-        moment = datetime.fromtimestamp(started_s, UTC)
+        moment = layout.utc(started_s)
         recording_id = f"{moment:%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
         name = options.name or f"Recording of {moment:%Y-%m-%d %H:%M:%S} UTC"
         header = self._header(recording_id, name, started_s)
@@ -314,6 +320,8 @@ class Library:
         progress, recording_id = recorder.progress, recorder.header.recording_id
         if progress.problem is not None:
             self._problems[recording_id] = {"reason": "failed", "problem": progress.problem}
+            if self._directory.find(recording_id) is None:
+                self._keep_removed(recorder)
         self._counted = self._counted[0].after(progress), recorder
         details = {
             "recording": recording_id,
@@ -323,6 +331,13 @@ class Library:
             "dropped_frames": progress.dropped_frames,
         }
         self._notify("recording-stopped", details)
+
+    def _keep_removed(self, recorder: Recorder) -> None:
+        """Go on listing a recording whose file was removed while it was written."""
+        recording_id = recorder.header.recording_id
+        self._removed[recording_id] = of_removed(recorder)
+        while len(self._removed) > _REMOVED:
+            del self._removed[next(iter(self._removed))]
 
     def _recorder_of(self, recording_id: str) -> Recorder | None:
         """Return the recorder of a recording that has not ended."""
@@ -338,7 +353,7 @@ class Library:
         path = self._directory.find(recording_id)
         document = None if path is None else self._descriptions.of_file(path)
         if document is None:
-            return None
+            return self._removed.get(recording_id)
         if recording_id in self._recovering:
             document["state"] = "recovering"
         if recording_id in self._problems:
@@ -351,7 +366,7 @@ class Library:
 
     def _recover(self, parts: list[Path]) -> None:
         for part in parts:
-            recovery.recover_all(self.directory, parts=[part], stop=self._closing.is_set)
+            recovery.recover_all([part], stop=self._closing.is_set)
             self._recovering -= {id_of(part)}
 
 

@@ -1,6 +1,5 @@
 """The problems of recordings: unknown, unfinished, not stored, or wrongly annotated."""
 
-import json
 import logging
 from collections.abc import Mapping
 from pathlib import Path
@@ -45,13 +44,14 @@ def require_annotations(annotations: Mapping[str, Any]) -> None:
     """
     try:
         size = len(layout.encoded(annotations))
-        json.dumps(annotations, ensure_ascii=False).encode()
+        layout.require_plain(annotations)
     except (ValueError, RecursionError):
         raise Problem(
             kinds.INVALID_REQUEST,
-            "The annotations hold a value that JSON lacks, such as NaN or half a character.",
+            "The annotations hold a value that JSON lacks, such as NaN or half a character, or "
+            f"more than {layout.MAX_DEPTH} levels.",
             field="annotations",
-            limit="JSON",
+            limit=f"JSON of at most {layout.MAX_DEPTH} levels",
         ) from None
     if size > layout.ANNOTATIONS_BYTES:
         raise Problem(

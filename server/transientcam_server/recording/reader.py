@@ -1,6 +1,7 @@
 """Reads recordings, finished or not: every frame as the camera gave it."""
 
 import contextlib
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -9,9 +10,10 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver import DriverError, RawFrame
+from transientcam_driver import RawFrame
 from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
 from transientcam_server.recording import layout, swmr
+from transientcam_server.recording.storage import Storage, read_rows
 
 
 class Recording:
@@ -39,47 +41,44 @@ class Recording:
     def __init__(self, path: Path, *, source: IO[bytes] | None = None) -> None:
         self.path = path
         self._source = source
-        if source is None:
-            with path.open("rb"):
-                pass  # its errors are clearer than h5py's
+        try:
+            if source is not None:
+                size_bytes = source.seek(0, os.SEEK_END)
+            else:
+                with path.open("rb") as stream:  # its errors are clearer than h5py's
+                    size_bytes = os.fstat(stream.fileno()).st_size
+        except OSError:
+            self._close_source()
+            raise
         try:
             # the writer of an unfinished one may still run: only SWMR readers may open it
             unfinished = source is None and path.name.endswith(".part")
-            self._file = swmr.open_file(source or path, "r", libver="latest", swmr=unfinished)
-        except OSError as error:
+            self._file = (
+                swmr.open_unfinished(path) if unfinished else swmr.open_file(source or path, "r")
+            )
+        except Exception as error:
             raise NotARecording(str(path), _reason(error)) from error
         try:
-            self.header = layout.read_header(self._file)
-            self.labels = layout.read_labels(self._file)
-            self._raw = self._file["raw"]
-            self._series = {name: self._file[name][()] for name in layout.SERIES}
-        except (KeyError, TypeError, ValueError, OSError, RuntimeError, DriverError) as error:
+            storage = Storage(self._file, size_bytes)
+            self.header = layout.read_header(storage)
+            self.labels = layout.read_labels(storage, self.header.applied)
+            self._series = layout.read_series(storage)
+            self._raw = storage.dataset("raw", axes=4)
+            self.annotations = layout.read_document(storage, "annotations")
+            """What people wrote about it, as JSON."""
+            self.end = layout.read_end(storage)
+            """How it ended; empty while it has not, or when its writer died."""
+        except Exception as error:  # h5py raises anything of a damaged file
             self.close()
             raise NotARecording(str(path), _reason(error)) from error
         self.frames = min(len(self._raw), *map(len, self._series.values()))
         """How many frames it has."""
-        self._as_written = (
-            self._raw.chunks == (1, *self._raw.shape[1:])
-            and self._raw.compression == "gzip"
-            and self._raw.shuffle
-            and not self._raw.fletcher32
-        )
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
         """Frames, images of a frame, height and width."""
         images, height, width = self._raw.shape[1:]
         return self.frames, images, height, width
-
-    @property
-    def annotations(self) -> dict[str, Any]:
-        """Its annotations, as JSON."""
-        return layout.read_document(self._file, "annotations")
-
-    @property
-    def end(self) -> dict[str, Any]:
-        """How it ended; empty while it has not, or when its writer died."""
-        return layout.read_document(self._file, "end")
 
     def series(self, name: str) -> NDArray[Any]:
         """Return one of `layout.SERIES`, one value a frame."""
@@ -127,8 +126,11 @@ class Recording:
 
     def close(self) -> None:
         """Close the file."""
-        with contextlib.suppress(RuntimeError):  # of a damaged one
+        with contextlib.suppress(Exception):  # of a damaged one
             self._file.close()
+        self._close_source()
+
+    def _close_source(self) -> None:
         if self._source is not None:
             self._source.close()
 
@@ -145,18 +147,16 @@ class Recording:
 
     def _images(self, index: int) -> NDArray[np.uint16]:
         try:
-            if not self._as_written:
-                images: NDArray[np.uint16] = self._raw[index]
-                return images
-            # past HDF5's filters, which take five times as long under a lock of the whole process
-            _, chunk = self._raw.id.read_direct_chunk((index, 0, 0, 0))
-            return swmr.expanded(chunk, self._raw.shape[1:], np.dtype("<u2"))
-        except (OSError, RuntimeError, ValueError) as error:
+            images = read_rows(self._raw, index, index + 1)[0]
+        except Exception as error:  # h5py raises anything of a damaged file
             raise DamagedFrame(str(self.path), index, _reason(error)) from error
+        native: NDArray[np.uint16] = images.astype(np.uint16, copy=False)
+        return native
 
 
 def _reason(error: Exception) -> str:
     """Return the reason in a message of HDF5: ``Unable to ... (the reason, and numbers)``."""
     text = str(error).partition("\n")[0]
-    _, opened, inner = text.partition("(")
-    return (inner.rstrip(")").partition(",")[0] if opened else text) or type(error).__name__
+    if text.startswith(("Unable to", "Can't")):
+        text = text.partition("(")[2].rstrip(")").partition(",")[0]
+    return text or type(error).__name__

@@ -271,6 +271,8 @@ class Recorder:
         self._size_bytes = max(self._size_bytes, self._writer.bytes_written)
         if now_s - self._checked_s >= _CHECK_DISK_S:
             self._checked_s = now_s
+            if not self._writer.is_there:
+                raise FileNotFoundError(2, "its file was removed while it was written")
             self._writer.synchronise(now_s)
             self._report_dropped()
             if self._free_bytes() < self.limits.free_bytes:

@@ -4,55 +4,111 @@ import logging
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Final
 
-from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
-from transientcam_server.recording import layout, swmr
+from transientcam_server.errors.exceptions import DamagedFrame, NotARecording, RecordingInUse
+from transientcam_server.recording import layout, lock, swmr
 from transientcam_server.recording.reader import Recording
-from transientcam_server.recording.writer import synchronise_directory
+from transientcam_server.recording.salvage import rebuild, salvage
+from transientcam_server.recording.seal import sealed_frames
 
 _log = logging.getLogger(__name__)
+SCRATCH_SUFFIX: Final = ".recovering"
 
 
-def recover(part: Path, *, target: Path | None = None) -> Path:
-    """Turn an unfinished recording into a finished one, delete the former, return the path.
+def recover(part: Path) -> Path:
+    """Turn an unfinished recording into a finished one and return its path.
 
     Frames are kept up to the first that is torn; a writer's death tears at most the last, which
-    was not acknowledged.
+    was not acknowledged. Whenever this is interrupted, there is one file to begin with anew.
 
     Raises
     ------
     NotARecording
         If nothing can be read of it; it stays where it is.
+    RecordingInUse
+        If it is being written, or another program recovers it.
     OSError
         If the copy cannot be written; it stays where it is.
     """
-    path = target or part.with_name(part.name.removesuffix(".part"))
+    path = part.with_name(part.name.removesuffix(".part"))
     if path == part:
         raise NotARecording(str(part), "an unfinished recording ends in .part")
-    if path.exists():
-        raise FileExistsError(17, "there is a recording already", str(path))
-    scratch = path.with_name(path.name + ".recovering")
-    try:
-        with Recording(part) as recording:
-            frames = whole_frames(recording)
-        _require_room(part, path.parent)
-        with swmr.open_file(part, "r", libver="latest", swmr=True) as source:
-            swmr.salvage(source, scratch, frames, row_axis=layout.ROW_AXIS)
-        with Recording(scratch) as copy:
-            if copy.frames != frames:
-                raise NotARecording(str(part), "its copy lacks frames")
-        synchronise_directory(path.parent)
-        scratch.rename(path)
-    except RuntimeError as error:  # h5py's of a file damaged beyond this
-        raise NotARecording(str(part), str(error)) from error
-    finally:
-        scratch.unlink(missing_ok=True)
-    part.unlink()
-    synchronise_directory(path.parent)
+    with lock.take(part):
+        if path.exists():
+            _require_nothing_more(part, path)
+            part.unlink()
+        else:
+            copy = _copied(part)
+            with lock.take(copy):
+                # first the place of the original, then the name: never one beside the other
+                copy.replace(part)
+                part.rename(path)
+        swmr.synchronise(path.parent)
     return path
 
 
-def whole_frames(recording: Recording) -> int:
+def recover_all(parts: list[Path], *, stop: Callable[[], bool] = lambda: False) -> list[Path]:
+    """Recover unfinished recordings; one that fails is logged and stays."""
+    recovered = []
+    for part in parts:
+        if stop():
+            break
+        try:
+            recovered.append(recover(part))
+        except (NotARecording, RecordingInUse, OSError) as error:
+            _log.warning("%s could not be recovered: %s", part, error)
+        else:
+            _log.info("recovered %s", recovered[-1])
+    return recovered
+
+
+def unfinished(directory: Path) -> list[Path]:
+    """Return the unfinished recordings of a directory that nobody writes.
+
+    Copies that a recovery left unfinished are deleted where the recording itself is gone.
+    """
+    for scratch in directory.glob("*" + layout.SUFFIX + SCRATCH_SUFFIX):
+        if not scratch.with_name(scratch.name.removesuffix(SCRATCH_SUFFIX) + ".part").exists():
+            scratch.unlink(missing_ok=True)
+    parts = sorted(each for each in directory.glob("*" + layout.PART_SUFFIX) if each.is_file())
+    return [part for part in parts if not lock.is_taken(part)]
+
+
+def _copied(part: Path) -> Path:
+    """Copy what is whole of an unfinished recording; the copy is on the disk."""
+    copy = part.with_name(part.name.removesuffix(".part") + SCRATCH_SUFFIX)
+    try:
+        _require_room(part)
+        sealed = sealed_frames(part)
+        frames = len(sealed) if sealed else _salvaged(part, copy)
+        if sealed:
+            rebuild(part, copy, sealed)
+        with Recording(copy) as made:
+            if made.frames != frames:
+                raise NotARecording(str(part), "its copy lacks frames")
+    except BaseException as error:
+        copy.unlink(missing_ok=True)
+        if isinstance(error, OSError | NotARecording) or not isinstance(error, Exception):
+            raise
+        raise NotARecording(str(part), str(error)) from error  # h5py's, of a damaged one
+    return copy
+
+
+def _salvaged(part: Path, copy: Path) -> int:
+    """Copy a recording that has no frame yet, or is of a version without seals."""
+    try:
+        with Recording(part) as recording:
+            frames = _whole_frames(recording)
+    except NotARecording:  # torn before its first frame was on the disk
+        rebuild(part, copy, [])
+        return 0
+    with swmr.open_unfinished(part) as source:
+        salvage(source, copy, frames, row_axis=layout.ROW_AXIS)
+    return frames
+
+
+def _whole_frames(recording: Recording) -> int:
     """Return how many frames from the first on are as they were written."""
     for index in range(recording.frames):
         try:
@@ -63,29 +119,20 @@ def whole_frames(recording: Recording) -> int:
     return recording.frames
 
 
-def recover_all(
-    directory: Path, *, parts: list[Path] | None = None, stop: Callable[[], bool] = lambda: False
-) -> list[Path]:
-    """Recover every unfinished recording of a directory; one that fails is logged and stays."""
-    recovered = []
-    for part in unfinished(directory) if parts is None else parts:
-        if stop():
-            break
-        try:
-            recovered.append(recover(part))
-        except (NotARecording, OSError) as error:
-            _log.warning("%s could not be recovered: %s", part, error)
-        else:
-            _log.info("recovered %s", recovered[-1])
-    return recovered
+def _require_nothing_more(part: Path, path: Path) -> None:
+    """Raise FileExistsError unless a finished recording has every frame of an unfinished one."""
+    try:
+        with Recording(path) as whole, Recording(part) as rest:
+            frames = _whole_frames(rest)
+            checksums = [each.series("crc32")[:frames].tolist() for each in (whole, rest)]
+            if checksums[0] == checksums[1]:
+                return
+    except NotARecording as error:
+        _log.warning("%s", error)
+    raise FileExistsError(17, "there is a recording already", str(path))
 
 
-def unfinished(directory: Path) -> list[Path]:
-    """Return the unfinished recordings of a directory."""
-    return sorted(each for each in directory.glob("*" + layout.PART_SUFFIX) if each.is_file())
-
-
-def _require_room(part: Path, directory: Path) -> None:
-    needed, free = part.stat().st_size, shutil.disk_usage(directory).free
+def _require_room(part: Path) -> None:
+    needed, free = part.stat().st_size, shutil.disk_usage(part.parent).free
     if needed > free:
         raise OSError(28, f"{needed} bytes are needed to recover it, {free} are free", str(part))

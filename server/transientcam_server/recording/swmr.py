@@ -10,6 +10,8 @@ Blocks are compressed here, by `isal`, and written past HDF5's filters as finish
 are byte-shuffled deflate, which every HDF5 reads with its own two filters.
 """
 
+import ctypes
+import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -24,6 +26,7 @@ File: TypeAlias = Any
 """An open h5py.File."""
 Dataset: TypeAlias = Any
 """An h5py.Dataset."""
+Seal: TypeAlias = Callable[[int, bytes, Mapping[str, object]], bytes]
 open_file: Final[Callable[..., Any]] = h5py.File
 """Opens a file; h5py has no types, so that files and datasets are `Any`."""
 
@@ -31,9 +34,49 @@ LIBVER: Final = ("v110", "v110")
 _SERIES_CHUNK: Final = 1024
 _LEVEL: Final = 1
 _FSYNC_EVERY_S: Final = 1.0
-_SCALE_ATTRIBUTES: Final = frozenset(
-    ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid")
-)
+_READ_ATTEMPTS: Final = 25
+"""Of a block whose checksum does not hold: 34 ms in all."""
+# h5py has no method for it; looked up through the module, which knows where its libhdf5 is
+_set_read_attempts = ctypes.CDLL(h5py.h5p.__file__).H5Pset_metadata_read_attempts
+_set_read_attempts.argtypes = ctypes.c_int64, ctypes.c_uint
+
+
+def open_unfinished(path: Path) -> File:
+    """Open a file that may still be written, to read it.
+
+    The lock on it is the recording's own, see `transientcam_server.recording.lock`; HDF5's would
+    be refused beside it. HDF5 reads a block whose checksum does not hold again, in case it is being
+    written, and waits twice as long each time, from 1 ns on: at its default of 100 attempts
+    a damaged file would never be given up.
+
+    Raises
+    ------
+    OSError
+        If it cannot be opened.
+    """
+    access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
+    access.set_file_locking(False, True)
+    if _set_read_attempts(access.id, _READ_ATTEMPTS) < 0:
+        raise OSError(5, "HDF5 takes no number of attempts", str(path))
+    flags = h5py.h5f.ACC_RDONLY | h5py.h5f.ACC_SWMR_READ
+    return open_file(h5py.h5f.open(os.fsencode(path), flags, access))
+
+
+def open_to_append(path: Path) -> File:
+    """Open a whole file for an `Appender`; the lock is the recording's own."""
+    return open_file(path, "r+", libver=LIBVER, locking=False)
+
+
+def image_of(make: Callable[[File], None]) -> bytes:
+    """Return the bytes of a new file that ``make`` lays out.
+
+    It is made in memory: HDF5 cannot close a file that it failed to write, as on a full disk.
+    """
+    with open_file("new", "w", driver="core", backing_store=False, libver=LIBVER) as file:
+        make(file)
+        file.flush()
+        image: bytes = file.id.get_file_image()
+    return image
 
 
 def compressed(block: NDArray[Any]) -> bytes:
@@ -42,22 +85,27 @@ def compressed(block: NDArray[Any]) -> bytes:
     return isal_zlib.compress(np.ascontiguousarray(bytes_of_values.T), _LEVEL)
 
 
-def expanded(chunk: bytes, shape: Sequence[int], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Return the block of a chunk.
+def expanded(
+    chunk: bytes, shape: Sequence[int], dtype: np.dtype[Any], *, shuffled: bool = True
+) -> NDArray[Any]:
+    """Return the block of a chunk, however much more it would expand to.
 
     Raises
     ------
     ValueError
-        If the chunk is damaged.
+        If the chunk is damaged, or holds another number of bytes.
     """
+    size_bytes = math.prod(shape) * dtype.itemsize
+    inflating = isal_zlib.decompressobj()
     try:
-        data = isal_zlib.decompress(chunk)
+        data = inflating.decompress(chunk, size_bytes + 1)
     except isal_zlib.error as error:  # type: ignore[misc]  # its stub has the class an instance
         raise ValueError(str(error)) from error
-    planes = np.frombuffer(data, np.uint8)
-    if planes.size != int(np.prod(shape)) * dtype.itemsize:
-        raise ValueError(f"{planes.size} bytes in a chunk of shape {tuple(shape)}")
-    values = np.ascontiguousarray(planes.reshape(dtype.itemsize, -1).T)
+    if len(data) != size_bytes or not inflating.eof:
+        raise ValueError(f"it does not expand to the {size_bytes} bytes of {tuple(shape)}")
+    values = np.frombuffer(data, np.uint8)
+    if shuffled:
+        values = np.ascontiguousarray(values.reshape(dtype.itemsize, -1).T)
     return values.view(dtype).reshape(shape)
 
 
@@ -104,9 +152,20 @@ class Appender:
     blocks, series
         Names of the datasets that grow by one each row; ``series`` in the order of writing, the
         one whose length counts the rows last.
+    seal
+        Returns, for a row, a chunk of it and its values of the series, what is written behind the
+        chunk.
     """
 
-    def __init__(self, file: File, blocks: Sequence[str], series: Sequence[str]) -> None:
+    def __init__(
+        self,
+        file: File,
+        blocks: Sequence[str],
+        series: Sequence[str],
+        *,
+        seal: Seal = lambda row, chunk, values: b"",
+    ) -> None:
+        self._seal = seal
         self._file = file
         self._blocks = {name: file[name] for name in blocks}
         self._series = {name: file[name] for name in series}
@@ -129,7 +188,9 @@ class Appender:
         for name, dataset in self._blocks.items():
             block = np.ascontiguousarray(blocks[name], dtype=dataset.dtype)
             dataset.resize(row + 1, 0)
-            dataset.id.write_direct_chunk((row, *(0,) * block.ndim), compressed(block))
+            chunk = compressed(block)
+            sealed = chunk + self._seal(row, chunk, series)
+            dataset.id.write_direct_chunk((row, *(0,) * block.ndim), sealed)
             dataset.flush()
         for name, dataset in self._series.items():
             dataset.resize(row + 1, 0)
@@ -162,62 +223,16 @@ class Appender:
             os.close(self._descriptor)
 
 
-def salvage(source: File, target: Path, rows: int, *, row_axis: str) -> None:
-    """Copy what is consistent of an unfinished file into a new one that any HDF5 reader opens.
+def synchronise(path: Path) -> None:
+    """Bring a file, or the names in a directory, to the disk.
 
-    Chunks are copied as they are. ``row_axis`` is the series whose length counts the rows; every
-    dataset that can grow is cut to ``rows``. Copying whole groups or repairing in place
-    (`h5clear`) were tried and fail on such files: the end of the allocated space that the file
-    states is out of date.
+    Raises
+    ------
+    OSError
+        If that fails.
     """
-    with open_file(target, "w", libver=LIBVER) as copy:
-        copy.attrs.update(source.attrs)
-        growing = [name for name, item in source.items() if item.maxshape[:1] == (None,)]
-        for name, dataset, first in _with_first_names(source):
-            if first != name:  # another name of the same dataset
-                copy[name] = copy[first]
-                continue
-            if name in growing:
-                _copy_rows(dataset, copy, rows)
-            else:
-                copy.create_dataset(name, data=dataset[()], dtype=dataset.dtype)
-            _copy_attributes(dataset, copy[name])
-        _restore_scales(source, copy)
-    if row_axis not in growing:
-        raise ValueError(f"no series {row_axis}")
-
-
-def _with_first_names(source: File) -> list[tuple[str, Dataset, str]]:
-    """Return name and dataset of everything, and the first name of the same dataset."""
-    first: dict[Dataset, str] = {}  # datasets are equal where they are the same in the file
-    return [(name, each, first.setdefault(each, name)) for name, each in source.items()]
-
-
-def _copy_rows(dataset: Dataset, copy: File, rows: int) -> None:
-    if dataset.ndim == 1:
-        create_series(copy, dataset.name, dataset.dtype)
-        copy[dataset.name].resize(rows, 0)
-        copy[dataset.name][:] = dataset[:rows]
-        return
-    blocks = create_blocks(copy, dataset.name, dataset.shape[1:], dataset.dtype)
-    blocks.resize(rows, 0)
-    for row in range(rows):
-        place = (row, *(0,) * (dataset.ndim - 1))
-        mask, chunk = dataset.id.read_direct_chunk(place)
-        blocks.id.write_direct_chunk(place, chunk, filter_mask=mask)
-
-
-def _copy_attributes(dataset: Dataset, copy: Dataset) -> None:
-    for name in dataset.attrs:
-        if name not in _SCALE_ATTRIBUTES:
-            copy.attrs[name] = dataset.attrs[name]
-
-
-def _restore_scales(source: File, copy: File) -> None:
-    for name, dataset in source.items():
-        if dataset.is_scale:
-            copy[name].make_scale(name)
-    for name, dataset in source.items():
-        for axis, dimension in enumerate(dataset.dims):
-            for scale in dimension.values():
-                copy[name].dims[axis].attach_scale(copy[scale.name])
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,14 +1,14 @@
 """Writes one recording: ``<file>.part`` while it grows, ``<file>`` once it is finished."""
 
-import contextlib
 import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from transientcam_driver import RawFrame
-from transientcam_server.recording import layout, swmr
+from transientcam_server.recording import layout, lock, swmr
 from transientcam_server.recording.layout import Header
+from transientcam_server.recording.seal import seal
 
 
 class RecordingWriter:
@@ -32,16 +32,22 @@ class RecordingWriter:
         self.part = path.with_name(path.name + ".part")
         if path.exists():
             raise FileExistsError(17, "there is a recording already", str(path))
-        file = swmr.open_file(self.part, "x", libver=swmr.LIBVER)
+        empty = layout.image(header, annotations or {})
+        self._lock = lock.create(self.part)
         try:
-            layout.create(file, header, annotations or {})
-            self._rows = swmr.Appender(file, ["raw"], list(layout.SERIES))
+            _write(self._lock.descriptor, empty)
+            swmr.synchronise(path.parent)
+            file = swmr.open_to_append(self.part)
+            self._rows = swmr.Appender(file, ["raw"], list(layout.SERIES), seal=seal)
         except BaseException:
-            with contextlib.suppress(RuntimeError, OSError):
-                file.close()
-            self.part.unlink()
+            self.part.unlink(missing_ok=True)
+            self._lock.close()
             raise
-        synchronise_directory(path.parent)
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the file still has its name; it may have been removed meanwhile."""
+        return self._lock.is_of(self.part)
 
     @property
     def frames(self) -> int:
@@ -80,15 +86,16 @@ class RecordingWriter:
         OSError
             If it cannot be finished; ``.part`` stays, and recovery makes a recording of it.
         """
-        try:
-            self._rows.overwrite("end", layout.encoded(end))
-        finally:
+        with self._lock:  # also while it gets its name
             try:
-                self._rows.close()
-            except RuntimeError as error:  # h5py's when closing fails to write
-                raise OSError(str(error)) from error
-        self.part.rename(self.path)
-        synchronise_directory(self.path.parent)
+                self._rows.overwrite("end", layout.encoded(end))
+            finally:
+                try:
+                    self._rows.close()
+                except RuntimeError as error:  # h5py's when closing fails to write
+                    raise OSError(str(error)) from error
+            self.part.rename(self.path)
+            swmr.synchronise(self.path.parent)
 
 
 def annotate(path: Path, annotations: Mapping[str, Any]) -> None:
@@ -120,10 +127,9 @@ def annotate(path: Path, annotations: Mapping[str, Any]) -> None:
         os.close(descriptor)
 
 
-def synchronise_directory(directory: Path) -> None:
-    """Bring the names in a directory to the disk."""
-    descriptor = os.open(directory, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+def _write(descriptor: int, data: bytes) -> None:
+    """Write all of ``data``, to the disk."""
+    left = memoryview(data)
+    while left:
+        left = left[os.write(descriptor, left) :]
+    os.fsync(descriptor)

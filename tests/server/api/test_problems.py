@@ -170,3 +170,15 @@ def test_kinds_with_one_status_share_its_documentation() -> None:
 
     examples = responses[422]["content"]["application/problem+json"]["examples"]
     assert set(examples) == {"invalid-request", "invalid-sequence"}
+
+
+def test_what_is_nested_deeply_is_shown_in_part() -> None:
+    value: object = 1
+    for _ in range(5000):
+        value = {"x": value}
+
+    shown = problem_document(Problem(kinds.INVALID_REQUEST, "x", value=value))["value"]
+
+    text = json.dumps(shown)
+    assert text.startswith('{"x": {"x": ')
+    assert len(text) < 200

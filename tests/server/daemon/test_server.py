@@ -1,5 +1,6 @@
 """The daemon as a process: its address, its signals, its socket."""
 
+import asyncio
 import gc
 import os
 import re
@@ -302,3 +303,17 @@ def test_later_garbage_is_still_collected() -> None:
         Node()
 
     assert gc.collect() >= 10
+
+
+def test_a_clock_beyond_the_year_9999_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    with open_camera("sim:wall?noise=off") as camera:
+        settings = Settings(camera="sim:wall?noise=off")
+        app = build_app(camera, settings)
+        server = Server(app, settings, on_listening=lambda: None)
+        server.config.load()
+        monkeypatch.setattr("uvicorn.server.time.time", lambda: 3e11)
+
+        assert asyncio.run(server.on_tick(0)) is False
+        server.should_exit = True
+        assert asyncio.run(server.on_tick(0)) is True
+        app.state.service._executor.shutdown()

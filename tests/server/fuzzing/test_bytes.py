@@ -4,6 +4,7 @@ import io
 import os
 import subprocess
 import sys
+import tracemalloc
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.conftest import ROOT
-from tests.server.fuzzing.targets import TARGETS
+from tests.server.fuzzing.targets import SMALL_BYTES, TARGETS
 from tests.serving import serving
 from transientcam import wire
 from transientcam_driver import Sequence, capture_calibration, open_camera
+from transientcam_driver.calibration.file import CalibrationCapture
 from transientcam_driver.clock import VirtualClock
+from transientcam_driver.errors import CalibrationError
 
 RUNS = 2000
 REPEATABLE = settings(derandomize=True, deadline=None, database=None, max_examples=60)
@@ -138,6 +141,32 @@ HOSTILE = {
     "a document that is none": archive(document=npy(np.array('{"sequence": 7}'))),
     "names that lead elsewhere": archive(**{"../../etc/passwd": npy(np.zeros(1))}),
 }
+
+
+def lying(name: str, data: bytes, *, stated: int, packing: int) -> bytes:
+    """A zip with one file, whose directory states another size than it unpacks to."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", packing) as packed:
+        packed.writestr(f"{name}.npy", data)
+    archive = stream.getvalue()
+    sizes = len(data).to_bytes(4, "little")
+    return archive.replace(sizes, stated.to_bytes(4, "little"))
+
+
+@pytest.mark.parametrize("packing", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2])
+def test_a_file_that_unpacks_to_more_than_it_states_takes_no_memory(
+    tmp_path: Path, packing: int
+) -> None:
+    path = tmp_path / "upload.npz"
+    path.write_bytes(lying("images", bytes(64 * SMALL_BYTES), stated=1000, packing=packing))
+
+    tracemalloc.start()
+    with pytest.raises(CalibrationError):
+        CalibrationCapture.load(path, max_bytes=SMALL_BYTES)
+    _, peak_bytes = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+
+    assert peak_bytes < SMALL_BYTES
 
 
 def test_uploads_are_taken_or_refused_and_nothing_else_is_disturbed(

@@ -1,17 +1,25 @@
 """What the service keeps of recordings, beside their files."""
 
+import shutil
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.server.recording.made import header, record
+from tests.server.recording.made import APPLIED, frame, header, record
+from tests.server.recording.test_recovery import abandoned
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.recording import Header, layout
 from transientcam_server.recording.descriptions import Descriptions
-from transientcam_server.recording.library import Library
+from transientcam_server.recording.library import Library, RecordingOptions
 from transientcam_server.settings import RecordingSettings
 
 IDS = [f"20261120T08150{number}Z-3f9c2a" for number in range(4)]
+
+
+def new_header(recording_id: str, name: str, started_s: float) -> Header:
+    return header(recording_id=recording_id, name=name, started_s=started_s)
 
 
 @pytest.fixture
@@ -19,9 +27,6 @@ def library(tmp_path: Path) -> Library:
     """One with a few recordings that others have made."""
     for each in IDS:
         record(tmp_path / f"{each}{layout.SUFFIX}", 2, recording_id=each)
-
-    def new_header(recording_id: str, name: str, started_s: float) -> Header:
-        return header(recording_id=recording_id, name=name, started_s=started_s)
 
     return Library(RecordingSettings(directory=tmp_path), header=new_header)
 
@@ -68,3 +73,96 @@ def test_a_file_may_be_described_while_others_are_forgotten(tmp_path: Path) -> N
     descriptions.keep(ids)
 
     assert len(descriptions) == len(IDS) - 1
+
+
+@pytest.fixture
+def two(tmp_path: Path) -> Iterator[tuple[Library, Library]]:
+    """Two services on one directory; the first one records."""
+    settings = RecordingSettings(directory=tmp_path, min_free_bytes=0)
+    first, second = (Library(settings, header=new_header) for _ in range(2))
+    first.open()
+    first.start(RecordingOptions())
+    second.open()
+    yield first, second
+    first.close()
+    second.close()
+
+
+def test_what_another_service_writes_is_neither_deleted_nor_recovered(
+    two: tuple[Library, Library],
+) -> None:
+    first, second = two
+    running = first.active_id
+    assert running is not None
+    first.offer(frame(0), APPLIED)
+
+    assert second.describe(running)["state"] == "recording"
+    with pytest.raises(Problem, match="not finished") as refused:
+        second.delete(running)
+
+    assert refused.value.kind.status == 409
+    first.offer(frame(1), APPLIED)
+    stopped = first.stop(running)
+    assert (stopped["state"], stopped["frames"]) == ("complete", 2)
+    second.delete(running)
+    with pytest.raises(Problem, match="no recording"):
+        first.describe(running)
+
+
+def test_what_a_killed_service_left_is_recovered_while_another_one_records(
+    two: tuple[Library, Library], tmp_path: Path
+) -> None:
+    abandoned(tmp_path / f"{IDS[0]}.h5", 2)
+    third = Library(RecordingSettings(directory=tmp_path), header=new_header)
+    third.open()
+    third.close()
+
+    assert third.describe(IDS[0])["state"] == "complete"
+    assert third.describe(str(two[0].active_id))["state"] == "recording"
+
+
+def test_a_deleted_recording_never_comes_back(library: Library, tmp_path: Path) -> None:
+    abandoned(tmp_path / f"{IDS[0]}.h5", 3)  # as a recovery of an earlier version left it
+    (tmp_path / f"{IDS[0]}.h5.recovering").write_bytes(b"half")
+
+    library.delete(IDS[0])
+    library.open()
+    library.close()
+
+    assert IDS[0] not in [each["id"] for each in library.describe_all()]
+    assert not list(tmp_path.glob(f"{IDS[0]}*"))
+
+
+def test_a_directory_that_was_removed_while_recording_is_said(tmp_path: Path) -> None:
+    ended = threading.Event()
+    directory = tmp_path / "kept"
+    library = Library(
+        RecordingSettings(directory=directory, min_free_bytes=0),
+        header=new_header,
+        notify=lambda kind, details: ended.set() if kind == "recording-stopped" else None,
+    )
+    running = library.start(RecordingOptions())["id"]
+    shutil.rmtree(directory)
+    assert ended.wait(30.0)
+
+    (listed,) = library.describe_all()
+    assert (listed["id"], listed["state"], listed["reason"]) == (running, "damaged", "failed")
+    assert "removed" in listed["problem"]
+    assert library.stop(running) == listed
+    library.delete(running)
+    assert library.describe_all() == []
+    library.close()
+
+
+def test_a_clock_beyond_the_year_9999_can_be_recorded_by(tmp_path: Path) -> None:
+    library = Library(
+        RecordingSettings(directory=tmp_path, min_free_bytes=0),
+        header=new_header,
+        unix_s=lambda: 3e11,
+    )
+
+    running = library.start(RecordingOptions())
+    library.close()
+
+    assert running["started_s"] == 3e11
+    assert library.describe(running["id"])["state"] == "complete"

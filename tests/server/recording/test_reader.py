@@ -1,5 +1,8 @@
 import json
+import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -13,6 +16,7 @@ from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, assert_same, fra
 from transientcam_driver import RawFrame
 from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
 from transientcam_server.recording import Recording, RecordingWriter, swmr
+from transientcam_server.recording import layout as recording_layout
 
 SHAPE = (APPLIED.images, HEIGHT, WIDTH)
 
@@ -132,6 +136,175 @@ def test_a_recording_that_was_repacked_reads_the_same(tmp_path: Path) -> None:
     with Recording(tmp_path / "b.h5") as recording:
         for number in range(3):
             assert_same(recording.frame(number), frame(number))
+
+
+@pytest.mark.parametrize("chunks", [(1, *SHAPE), (2, 3, 5, 7)])
+@pytest.mark.parametrize("shuffle", [False, True])
+def test_a_recording_that_was_compressed_otherwise_reads_the_same(
+    tmp_path: Path, chunks: tuple[int, ...], shuffle: bool
+) -> None:
+    path = record(tmp_path / "a.h5", 3)
+    with h5py.File(path, "r+") as file:
+        values = file["raw"][()]
+        del file["raw"]
+        packed = {"compression": "gzip", "shuffle": shuffle, "chunks": chunks}
+        file.create_dataset("raw", data=values, dtype="<u2", **packed)
+
+    with Recording(path) as recording:
+        for number in range(3):
+            assert_same(recording.frame(number), frame(number))
+
+
+def test_a_chunk_expands_to_its_stated_size_at_most(tmp_path: Path) -> None:
+    path = record(tmp_path / "a.h5", 3)
+    mebibyte = bytes(1024**2)
+    bomb = isal_zlib.compress(256 * mebibyte, 1)
+    with h5py.File(path, "r+") as file:
+        file["raw"].id.write_direct_chunk((1, 0, 0, 0), bomb)
+
+    with Recording(path) as recording:
+        tracemalloc.start()
+        with pytest.raises(DamagedFrame, match="expand"):
+            recording.frame(1)
+        _, peak_bytes = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert_same(recording.frame(2), frame(2))
+    assert peak_bytes < 4 * len(mebibyte)
+
+
+def other_place(file: Any, name: str) -> None:
+    other = Path(file.filename).with_name("other.h5")
+    shape, dtype = file[name].shape, file[name].dtype
+    del file[name]
+    file.create_dataset(name, shape, dtype, external=[(str(other), 0, h5py.h5f.UNLIMITED)])
+
+
+def virtual(file: Any, name: str) -> None:
+    other = Path(file.filename).with_name("other.h5")
+    shape, dtype = file[name].shape, file[name].dtype
+    del file[name]
+    layout = h5py.VirtualLayout(shape, dtype)
+    layout[...] = h5py.VirtualSource(str(other), name, shape)
+    file.create_virtual_dataset(name, layout)
+
+
+def replaced(file: Any, name: str, value: Any) -> None:
+    del file[name]
+    file[name] = value
+
+
+def end(file: Any, document: str) -> None:
+    file["end"][()] = document.encode()
+
+
+def capability(file: Any, **changes: Any) -> None:
+    file.attrs["capabilities"] = json.dumps(json.loads(file.attrs["capabilities"]) | changes)
+
+
+def longer(file: Any, rows: int) -> None:
+    for name in (*recording_layout.SERIES, "raw"):
+        file[name].resize(rows, 0)
+
+
+CRAFTED: dict[str, tuple[Callable[[Any], object], str]] = {
+    "no annotations": (lambda file: file.__delitem__("annotations"), "it has no annotations"),
+    "annotations in a group": (
+        lambda file: (file.__delitem__("annotations"), file.create_group("annotations")),
+        "annotations is no dataset",
+    ),
+    "annotations by a link": (
+        lambda file: replaced(file, "annotations", h5py.ExternalLink("other.h5", "/annotations")),
+        "annotations is a link to elsewhere",
+    ),
+    "annotations by a soft link": (
+        lambda file: replaced(file, "annotations", h5py.SoftLink("/end")),
+        "annotations is a link to elsewhere",
+    ),
+    "images in a group": (
+        lambda file: (file.__delitem__("raw"), file.create_group("raw")),
+        "raw is no dataset",
+    ),
+    "images of three axes": (
+        lambda file: replaced(file, "raw", np.zeros((3, HEIGHT, WIDTH), "<u2")),
+        "raw has 3 axes, not 4",
+    ),
+    "images of floating point": (
+        lambda file: replaced(file, "raw", np.zeros((3, *SHAPE), "<f4")),
+        "raw holds float32, not uint16",
+    ),
+    "images in another file": (lambda file: other_place(file, "raw"), "stored in other files"),
+    "a virtual series": (lambda file: virtual(file, "frame"), "stored in other files"),
+    "images packed otherwise": (
+        lambda file: (
+            file.__delitem__("raw"),
+            file.create_dataset("raw", data=np.zeros((3, *SHAPE), "<u2"), compression="lzf"),
+        ),
+        "raw is packed with filters",
+    ),
+    "a series of 10^12 values": (lambda file: longer(file, 10**12), "states a size of"),
+    "a time that is no number": (
+        lambda file: file["host_time_s"].__setitem__(1, np.nan),
+        "host_time_s is nan",
+    ),
+    "a duration in words": (lambda file: end(file, '{"duration_s":"abc"}'), "end.duration_s"),
+    "a reason in a list": (lambda file: end(file, '{"reason":[1]}'), "end.reason"),
+    "versions in a list": (
+        lambda file: file.attrs.__setitem__("versions", "[1]"),
+        "for a JSON object",
+    ),
+    "capabilities in a list": (
+        lambda file: file.attrs.__setitem__("capabilities", "[1]"),
+        "for a JSON object",
+    ),
+    "a width in words": (lambda file: capability(file, width="wide"), "capabilities have width"),
+    "a sensor of a terabyte": (
+        lambda file: capability(file, width=10**6, height=10**6),
+        "its images have shape",
+    ),
+    "a document of a thousand levels": (
+        lambda file: file.attrs.__setitem__("camera", '{"a":' * 900 + "1" + "}" * 900),
+        "levels|recursion",
+    ),
+    "half a character": (
+        lambda file: file.attrs.__setitem__("camera", '{"a":"\\ud800"}'),
+        "surrogates not allowed",
+    ),
+    "a title that is an array": (
+        lambda file: file.attrs.__setitem__("title", ["a", "b"]),
+        "title is an array",
+    ),
+    "labels of another sequence": (
+        lambda file: file["take"].__setitem__(0, 5),
+        "labelled otherwise",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CRAFTED)
+def test_a_crafted_recording_is_refused_with_the_reason(tmp_path: Path, name: str) -> None:
+    change, reason = CRAFTED[name]
+    path = record(tmp_path / "a.h5", 3)
+    record(tmp_path / "other.h5", 3)
+    with h5py.File(path, "r+") as file:
+        change(file)
+
+    with pytest.raises(NotARecording, match=reason):
+        Recording(path)
+
+
+def test_a_damaged_unfinished_recording_is_given_up_soon(tmp_path: Path) -> None:
+    writer = RecordingWriter(tmp_path / "a.h5", header())
+    writer.append(frame(0))
+    part = tmp_path / "b.h5.part"
+    part.write_bytes(writer.part.read_bytes())
+    writer.close({})
+    with h5py.File(tmp_path / "a.h5") as file:
+        place = h5py.h5o.get_info(file["crc32"].id).addr
+    _flip(part, place + 20)
+
+    # HDF5 by itself would read the block a hundred times, and wait twice as long each time
+    with pytest.raises(NotARecording, match="checksum"):
+        Recording(part)
 
 
 def test_any_hdf5_reader_finds_images_labels_and_documents(tmp_path: Path) -> None:

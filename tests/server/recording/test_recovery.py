@@ -1,10 +1,11 @@
+import contextlib
 import os
 import random
 import resource
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,8 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.server.recording.made import HEIGHT, WIDTH, assert_same, frame, header, record
-from transientcam_server.errors.exceptions import NotARecording
-from transientcam_server.recording import Recording, RecordingWriter, recover
+from transientcam_server.errors.exceptions import NotARecording, RecordingInUse
+from transientcam_server.recording import Recording, RecordingWriter, layout, lock, recover
 from transientcam_server.recording.recovery import recover_all, unfinished
 
 KILLS = 20
@@ -34,6 +35,7 @@ def kill_in_mid_recording(path: Path, *, after_frames: int) -> int:
         acknowledged = 0
         while acknowledged < after_frames:
             acknowledged = int(writer.stdout.readline())
+        assert lock.is_taken(path.with_name(path.name + ".part"))
         writer.kill()  # wherever it is in the frame after
         for line in writer.stdout:
             acknowledged = int(line)
@@ -107,19 +109,95 @@ def test_what_cannot_be_read_stays_and_stops_nothing(tmp_path: Path) -> None:
     (tmp_path / "a.h5.part").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
     abandoned(tmp_path / "b.h5", 2)
 
-    assert recover_all(tmp_path) == [tmp_path / "b.h5"]
+    assert recover_all(unfinished(tmp_path)) == [tmp_path / "b.h5"]
     assert [path.name for path in unfinished(tmp_path)] == ["a.h5.part"]
     with pytest.raises(NotARecording):
         recover(tmp_path / "a.h5.part")
 
 
-def test_recovery_never_replaces_a_recording(tmp_path: Path) -> None:
-    record(tmp_path / "a.h5", 3)
-    part = abandoned(tmp_path / "a.h5", 2)
+def test_recovery_never_replaces_a_recording_that_has_less(tmp_path: Path) -> None:
+    record(tmp_path / "a.h5", 2)
+    part = abandoned(tmp_path / "a.h5", 3)
 
     with pytest.raises(FileExistsError):
         recover(part)
     assert part.exists()
+
+
+def test_an_unfinished_recording_beside_its_whole_one_is_removed(tmp_path: Path) -> None:
+    record(tmp_path / "a.h5", 3)
+    part = abandoned(tmp_path / "a.h5", 3)
+
+    assert recover_all([part]) == [tmp_path / "a.h5"]
+    assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
+
+
+class Killed(BaseException):
+    """Ends a program where it is, as SIGKILL would."""
+
+
+@pytest.mark.parametrize("steps", range(3))
+def test_a_recovery_that_is_killed_between_any_two_steps_leaves_nothing_behind(
+    tmp_path: Path, steps: int
+) -> None:
+    part = abandoned(tmp_path / "a.h5", 3)
+    done: list[str] = []
+
+    def step(change: Callable[..., Any]) -> Callable[..., Any]:
+        def killed(*arguments: Any, **options: Any) -> Any:
+            if len(done) >= steps:
+                raise Killed
+            done.append(change.__name__)
+            return change(*arguments, **options)
+
+        return killed
+
+    with pytest.MonkeyPatch.context() as patch, contextlib.suppress(Killed):
+        for name in ("rename", "replace", "unlink"):
+            patch.setattr(Path, name, step(getattr(Path, name)))
+        recover(part)
+
+    assert done == ["replace", "rename"][:steps]
+    recover_all(unfinished(tmp_path))
+    assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.frames == 3
+
+
+def test_a_copy_that_a_killed_recovery_left_is_removed_with_its_recording_gone(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "a.h5.recovering").write_bytes(b"half")
+
+    assert unfinished(tmp_path) == []
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_being_written_is_not_recovered(tmp_path: Path) -> None:
+    writer = RecordingWriter(tmp_path / "a.h5", header())
+    writer.append(frame(0))
+
+    assert unfinished(tmp_path) == []
+    with pytest.raises(RecordingInUse):
+        recover(writer.part)
+    writer.append(frame(1))
+    writer.close({})
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.frames == 2
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.8, 0.999])
+def test_a_start_that_is_refused_leaves_no_file_and_no_descriptor(
+    tmp_path: Path, share: float
+) -> None:
+    size_bytes = len(layout.image(header(), {}))
+    before = len(list(Path("/proc/self/fd").iterdir()))
+
+    with limited_files(int(share * size_bytes)), pytest.raises(OSError, match="File too large"):
+        RecordingWriter(tmp_path / "a.h5", header())
+
+    assert not list(tmp_path.iterdir())
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
 
 
 def test_recovery_without_room_leaves_everything_as_it_was(tmp_path: Path) -> None:

@@ -118,8 +118,9 @@ class RecordingRequest(Document):
     max_bytes: int | None = Field(default=None, ge=1)
     frames: int | None = Field(default=None, ge=1)
     """Those of the past count, too."""
-    history_s: float | None = Field(default=None, gt=0, le=3600, allow_inf_nan=False)
-    """Begin with the frames of so many seconds before, as far as `GET /frames` has them."""
+    history_s: float | None = Field(default=None, ge=0, le=3600, allow_inf_nan=False)
+    """Begin with the frames of so many seconds before, as far as `GET /frames` has them; 0 is
+    without."""
     annotations: dict[str, Any] = Field(default_factory=dict)
     """Anything worth keeping with it, at most 16 KiB as JSON."""
 

@@ -6,6 +6,8 @@ import secrets
 import time
 from typing import Final
 
+from fastapi.exceptions import ValidationException
+from pydantic import ValidationError
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -24,6 +26,17 @@ _READS: Final = frozenset(("GET", "HEAD", "OPTIONS"))
 def asks_for_head(scope: Scope) -> bool:
     """Whether a request that is answered as GET is HEAD; an endless answer must not start then."""
     return bool(scope.get(_HEAD))
+
+
+def without_bodies(error: Exception) -> Exception:
+    """Return an error without those before it that quote the body of a request."""
+    each: BaseException = error
+    while (before := each.__cause__ or each.__context__) is not None:
+        if isinstance(before, ValidationException | ValidationError):
+            each.__cause__ = each.__context__ = None
+            break
+        each = before
+    return error
 
 
 class RequestLog:
@@ -69,7 +82,8 @@ class RequestLog:
         try:
             await self._app(inner, receive, observed)
         except Exception as error:
-            _log.exception("%s %s failed", scope["method"], scope["path"][:200])
+            place = scope["method"], scope["path"][:200]
+            _log.error("%s %s failed", *place, exc_info=without_bodies(error))
             if status:  # it has begun: only an abort shows the client that it failed
                 raise
             response = problem_response(problem_of(error), instance=scope["path"])

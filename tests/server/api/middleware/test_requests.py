@@ -4,8 +4,11 @@ import httpx
 import pytest
 
 from tests.serving import Served
+from transientcam_server.api import problems
 from transientcam_server.api.middleware.requests import REQUEST_ID_HEADER
 from transientcam_server.api.middleware.security import SECURITY_HEADERS
+
+JSON = {"Content-Type": "application/json"}
 
 
 def test_a_request_keeps_the_id_it_comes_with(http: httpx.Client) -> None:
@@ -87,6 +90,50 @@ def test_a_failure_is_answered_counted_and_logged_with_its_id(
     assert http.get("/livez").status_code == 200
     text = http.get("/metrics").text
     assert 'transientcam_http_requests_total{status="5xx"} 1.0' in text
+
+
+@pytest.mark.parametrize("path", ["lease", "sequence/validate", "plan", "recordings"])
+def test_a_body_of_many_levels_is_refused_and_not_logged(
+    steady: httpx.Client, caplog: pytest.LogCaptureFixture, path: str
+) -> None:
+    caplog.set_level("DEBUG")
+    body = '{"x":' * 500 + "1" + "}" * 500
+
+    answer = steady.post(f"/api/v1/{path}", content=body, headers=JSON)
+
+    assert answer.status_code == 422
+    assert len(answer.content) < 2000
+    assert '"x"' not in caplog.text
+    assert "{'x'" not in caplog.text
+
+
+def test_a_failure_with_a_refused_body_is_logged_without_it(
+    steady: httpx.Client, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(error: object) -> None:
+        raise ZeroDivisionError("in the midst of it")
+
+    monkeypatch.setattr(problems, "_of_validation", fail)
+    with httpx.Client(base_url=steady.base_url) as client:  # it is not documented
+        answer = client.post("/api/v1/lease", content='{"private": 1}', headers=JSON)
+
+    assert answer.status_code == 500
+    (record,) = [each for each in caplog.records if each.exc_info]
+    text = logging.Formatter().format(record)
+    assert "ZeroDivisionError" in text
+    assert "private" not in text
+
+
+@pytest.mark.parametrize(
+    ("path", "methods"),
+    [("calibrations/active", "GET, HEAD, PUT"), ("calibrations/import", "POST")],
+)
+def test_methods_of_a_path_are_those_of_its_documentation(
+    steady: httpx.Client, path: str, methods: str
+) -> None:
+    answer = steady.request("PATCH", f"/api/v1/{path}")
+
+    assert (answer.status_code, answer.headers["allow"]) == (405, methods)
 
 
 def test_changes_are_logged_without_their_query(

@@ -1,0 +1,187 @@
+"""Damaged and forged recordings in a service's directory: what becomes of it.
+
+Run it with ``python -m benchmarks.fuzz_recordings [--cases 100000] [--jobs 2] [--write]``. Cases
+follow from their numbers, so that one can be tried again alone. They run in processes of their
+own: one that crashes or hangs is noted, and the next process goes on after it.
+"""
+
+import argparse
+import collections
+import json
+import os
+import selectors
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from benchmarks.machine import machine
+from tests.server.fuzzing.recordings import BEYOND_BYTES, KINDS, MEMORY_BYTES, in_memory
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "fuzzed-recordings.md"
+BATCH = 500
+HANGS_S = 120.0
+OVER_HTTP_EVERY = 10
+
+
+@dataclass
+class Findings:
+    """What came of many cases.
+
+    Attributes
+    ----------
+    states
+        How often a kind of case was listed as what.
+    wrong
+        Cases by what should not have happened: crashes, hangs, server errors.
+    grown_bytes
+        The most memory that each case took.
+    """
+
+    states: collections.Counter[tuple[str, str]] = field(default_factory=collections.Counter)
+    wrong: dict[str, list[int]] = field(default_factory=dict)
+    grown_bytes: list[int] = field(default_factory=list)
+
+    def take(self, outcome: dict[str, Any]) -> None:
+        """Count a case."""
+        self.states[outcome["kind"], outcome["state"]] += 1
+        self.grown_bytes.append(outcome["grown_bytes"])
+        for each in outcome["wrong"]:
+            self.wrong.setdefault(each, []).append(outcome["number"])
+
+
+def attempt(first: int, last: int) -> Iterator[dict[str, Any]]:
+    """Try some cases, and go on after one that ends the process."""
+    while first < last:
+        number = first
+        with tempfile.TemporaryDirectory(dir=in_memory()) as name:
+            for line in _lines(Path(name), first, last):
+                if "begin" in line:
+                    number = line["begin"]
+                elif "ended" in line:
+                    if line["ended"] != 0:
+                        how = {"kind": KINDS[number % len(KINDS)], "state": "lost"}
+                        wrong = [f"the process ended: {line['ended']}"]
+                        yield how | {"number": number, "wrong": wrong, "grown_bytes": 0}
+                    elif number < last - 1:
+                        raise RuntimeError(f"the process ended after case {number}")
+                else:
+                    yield line
+        first = number + 1
+
+
+def _lines(directory: Path, first: int, last: int) -> Iterator[dict[str, Any]]:
+    """Run a process, and return what it writes, and with what it ended."""
+    command = [sys.executable, "-m", "tests.server.fuzzing.recordings", str(directory / "tried")]
+    environment = os.environ | {"TRANSIENTCAM_KERNELS": "off"}
+    with (
+        subprocess.Popen(
+            [*command, str(first), str(last), str(OVER_HTTP_EVERY)],
+            cwd=ROOT,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        ) as process,
+        selectors.DefaultSelector() as selector,
+    ):
+        assert process.stdout is not None
+        selector.register(process.stdout, selectors.EVENT_READ)
+        rest = b""
+        while True:
+            if not selector.select(HANGS_S):
+                process.kill()
+                yield {"ended": f"no answer for {HANGS_S:g} s"}
+                return
+            data = os.read(process.stdout.fileno(), 65536)
+            if not data:
+                break
+            *lines, rest = (rest + data).split(b"\n")
+            yield from map(json.loads, lines)
+    yield {"ended": process.returncode}
+
+
+def measure(*, cases: int, jobs: int) -> Findings:
+    """Try so many cases, some at the same time."""
+    findings = Findings()
+    batches = [(begin, min(begin + BATCH, cases)) for begin in range(0, cases, BATCH)]
+    with ThreadPoolExecutor(jobs) as threads:
+        for outcomes in threads.map(lambda batch: list(attempt(*batch)), batches):
+            for outcome in outcomes:
+                findings.take(outcome)
+    return findings
+
+
+def report(findings: Findings, *, elapsed_s: float) -> str:
+    """Return the page."""
+    states = ("complete", "interrupted", "damaged")
+    cases = len(findings.grown_bytes)
+    beyond = [each for each in findings.grown_bytes if each > BEYOND_BYTES]
+    page = [
+        "# What damaged and forged recordings do to a service",
+        "",
+        "Written by `python -m benchmarks.fuzz_recordings --write` on",
+        f"{machine()},",
+        f"h5py {h5py.version.version} (HDF5 {h5py.version.hdf5_version}).",
+        "",
+        f"{cases} files were put into the directory of a service, beside a good recording: "
+        f"in {elapsed_s / 60:.0f} min. Each was listed, described, read frame by frame, replayed, "
+        "recovered if unfinished, and deleted; every tenth over HTTP. A file is bytes damaged "
+        "(`flipped`, `cut`, `overwritten`, `resummed`: changed with HDF5's checksum made right), "
+        "or rewritten by h5py with wrong types, shapes, places and values.",
+        "",
+        "| | |",
+        "|---|---:|",
+        f"| processes that crashed or hung, server errors, files that could not be deleted, or a "
+        f"good recording not listed as complete | {sum(map(len, findings.wrong.values()))} |",
+        f"| most memory that one case took | {max(findings.grown_bytes) / 2**20:.0f} MiB |",
+        f"| cases that took more than {BEYOND_BYTES / 2**20:.0f} MiB | {len(beyond)} |",
+        "",
+        f"The processes could take {MEMORY_BYTES / 2**30:.0f} GiB beyond what they began with. The "
+        "length of a text attribute is the one size that cannot be looked at before HDF5 allocates "
+        "it: that is where the most memory went.",
+        "",
+        "| damage | " + " | ".join(states) + " |",
+        "|---|" + "---:|" * len(states),
+        *(
+            f"| `{kind}` | "
+            + " | ".join(str(findings.states[kind, each]) for each in states)
+            + " |"
+            for kind in KINDS
+        ),
+        "",
+        "`complete` and `interrupted` can be opened: the damage hit nothing that is read, or "
+        "a frame, which its checksum tells.",
+        "",
+    ]
+    if findings.wrong:
+        page += ["Wrong:", ""]
+        page += [f"- {what}: cases {numbers[:10]}" for what, numbers in findings.wrong.items()]
+        page.append("")
+    return "\n".join(page)
+
+
+def main() -> None:
+    """Measure, print, and with ``--write`` keep the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=100_000, help="how many files")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="how many at a time")
+    parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
+    arguments = parser.parse_args()
+    begin_s = time.perf_counter()
+    findings = measure(cases=arguments.cases, jobs=arguments.jobs)
+    page = report(findings, elapsed_s=time.perf_counter() - begin_s)
+    print(page)
+    if arguments.write:
+        PAGE.write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,139 @@
+"""Recordings whose writer's power is cut: what a disk may have kept, and what recovery finds.
+
+Run it with ``python -m benchmarks.power_cuts [--cuts 100] [--write]``; it needs strace. What the
+writer did to its file is replayed up to a random moment. Of what was written since the last
+fsync each kind of disk keeps another part.
+"""
+
+import argparse
+import random
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.machine import machine
+from tests.server.fuzzing.recordings import in_memory
+from tests.server.recording.made import frame
+from tests.server.recording.power import DISKS, Event, cut, moments, traced
+from transientcam_server.errors.exceptions import NotARecording
+from transientcam_server.recording import Recording, recover
+
+PAGE = Path(__file__).parents[1] / "docs" / "power-cuts.md"
+FRAMES = 100
+"""Of a recording, which lasts 10 s."""
+WHAT = {
+    "nothing": "none of it",
+    "everything": "all of it, as when the process is killed",
+    "in order, torn": "the first writes, and of the next one the first sectors",
+    "pages in any order": "of each page of 4 KiB any version it had, whatever the others have",
+    "sectors in any order": "the same of each sector of 512 B",
+}
+
+
+@dataclass(frozen=True)
+class Survived:
+    """What was left after a cut.
+
+    Attributes
+    ----------
+    acknowledged, recovered
+        Frames before the cut, and after recovery.
+    lost
+        Acknowledged more than 1 s before, and not there.
+    different
+        Frames that are not as they were written.
+    opened
+        Whether the file can be opened after recovery.
+    """
+
+    acknowledged: int
+    recovered: int
+    lost: int
+    different: int
+    opened: bool
+
+
+def survive(events: list[Event], disk: str, number: int, directory: Path) -> Survived:
+    """Cut the power once, and recover."""
+    draw = random.Random(f"{disk} {number}")
+    found = cut(events, draw.choice(moments(events)), DISKS[disk], draw)
+    part = directory / f"{number}.h5.part"
+    part.write_bytes(found.content)
+    try:
+        with Recording(recover(part)) as recording:
+            different = sum(
+                not np.array_equal(raw.images, frame(index).images)
+                for index, raw in enumerate(recording)
+            )
+            recovered = recording.frames
+        opened = True
+    except NotARecording:
+        recovered, different, opened = 0, 0, False
+    lost = max(0, found.must_be_there - recovered)
+    return Survived(found.acknowledged, recovered, lost, different, opened)
+
+
+def measure(directory: Path, *, cuts: int) -> dict[str, list[Survived]]:
+    """Cut the power so often for each kind of disk."""
+    events = traced(directory / "traced.h5", frames=FRAMES)
+    return {
+        disk: [survive(events, disk, number, directory) for number in range(cuts)] for disk in DISKS
+    }
+
+
+def report(found: dict[str, list[Survived]]) -> str:
+    """Return the page."""
+    page = [
+        "# What a power cut takes of a recording",
+        "",
+        "Written by `python -m benchmarks.power_cuts --write` on",
+        f"{machine()}.",
+        "",
+        f"A recording of {FRAMES} frames at 10 frames/s was traced (strace), and what it wrote "
+        "replayed up to a random moment. What was written before the last fsync is on the disk. "
+        "Of what was written since, each kind of disk keeps another part; then the file is "
+        "recovered, and every frame compared with what was written.",
+        "",
+        "| of what was not brought to the disk, there is | cuts | frames acknowledged | recovered "
+        "| acknowledged > 1 s before and lost | different | files not opened |",
+        "|---|---:|---:|---:|---:|---:|---:|",
+        *(_row(disk, each) for disk, each in found.items()),
+        "",
+        "The model: sectors are written as a whole; an fsync that returned has everything before "
+        "it on the disk; the name of the file and its first bytes are there before the recording "
+        "counts as started (both are brought to the disk). The order of anything between two "
+        "fsyncs is up to the disk, which is more than a journalling file system takes away.",
+        "",
+    ]
+    return "\n".join(page)
+
+
+def _row(disk: str, all_of_it: list[Survived]) -> str:
+    values = (
+        len(all_of_it),
+        sum(each.acknowledged for each in all_of_it),
+        sum(each.recovered for each in all_of_it),
+        sum(each.lost for each in all_of_it),
+        sum(each.different for each in all_of_it),
+        sum(not each.opened for each in all_of_it),
+    )
+    return f"| {WHAT[disk]} | " + " | ".join(map(str, values)) + " |"
+
+
+def main() -> None:
+    """Measure, print, and with ``--write`` keep the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cuts", type=int, default=100, help="for each kind of disk")
+    parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory(dir=in_memory()) as name:  # a disk would be waited for
+        page = report(measure(Path(name), cuts=arguments.cuts))
+    print(page)
+    if arguments.write:
+        PAGE.write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
