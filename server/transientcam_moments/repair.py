@@ -280,13 +280,13 @@ class _Verdict:
             return False
         found = self._disagreement(spoilt)
         if self._before is not None:
-            return found - self._disagreement_of(self._before) > _CONTRADICTING
+            return bool(found - self._disagreement_of(self._before) > _CONTRADICTING)
         if self._zeroth == "estimated":
             return False
         first = int(self._look.earlier[0])
         steps = np.median(self._look.values[first:, self._static], axis=1)
         noise = _NOISE * self._usual / max(float(np.ptp(steps)), 1e-30)
-        return found > _CONTRADICTING + noise
+        return bool(found > _CONTRADICTING + noise)
 
     def _disagreement(self, spoilt: Choice) -> float:
         return self._disagreement_of(self._with_rebuilt(spoilt))

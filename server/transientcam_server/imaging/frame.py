@@ -51,6 +51,8 @@ class Frame:
         The labelled images.
     recipe
         Sequence, settings and gains that its products are computed with.
+    previous
+        The capture before, where its images may be filled in from it.
     past
         Whether it is a former or a recorded one, whose computation delays no new one.
     """
@@ -62,11 +64,13 @@ class Frame:
         raw: RawFrame,
         recipe: Recipe,
         *,
+        previous: RawFrame | None = None,
         truth: Callable[[float | None], Truth] | None = None,
         past: bool = False,
     ) -> None:
         self.number = number
         self.raw = raw
+        self.previous = previous
         self.recipe = recipe
         self.past = past
         self._workers = workers
@@ -88,6 +92,7 @@ class Frame:
             self.number,
             self.raw,
             self.recipe,
+            previous=self.previous,
             truth=self._truth,
             past=True,
         )
@@ -126,6 +131,11 @@ class Frame:
             "temperature_c": self.raw.temperature_c,
             "lost_images": self.raw.lost_images,
             "rejected_images": None if found is None else found.rejected_images,
+            "repaired_images": None if found is None else found.repaired_images,
+            "unrepaired_images": None if found is None else found.unrepaired_images,
+            "filled_images": None
+            if found is None
+            else [self.raw.index_of(take, place) for take, place in found.filled_images],
             "pixels": self._computed.pixels,
             "predicted_range_std_m": self._computed.range_noise,
         }
@@ -167,7 +177,7 @@ class Frame:
             while self._requested:
                 requested, self._requested = self._requested, set()
                 self._computed, elapsed_s = await self._run(
-                    compute, self._computed, self.recipe, self.raw, requested
+                    compute, self._computed, self.recipe, self.raw, self.previous, requested
                 )
                 self._reconstruct_s = (self._reconstruct_s or 0.0) + elapsed_s
                 for stage in requested:
