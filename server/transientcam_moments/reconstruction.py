@@ -255,7 +255,8 @@ class Reconstruction:
     def _eigenvalue_after(self) -> Array:
         """Smallest eigenvalue after biasing, which need not be searched for again."""
         if self.settings.keep == "harmonics":
-            return self.eigenvalue + (self.moments[0].real - self.smoothed[0].real)
+            with np.errstate(invalid="ignore"):  # of pixels that are not finite
+                return self.eigenvalue + (self.moments[0].real - self.smoothed[0].real)
         xp = namespace(self.moments)
         least = self.settings.epsilon * self.moments[0].real
         return xp.where(self._biased[1], least, self.eigenvalue)
