@@ -66,6 +66,12 @@ class FrameMeta(TypedDict):
     """Images lost or corrupt between the frame before and this one."""
     rejected_images: int | None
     """Images left out of the average over takes as outliers; None until it was computed."""
+    repaired_images: int | None
+    """Images that lost their synchronisation, rebuilt from the others; None until computed."""
+    unrepaired_images: int | None
+    """Images of pairs that contradict the others and could not be rebuilt; None until computed."""
+    filled_images: list[int] | None
+    """Which images are those of the frame before, by their index in it; None until computed."""
     pixels: PixelCounts | None
     predicted_range_std_m: PredictedStd | None
     """None until the range of this frame was computed."""

@@ -46,6 +46,7 @@ from transientcam_moments.pisarenko import Returns, Separation, pisarenko, separ
 from transientcam_moments.ranging import SPEED_OF_LIGHT_M_S, range_m
 from transientcam_moments.reconstruction import Reconstruction, Settings
 from transientcam_moments.reconstructor import Reconstructor, reconstruct
+from transientcam_moments.repair import Repair, repair
 from transientcam_moments.smoothing import smooth
 from transientcam_moments.takes import Average, average_takes
 
@@ -62,6 +63,7 @@ __all__ = [
     "Peaks",
     "Reconstruction",
     "Reconstructor",
+    "Repair",
     "Returns",
     "Separation",
     "Settings",
@@ -93,6 +95,7 @@ __all__ = [
     "pisarenko",
     "range_m",
     "reconstruct",
+    "repair",
     "saturated",
     "separate",
     "smallest_eigenvalue",

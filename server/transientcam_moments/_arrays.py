@@ -27,8 +27,11 @@ def namespace(array: Array) -> Any:
 
 
 def as_array(values: Array) -> Array:
-    """Return `values` as it is when it is an array, else as a NumPy array."""
-    return values if hasattr(values, "__array_namespace__") else np.asarray(values)
+    """Return `values` as it is when it is an array, else as a NumPy array; in native byte order."""
+    array = values if hasattr(values, "__array_namespace__") else np.asarray(values)
+    if isinstance(array, np.ndarray) and not array.dtype.isnative:  # as FITS and HDF5 keep them
+        return array.astype(array.dtype.newbyteorder("="))
+    return array
 
 
 def moment_planes(b: Array, *, name: str = "b") -> tuple[Array, tuple[int, ...]]:
@@ -185,6 +188,17 @@ def to_complex(real: Array, imag: Array) -> Array:
     out.real = real
     out.imag = imag
     return out
+
+
+def root_and_inverse(square: Array) -> tuple[Array, Array]:
+    """Return sqrt(square) and its reciprocal where it is positive, else 1 and 1.
+
+    What a branch is not taken for must be finite there, too: the derivative of both branches of
+    `where` is computed, and 0 times infinity is NaN.
+    """
+    xp = namespace(square)
+    root = xp.sqrt(xp.where(square > 0, square, xp.ones_like(square)))
+    return root, 1 / root
 
 
 def some(mask: Array) -> bool:

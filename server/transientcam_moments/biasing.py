@@ -27,6 +27,9 @@ from transientcam_moments.levinson import normalised
 EPSILON = 4e-3
 """The paper's least uniform part, relative to b_0 (Sec. 6)."""
 
+ROUNDING = 4.0
+"""An eigenvalue counts as smaller than epsilon b_0 by more than this many eps a moment, b_0 = 1."""
+
 _TRIALS = 110  # a few finish most pixels; every second one halves the bracket at worst
 
 
@@ -36,7 +39,7 @@ class Biased(NamedTuple):
     Attributes
     ----------
     moments : array, shape (m + 1, ...)
-        With smallest eigenvalue >= epsilon b_0.
+        With smallest eigenvalue >= epsilon b_0, up to rounding.
     biased : boolean array, shape (...)
         Where the moments had to be changed.
     """
@@ -159,7 +162,9 @@ def _bias(b: Array, eigenvalue: Array, epsilon: float, keep: str) -> tuple[Array
     xp = namespace(b)
     b0 = b[0].real
     with np.errstate(all="ignore"):
-        biased = eigenvalue < epsilon * b0
+        # less by rounding is what moments have that were biased, or whose b_0 was estimated
+        rounding = ROUNDING * len(b) * float(np.finfo(b0.dtype).eps)
+        biased = eigenvalue < (epsilon - rounding) * b0
         if keep == "harmonics":
             # b_0 := (b_0 - lambda) / (1 - epsilon) (Sec. 4.3, see `bias`)
             raised = xp.where(biased, (b0 - eigenvalue) / (1 - epsilon), b0)

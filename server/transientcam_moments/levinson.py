@@ -21,6 +21,7 @@ from transientcam_moments._arrays import (
     moment_planes,
     namespace,
     real_type,
+    root_and_inverse,
     some,
     squared,
 )
@@ -255,7 +256,10 @@ def normalised(b: Array) -> tuple[list[Array], Array]:
         lift = lift.astype(scale.dtype)
         planes = [plane * lift for plane in planes]
         near = scale * lift
-    inverse = xp.where(near > 0, 1 / near, near)  # 0 and NaN stay what they are
+    lit = near > 0
+    inverse = xp.where(
+        lit, 1 / xp.where(lit, near, xp.ones_like(near)), near
+    )  # 0 and NaN stay what they are
     return [plane * inverse for plane in planes], scale
 
 
@@ -271,11 +275,13 @@ def _physical(b: list[Array]) -> list[Array]:
     if not some(broken):
         return b
     tiny = 4 * float(np.finfo(b0.dtype).tiny)
-    inverse = xp.where(b0 > tiny, 1 / b0, 0 * b0)
+    lit = b0 > tiny
+    inverse = xp.where(lit, 1 / xp.where(lit, b0, xp.ones_like(b0)), 0 * b0)
     planes = [b0 * inverse]
     for plane in b[1:]:
-        size = xp.sqrt(squared(plane))
-        factor = xp.where(size > 2 * b0, 2 / size, inverse)
+        square = squared(plane)
+        size, reciprocal = root_and_inverse(square)
+        factor = xp.where((square > 0) & (size > 2 * b0), 2 * reciprocal, inverse)
         planes.append(plane * xp.where(planes[0] > 0, factor, 0 * b0))
     return planes
 
@@ -309,13 +315,14 @@ def recursion(b: list[Array], floors: Sequence[float], border: Border) -> Recurs
         inner = b[k]
         for j in range(1, k):
             inner = inner + a[j - 1] * b[k - j]
-        g = inner * (-1 / error)
+        divisor = xp.where(alive, error, xp.ones_like(error)) if some(~alive) else error
+        g = inner * (-1 / divisor)
         remaining = error * below_one(g)  # E_k = E_{k-1} (1 - |g_k|^2)
         ends = alive & ~(remaining > floor)
         if some(ends | ~alive):
-            size = xp.sqrt(squared(g))
-            unit = xp.where(size > 0, g * (1 / size).astype(error.dtype), xp.ones_like(g))
-            at_border = border(unit, error)
+            square = squared(g)
+            unit = xp.where(square > 0, g * root_and_inverse(square)[1], xp.ones_like(g))
+            at_border = border(unit, divisor)
             # NaN belongs to an invalid pixel, which keeps it; what comes after the border is zero
             g = xp.where(alive, xp.where(ends, at_border[0], g), 0 * b[k])
             remaining = xp.where(alive, xp.where(ends, at_border[1], remaining), error)
@@ -332,7 +339,8 @@ def into_disc(floor: float) -> Border:
     """Project g_k into the unit disc so that E_k is ``floor``: the density stays positive."""
 
     def border(unit: Array, error: Array) -> tuple[Array, Array]:
-        g = unit * namespace(unit).sqrt(namespace(unit).maximum(1 - floor / error, 0))
+        rest = 1 - floor / error
+        g = unit * namespace(unit).where(rest > 0, root_and_inverse(rest)[0], 0 * rest)
         return g, error * below_one(g)  # E_k that belongs to the rounded g_k
 
     return border

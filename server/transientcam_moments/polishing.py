@@ -1,7 +1,8 @@
-"""Newton's method on returns that don't reproduce their moments to the last digits.
+"""Returns that don't reproduce their moments to the last digits: their weights, then Newton steps.
 
 Returns that nearly coincide amplify rounding: their nodes are known to eps over their distance, and
-their weights to that over the distance again. The moments as a function of phases, weights and
+their weights to that over the distance again. Moments are linear in the weights: least squares
+finds those that belong to the nodes as they are. The moments as a function of phases, weights and
 uniform part are smooth, so that one or two Newton steps bring what is missing. Few pixels need it.
 """
 
@@ -48,6 +49,16 @@ def polish(
     phase, weight, uniform = phase.copy(), weight.copy(), uniform.copy()
     left = residual(b, phase, weight, uniform)
     error = size(left, b)
+    at = np.flatnonzero(error > tolerance)
+    if at.size:
+        changed = weight[:, at] + _weights(left[:, at], phase[:, at], weight[:, at])
+        left_now = residual(b[:, at], phase[:, at], changed, uniform[at])
+        error_now = size(left_now, b[:, at])
+        better = (error_now < error[at]) & ((changed > 0) | (weight[:, at] <= 0)).all(axis=0)
+        to = at[better]
+        weight[:, to], left[:, to], error[to] = (
+            part[..., better] for part in (changed, left_now, error_now)
+        )
     share = np.ones_like(uniform)
     for _ in range(_STEPS):
         at = np.flatnonzero((error > tolerance) & (share > _LEAST_SHARE))
@@ -78,6 +89,33 @@ def _tried(
     )
 
 
+def _weights(left: Array, phase: Array, weight: Array) -> Array:
+    """Return the changes of weights (m, P) that leave least of the residual, by least squares."""
+    used = weight > 0
+    wave = _waves(phase, used)
+    system = np.concatenate([wave.real, wave[1:].imag]).transpose(2, 0, 1)
+    right = np.concatenate([left.real, left[1:].imag]).T[..., None]
+    return np.where(used, _solved(system, right, ~used.T), 0)
+
+
+def _waves(phase: Array, used: Array) -> Array:
+    """Return exp(i j phi_k), shape (m + 1, m, P); 0 for unused returns."""
+    j = np.arange(len(phase) + 1)[:, None, None]
+    return np.where(used, np.exp(1j * j * np.where(used, phase, 0)), 0)
+
+
+def _solved(system: Array, right: Array, unused: Array) -> Array:
+    """Solve systems (P, rows, n) by least squares; some of the unknowns (P, n) are unused."""
+    count = system.shape[2]
+    q, r = np.linalg.qr(system)
+    with np.errstate(all="ignore"):
+        r = r + unused[:, :, None] * np.eye(count)
+        flat = np.abs(r.diagonal(axis1=1, axis2=2)).min(axis=1) == 0
+        r[flat] = np.eye(count)  # nothing can be solved here; the result will not be kept
+        solution: Array = np.linalg.solve(r, q.transpose(0, 2, 1) @ right)[..., 0].T
+    return solution
+
+
 def _step(left: Array, phase: Array, weight: Array) -> tuple[Array, Array, Array]:
     """Solve the linearised system for the changes of phase, weight and uniform part.
 
@@ -87,17 +125,13 @@ def _step(left: Array, phase: Array, weight: Array) -> tuple[Array, Array, Array
     m, pixels = weight.shape
     used = weight > 0
     j = np.arange(m + 1)[:, None, None]
-    wave = np.where(used, np.exp(1j * j * np.where(used, phase, 0)), 0)
+    wave = _waves(phase, used)
     columns = np.concatenate([wave, 1j * j * wave, np.zeros((m + 1, 1, pixels))], axis=1)
     columns[0, -1] = 1
     system = np.concatenate([columns.real, columns[1:].imag]).transpose(2, 0, 1)
     right = np.concatenate([left.real, left[1:].imag]).T[..., None]
-    q, r = np.linalg.qr(system)
     unused = np.concatenate([~used, ~used, np.zeros((1, pixels), bool)]).T
     with np.errstate(all="ignore"):
-        r = r + unused[:, :, None] * np.eye(2 * m + 1)
-        flat = np.abs(r.diagonal(axis1=1, axis2=2)).min(axis=1) == 0
-        r[flat] = np.eye(2 * m + 1)  # nothing can be solved here; the step will not be kept
-        change = np.linalg.solve(r, q.transpose(0, 2, 1) @ right)[..., 0].T
+        change = _solved(system, right, unused)
         turn = np.where(used, change[m : 2 * m] / np.where(used, weight, 1), 0)
     return turn, change[:m], change[2 * m]

@@ -25,7 +25,11 @@ from transientcam_moments.pisarenko import (
     separate,
 )
 from transientcam_moments.ranging import range_m
+from transientcam_moments.repair import Repair
 from transientcam_moments.smoothing import SIGMA_PX, smooth
+
+SPOILT_IMAGES = ("keep", "repair", "fill")
+"""What becomes of images that lost their synchronisation; see `Settings`."""
 
 _OWN = ("pisarenko", "maximum-entropy", "single-frequency")
 ESTIMATORS = (
@@ -68,6 +72,10 @@ class Settings:
         Pixels with b_0 at or below it have no signal, in the unit of the moments.
     full_scale : float
         Largest value of a raw image; pixels that reach it are saturated.
+    spoilt_images : {"repair", "fill", "keep"}
+        What becomes of raw images that lost their synchronisation (Sec. 6): rebuilt where sums of
+        opposite images find them (`repair`), and where those don't tell also filled in from the
+        frame before, or kept as they are.
     """
 
     base_frequency_hz: float | None = None
@@ -80,6 +88,7 @@ class Settings:
     estimator: str = "pisarenko"
     minimum_brightness: float = 0.0
     full_scale: float = 4095.0
+    spoilt_images: str = "repair"
 
     def __post_init__(self) -> None:
         """Refuse what no stage could work with (ParameterError)."""
@@ -94,6 +103,7 @@ class Settings:
         in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
         in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
         chosen("estimator", self.estimator, ESTIMATORS)
+        chosen("spoilt_images", self.spoilt_images, SPOILT_IMAGES)
 
     @property
     def least_harmonics(self) -> int:
@@ -125,6 +135,8 @@ class Reconstruction:
         Pixels to be flagged as replaced.
     kept : boolean array, shape (takes, N), optional
         Which images went into the moments; all, when left out.
+    repaired : Repair, optional
+        What was done to the images before.
     """
 
     def __init__(
@@ -135,12 +147,14 @@ class Reconstruction:
         *,
         bad_pixels: Array | None = None,
         kept: Array | None = None,
+        repaired: Repair | None = None,
     ) -> None:
         self.settings = settings
         self._measured = moments
         self._saturated = saturated_pixels
         self._bad = bad_pixels
         self._kept = kept
+        self._repaired = repaired
 
     @cached_property
     def measured(self) -> Array:
@@ -151,6 +165,23 @@ class Reconstruction:
     def rejected_images(self) -> int:
         """How many images were left out of the average over takes, as outliers."""
         return 0 if self._kept is None else int((~self._kept).sum())
+
+    @property
+    def repaired_images(self) -> int:
+        """How many images that lost their synchronisation were rebuilt from the others."""
+        return 0 if self._repaired is None else int(self._repaired.repaired.sum())
+
+    @property
+    def unrepaired_images(self) -> int:
+        """How many images are of pairs that contradict the others and could not be repaired."""
+        return 0 if self._repaired is None else int(self._repaired.unrepaired.sum())
+
+    @property
+    def filled_images(self) -> tuple[tuple[int, int], ...]:
+        """Take and place in it of the images that are those of the frame before."""
+        if self._repaired is None:
+            return ()
+        return tuple((int(t), int(i)) for t, i in np.argwhere(self._repaired.filled))
 
     @cached_property
     def smoothed(self) -> Array:
@@ -243,7 +274,8 @@ class Reconstruction:
     def _eigenvalue_after(self) -> Array:
         """Smallest eigenvalue after biasing, which need not be searched for again."""
         if self.settings.keep == "harmonics":
-            return self.eigenvalue + (self.moments[0].real - self.smoothed[0].real)
+            with np.errstate(invalid="ignore"):  # of pixels that are not finite
+                return self.eigenvalue + (self.moments[0].real - self.smoothed[0].real)
         xp = namespace(self.moments)
         least = self.settings.epsilon * self.moments[0].real
         return xp.where(self._biased[1], least, self.eigenvalue)
@@ -366,6 +398,8 @@ class PassedReconstruction(Reconstruction):
         Returns the calibrated moments that are not smoothed; called when they are first read.
     kept : boolean array, shape (takes, N), optional
         Which images went into the moments; all, when left out.
+    repaired : Repair, optional
+        What was done to the images before.
     """
 
     def __init__(
@@ -374,8 +408,9 @@ class PassedReconstruction(Reconstruction):
         settings: Settings,
         measure: Callable[[], Array],
         kept: Array | None = None,
+        repaired: Repair | None = None,
     ) -> None:
-        super().__init__(None, settings, kept=kept)
+        super().__init__(None, settings, kept=kept, repaired=repaired)
         self._measure = measure
         self.smoothed = planes.smoothed
         self.validity = planes.validity

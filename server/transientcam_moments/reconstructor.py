@@ -19,6 +19,7 @@ from transientcam_moments.four_bucket import harmonics_of, measure, saturated, t
 from transientcam_moments.labels import Labels
 from transientcam_moments.ranging import range_m
 from transientcam_moments.reconstruction import PassedReconstruction, Reconstruction, Settings
+from transientcam_moments.repair import Repair, repair
 from transientcam_moments.smoothing import gaussian_taps, smooth
 from transientcam_moments.takes import average_takes
 
@@ -61,6 +62,7 @@ class Reconstructor:
         data: Array | Sequence[Array],
         *,
         saturated_pixels: Array | None = None,
+        previous: Array | None = None,
         spread: Spread = at_once,
     ) -> Reconstruction:
         """Reconstruct one frame.
@@ -72,6 +74,8 @@ class Reconstructor:
             (m + 1, ...). They must stay as they are if ``measured`` is to be read later.
         saturated_pixels : boolean array, shape (...), optional
             Pixels to be flagged; found in images by themselves.
+        previous : array, optional
+            Images of the frame before, like `data`, for ``spoilt_images="fill"``.
         spread : callable
             How the compiled pass uses several threads, as `kernels.over` returns it.
 
@@ -95,17 +99,22 @@ class Reconstructor:
             return self._of_moments(self._calibrated(moments), saturated_pixels, None, spread)
         zeroth, count = self._require_labels()
         takes = takes_first(data, count)
+        repaired = self._repaired(takes, previous)
+        if repaired is not None:
+            takes = repaired.images
         one_pass = self._pass_of_images(takes, zeroth)
         if one_pass is not None:
             planes = one_pass.images(takes[0], saturated_pixels, spread)
-            return PassedReconstruction(planes, self.settings, lambda: self._measured(takes)[0])
-        moments, kept = self._measured(takes)
+            return PassedReconstruction(
+                planes, self.settings, lambda: self._measured(takes)[0], repaired=repaired
+            )
+        moments, kept = self._measured(takes, None if repaired is None else repaired.left_out)
         if saturated_pixels is None:
             stack = takes.reshape((-1, *moments.shape[1:]))
             saturated_pixels = saturated(stack, full_scale=self.settings.full_scale)
             if self._bad is not None:  # their own values are not used
                 saturated_pixels = saturated_pixels & ~self._bad
-        return self._of_moments(moments, saturated_pixels, kept, spread)
+        return self._of_moments(moments, saturated_pixels, kept, spread, repaired)
 
     def _require_labels(self) -> tuple[str, int]:
         """Return how b_0 was measured and the number of takes, where raw images can be read."""
@@ -116,23 +125,52 @@ class Reconstructor:
         return settings.zeroth, settings.takes
 
     def _of_moments(
-        self, moments: Array, saturated_pixels: Array | None, kept: Array | None, spread: Spread
+        self,
+        moments: Array,
+        saturated_pixels: Array | None,
+        kept: Array | None,
+        spread: Spread,
+        repaired: Repair | None = None,
     ) -> Reconstruction:
         """Go on from calibrated moments."""
         one_pass = self._pass_of_moments(moments)
         if one_pass is None:
             return Reconstruction(
-                moments, self.settings, saturated_pixels, bad_pixels=self._bad, kept=kept
+                moments,
+                self.settings,
+                saturated_pixels,
+                bad_pixels=self._bad,
+                kept=kept,
+                repaired=repaired,
             )
         smoothed = moments
         if moments.ndim == 3:
             smoothed = smooth(moments, self.settings.smoothing_sigma_px)
         planes = one_pass.moments(smoothed, saturated_pixels, spread)
-        return PassedReconstruction(planes, self.settings, lambda: moments, kept)
+        return PassedReconstruction(planes, self.settings, lambda: moments, kept, repaired)
 
-    def _measured(self, takes: Array) -> tuple[Array, Array]:
+    def _repaired(self, takes: Array, previous: Array | None) -> Repair | None:
+        """Return the images after repair; None for other arrays than NumPy's, or by the settings.
+
+        What to do depends on the values, which are not known yet where JAX traces a function.
+        """
+        if self.settings.spoilt_images == "keep" or not isinstance(takes, np.ndarray):
+            return None
+        zeroth, count = self._require_labels()
+        before = None
+        if previous is not None and self.settings.spoilt_images == "fill":
+            before = np.asarray(takes_first(previous, count))
+        return repair(
+            takes,
+            zeroth=zeroth,
+            calibration=self._calibration,
+            full_scale=self.settings.full_scale,
+            previous=before,
+        )
+
+    def _measured(self, takes: Array, left_out: Array | None = None) -> tuple[Array, Array]:
         """Return calibrated moments of raw images, and which images went into them."""
-        average, kept = average_takes(takes)
+        average, kept = average_takes(takes, left_out=left_out)
         if self._bad is not None:
             average = fill_bad_pixels(average, self._bad)
         zeroth, _ = self._require_labels()
@@ -253,6 +291,8 @@ def reconstruct(
         Pixels to be flagged; found in images by themselves.
     bad_pixels : boolean array, shape (H, W), optional
         Pixels that show the mean of their neighbours instead, and are flagged.
+    previous : array, optional
+        Images of the frame before, like `data`, for ``spoilt_images="fill"``.
     threads : int, optional
         How many the compiled pass uses; all cores, when left out.
 
@@ -274,13 +314,15 @@ def reconstruct(
         labels = Labels(harmonic, phase_rad, frequency_hz, illumination, take)
         chosen = labels.settings(chosen)
         data = labels.in_order(data) if raw else data
+        previous = None if previous is None else labels.in_order(previous)
     elif raw:
         _require_stated(chosen, given, calibration)
     if raw and (chosen.base_frequency_hz is None or calibration is None):
         needed = {"frequency_hz": chosen.base_frequency_hz, "calibration": calibration}
         raise UnlabelledImages(tuple(name for name, value in needed.items() if value is None))
     reconstructor = Reconstructor(chosen, calibration=calibration, bad_pixels=bad_pixels)
-    return reconstructor(data, saturated_pixels=saturated_pixels, spread=on_threads(threads))
+    spread = on_threads(threads)
+    return reconstructor(data, saturated_pixels=saturated_pixels, previous=previous, spread=spread)
 
 
 def _require_stated(

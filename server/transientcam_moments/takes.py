@@ -25,7 +25,9 @@ class Average(NamedTuple):
     kept: Array
 
 
-def average_takes(images: Array, *, outlier_factor: float = 3.0) -> Average:
+def average_takes(
+    images: Array, *, outlier_factor: float = 3.0, left_out: Array | None = None
+) -> Average:
     """Average takes, discarding whole images that differ from the others of their configuration.
 
     Parameters
@@ -36,6 +38,8 @@ def average_takes(images: Array, *, outlier_factor: float = 3.0) -> Average:
         An image is an outlier when its mean absolute difference from the median over the takes is
         more than this many times the median of that figure over the takes, > 1. With fewer than
         three takes the wrong one cannot be identified, and all are kept.
+    left_out : boolean array, shape (takes, N), optional
+        Images known to be wrong, which are left out as well; never all takes of an image.
 
     Returns
     -------
@@ -69,6 +73,8 @@ def average_takes(images: Array, *, outlier_factor: float = 3.0) -> Average:
         # equal takes differ by nothing; rounding is not an outlier
         slack = 4 * float(np.finfo(real.dtype).eps) * _level(real)
         kept = difference <= outlier_factor * typical + slack
+    if left_out is not None:
+        kept = xp.where((kept & ~left_out).any(axis=0), kept & ~left_out, ~left_out)
     weight = kept.astype(real.dtype)
     weight = (weight / weight.sum(axis=0)).reshape(kept.shape + (1,) * (real.ndim - 2))
     masked = xp.where(weight > 0, real, 0)

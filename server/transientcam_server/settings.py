@@ -28,6 +28,7 @@ else:
     Estimator = Literal[
         tuple(name for name in ESTIMATORS if tm.comparisons.TECHNIQUES[name].planar)
     ]
+SpoiltImages = Literal["keep", "repair", "fill"]
 
 
 class SequenceSettings(_Group):
@@ -62,6 +63,9 @@ class ReconstructionSettings(_Group):
     """What the range is taken from; all but the first two are there for comparison."""
     minimum_brightness_dn: _Finite = Field(default=0.0, ge=0.0)
     """Pixels with no more light than this have no range."""
+    spoilt_images: SpoiltImages = "repair"
+    """Images that lost their synchronisation: rebuilt from the frame's other images, and (`fill`)
+    taken from the frame before where that is impossible; or kept."""
 
     @property
     def least_harmonics(self) -> int:
@@ -76,6 +80,7 @@ class ReconstructionSettings(_Group):
             threshold=self.return_threshold,
             estimator=self.estimator,
             minimum_brightness=self.minimum_brightness_dn,
+            spoilt_images=self.spoilt_images,
             **others,
         )
 

@@ -1,5 +1,6 @@
 """Assemble the images of one transient image, and count what is missing."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,6 +56,11 @@ class RawFrame:
         if takes > 1 and self.labels[1].take == 1:  # interleaved
             return self.images.reshape(each, takes, *shape).swapaxes(0, 1)
         return self.images.reshape(takes, each, *shape)
+
+    def index_of(self, take: int, place: int) -> int:
+        """Return the index in ``images`` of an image of a take, as `by_take` counts them."""
+        own = (each.index for each in self.labels if each.take == take)
+        return next(itertools.islice(own, place, None))
 
 
 @dataclass(slots=True)

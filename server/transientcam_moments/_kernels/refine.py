@@ -6,6 +6,7 @@ import numpy as np
 
 from transientcam_moments._arrays import in_turn
 from transientcam_moments._kernels.registry import LEAST_PIXELS, REGISTRY, Key
+from transientcam_moments.polishing import polish
 
 
 def redo(planes: Any, found: tuple[Any, ...], ill: Any, noise: float) -> None:
@@ -25,10 +26,10 @@ def redo(planes: Any, found: tuple[Any, ...], ill: Any, noise: float) -> None:
     from transientcam_moments.pisarenko import _improved, _pisarenko
 
     part = planes[:, ill]
-    wide = REGISTRY.compiled.get(Key("pisarenko", len(planes) - 1, "d"))
-    if part.dtype == np.complex64 and wide is not None:
+    lane = REGISTRY.compiled.get(Key("pisarenko", len(planes) - 1, "d"))
+    if part.dtype == np.complex64 and lane is not None:
         enough = np.resize(np.arange(ill.size), max(ill.size, LEAST_PIXELS))
-        better = wide(part[:, enough].astype(np.complex128), noise=noise)
+        better = lane(part[:, enough].astype(np.complex128), noise=noise)
         better = tuple(plane[..., : ill.size] for plane in better)
     elif part.dtype == np.complex64:
         better = _improved(part, tuple(plane[..., ill] for plane in found))
@@ -37,6 +38,11 @@ def redo(planes: Any, found: tuple[Any, ...], ill: Any, noise: float) -> None:
         if noise == np.finfo(np.float64).eps:
             better = _improved(part, better)
     phase, weight, uniform, _ = better
+    if noise > np.finfo(np.float64).eps:
+        wide = part.astype(np.complex128)
+        found64 = (each.astype(np.float64) for each in (phase, weight, uniform))
+        with np.errstate(all="ignore"):
+            phase, weight, uniform = polish(wide, *found64, tolerance=4 * len(planes) * noise)
     weight = weight.astype(found[1].dtype)
     # what is less than the least number of that precision isn't a return
     phase = in_turn(np.where(weight > 0, phase, np.nan).astype(found[0].dtype))

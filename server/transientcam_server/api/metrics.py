@@ -59,6 +59,7 @@ class Metrics:
         self._last: Captured | None = None
         # every series from the start, so that its rate can be queried
         self.pixels: Mapping[str, int] = {"total": 1} | dict.fromkeys(_FLAGS, 0)
+        self.spoilt = dict.fromkeys(("rejected", "repaired", "filled", "unrepaired"), 0)
         self.losses = 0
         self.reconnects = 0
         self.registry.register(_ServiceCollector(service, self))
@@ -90,6 +91,9 @@ class Metrics:
         if meta["reconstruct_s"] is not None:
             self._reconstruction.observe(meta["reconstruct_s"])
         self.pixels = meta["pixels"] or self.pixels
+        for result in self.spoilt:
+            images = meta[f"{result}_images"] or 0
+            self.spoilt[result] += len(images) if isinstance(images, list) else images
 
     def answered(self, status: int) -> None:
         """Count an answer."""
@@ -165,6 +169,14 @@ class _ServiceCollector(Collector):
         ):
             images.add_metric((result,), count)
         yield images
+        spoilt = CounterMetricFamily(
+            "transientcam_spoilt_images",
+            "Images unlike the others, of frames that were computed, by what became of them.",
+            labels=("result",),
+        )
+        for result, count in self._metrics.spoilt.items():
+            spoilt.add_metric((result,), count)
+        yield spoilt
         yield CounterMetricFamily(
             "transientcam_usb_resynchronisations",
             "How often the beginning of an image had to be searched for.",

@@ -56,6 +56,8 @@ class Frame:
         The labelled images.
     recipe
         Sequence, settings and gains that its products are computed with.
+    previous
+        The capture before, where its images may be filled in from it.
     past
         Whether it is a former or a recorded one, whose computation delays no new one.
     """
@@ -67,11 +69,13 @@ class Frame:
         raw: RawFrame,
         recipe: Recipe,
         *,
+        previous: RawFrame | None = None,
         truth: Callable[[float | None], Truth] | None = None,
         past: bool = False,
     ) -> None:
         self.number = number
         self.raw = raw
+        self.previous = previous
         self.recipe = recipe
         self.past = past
         self._workers = workers
@@ -93,6 +97,7 @@ class Frame:
             self.number,
             self.raw,
             self.recipe,
+            previous=self.previous,
             truth=self._truth,
             past=True,
         )
@@ -149,7 +154,7 @@ class Frame:
             while self._requested:
                 requested, self._requested = self._requested, set()
                 self._computed, elapsed_s = await self._run(
-                    compute, self._computed, self.recipe, self.raw, requested
+                    compute, self._computed, self.recipe, self.raw, self.previous, requested
                 )
                 self._reconstruct_s = (self._reconstruct_s or 0.0) + elapsed_s
                 for stage in requested:

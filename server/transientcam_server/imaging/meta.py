@@ -33,6 +33,11 @@ def frame_meta(
         "temperature_c": raw.temperature_c,
         "lost_images": raw.lost_images,
         "rejected_images": None if found is None else found.rejected_images,
+        "repaired_images": None if found is None else found.repaired_images,
+        "unrepaired_images": None if found is None else found.unrepaired_images,
+        "filled_images": None
+        if found is None
+        else [raw.index_of(take, place) for take, place in found.filled_images],
         "pixels": computed.pixels,
         "predicted_range_std_m": computed.range_noise,
     }

@@ -75,6 +75,7 @@ class Pipeline:
         self._full_scale = 2.0**camera.capabilities.bits - 1.0
         self._truth = _truth_of(camera.simulation)
         self._frames = 0
+        self._last: RawFrame | None = None
         self._recipe: Recipe | None = None
         self.products: dict[str, Product] = {
             name: product for name, product in PRODUCTS.items() if self._has(product)
@@ -99,13 +100,26 @@ class Pipeline:
         )
         if self._recipe is None or recipe != self._recipe:
             self._recipe = recipe  # else the same one: it holds what was prepared for it
-        return self.recorded_frame(self._frames, raw, self._recipe)
+        previous, self._last = self._last, raw
+        return self.recorded_frame(self._frames, raw, self._recipe, previous=previous)
 
     def recorded_frame(
-        self, number: int, raw: RawFrame, recipe: Recipe, *, past: bool = False
+        self,
+        number: int,
+        raw: RawFrame,
+        recipe: Recipe,
+        *,
+        previous: RawFrame | None = None,
+        past: bool = False,
     ) -> Frame:
-        """Return a frame with a number and a recipe of its own, as of a recording."""
-        return Frame(self.workers, number, raw, recipe, truth=self._truth, past=past)
+        """Return a frame with a number and a recipe of its own, as of a recording.
+
+        ``previous`` is the capture before, which is kept with it where the recipe needs it.
+        """
+        before = previous if recipe.fills else None
+        return Frame(
+            self.workers, number, raw, recipe, previous=before, truth=self._truth, past=past
+        )
 
     def gains_for(self, applied: AppliedSequence) -> Gains | None:
         """Return the gains of the calibration, if it fits this sequence."""

@@ -4,6 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 import transientcam_moments as tm
 from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_server.errors import kinds
@@ -90,6 +93,11 @@ class Recipe:
     intrinsics: Intrinsics | None = None
     sensor: tm.noise.Sensor | None = None
 
+    @property
+    def fills(self) -> bool:
+        """Whether the frame before is needed."""
+        return self.settings.spoilt_images == "fill"
+
     def lens(self, height: int, width: int) -> Intrinsics:
         """Return where the pixels look, as it is known or else assumed."""
         if self.intrinsics is not None:
@@ -101,9 +109,13 @@ class Recipe:
         """The frequency whose period is the unambiguous time of flight."""
         return self.applied.sequence.base_frequency_hz
 
-    def reconstruct(self, raw: RawFrame) -> tm.Reconstruction:
-        """Return the reconstruction of a capture; it computes what is read of it."""
-        return self._reconstructor(raw.by_take.reshape(raw.images.shape))
+    def reconstruct(self, raw: RawFrame, previous: RawFrame | None = None) -> tm.Reconstruction:
+        """Return the reconstruction of a capture; it computes what is read of it.
+
+        ``previous``, where it has the same sequence, is what spoilt images are filled in from.
+        """
+        before = None if previous is None or previous.epoch != raw.epoch else _in_turn(previous)
+        return self._reconstructor(_in_turn(raw), previous=before)
 
     @cached_property
     def _reconstructor(self) -> tm.Reconstructor:
@@ -120,3 +132,8 @@ class Recipe:
             calibration=nominal_gains(sequence) if gains is None else gains.planes,
             bad_pixels=None if gains is None else gains.bad,
         )
+
+
+def _in_turn(raw: RawFrame) -> NDArray[np.uint16]:
+    """Return the images take by take, whatever order they were captured in."""
+    return raw.by_take.reshape(raw.images.shape)

@@ -47,13 +47,19 @@ class Computed:
     range_noise: dict[str, float] | None = None
 
 
-def compute(before: Computed, recipe: Recipe, raw: RawFrame, stages: Iterable[str]) -> Computed:
+def compute(
+    before: Computed,
+    recipe: Recipe,
+    raw: RawFrame,
+    previous: RawFrame | None,
+    stages: Iterable[str],
+) -> Computed:
     """Compute stages of a frame; one that fails leaves the others as they are. Never raises."""
     requested = set(stages)
     computed = Computed(before.reconstruction, {}, before.pixels, before.range_noise)
     try:
         if computed.reconstruction is None:
-            computed.reconstruction = found = recipe.reconstruct(raw)
+            computed.reconstruction = found = recipe.reconstruct(raw, previous)
             _read(found, FIRST)
             _flag_contradictions(recipe, found)
             computed.pixels = pixel_counts(found)

@@ -51,6 +51,11 @@ class ComputedFrame:
         """Its images with their labels and times."""
         return self._read(self.index)
 
+    @cached_property
+    def _previous(self) -> RawFrame | None:
+        """The frame before, where images may be filled in from it."""
+        return self._read(self.index - 1) if self.recipe.fills and self.index else None
+
     @property
     def raw(self) -> NDArray[np.uint16]:
         """Its images (N, H, W) in DN."""
@@ -136,7 +141,7 @@ class ComputedFrame:
         return self.product("range")._repr_html_()
 
     def _found(self, stage: str) -> tm.Reconstruction:
-        computed = compute(self._computed, self.recipe, self.raw_frame, {stage})
+        computed = compute(self._computed, self.recipe, self.raw_frame, self._previous, {stage})
         if stage in computed.failures:
             raise computed.failures[stage]
         self._computed = computed

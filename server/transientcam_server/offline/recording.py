@@ -56,9 +56,10 @@ class BatchReconstructor:
         """Shape of a product of one frame."""
         return product.shape(self._recipe.applied, *self._size, times=len(self.time_s))
 
-    def compute(self, raw: RawFrame) -> dict[str, NDArray[Any]]:
-        """Return the products of a frame by name."""
-        frame = ComputedFrame(0, self._recipe, lambda _: raw)
+    def compute(self, raw: RawFrame, previous: RawFrame | None = None) -> dict[str, NDArray[Any]]:
+        """Return the products of a frame by name; it may be filled in from the ``previous`` one."""
+        frames = [raw] if previous is None else [previous, raw]
+        frame = ComputedFrame(len(frames) - 1, self._recipe, frames.__getitem__)
         return {
             each.name: frame.product(
                 each.name, time_s=self.time_s.tolist() if each.over_time else None
@@ -109,6 +110,7 @@ def reconstruct_recording(
         _lay_out(file, recording, reconstructor, document)
     rows = swmr.Appender(file, list(options.products), list(_SERIES))
     done = rows.rows
+    previous = recording.frame(done - 1) if 0 < done < recording.frames else None
     try:
         for index in range(done, recording.frames):
             progress(index, recording.frames)
@@ -118,7 +120,8 @@ def reconstruct_recording(
                 "host_time_s": raw.host_time_s,
                 "frame": raw.number,
             }
-            rows.append(reconstructor.compute(raw), series)
+            rows.append(reconstructor.compute(raw, previous), series)
+            previous = raw
         progress(recording.frames, recording.frames)
     finally:
         rows.close()

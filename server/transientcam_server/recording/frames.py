@@ -90,7 +90,10 @@ class RecordedFrames:
     async def _read(self, number: int, reconstruction: SettingsVersion) -> Frame:
         raw, _ = await self.pipeline.workers.run_long(_read_frame, self._find, number)
         recipe = recorded_recipe(self._header, reconstruction, lens=self._lens)
-        return self.pipeline.recorded_frame(number, raw, recipe, past=True)
+        previous = None
+        if recipe.fills and number > 1:
+            previous, _ = await self.pipeline.workers.run_long(_read_frame, self._find, number - 1)
+        return self.pipeline.recorded_frame(number, raw, recipe, previous=previous, past=True)
 
     def _reconstruction(self, settings: SettingsChoice) -> SettingsVersion:
         """Return the recorded settings, if this version has them all, or the present ones."""

@@ -58,6 +58,12 @@ class FrameDocument(Document):
     """Images lost or corrupt between the frame before and this one."""
     rejected_images: int | None = None
     """Images left out of the average over takes as outliers; null until it was computed."""
+    repaired_images: int | None = None
+    """Images that lost their synchronisation, rebuilt from the others; null until computed."""
+    unrepaired_images: int | None = None
+    """Images of pairs that contradict the others and could not be rebuilt; null until computed."""
+    filled_images: list[int] | None = None
+    """Which images are those of the frame before, by their index in it; null until computed."""
     pixels: PixelCountsDocument | None = None
     """Null until something was computed."""
     predicted_range_std_m: PredictedStdDocument | None = None
