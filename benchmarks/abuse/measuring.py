@@ -192,7 +192,7 @@ def _frames(viewer: Viewer | None, client: httpx.Client, duration_s: float) -> f
     if viewer is None:
         before = _acquisition(client)["frames"]
         time.sleep(duration_s)
-        return (_acquisition(client)["frames"] - before) / duration_s
+        return float(_acquisition(client)["frames"] - before) / duration_s
     count = len(viewer.seen.numbers)
     took_s = watch([viewer], duration_s=duration_s)
     return (len(viewer.seen.numbers) - count) / took_s

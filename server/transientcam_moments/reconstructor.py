@@ -260,6 +260,7 @@ def reconstruct(
     calibration: Array | None = None,
     saturated_pixels: Array | None = None,
     bad_pixels: Array | None = None,
+    previous: Array | None = None,
     threads: int | None = None,
 ) -> Reconstruction:
     """Reconstruct one frame of labelled raw images, or of moments.

@@ -258,7 +258,7 @@ def _lit(moments: _Array, usable: _Array) -> _Array:
     brightness = moments[0].real if moments[0].any() else np.abs(moments[1])
     lit = usable & np.isfinite(moments).all(axis=0) & (np.abs(moments[1]) > 0)
     if not lit.any():
-        return lit
+        return np.asarray(lit)
     return np.asarray(lit & (brightness > _DARK * np.median(brightness[lit])))
 
 

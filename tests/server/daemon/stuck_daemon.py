@@ -5,18 +5,19 @@
 
 import sys
 from pathlib import Path
-from typing import Any
 
 from fastapi import FastAPI
 
 from transientcam.cli import main
 from transientcam_server.api import app as application
+from transientcam_server.camera.source import Camera
+from transientcam_server.settings import Settings
 
 _build = application.build_app
 
 
-def _with_route(*arguments: Any) -> FastAPI:
-    app = _build(*arguments)
+def _with_route(camera: Camera, settings: Settings) -> FastAPI:
+    app = _build(camera, settings)
 
     @app.get("/stuck")
     async def stuck(fifo: str) -> None:
