@@ -33,6 +33,7 @@ from transientcam_moments.levinson import (
     levinson,
     moments_of,
 )
+from transientcam_moments.likelihood import Likelihood, likelihood
 from transientcam_moments.maximum_entropy import density
 from transientcam_moments.modulation import modulation_gain
 from transientcam_moments.peaks import Peaks, peaks
@@ -50,6 +51,7 @@ __all__ = [
     "Biased",
     "Coefficients",
     "Flags",
+    "Likelihood",
     "MomentsError",
     "ParameterError",
     "Peaks",
@@ -76,6 +78,7 @@ __all__ = [
     "from_reflection",
     "kernels",
     "levinson",
+    "likelihood",
     "measure",
     "modulation_gain",
     "moments_of",

@@ -15,7 +15,11 @@ from transientcam_moments.errors import ParameterError
 from transientcam_moments.flags import INVALID, Flags, flags
 from transientcam_moments.four_bucket import ZEROTH_IMAGES
 from transientcam_moments.levinson import Coefficients, levinson
+from transientcam_moments.likelihood import Likelihood, likelihood
 from transientcam_moments.maximum_entropy import density
+from transientcam_moments.noise.moments import MomentNoise, moment_noise
+from transientcam_moments.noise.moments import smoothed as smoothed_noise
+from transientcam_moments.noise.sensor import Sensor
 from transientcam_moments.peaks import Peaks, peaks
 from transientcam_moments.pisarenko import (
     DIRECT_THRESHOLD,
@@ -27,7 +31,7 @@ from transientcam_moments.pisarenko import (
 from transientcam_moments.ranging import range_m
 from transientcam_moments.smoothing import SIGMA_PX, smooth
 
-_OWN = ("pisarenko", "maximum-entropy", "single-frequency")
+_OWN = ("pisarenko", "maximum-entropy", "likelihood", "single-frequency")
 ESTIMATORS = (
     *_OWN,
     *(
@@ -61,12 +65,15 @@ class Settings:
         The range is that of the first return, or peak, with this share of the strongest one's
         weight, or density.
     estimator : str
-        What the range is taken from: "pisarenko", "maximum-entropy", "single-frequency", which is
-        the usual arg b_1, or another of the `comparisons` of moments.
+        What the range is taken from: "pisarenko", "maximum-entropy", "likelihood",
+        "single-frequency", which is the usual arg b_1, or another of the `comparisons` of moments.
     minimum_brightness : float
         Pixels with b_0 at or below it have no signal, in the unit of the moments.
     full_scale : float
         Largest value of a raw image; pixels that reach it are saturated.
+    sensor : noise.Sensor, optional
+        Whose noise the images have; "likelihood" weighs the moments by it, and without one takes
+        the noise that `likelihood` assumes.
     """
 
     base_frequency_hz: float = 23e6
@@ -79,6 +86,7 @@ class Settings:
     estimator: str = "pisarenko"
     minimum_brightness: float = 0.0
     full_scale: float = 4095.0
+    sensor: Sensor | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no stage could work with (ParameterError)."""
@@ -119,6 +127,8 @@ class Reconstruction:
         Pixels to be flagged as replaced.
     kept : boolean array, shape (takes, N), optional
         Which images went into the moments; all, when left out.
+    calibration : array, shape (m + 1,) or (m + 1, ...), optional
+        Gains that the moments were divided by, for their noise; 1, when left out.
     """
 
     def __init__(
@@ -129,12 +139,14 @@ class Reconstruction:
         *,
         bad_pixels: Array | None = None,
         kept: Array | None = None,
+        calibration: Array | None = None,
     ) -> None:
         self.settings = settings
         self._measured = moments
         self._saturated = saturated_pixels
         self._bad = bad_pixels
         self._kept = kept
+        self._calibration = calibration
 
     @cached_property
     def measured(self) -> Array:
@@ -235,8 +247,48 @@ class Reconstruction:
         return peaks(self.coefficients, threshold=self.settings.threshold)
 
     @cached_property
+    def noise(self) -> MomentNoise | None:
+        """Noise of the smoothed moments (m + 1, ...) by the sensor's; None without a sensor."""
+        sensor, moments = self.settings.sensor, self.smoothed
+        if sensor is None:
+            return None
+        gains = self._calibration
+        found = moment_noise(
+            moments[0].real,
+            sensor,
+            calibration=np.ones(moments.shape[0]) if gains is None else gains,
+            zeroth=self.settings.zeroth,
+            takes=self.settings.takes,
+        )
+        if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
+            found = smoothed_noise(found, self.settings.smoothing_sigma_px)
+        return found
+
+    @cached_property
+    def likelihood(self) -> Likelihood:
+        """Few returns, or one with a tail, with what they are worth; of moments as measured."""
+        return likelihood(self.smoothed, self.noise)
+
+    @cached_property
+    def reduced_chi_square(self) -> Array:
+        """Chi-square of `likelihood` over its degrees of freedom; NaN without a range or any."""
+        xp = namespace(self.smoothed)
+        found = self.likelihood.reduced_chi_square
+        return xp.where(self.has_range, found, np.nan).astype(found.dtype)
+
+    @cached_property
+    def range_std_m(self) -> Array:
+        """Standard deviation in m of the range of `likelihood`; NaN where there is none."""
+        xp = namespace(self.smoothed)
+        std = self.likelihood.direct_phase_std_rad(self.settings.threshold)
+        found = range_m(std, self.settings.base_frequency_hz)
+        return xp.where(self.has_range, found, np.nan).astype(std.dtype)
+
+    @cached_property
     def _separation(self) -> Separation:
         technique = self._technique
+        if self.settings.estimator == "likelihood":
+            return self.likelihood.separate(self.settings.threshold)
         if technique is None:
             return separate(self.returns, self.settings.threshold)
         xp = namespace(self.smoothed)
@@ -259,8 +311,11 @@ class Reconstruction:
 
     @cached_property
     def uniform(self) -> Array:
-        """Brightness of the uniform part; of another technique, what it leaves unexplained."""
-        if self._technique is not None:
+        """Brightness of the uniform part; of another technique, what it leaves unexplained.
+
+        That is negative where noise, or a contradiction, makes the returns brighter than b_0.
+        """
+        if self._technique is not None or self.settings.estimator == "likelihood":
             return self.brightness - self.direct - self.indirect
         return self.returns.uniform
 
@@ -319,6 +374,8 @@ class PassedReconstruction(Reconstruction):
         Returns the calibrated moments that are not smoothed; called when they are first read.
     kept : boolean array, shape (takes, N), optional
         Which images went into the moments; all, when left out.
+    calibration : array, optional
+        As of `Reconstruction`.
     """
 
     def __init__(
@@ -327,18 +384,20 @@ class PassedReconstruction(Reconstruction):
         settings: Settings,
         measure: Callable[[], Array],
         kept: Array | None = None,
+        calibration: Array | None = None,
     ) -> None:
-        super().__init__(None, settings, kept=kept)
+        super().__init__(None, settings, kept=kept, calibration=calibration)
         self._measure = measure
         self.smoothed = planes.smoothed
         self.validity = planes.validity
         self.flags = planes.flags
         self.returns = Returns(planes.phase_rad, planes.weight, planes.uniform, planes.count)
         self.brightness = planes.brightness
-        self.uniform = planes.uniform
-        self.direct = planes.direct
-        self.indirect = planes.indirect
-        self.range_m = planes.range_m
+        if settings.estimator == "pisarenko":  # else they follow from another estimate
+            self.uniform = planes.uniform
+            self.direct = planes.direct
+            self.indirect = planes.indirect
+            self.range_m = planes.range_m
 
     @cached_property
     def measured(self) -> Array:

@@ -91,7 +91,12 @@ class Reconstructor:
         one_pass = self._pass_of_images(takes)
         if one_pass is not None:
             planes = one_pass.images(takes[0], saturated_pixels, spread)
-            return PassedReconstruction(planes, self.settings, lambda: self._measured(takes)[0])
+            return PassedReconstruction(
+                planes,
+                self.settings,
+                lambda: self._measured(takes)[0],
+                calibration=self._calibration,
+            )
         moments, kept = self._measured(takes)
         if saturated_pixels is None:
             stack = takes.reshape((-1, *moments.shape[1:]))
@@ -107,13 +112,18 @@ class Reconstructor:
         one_pass = self._pass_of_moments(moments)
         if one_pass is None:
             return Reconstruction(
-                moments, self.settings, saturated_pixels, bad_pixels=self._bad, kept=kept
+                moments,
+                self.settings,
+                saturated_pixels,
+                bad_pixels=self._bad,
+                kept=kept,
+                calibration=self._calibration,
             )
         smoothed = moments
         if moments.ndim == 3:
             smoothed = smooth(moments, self.settings.smoothing_sigma_px)
         planes = one_pass.moments(smoothed, saturated_pixels, spread)
-        return PassedReconstruction(planes, self.settings, lambda: moments, kept)
+        return PassedReconstruction(planes, self.settings, lambda: moments, kept, self._calibration)
 
     def _measured(self, takes: Array) -> tuple[Array, Array]:
         """Return calibrated moments of raw images, and which images went into them."""
@@ -128,9 +138,10 @@ class Reconstructor:
     # -- which way -----------------------------------------------------------------------------
     # The compiled pass serves NumPy arrays in single precision, of 64 pixels or more and an order
     # whose kernel "reconstruct" is compiled, where moments keep their harmonics and the range is
-    # Pisarenko's. It begins with the raw images of one take of uint16, as wide as its smoothing
-    # needs, or else (several takes, other images, moments) behind the smoothing. All else goes
-    # stage by stage, each computed when it is first read.
+    # Pisarenko's, or that of the likelihood, which follows from the pass's moments. It begins with
+    # the raw images of one take of uint16, as wide as its smoothing needs, or else (several takes,
+    # other images, moments) behind the smoothing. All else goes stage by stage, each computed when
+    # it is first read.
 
     def _pass_of_images(self, takes: Array) -> OnePass | None:
         m = harmonics_of(takes.shape[1], self.settings.zeroth)
@@ -145,7 +156,8 @@ class Reconstructor:
         return self._pass(moments.shape[0] - 1, moments.shape[1:])
 
     def _pass(self, m: int, shape: tuple[int, ...]) -> OnePass | None:
-        usual = (self.settings.keep, self.settings.estimator) == ("harmonics", "pisarenko")
+        usual = self.settings.keep == "harmonics"
+        usual = usual and self.settings.estimator in ("pisarenko", "likelihood")
         prepare = _kernels.lookup("reconstruct", m, math.prod(shape))
         masked = self._bad is None or np.shape(self._bad) == shape
         if not usual or prepare is None or not masked:
