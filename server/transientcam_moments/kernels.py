@@ -40,8 +40,11 @@ LANES = (
     "levinson",
     "density",
     "reconstruct",
+    "likelihood",
 )
-_SINGLE_ONLY = ("smooth", "measure", "separate", "reconstruct")
+_SINGLE_ONLY = ("smooth", "measure", "separate", "reconstruct", "likelihood")
+
+_OF_FEW = ("pisarenko", "smallest_eigenvalue", "reconstruct", "likelihood")
 
 MOST_ROOTS = 8
 """The largest m with lanes for eigenvalues and returns."""
@@ -151,7 +154,7 @@ def _is_offered(name: str, m: int, precision: str) -> bool:
     if name in _SINGLE_ONLY and precision != "float32":
         return False
     # a characteristic polynomial with more roots underflows where they cluster
-    return m <= MOST_ROOTS or name not in ("pisarenko", "smallest_eigenvalue", "reconstruct")
+    return m <= MOST_ROOTS or name not in _OF_FEW
 
 
 def _compile(keys: list[Key], progress: Progress | None, go_on: Callable[[], bool]) -> None:

@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 import transientcam_moments as tm
 from tests.moments.oracles import moments_of_returns
-from transientcam_moments.likelihood import estimate, planar, sharp, tail
+from transientcam_moments.likelihood import choice, estimate, sharp, tail
 
 NOISE_SHARE = 1 / 100
 
@@ -290,14 +290,14 @@ def test_no_step_raises_chi_square(monkeypatch: pytest.MonkeyPatch) -> None:
 
     tm.likelihood(b, equal_noise(b, 0.003))
 
-    assert len(costs) == sum(planar.STEPS) + planar.TAIL_STEPS
+    assert len(costs) == sum(choice.STEPS) + choice.TAIL_STEPS
     assert all((after <= before).all() for before, after in costs)
 
 
 def test_more_models_never_have_a_worse_score() -> None:
     b = some_moments(pixels=300)
     noise = equal_noise(b, 0.003)
-    penalty = np.log(9) + estimate.MARGIN
+    penalty = np.log(9) + choice.MARGIN
 
     def score(found: tm.Likelihood) -> np.ndarray:
         unknowns = 9 - found.degrees_of_freedom

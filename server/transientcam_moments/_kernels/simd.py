@@ -477,6 +477,7 @@ tiny = _constant(lambda limits: limits.tiny)
 overflowing = _constant(lambda limits: limits.max * limits.eps)
 nan = _constant(lambda limits: np.nan)
 infinity = _constant(lambda limits: np.inf)
+root_of_tiny = _constant(lambda limits: float(limits.tiny) ** 0.5)
 # A step this small leaves an error of rounding where it converges with the third power.
 nearly = _constant(lambda limits: limits.eps**0.5)
 # The powers of two between which a number and its reciprocal are far from the ends of the range.

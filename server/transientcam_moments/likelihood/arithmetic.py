@@ -48,6 +48,15 @@ def root(x: Array) -> Array:
     return namespace(x).sqrt(x)
 
 
+def logarithm(x: Array) -> Array:
+    """Return log x to single precision, for x from 1/100 to 100, by roots and a series."""
+    eighth = root(root(root(x)))
+    c = (eighth - 1.0) / (eighth + 1.0)
+    square = c * c
+    series = 1.0 + square * (1 / 3 + square * (1 / 5 + square * (1 / 7 + square * (1 / 9))))
+    return 16.0 * c * series
+
+
 def rounding(x: Array) -> Array:
     """Return a few times the rounding error of 1, in the precision of `x`."""
     return np.asarray(8 * float(np.finfo(x.dtype).eps), x.dtype)

@@ -13,6 +13,7 @@ from transientcam_moments.likelihood.arithmetic import (
     bank,
     larger,
     least,
+    logarithm,
     select,
     smaller,
 )
@@ -24,6 +25,25 @@ TAIL, LENGTH, TAIL_VARIANCE, LENGTH_VARIANCE = 15, 16, 17, 18
 """Light v of the tail, d, the variances of v and of log d; all 0 where there is no tail."""
 CHI_SQUARE, SCORE, COUNT = 19, 20, 21
 PLANES: Final = 22
+STEPS: Final = (4, 8, 10)
+"""Of the fits of one, two and three returns."""
+TAIL_STEPS: Final = 10
+TAIL_SHAPE: Final = 3
+"""Shape of the gamma distribution of the tail; docs/likelihood.md has the evidence."""
+DELAY_RAD: Final = 0.75
+"""Mean of the prior of the tail's mean delay; its standard deviation is a factor e."""
+PRIOR: Final = 1.0
+"""Inverse variance of log d."""
+MARGIN: Final = 6.0
+"""Added to log n of the Bayesian information criterion for each unknown. Many positions are tried
+where the criterion counts one; with this margin fewer than 1 of 1000 single returns are split."""
+LEAST_RATIO, MOST_RATIO = 0.05, 4.0
+"""Of a tail's first d over its mean in the prior."""
+
+
+def phases_of(m: int) -> int:
+    """Return how many phases around the turn are tried for a start."""
+    return 6 * m + 8
 
 
 def nothing(like: Array, score: Array, found: Bank) -> None:
@@ -71,11 +91,11 @@ def offer_returns(
     found[COUNT] = select(better, float(count) + zero, found[COUNT])
 
 
-def start_of_tail(x: Bank, y: Bank, w: Bank, longest: Array) -> tuple[Array, ...]:
-    """Return point, light, light of the tail and its mean delay from two returns.
+def start_of_tail(x: Bank, y: Bank, w: Bank, mean: float) -> tuple[Array, ...]:
+    """Return point, light, light of the tail, d over the prior's mean, and its logarithm.
 
-    The earlier one, within half a turn, is the direct return. A second one without weight says
-    nothing about the delay, which is then `longest` over 4.
+    From two returns, of which the earlier one, within half a turn, is the direct one. A second one
+    without weight says nothing about the delay, which is then the prior's `mean`.
     """
     dx, dy = x[0] * x[1] + y[0] * y[1], y[1] * x[0] - x[1] * y[0]
     first = dy >= 0.0
@@ -89,7 +109,9 @@ def start_of_tail(x: Bank, y: Bank, w: Bank, longest: Array) -> tuple[Array, ...
     sx, sy = select(lone & strong, x[0], sx), select(lone & strong, y[0], sy)
     sx, sy = select(lone & ~strong, x[1], sx), select(lone & ~strong, y[1], sy)
     sw, sv = select(lone, larger(w[0], w[1]), sw), select(lone, 0.0 * sv, sv)
-    return sx, sy, sw, sv, select(lone, 0.25 * longest, smaller(angle, longest))
+    delay = select(lone, mean + 0.0 * angle, angle)
+    ratio = larger(smaller(delay / mean, MOST_RATIO + 0.0 * delay), LEAST_RATIO + 0.0 * delay)
+    return sx, sy, sw, sv, ratio, logarithm(ratio)
 
 
 def offer_tail(

@@ -16,18 +16,15 @@ from transientcam_moments._arrays import (
     moment_planes,
     namespace,
 )
+from transientcam_moments._kernels import accelerated
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.likelihood import choice
-from transientcam_moments.likelihood.choice import MOST_RETURNS
+from transientcam_moments.likelihood.arithmetic import logarithm
+from transientcam_moments.likelihood.choice import MARGIN, MOST_RETURNS, TAIL_SHAPE
 from transientcam_moments.likelihood.planar import Data, fit
 from transientcam_moments.noise.moments import MomentNoise
 from transientcam_moments.pisarenko import DIRECT_THRESHOLD, Returns, Separation, separate
 
-TAIL_SHAPE: Final = 3
-"""Shape of the gamma distribution of the tail; docs/likelihood.md has the evidence."""
-MARGIN: Final = 6.0
-"""Added to log n of the Bayesian information criterion for each unknown. Two positions are tried
-where the criterion counts one; with this margin fewer than 1 of 1000 single returns are split."""
 ASSUMED_NOISE: Final = 0.01
 """Standard deviation over the largest moment, where none is given."""
 SIGNIFICANCE: Final = 1e-3
@@ -217,9 +214,7 @@ def likelihood(
         dense = [by_place.get(j) for j in range(order + 1)]
         planes = xp.stack([empty if at is None else planes[at] for at in dense])
         variance = xp.stack([0 * variance[0] if at is None else variance[at] for at in dense])
-    found = by_blocks(
-        lambda b, variance: _estimate(b, variance, returns, tail_shape), planes, variance
-    )
+    found = _estimated(planes, variance, returns, tail_shape)
     shaped = (part.reshape((*part.shape[:-1], *trailing)) for part in found)
     return Likelihood(*shaped, tail_shape=tail_shape)
 
@@ -249,6 +244,14 @@ def _variance(noise: MomentNoise | None, planes: Array, trailing: tuple[int, ...
     return xp.broadcast_to(xp.asarray(flat).astype(real), planes.shape)
 
 
+@accelerated("likelihood")
+def _estimated(planes: Array, variance: Array, returns: int, tail_shape: int) -> tuple[Array, ...]:
+    """Return the attributes of `Likelihood` of flat planes."""
+    return by_blocks(
+        lambda b, variance: _estimate(b, variance, returns, tail_shape), planes, variance
+    )
+
+
 def _estimate(b: Array, variance: Array, returns: int, tail_shape: int) -> tuple[Array, ...]:
     """Planar statement of `likelihood`: all harmonics from 0 on, (m + 1, P)."""
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
@@ -271,7 +274,11 @@ def _prepared(b: Array, variance: Array) -> tuple[Data, Array, Array]:
     size = xp.maximum(abs(re), abs(im)).max(axis=0)
     # the squares of deviations over it must neither over- nor underflow
     limits = np.finfo(size.dtype)
-    usable = xp.isfinite(size) & (size > float(limits.tiny) * 16) & (size < float(limits.max) / 16)
+    usable = (
+        xp.isfinite(size)
+        & (size > float(limits.tiny) * 16)
+        & (size < float(limits.max * limits.eps))
+    )
     usable = usable & (seen & ~first).any(axis=0)
     usable = usable & ~(seen[0] & ~(re[0] > 0))
     scale = xp.where(usable, size, 1).astype(size.dtype)
@@ -282,7 +289,7 @@ def _prepared(b: Array, variance: Array) -> tuple[Data, Array, Array]:
     std = xp.minimum(xp.maximum(std, rounding), 1 / rounding)
     weight = xp.where(usable, xp.where(seen, 1 / (std * std), 0), 1)
     numbers = xp.where(usable, (2 * seen).sum(axis=0) - seen[0], 1).astype(size.dtype)
-    penalty = (xp.log(numbers) + MARGIN).astype(size.dtype)
+    penalty = (logarithm(numbers) + MARGIN).astype(size.dtype)
     data = Data(*(part.astype(size.dtype) for part in (re, im, weight)), penalty, numbers)
     return data, scale, usable
 

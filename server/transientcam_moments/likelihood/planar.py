@@ -8,22 +8,19 @@ import numpy as np
 from transientcam_moments._arrays import Array, namespace
 from transientcam_moments.likelihood import sharp, tail
 from transientcam_moments.likelihood.choice import (
+    DELAY_RAD,
     MOST_RETURNS,
     PLANES,
+    PRIOR,
     SCORE,
+    STEPS,
+    TAIL_STEPS,
     nothing,
     offer_returns,
     offer_tail,
+    phases_of,
     start_of_tail,
 )
-
-STEPS = (4, 8, 10)
-"""Of the fits of one, two and three returns."""
-TAIL_STEPS = 10
-DELAY_RAD = 0.75
-"""Mean of the prior of the tail's mean delay; its standard deviation is a factor e."""
-PRIOR = 1.0
-"""Inverse variance of log d."""
 
 
 class Data(NamedTuple):
@@ -46,11 +43,6 @@ class Data(NamedTuple):
     weight: Array
     penalty: Array
     numbers: Array
-
-
-def phases_of(m: int) -> int:
-    """Return how many phases around the turn are tried for a start."""
-    return 6 * m + 8
 
 
 def fit(data: Data, most: int, shape: int) -> Array:
@@ -187,12 +179,8 @@ def _offer_tail(data: Data, two: _Returns, shape: int, found: list[Array]) -> No
     """Fit a return with a tail, from two returns on, and put it where it is the better model."""
     order, powers, unknowns = two.order, (0,) * shape, (0,) * 4
     mean = DELAY_RAD / shape
-    longest = DELAY_RAD * float(np.exp(tail.LONGEST)) + 0 * two.cost
-    x, y, w, v, delay = start_of_tail(two.x, two.y, two.w, longest / 8)
-    xp = namespace(delay)
-    shortest = DELAY_RAD * float(np.exp(tail.SHORTEST)) * 1.01
-    d = xp.maximum(delay, shortest + 0 * delay) / shape
-    t = xp.log(d / mean)
+    x, y, w, v, ratio, t = start_of_tail(two.x, two.y, two.w, DELAY_RAD)
+    d = ratio * mean
     planes = [tuple([d] * len(data.re)) for _ in range(4)]
     qr, qi, rr, ri = (list(part) for part in planes)
     tail.shape(order, powers, d, qr, qi)
