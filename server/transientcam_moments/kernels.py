@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import TypedDict
 
-from transientcam_moments._arrays import MAX_HARMONICS
+from transientcam_moments._arrays import MAX_HARMONICS, chosen
 from transientcam_moments._kernels.parallel import Spread, at_once, over
 from transientcam_moments._kernels.registry import PRECISION_NAMES, REGISTRY, Key
 from transientcam_moments.errors import ParameterError
@@ -85,6 +85,7 @@ def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the buil
     *,
     harmonics: Sequence[int] = (3, 4, 8),
     precisions: Sequence[str] = ("float32", "float64"),
+    names: Sequence[str] = LANES,
     progress: Progress | None = None,
 ) -> None:
     """Compile all lanes, or load them from the cache, before returning.
@@ -97,20 +98,25 @@ def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the buil
     precisions : sequence of {"float32", "float64"}
         Most urgent first; all of one order before the next. Single precision uses the lanes for
         double where it isn't enough.
+    names : sequence of str
+        Which of `LANES`; all of them, when left out.
     progress : callable, optional
         Called as ``progress(done, total, name)`` before each lane and after the last.
 
     Raises
     ------
     ParameterError
-        For another order or precision.
+        For another order, precision or lane.
 
     Notes
     -----
     A lane that fails to compile is noted in `state`; the others are compiled all the same. Does
     nothing when kernels are off. Safe to call from several threads: each lane is compiled once.
     """
-    _compile(_keys(harmonics, precisions), progress, lambda: True)
+    for name in names:
+        chosen("names", name, LANES)
+    keys = [key for key in _keys(harmonics, precisions) if key.name in names]
+    _compile(keys, progress, lambda: True)
 
 
 def compile_in_background(

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -17,8 +17,7 @@ from transientcam_moments.four_bucket import ZEROTH_IMAGES
 from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.likelihood import Likelihood, likelihood
 from transientcam_moments.maximum_entropy import density
-from transientcam_moments.noise.moments import MomentNoise, moment_noise
-from transientcam_moments.noise.moments import smoothed as smoothed_noise
+from transientcam_moments.noise.moments import MomentNoise, moment_noise, smoothed_of
 from transientcam_moments.noise.sensor import Sensor
 from transientcam_moments.peaks import Peaks, peaks
 from transientcam_moments.pisarenko import (
@@ -253,16 +252,17 @@ class Reconstruction:
         if sensor is None:
             return None
         gains = self._calibration
-        found = moment_noise(
-            moments[0].real,
-            sensor,
+        noise_of = partial(
+            moment_noise,
+            sensor=sensor,
             calibration=np.ones(moments.shape[0]) if gains is None else gains,
             zeroth=self.settings.zeroth,
             takes=self.settings.takes,
         )
+        brightness = moments[0].real
         if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
-            found = smoothed_noise(found, self.settings.smoothing_sigma_px)
-        return found
+            return smoothed_of(noise_of, brightness, self.settings.smoothing_sigma_px)
+        return noise_of(brightness)
 
     @cached_property
     def likelihood(self) -> Likelihood:

@@ -45,7 +45,7 @@ from transientcam_moments.likelihood.choice import (
 __all__ = ["likelihood_lane", "portable"]  # which gives the fits' arithmetic its meaning
 
 _MEAN = DELAY_RAD / TAIL_SHAPE
-_INTERLEAVE = 1
+_INTERLEAVE = 2
 
 
 @njit(forceinline=True, error_model="numpy")

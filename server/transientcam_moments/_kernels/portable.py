@@ -7,11 +7,13 @@ that they call has its meaning for lanes here.
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+from llvmlite import ir  # type: ignore[import-untyped]  # it has no annotations
 from numba import types as numba_types
 from numba.core import cgutils as numba_cgutils
 
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.simd import Lanes, Registers, extending, templates
+from transientcam_moments._kernels.simd import Lanes, Mask, Registers, extending, templates
 from transientcam_moments.likelihood import arithmetic, choice, linear, sharp, tail
 
 types: Any = numba_types
@@ -40,22 +42,49 @@ _room(arithmetic.bank, lambda length, extra: length + extra)
 _room(arithmetic.square_bank, lambda length, extra: (length + extra) ** 2)
 
 
-def _meaning(function: Callable[..., Any], compiled: Callable[..., Any]) -> None:
-    """Have a function of planes mean a function of lanes."""
-
-    options = {"forceinline": True, "error_model": "numpy"}
-
-    @extending.overload(function, jit_options=options, strict=False)
-    def _overload(*args: Any) -> Any:
-        return compiled if any(isinstance(arg, Lanes) for arg in args) else None
+def _same(vector: Any) -> Any:
+    return vector
 
 
-_meaning(arithmetic.select, lambda mask, yes, no: simd.select(mask, yes, no))
-_meaning(arithmetic.larger, lambda x, y: simd.maximum(x, y))
-_meaning(arithmetic.smaller, lambda x, y: simd.minimum(x, y))
-_meaning(arithmetic.root, lambda x: simd.sqrt(x))
-_meaning(arithmetic.least, lambda x: simd.root_of_tiny(x))
-_meaning(arithmetic.rounding, lambda x: 8.0 * simd.eps(x))
+def _root(builder: Any, x: Any) -> Any:
+    kind = ir.FunctionType(x.type, [x.type])
+    name = f"llvm.sqrt.v{x.type.count}f{32 if isinstance(x.type.element, ir.FloatType) else 64}"
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [x])
+
+
+def _constant(value: Callable[[Any], float]) -> Callable[[Any, Any], Any]:
+    """Return what gives a number depending on the precision of its argument."""
+
+    def emit(builder: Any, x: Any) -> Any:
+        limits = np.finfo(np.float32 if isinstance(x.type.element, ir.FloatType) else np.float64)
+        return ir.Constant(x.type, [value(limits)] * x.type.count)
+
+    return emit
+
+
+simd.define(
+    arithmetic.larger, Lanes, 2, lambda b, x, y: b.select(b.fcmp_ordered(">", x, y), x, y), _same
+)
+simd.define(
+    arithmetic.smaller, Lanes, 2, lambda b, x, y: b.select(b.fcmp_ordered("<", x, y), x, y), _same
+)
+simd.define(arithmetic.root, Lanes, 1, _root, _same)
+simd.define(arithmetic.least, Lanes, 1, _constant(lambda limits: float(limits.tiny) ** 0.5), _same)
+simd.define(arithmetic.rounding, Lanes, 1, _constant(lambda limits: 8 * float(limits.eps)), _same)
+
+
+@templates.infer_global(arithmetic.select)
+class _Select(templates.AbstractTemplate):  # type: ignore[misc]  # numba is untyped
+    def generic(self, args: Any, kws: Any) -> Any:
+        lanes = args[1] if isinstance(args[1], Lanes) else args[2]
+        fits = isinstance(args[0], Mask) and isinstance(lanes, Lanes)
+        return templates.signature(lanes, args[0], lanes, lanes) if fits else None
+
+
+@extending.lower_builtin(arithmetic.select, Mask, Lanes, Lanes)
+def _select(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.select(*args)
+
 
 for _function in (
     arithmetic.logarithm,

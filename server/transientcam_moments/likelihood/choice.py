@@ -43,7 +43,7 @@ LEAST_RATIO, MOST_RATIO = 0.05, 4.0
 
 def phases_of(m: int) -> int:
     """Return how many phases around the turn are tried for a start."""
-    return 6 * m + 8
+    return 4 * m + 6
 
 
 def nothing(like: Array, score: Array, found: Bank) -> None:

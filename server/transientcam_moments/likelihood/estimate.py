@@ -192,7 +192,7 @@ def likelihood(
     standard deviation 1. The one with the least chi^2 + n_unknowns (log n_numbers + 6) is taken:
     the Bayesian information criterion with a margin (see `MARGIN`).
 
-    A fit begins with the returns of the one before and the best of 6 m + 8 phases for one more,
+    A fit begins with the returns of the one before and the best of 4 m + 6 phases for one more,
     the tail with two returns; it takes a fixed number of Levenberg and Marquardt's steps, none of
     which raises chi^2, with the weights eliminated (Golub and Pereyra 1973, Kaufman 1975). Noise
     smaller than the rounding of the moments' precision counts as that large.
