@@ -44,9 +44,9 @@ def _bound() -> Table:
         ("returns, m", "bound", *COLUMNS, "likelihood over bound"),
         notes=[
             f"{PIXELS} random responses each: returns at least {APART:g}/m radians apart, of 0.4 "
-            f"to 1.0 before they are made 1 in all; f = 23 MHz; every part of a moment has a standard "
-            f"deviation of 1/{1 / NOISE_SHARE:.0f} of b_0. The bound is that without b_0, its root "
-            "mean square over the responses.",
+            "to 1.0 before they are made 1 in all; f = 23 MHz; every part of a moment has a "
+            f"standard deviation of 1/{1 / NOISE_SHARE:.0f} of b_0. The bound is that without "
+            "b_0, its root mean square over the responses.",
         ],
     )
     settings = tm.Settings(base_frequency_hz=BASE_HZ)

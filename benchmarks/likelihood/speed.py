@@ -23,8 +23,8 @@ def tables() -> Iterator[Table]:
         "Time of a frame, on one core, single precision",
         ("m, pixels", "scene", "likelihood", "pass of raw images", "ratio", "planar NumPy"),
         notes=[
-            "The pass is the compiled `reconstruct`, from raw images to Pisarenko's returns, in the "
-            "same run. One return: one model is fitted. Three returns: all models are.",
+            "The pass is the compiled `reconstruct`, from raw images to Pisarenko's returns, in "
+            "the same run. One return: one model is fitted. Three returns: all models are.",
         ],
     )
     for m in ORDERS:
