@@ -45,6 +45,7 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 	$(BIN)/python -m benchmarks.stability
 	$(BIN)/python -m benchmarks.accuracy --write
 	$(BIN)/python -m benchmarks.estimators --write
+	$(BIN)/python -m benchmarks.likelihood --write
 	$(BIN)/python -m benchmarks.simulation --write
 	$(BIN)/python -m benchmarks.recording --write
 	$(BIN)/python -m benchmarks.by_hand --write

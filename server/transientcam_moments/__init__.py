@@ -39,6 +39,7 @@ from transientcam_moments.levinson import (
     levinson,
     moments_of,
 )
+from transientcam_moments.likelihood import Likelihood, likelihood
 from transientcam_moments.maximum_entropy import density
 from transientcam_moments.modulation import modulation_gain
 from transientcam_moments.peaks import Peaks, peaks
@@ -58,6 +59,7 @@ __all__ = [
     "Coefficients",
     "Flags",
     "Labels",
+    "Likelihood",
     "MomentsError",
     "ParameterError",
     "Peaks",
@@ -86,6 +88,7 @@ __all__ = [
     "from_reflection",
     "kernels",
     "levinson",
+    "likelihood",
     "measure",
     "modulation_gain",
     "moments_of",

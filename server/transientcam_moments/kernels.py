@@ -20,7 +20,7 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import TypedDict
 
-from transientcam_moments._arrays import MAX_HARMONICS
+from transientcam_moments._arrays import MAX_HARMONICS, chosen
 from transientcam_moments._kernels.automatic import MOST_ROOTS, THREAD, compile_one, is_offered
 from transientcam_moments._kernels.parallel import Spread, at_once, over, use_one_thread
 from transientcam_moments._kernels.registry import PRECISION_NAMES, REGISTRY, Key
@@ -50,6 +50,7 @@ LANES = (
     "levinson",
     "density",
     "reconstruct",
+    "likelihood",
 )
 Progress = Callable[[int, int, str], None]
 """Takes lanes done, lanes in all, and the name of the lane that is next ("" after the last)."""
@@ -87,6 +88,7 @@ def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the buil
     harmonics: Sequence[int] = (3, 4, 8),
     precisions: Sequence[str] = ("float32", "float64"),
     *,
+    names: Sequence[str] = LANES,
     progress: Progress | None = None,
 ) -> None:
     """Compile all lanes, or load them from the cache, before returning.
@@ -99,20 +101,25 @@ def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the buil
     precisions : sequence of {"float32", "float64"}
         Most urgent first; all of one order before the next. Single precision uses the lanes for
         double where it isn't enough.
+    names : sequence of str
+        Which of `LANES`; all of them, when left out.
     progress : callable, optional
         Called as ``progress(done, total, name)`` before each lane and after the last.
 
     Raises
     ------
     ParameterError
-        For another order or precision.
+        For another order, precision or lane.
 
     Notes
     -----
     A lane that fails to compile is noted in `state`; the others are compiled all the same. Does
     nothing when kernels are off. Safe to call from several threads: each lane is compiled once.
     """
-    _compile(_keys(harmonics, precisions), progress, lambda: True)
+    for name in names:
+        chosen("names", name, LANES)
+    keys = [key for key in _keys(harmonics, precisions) if key.name in names]
+    _compile(keys, progress, lambda: True)
 
 
 def compile_in_background(

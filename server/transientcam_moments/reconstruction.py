@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -15,7 +15,10 @@ from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.flags import INVALID, Flags, flags
 from transientcam_moments.four_bucket import ZEROTH_IMAGES
 from transientcam_moments.levinson import Coefficients, levinson
+from transientcam_moments.likelihood import Likelihood, likelihood
 from transientcam_moments.maximum_entropy import density
+from transientcam_moments.noise.moments import MomentNoise, moment_noise, smoothed_of
+from transientcam_moments.noise.sensor import Sensor
 from transientcam_moments.peaks import Peaks, peaks
 from transientcam_moments.pisarenko import (
     DIRECT_THRESHOLD,
@@ -31,7 +34,7 @@ from transientcam_moments.smoothing import SIGMA_PX, smooth
 SPOILT_IMAGES = ("keep", "repair", "fill")
 """What becomes of images that lost their synchronisation; see `Settings`."""
 
-_OWN = ("pisarenko", "maximum-entropy", "single-frequency")
+_OWN = ("pisarenko", "maximum-entropy", "likelihood", "single-frequency")
 ESTIMATORS = (
     *_OWN,
     *(
@@ -66,8 +69,8 @@ class Settings:
         The range is that of the first return, or peak, with this share of the strongest one's
         weight, or density.
     estimator : str
-        What the range is taken from: "pisarenko", "maximum-entropy", "single-frequency", which is
-        the usual arg b_1, or another of the `comparisons` of moments.
+        What the range is taken from: "pisarenko", "maximum-entropy", "likelihood",
+        "single-frequency", which is the usual arg b_1, or another of the `comparisons` of moments.
     minimum_brightness : float
         Pixels with b_0 at or below it have no signal, in the unit of the moments.
     full_scale : float
@@ -76,6 +79,9 @@ class Settings:
         What becomes of raw images that lost their synchronisation (Sec. 6): rebuilt where sums of
         opposite images find them (`repair`), and where those don't tell also filled in from the
         frame before, or kept as they are.
+    sensor : noise.Sensor, optional
+        Whose noise the images have; "likelihood" weighs the moments by it, and without one takes
+        the noise that `likelihood` assumes.
     """
 
     base_frequency_hz: float | None = None
@@ -89,6 +95,7 @@ class Settings:
     minimum_brightness: float = 0.0
     full_scale: float = 4095.0
     spoilt_images: str = "repair"
+    sensor: Sensor | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no stage could work with (ParameterError)."""
@@ -98,6 +105,10 @@ class Settings:
             chosen("zeroth", self.zeroth, tuple(ZEROTH_IMAGES))
         if self.takes is not None and self.takes < 1:
             raise ParameterError("takes", self.takes, ">= 1")
+        if self.sensor is not None:
+            for field in ("zeroth", "takes"):
+                if getattr(self, field) is None:
+                    raise ParameterError(field, None, "stated, for the noise of a sensor")
         in_range("epsilon", self.epsilon, 0.0, float(np.nextafter(1.0, 0.0)), "0 <= epsilon < 1")
         chosen("keep", self.keep, ("harmonics", "brightness"))
         in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
@@ -137,6 +148,8 @@ class Reconstruction:
         Which images went into the moments; all, when left out.
     repaired : Repair, optional
         What was done to the images before.
+    calibration : array, shape (m + 1,) or (m + 1, ...), optional
+        Gains that the moments were divided by, for their noise; 1, when left out.
     """
 
     def __init__(
@@ -148,6 +161,7 @@ class Reconstruction:
         bad_pixels: Array | None = None,
         kept: Array | None = None,
         repaired: Repair | None = None,
+        calibration: Array | None = None,
     ) -> None:
         self.settings = settings
         self._measured = moments
@@ -155,6 +169,7 @@ class Reconstruction:
         self._bad = bad_pixels
         self._kept = kept
         self._repaired = repaired
+        self._calibration = calibration
 
     @cached_property
     def measured(self) -> Array:
@@ -286,8 +301,50 @@ class Reconstruction:
         return peaks(self.coefficients, threshold=self.settings.threshold)
 
     @cached_property
+    def noise(self) -> MomentNoise | None:
+        """Noise of the smoothed moments (m + 1, ...) by the sensor's; None without a sensor."""
+        sensor, moments = self.settings.sensor, self.smoothed
+        zeroth, takes = self.settings.zeroth, self.settings.takes
+        if sensor is None or zeroth is None or takes is None:  # the last two go with a sensor
+            return None
+        gains = self._calibration
+        noise_of = partial(
+            moment_noise,
+            sensor=sensor,
+            calibration=np.ones(moments.shape[0]) if gains is None else gains,
+            zeroth=zeroth,
+            takes=takes,
+        )
+        brightness = moments[0].real
+        if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
+            return smoothed_of(noise_of, brightness, self.settings.smoothing_sigma_px)
+        return noise_of(brightness)
+
+    @cached_property
+    def likelihood(self) -> Likelihood:
+        """Few returns, or one with a tail, with what they are worth; of moments as measured."""
+        return likelihood(self.smoothed, self.noise)
+
+    @cached_property
+    def reduced_chi_square(self) -> Array:
+        """Chi-square of `likelihood` over its degrees of freedom; NaN without a range or any."""
+        xp = namespace(self.smoothed)
+        found = self.likelihood.reduced_chi_square
+        return xp.where(self.has_range, found, np.nan).astype(found.dtype)
+
+    @cached_property
+    def range_std_m(self) -> Array:
+        """Standard deviation in m of the range of `likelihood`; NaN where there is none."""
+        xp = namespace(self.smoothed)
+        std = self.likelihood.direct_phase_std_rad(self.settings.threshold)
+        found = range_m(std, self.settings.base_frequency_hz)
+        return xp.where(self.has_range, found, np.nan).astype(std.dtype)
+
+    @cached_property
     def _separation(self) -> Separation:
         technique = self._technique
+        if self.settings.estimator == "likelihood":
+            return self.likelihood.separate(self.settings.threshold)
         if technique is None:
             return separate(self.returns, self.settings.threshold)
         xp = namespace(self.smoothed)
@@ -310,8 +367,11 @@ class Reconstruction:
 
     @cached_property
     def uniform(self) -> Array:
-        """Brightness of the uniform part; of another technique, what it leaves unexplained."""
-        if self._technique is not None:
+        """Brightness of the uniform part; of another technique, what it leaves unexplained.
+
+        That is negative where noise, or a contradiction, makes the returns brighter than b_0.
+        """
+        if self._technique is not None or self.settings.estimator == "likelihood":
             return self.brightness - self.direct - self.indirect
         return self.returns.uniform
 
@@ -400,6 +460,8 @@ class PassedReconstruction(Reconstruction):
         Which images went into the moments; all, when left out.
     repaired : Repair, optional
         What was done to the images before.
+    calibration : array, optional
+        As of `Reconstruction`.
     """
 
     def __init__(
@@ -409,17 +471,19 @@ class PassedReconstruction(Reconstruction):
         measure: Callable[[], Array],
         kept: Array | None = None,
         repaired: Repair | None = None,
+        calibration: Array | None = None,
     ) -> None:
-        super().__init__(None, settings, kept=kept, repaired=repaired)
+        super().__init__(None, settings, kept=kept, repaired=repaired, calibration=calibration)
         self._measure = measure
         self.smoothed = planes.smoothed
         self.validity = planes.validity
         self.flags = planes.flags
         self.returns = Returns(planes.phase_rad, planes.weight, planes.uniform, planes.count)
         self.brightness = planes.brightness
-        self.uniform = planes.uniform
-        self.direct = planes.direct
-        self.indirect = planes.indirect
+        if settings.estimator == "pisarenko":  # else they follow from another estimate
+            self.uniform = planes.uniform
+            self.direct = planes.direct
+            self.indirect = planes.indirect
         if settings.base_frequency_hz is not None:
             self.range_m = planes.range_m
 

@@ -106,7 +106,11 @@ class Reconstructor:
         if one_pass is not None:
             planes = one_pass.images(takes[0], saturated_pixels, spread)
             return PassedReconstruction(
-                planes, self.settings, lambda: self._measured(takes)[0], repaired=repaired
+                planes,
+                self.settings,
+                lambda: self._measured(takes)[0],
+                repaired=repaired,
+                calibration=self._calibration,
             )
         moments, kept = self._measured(takes, None if repaired is None else repaired.left_out)
         if saturated_pixels is None:
@@ -142,12 +146,15 @@ class Reconstructor:
                 bad_pixels=self._bad,
                 kept=kept,
                 repaired=repaired,
+                calibration=self._calibration,
             )
         smoothed = moments
         if moments.ndim == 3:
             smoothed = smooth(moments, self.settings.smoothing_sigma_px)
         planes = one_pass.moments(smoothed, saturated_pixels, spread)
-        return PassedReconstruction(planes, self.settings, lambda: moments, kept, repaired)
+        return PassedReconstruction(
+            planes, self.settings, lambda: moments, kept, repaired, self._calibration
+        )
 
     def _repaired(self, takes: Array, previous: Array | None) -> Repair | None:
         """Return the images after repair; None for other arrays than NumPy's, or by the settings.
@@ -182,9 +189,10 @@ class Reconstructor:
     # -- which way -----------------------------------------------------------------------------
     # The compiled pass serves NumPy arrays in single precision, of 64 pixels or more and an order
     # whose kernel "reconstruct" is compiled, where moments keep their harmonics and the range is
-    # Pisarenko's. It begins with the raw images of one take of uint16, as wide as its smoothing
-    # needs, or else (several takes, other images, moments) behind the smoothing. All else goes
-    # stage by stage, each computed when it is first read.
+    # Pisarenko's, or that of the likelihood, which follows from the pass's moments. It begins with
+    # the raw images of one take of uint16, as wide as its smoothing needs, or else (several takes,
+    # other images, moments) behind the smoothing. All else goes stage by stage, each computed when
+    # it is first read.
 
     def _pass_of_images(self, takes: Array, zeroth: str) -> OnePass | None:
         m = harmonics_of(takes.shape[1], zeroth)
@@ -199,7 +207,8 @@ class Reconstructor:
         return self._pass(moments.shape[0] - 1, moments.shape[1:])
 
     def _pass(self, m: int, shape: tuple[int, ...]) -> OnePass | None:
-        usual = (self.settings.keep, self.settings.estimator) == ("harmonics", "pisarenko")
+        usual = self.settings.keep == "harmonics"
+        usual = usual and self.settings.estimator in ("pisarenko", "likelihood")
         prepare = _kernels.lookup("reconstruct", m, math.prod(shape))
         masked = self._bad is None or np.shape(self._bad) == shape
         if not usual or prepare is None or not masked:

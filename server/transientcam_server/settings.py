@@ -60,7 +60,7 @@ class ReconstructionSettings(_Group):
     return_threshold: _Finite = Field(default=_DEFAULTS.threshold, ge=0.0, le=1.0)
     """Weight from which a return counts as the first, over the pixel's strongest return."""
     estimator: Estimator = "pisarenko"
-    """What the range is taken from; all but the first two are there for comparison."""
+    """What the range is taken from; all but the first three are there for comparison."""
     minimum_brightness_dn: _Finite = Field(default=0.0, ge=0.0)
     """Pixels with no more light than this have no range."""
     spoilt_images: SpoiltImages = "repair"

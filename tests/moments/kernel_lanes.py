@@ -9,16 +9,22 @@ import transientcam_moments as tm
 from transientcam_moments._kernels.registry import REGISTRY
 
 CACHE = Path(__file__).resolve().parents[2] / ".pytest_cache" / "kernels"
+FEW = tuple(name for name in tm.kernels.LANES if name != "likelihood")
+"""All but that of the likelihood, which takes as long to compile as the others together."""
 
 
 @contextmanager
-def lanes(*harmonics: int, precisions: tuple[str, ...] = ("float32", "float64")) -> Iterator[None]:
+def lanes(
+    *harmonics: int,
+    precisions: tuple[str, ...] = ("float32", "float64"),
+    names: tuple[str, ...] = FEW,
+) -> Iterator[None]:
     """Have the lanes of these orders inside, as well as those that were there before."""
     before = dict(REGISTRY.compiled)
     set_by_user = "NUMBA_CACHE_DIR" in os.environ
     os.environ.setdefault("NUMBA_CACHE_DIR", str(CACHE))
     try:
-        tm.kernels.compile(harmonics=harmonics, precisions=precisions)
+        tm.kernels.compile(harmonics=harmonics, precisions=precisions, names=names)
         assert not tm.kernels.state()["failed"]
         yield
     finally:

@@ -464,3 +464,19 @@ def test_mistakes_name_the_field_and_its_limit() -> None:
 
 def test_the_brightest_light_saturates_neither_well_nor_converter() -> None:
     assert SENSOR.brightest == pytest.approx(min(40_000 / 9.0, 4095 - 64))
+
+
+def test_noise_by_a_smoothed_brightness_is_the_smoothed_noise() -> None:
+    brightness = np.random.default_rng(0).uniform(-50, 2000, (12, 15))
+    calibration = np.array([1.0, 0.9, 0.7j, 0.3])
+
+    def noise_of(light: np.ndarray) -> noise.MomentNoise:
+        return noise.moment_noise(light, noise.Sensor(), calibration=calibration)
+
+    for sigma_px in (0.0, 0.6, 1.5):
+        expected = noise.smoothed(noise_of(brightness), sigma_px).variance
+        found = noise.smoothed_of(noise_of, brightness, sigma_px).variance
+        assert np.allclose(found, expected, rtol=1e-12)
+
+    with pytest.raises(tm.ShapeError, match="brightness"):
+        noise.smoothed_of(noise_of, brightness[0])

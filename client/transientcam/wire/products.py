@@ -45,6 +45,20 @@ PRODUCTS: Final[dict[str, Product]] = {
         Product("uniform", "DN", _IMAGE, "<f4", "weight spread evenly over all times"),
         Product("brightness", "DN", _IMAGE, "<f4", "zeroth moment: all light"),
         Product("validity", "1", _IMAGE, "<f4", "smallest eigenvalue of the moments, over b_0"),
+        Product(
+            "range_std",
+            "m",
+            _IMAGE,
+            "<f4",
+            "standard deviation of the range of the likelihood estimate; NaN without one",
+        ),
+        Product(
+            "reduced_chi_square",
+            "1",
+            _IMAGE,
+            "<f4",
+            "misfit of the likelihood estimate over noise: about 1 where it explains the moments",
+        ),
         Product("flags", "1", _IMAGE, "|u1", "what was wrong with a pixel; 0 for nothing"),
         Product(
             "coefficients",

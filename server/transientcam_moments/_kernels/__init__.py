@@ -26,6 +26,9 @@ isn't finite
 
 ``separate(weight (m, ...), phase (m, ...), threshold) -> direct, indirect, phase (...)``
 
+``likelihood(b (m+1, P), variance (m+1, P), returns, tail_shape) -> attributes of Likelihood``,
+or None for other than the usual models
+
 ``reconstruct(shape, constants) -> OnePass``, found by `lookup`
 
 All others take ``spread=`` to do parts of the pixels on other threads (see ``parallel``).

@@ -31,9 +31,10 @@ def cache_directory(environ: Mapping[str, str], digest: str) -> Path | None:
 
 
 def digest_of_sources() -> str:
-    """Return a short digest of every source file of the kernels."""
+    """Return a short digest of every source file of the kernels, and of what they compile."""
     digest = hashlib.sha256()
-    for file in sorted(Path(__file__).parent.glob("*.py")):
+    here = Path(__file__).parent
+    for file in sorted([*here.glob("*.py"), *here.parent.glob("likelihood/*.py")]):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -7,6 +7,7 @@ from transientcam_moments._kernels.density import density_lane
 from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue_lane
 from transientcam_moments._kernels.frames import measure_lane, separate_lane, smooth_lane
 from transientcam_moments._kernels.levinson import levinson_lane
+from transientcam_moments._kernels.likelihood import likelihood_lane
 from transientcam_moments._kernels.pisarenko import pisarenko_lane
 from transientcam_moments._kernels.reconstruct import reconstruct_lane
 from transientcam_moments._kernels.registry import Key
@@ -20,6 +21,7 @@ LANES: dict[str, Callable[[int, str], Callable[..., Any]]] = {
     "smooth": smooth_lane,
     "separate": separate_lane,
     "reconstruct": reconstruct_lane,
+    "likelihood": likelihood_lane,
 }
 
 

@@ -101,7 +101,7 @@ def _cast(context: Any, builder: Any, fromty: Any, toty: Any, val: Any) -> Any:
     return _spread(builder, context.get_value_type(toty), scalar)
 
 
-def _operator(op: Any, kind: type, count: int, emit: Callable[..., Any], result: Any) -> None:
+def define(op: Any, kind: type, count: int, emit: Callable[..., Any], result: Any) -> None:
     """Give ``op`` a meaning for ``count`` operands of ``kind``, or of numbers spread to match."""
 
     @templates.infer_global(op)
@@ -134,19 +134,19 @@ def _compare(code: str) -> Callable[..., Any]:
     return lambda builder, x, y: builder.fcmp_ordered(code, x, y)
 
 
-_operator(operator.add, Lanes, 2, lambda b, x, y: b.fadd(x, y, flags=_FUSE), _same)
-_operator(operator.sub, Lanes, 2, lambda b, x, y: b.fsub(x, y, flags=_FUSE), _same)
-_operator(operator.mul, Lanes, 2, lambda b, x, y: b.fmul(x, y, flags=_FUSE), _same)
-_operator(operator.truediv, Lanes, 2, lambda b, x, y: b.fdiv(x, y), _same)
-_operator(operator.neg, Lanes, 1, lambda b, x: b.fneg(x), _same)
-_operator(operator.lt, Lanes, 2, _compare("<"), _truth)
-_operator(operator.le, Lanes, 2, _compare("<="), _truth)
-_operator(operator.gt, Lanes, 2, _compare(">"), _truth)
-_operator(operator.ge, Lanes, 2, _compare(">="), _truth)
-_operator(operator.eq, Lanes, 2, _compare("=="), _truth)
-_operator(operator.and_, Mask, 2, lambda b, x, y: b.and_(x, y), _same)
-_operator(operator.or_, Mask, 2, lambda b, x, y: b.or_(x, y), _same)
-_operator(operator.invert, Mask, 1, lambda b, x: b.not_(x), _same)
+define(operator.add, Lanes, 2, lambda b, x, y: b.fadd(x, y, flags=_FUSE), _same)
+define(operator.sub, Lanes, 2, lambda b, x, y: b.fsub(x, y, flags=_FUSE), _same)
+define(operator.mul, Lanes, 2, lambda b, x, y: b.fmul(x, y, flags=_FUSE), _same)
+define(operator.truediv, Lanes, 2, lambda b, x, y: b.fdiv(x, y), _same)
+define(operator.neg, Lanes, 1, lambda b, x: b.fneg(x), _same)
+define(operator.lt, Lanes, 2, _compare("<"), _truth)
+define(operator.le, Lanes, 2, _compare("<="), _truth)
+define(operator.gt, Lanes, 2, _compare(">"), _truth)
+define(operator.ge, Lanes, 2, _compare(">="), _truth)
+define(operator.eq, Lanes, 2, _compare("=="), _truth)
+define(operator.and_, Mask, 2, lambda b, x, y: b.and_(x, y), _same)
+define(operator.or_, Mask, 2, lambda b, x, y: b.or_(x, y), _same)
+define(operator.invert, Mask, 1, lambda b, x: b.not_(x), _same)
 
 
 @templates.infer_global(operator.getitem)

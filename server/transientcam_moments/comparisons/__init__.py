@@ -34,6 +34,7 @@ from transientcam_moments.comparisons._pixels import check_order
 from transientcam_moments.comparisons.estimate import (
     Estimate,
     GridEstimate,
+    LikelihoodEstimate,
     MaximumEntropyEstimate,
     SparseEstimate,
     grid_rad,
@@ -45,6 +46,7 @@ TECHNIQUES: dict[str, Technique] = {
     for technique in (
         own.MAXIMUM_ENTROPY,
         own.PISARENKO,
+        own.LIKELIHOOD,
         single_frequency.TECHNIQUE,
         inverse_fourier.TECHNIQUE,
         godbaz.TECHNIQUE,
@@ -67,6 +69,7 @@ __all__ = [
     "TECHNIQUES",
     "Estimate",
     "GridEstimate",
+    "LikelihoodEstimate",
     "MaximumEntropyEstimate",
     "SparseEstimate",
     "Technique",

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from transientcam_moments._arrays import flat_planes, in_range
 from transientcam_moments.cumulative import cumulative
 from transientcam_moments.levinson import Coefficients
+from transientcam_moments.likelihood import Likelihood
 from transientcam_moments.peaks import peaks
 from transientcam_moments.pisarenko import DIRECT_THRESHOLD, Returns, Separation, separate
 
@@ -17,6 +18,7 @@ Real = NDArray[np.floating[Any]]
 GRID_PHASES = 256
 _FULL_TURN = 2 * np.pi
 _BLOCK_VALUES = 1 << 20
+_TAIL_TURNS = 8
 
 
 class Estimate(ABC):
@@ -147,6 +149,47 @@ class MaximumEntropyEstimate(Estimate):
         """Return the phase (...) of the first local maximum above the threshold (Sec. 5.3)."""
         phase: Real = peaks(self.coefficients, threshold=threshold).first_rad
         return phase
+
+
+@dataclass(frozen=True, slots=True)
+class LikelihoodEstimate(Estimate):
+    """Sharp returns, or one with a gamma-shaped tail, by weighted least squares."""
+
+    likelihood: Likelihood
+
+    def cumulative(self, phase_rad: ArrayLike) -> Real:
+        """Return the light (T, ...) that has come back until phases (T,); a tail goes around."""
+        found = self.likelihood
+        sharp = SparseEstimate(found.phase_rad, found.weight, np.zeros_like(found.tail))
+        phase = np.asarray(phase_rad, float).reshape(-1)
+        come = sharp.cumulative(phase)
+        tailed = found.has_tail
+        delay = np.where(tailed, found.delay_rad, 1)
+        start = np.where(tailed, found.phase_rad[0], 0)
+        for index, at in enumerate(phase):
+            late = gamma_share((at - start) / delay, found.tail_shape)
+            # what is still on its way at the end of a turn comes in the next one
+            for turn in range(1, _TAIL_TURNS):
+                shifted = (at - start + turn * _FULL_TURN) / delay
+                late = late + gamma_share(shifted, found.tail_shape)
+                late = late - gamma_share((turn * _FULL_TURN - start) / delay, found.tail_shape)
+            come[index] += np.where(tailed, found.tail * late, 0)
+        return come
+
+    def separate(self, threshold: float = DIRECT_THRESHOLD) -> Separation:
+        """Tell the first return from all later light."""
+        return self.likelihood.separate(threshold)
+
+
+def gamma_share(time: Real, shape: int) -> Real:
+    """Return the share of a gamma distribution of mean 1 until `time`, for a whole shape."""
+    y = np.maximum(time, 0) * shape
+    rest, term = np.zeros_like(y), np.ones_like(y)
+    for k in range(shape):
+        rest = rest + term
+        term = term * y / (k + 1)
+    share: Real = 1 - rest * np.exp(-y)
+    return share
 
 
 def grid_rad(bins: int) -> Real:

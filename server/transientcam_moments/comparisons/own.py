@@ -1,9 +1,14 @@
 """The paper's own estimates in the form of the others (Sec. 3.2 and 5.1)."""
 
 from transientcam_moments._arrays import Array
-from transientcam_moments.comparisons.estimate import MaximumEntropyEstimate, SparseEstimate
+from transientcam_moments.comparisons.estimate import (
+    LikelihoodEstimate,
+    MaximumEntropyEstimate,
+    SparseEstimate,
+)
 from transientcam_moments.comparisons.technique import Technique, from_first, from_zeroth
 from transientcam_moments.levinson import levinson
+from transientcam_moments.likelihood import likelihood
 from transientcam_moments.pisarenko import pisarenko
 
 
@@ -22,6 +27,14 @@ def pisarenko_estimate(b: Array) -> SparseEstimate:
     """
     found = pisarenko(b)
     return SparseEstimate(found.phase_rad, found.weight, found.uniform)
+
+
+def likelihood_estimate(b: Array) -> LikelihoodEstimate:
+    """Estimate one to three returns, or one with a tail, from moments (m + 1, ...), b_0 included.
+
+    Their noise is not known here: see `transientcam_moments.likelihood` for what it assumes.
+    """
+    return LikelihoodEstimate(likelihood(b))
 
 
 MAXIMUM_ENTROPY = Technique(
@@ -49,4 +62,18 @@ PISARENKO = Technique(
     cost="Closed form: a smallest eigenvalue and the roots of a polynomial of degree m.",
     failure="A continuous response is made sparse: outliers in range under diffuse light.",
     estimate=pisarenko_estimate,
+)
+
+LIKELIHOOD = Technique(
+    name="likelihood",
+    label="Weighted least squares of few returns, or one with a tail",
+    returns="3, or 1 and a tail",
+    frequencies="f .. m f; 0 helps",
+    harmonics=from_zeroth,
+    least_harmonics=1,
+    assumptions="Few sharp returns, or one with a gamma-shaped tail; the noise of the moments.",
+    cost="Up to four fits of 4 to 10 Levenberg-Marquardt steps, in compiled lanes.",
+    failure="Light of another shape biases the range; chi-square then says so where it exceeds "
+    "the noise.",
+    estimate=likelihood_estimate,
 )

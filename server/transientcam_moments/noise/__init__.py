@@ -20,6 +20,7 @@ from transientcam_moments.noise.moments import (
     moment_noise,
     smoothed,
     smoothed_at,
+    smoothed_of,
     smoothing_factor,
 )
 from transientcam_moments.noise.returns import ReturnNoise, return_noise
@@ -39,5 +40,6 @@ __all__ = [
     "return_noise",
     "smoothed",
     "smoothed_at",
+    "smoothed_of",
     "smoothing_factor",
 ]

@@ -176,6 +176,45 @@ def smoothed(noise: MomentNoise, sigma_px: float = SIGMA_PX) -> MomentNoise:
     return MomentNoise(smooth(variance, sigma_px / math.sqrt(2)) * left)
 
 
+def smoothed_of(
+    noise_of: Callable[[Array], MomentNoise], brightness: Array, sigma_px: float = SIGMA_PX
+) -> MomentNoise:
+    """Return what `smoothed` gives of an image, by smoothing its brightness alone.
+
+    Parameters
+    ----------
+    noise_of : callable
+        Returns the noise (m + 1, H, W) of each pixel by itself, of its brightness, as
+        `moment_noise` does: its variance must be affine in a brightness above 0. Gains of single
+        pixels are taken for those of their neighbours.
+    brightness : array, shape (H, W)
+        In DN.
+    sigma_px : float
+        Standard deviation of the Gaussian, 0 to 100.
+
+    Returns
+    -------
+    MomentNoise
+        Of shape (m + 1, H, W).
+
+    Raises
+    ------
+    ShapeError
+        When the brightness is no image.
+    """
+    in_range("sigma_px", sigma_px, 0.0, 100.0, "0 to 100 pixels")
+    if brightness.ndim != 2:
+        raise ShapeError("brightness", f"of shape {tuple(brightness.shape)}", "(H, W)")
+    if sigma_px == 0:
+        return noise_of(brightness)
+    xp = namespace(brightness)
+    light = xp.maximum(brightness, 0)
+    variance = noise_of(smooth(light[None], sigma_px / math.sqrt(2))[0]).variance
+    rows, columns = (_factors(sigma_px, length) for length in brightness.shape)
+    left = xp.asarray(np.outer(rows, columns)).astype(variance.dtype)
+    return MomentNoise(variance * left)
+
+
 def smoothed_at(
     noise_of: Callable[[Array], MomentNoise],
     brightness: Array,

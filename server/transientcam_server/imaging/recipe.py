@@ -126,6 +126,7 @@ class Recipe:
             zeroth=sequence.zeroth,
             takes=sequence.takes,
             full_scale=self.full_scale,
+            sensor=self.sensor,
         )
         return tm.Reconstructor(
             settings,

@@ -19,6 +19,7 @@ STAGES: Final[dict[str, tuple[str, ...]]] = {
     "moments": ("moments",),
     "returns": ("returns", "direct", "range_m"),
     "coefficients": ("coefficients",),
+    "likelihood": ("likelihood",),
 }
 """Properties of `tm.Reconstruction` that each stage computes, in the order they build on."""
 FIRST: Final = "light"

@@ -31,7 +31,7 @@ def test_the_daemon_offers_the_techniques_that_compute_all_pixels_at_once() -> N
 
     offered = ReconstructionSettings.model_json_schema()["properties"]["estimator"]["enum"]
     assert set(offered) == planar
-    assert offered[:3] == ["pisarenko", "maximum-entropy", "single-frequency"]
+    assert offered[:3] == ["pisarenko", "maximum-entropy", "likelihood"]
 
 
 @cache

@@ -1,0 +1,1 @@
+"""Run ``python -m benchmarks.likelihood [--data FOLDER] [--only PART] [--write]``."""

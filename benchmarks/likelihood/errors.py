@@ -1,0 +1,84 @@
+"""How far the ranges of all estimators are off, on the same moments."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+
+Array = NDArray[Any]
+ESTIMATORS: Final[Mapping[str, str]] = {
+    "single-frequency": "single frequency",
+    "pisarenko": "Pisarenko",
+    "maximum-entropy": "maximum entropy",
+    "likelihood": "likelihood",
+}
+COLUMNS: Final = tuple(ESTIMATORS.values())
+HEAD: Final = "median / 90 % / RMSE / bias, mm"
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """Of the range over pixels, in mm: of its size half and nine of ten, root mean square, mean."""
+
+    median_mm: float
+    p90_mm: float
+    rmse_mm: float
+    bias_mm: float
+    missing: float
+
+    def __str__(self) -> str:
+        """As in a table."""
+        lost = f", {self.missing:.1%} without" if self.missing > 0 else ""
+        parts = (self.median_mm, self.p90_mm, self.rmse_mm)
+        return " / ".join(map(_short, parts)) + f" / {self.bias_mm:+.1f}{lost}"
+
+
+def _short(value: float) -> str:
+    return f"{value:.1f}" if value < 100 else f"{value:.0f}"
+
+
+def errors_of(range_m: Array, truth_m: Array, turn_m: float) -> Errors:
+    """Compare ranges, of which those a whole turn apart are the same, where there is a truth."""
+    known = np.isfinite(truth_m)
+    found = np.asarray(range_m, float)[known]
+    there = np.isfinite(found)
+    off_mm = 1e3 * (found - truth_m[known])[there]
+    off_mm = np.remainder(off_mm + 500 * turn_m, 1e3 * turn_m) - 500 * turn_m
+    size = np.abs(off_mm)
+    return Errors(
+        float(np.median(size)),
+        float(np.quantile(size, 0.9)),
+        float(np.sqrt(np.mean(off_mm**2))),
+        float(off_mm.mean()),
+        1 - float(there.mean()),
+    )
+
+
+def ranges(
+    moments: Array,
+    settings: tm.Settings,
+    *,
+    noise: tm.noise.MomentNoise | None = None,
+    calibration: Array | None = None,
+) -> dict[str, Array]:
+    """Return the range (...) by each estimator; that of the likelihood by `noise` where given."""
+    found = {}
+    for name in ESTIMATORS:
+        if name == "likelihood" and noise is not None:
+            phase = tm.likelihood(moments, noise).separate(settings.threshold).phase_rad
+            found[name] = np.asarray(tm.range_m(phase, settings.base_frequency_hz))
+            continue
+        chosen = replace(settings, estimator=name)
+        found[name] = np.asarray(
+            tm.Reconstruction(moments, chosen, calibration=calibration).range_m
+        )
+    return found
+
+
+def turn_m(base_frequency_hz: float) -> float:
+    """Return the unambiguous range."""
+    return float(tm.range_m(np.float64(2 * np.pi), base_frequency_hz))

@@ -1,0 +1,63 @@
+"""How long the likelihood takes for a frame, beside the compiled pass that makes its moments."""
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+import transientcam_moments as tm
+from benchmarks.data import PAPER, VGA, images, numpy_alone
+from benchmarks.tables import Table
+from benchmarks.timing import measure
+
+ORDERS: Final = (3, 4, 8)
+_SENSOR: Final = tm.noise.Sensor(read_noise_e=18.0, dark_dn=50.0, gain_e_per_dn=1.0)
+"""That of `benchmarks.data.images`."""
+
+
+def tables() -> Iterator[Table]:
+    """Time two frames of each order and size: light of one return, and of three."""
+    tm.kernels.compile(harmonics=ORDERS, precisions=("float32",))
+    table = Table(
+        "Time of a frame, on one core, single precision",
+        ("m, pixels", "scene", "likelihood", "pass of raw images", "ratio", "planar NumPy"),
+        notes=[
+            "The pass is the compiled `reconstruct`, from raw images to Pisarenko's returns, in "
+            "the same run. One return: one model is fitted. Three returns: all models are.",
+        ],
+    )
+    for m in ORDERS:
+        for name, shape in (("163 x 120", PAPER), ("640 x 480", VGA)):
+            for returns in (1, 3):
+                table.rows.append(_row(m, name, shape, returns))
+    yield table
+
+
+def _row(m: int, name: str, shape: tuple[int, int], returns: int) -> tuple[str, ...]:
+    raw = images(m, shape)
+    settings = tm.Settings(sensor=_SENSOR)
+    found = tm.reconstruct(raw, settings)
+    moments, noise = np.asarray(found.smoothed), found.noise
+    if returns == 1:
+        random = np.random.default_rng(m)
+        j = np.arange(m + 1)[:, None, None]
+        turn = np.exp(1j * j * random.uniform(1, 4, shape))
+        b = (1500 * turn).astype(np.complex64)
+        assert noise is not None
+        moments = tm.noise.draw(b, noise, random, draws=1)[:, 0]
+    lane = measure(partial(tm.likelihood, moments, noise))
+    reconstructor = tm.Reconstructor(settings)
+    one_pass = measure(partial(reconstructor, raw))
+    planar = "-"
+    if shape == PAPER:
+        with numpy_alone():
+            planar = str(measure(partial(tm.likelihood, moments, noise), least_s=0.1))
+    return (
+        f"{m}, {name}",
+        "one return" if returns == 1 else "three returns",
+        str(lane),
+        str(one_pass),
+        f"{lane.median_s / one_pass.median_s:.1f}",
+        planar,
+    )

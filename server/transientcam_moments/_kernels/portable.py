@@ -1,0 +1,114 @@
+"""What the fits of `likelihood` need beyond + - * /, for vectors of pixels.
+
+The functions of `transientcam_moments.likelihood` are compiled as they stand there: the arithmetic
+that they call has its meaning for lanes here.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir  # type: ignore[import-untyped]  # it has no annotations
+from numba import types as numba_types
+from numba.core import cgutils as numba_cgutils
+
+from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.simd import Lanes, Mask, Registers, extending, templates
+from transientcam_moments.likelihood import arithmetic, choice, linear, sharp, tail
+
+types: Any = numba_types
+cgutils: Any = numba_cgutils
+
+
+def _room(function: Callable[..., Any], size: Callable[[int, int], int]) -> None:
+    """Give a function that makes room its meaning; the room is the calling function's."""
+
+    @templates.infer_global(function)
+    class _Template(templates.AbstractTemplate):  # type: ignore[misc]  # numba is untyped
+        def generic(self, args: Any, kws: Any) -> Any:
+            like, length, extra = args
+            if not isinstance(like, Lanes) or not isinstance(extra, types.IntegerLiteral):
+                return None
+            room = Registers(like, size(len(length), extra.literal_value))
+            return templates.signature(room, like, length, extra)
+
+    @extending.lower_builtin(function, Lanes, types.Any, types.Any)
+    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        item = context.get_value_type(sig.return_type.item)
+        return cgutils.alloca_once(builder, item, size=sig.return_type.size)
+
+
+_room(arithmetic.bank, lambda length, extra: length + extra)
+_room(arithmetic.square_bank, lambda length, extra: (length + extra) ** 2)
+
+
+def _same(vector: Any) -> Any:
+    return vector
+
+
+def _root(builder: Any, x: Any) -> Any:
+    kind = ir.FunctionType(x.type, [x.type])
+    name = f"llvm.sqrt.v{x.type.count}f{32 if isinstance(x.type.element, ir.FloatType) else 64}"
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [x])
+
+
+def _constant(value: Callable[[Any], float]) -> Callable[[Any, Any], Any]:
+    """Return what gives a number depending on the precision of its argument."""
+
+    def emit(builder: Any, x: Any) -> Any:
+        limits = np.finfo(np.float32 if isinstance(x.type.element, ir.FloatType) else np.float64)
+        return ir.Constant(x.type, [value(limits)] * x.type.count)
+
+    return emit
+
+
+simd.define(
+    arithmetic.larger, Lanes, 2, lambda b, x, y: b.select(b.fcmp_ordered(">", x, y), x, y), _same
+)
+simd.define(
+    arithmetic.smaller, Lanes, 2, lambda b, x, y: b.select(b.fcmp_ordered("<", x, y), x, y), _same
+)
+simd.define(arithmetic.root, Lanes, 1, _root, _same)
+simd.define(arithmetic.least, Lanes, 1, _constant(lambda limits: float(limits.tiny) ** 0.5), _same)
+simd.define(arithmetic.rounding, Lanes, 1, _constant(lambda limits: 8 * float(limits.eps)), _same)
+
+
+@templates.infer_global(arithmetic.select)
+class _Select(templates.AbstractTemplate):  # type: ignore[misc]  # numba is untyped
+    def generic(self, args: Any, kws: Any) -> Any:
+        lanes = args[1] if isinstance(args[1], Lanes) else args[2]
+        fits = isinstance(args[0], Mask) and isinstance(lanes, Lanes)
+        return templates.signature(lanes, args[0], lanes, lanes) if fits else None
+
+
+@extending.lower_builtin(arithmetic.select, Mask, Lanes, Lanes)
+def _select(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.select(*args)
+
+
+for _function in (
+    arithmetic.logarithm,
+    linear.decompose,
+    linear.solve,
+    linear.variances,
+    sharp.chi_square,
+    sharp.take_away,
+    sharp.weigh_what_is_left,
+    sharp.try_phase,
+    sharp.information,
+    sharp.weigh,
+    sharp.step,
+    sharp.deviations,
+    tail.shape,
+    tail.weigh,
+    tail.remains,
+    tail.information,
+    tail.step,
+    tail.deviations,
+    choice.nothing,
+    choice.offer_returns,
+    choice.start_of_tail,
+    choice.offer_tail,
+    choice.phases_of,
+):
+    extending.register_jitable(error_model="numpy")(_function)

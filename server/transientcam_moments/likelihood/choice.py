@@ -1,0 +1,155 @@
+"""Of several models of a pixel the one that explains its moments with the fewest unknowns.
+
+What is found of a pixel is a bank of planes, in the order of `Found`. Three returns at most.
+"""
+
+from typing import Any, Final
+
+from transientcam_moments._arrays import Array
+from transientcam_moments.likelihood import sharp, tail
+from transientcam_moments.likelihood.arithmetic import (
+    Bank,
+    Length,
+    bank,
+    larger,
+    least,
+    logarithm,
+    select,
+    smaller,
+)
+
+MOST_RETURNS: Final = 3
+X, Y, WEIGHT, WEIGHT_VARIANCE, PHASE_VARIANCE = 0, 3, 6, 9, 12
+"""First plane of the points of the unit circle, the weights and their variances, of each return."""
+TAIL, LENGTH, TAIL_VARIANCE, LENGTH_VARIANCE = 15, 16, 17, 18
+"""Light v of the tail, d, the variances of v and of log d; all 0 where there is no tail."""
+CHI_SQUARE, SCORE, COUNT = 19, 20, 21
+PLANES: Final = 22
+STEPS: Final = (4, 8, 10)
+"""Of the fits of one, two and three returns."""
+TAIL_STEPS: Final = 10
+TAIL_SHAPE: Final = 3
+"""Shape of the gamma distribution of the tail; docs/likelihood.md has the evidence."""
+DELAY_RAD: Final = 0.75
+"""Mean of the prior of the tail's mean delay; its standard deviation is a factor e."""
+PRIOR: Final = 1.0
+"""Inverse variance of log d."""
+MARGIN: Final = 6.0
+"""Added to log n of the Bayesian information criterion for each unknown. Many positions are tried
+where the criterion counts one; with this margin fewer than 1 of 1000 single returns are split."""
+LEAST_RATIO, MOST_RATIO = 0.05, 4.0
+"""Of a tail's first d over its mean in the prior."""
+
+
+def phases_of(m: int) -> int:
+    """Return how many phases around the turn are tried for a start."""
+    return 4 * m + 6
+
+
+def nothing(like: Array, score: Array, found: Bank) -> None:
+    """Begin with no return, at a score that every model is better than."""
+    for i in range(PLANES):
+        found[i] = 0.0 * like
+    found[SCORE] = score
+
+
+def offer_returns(
+    order: Length,
+    returns: Length,
+    unknowns: Length,
+    weight: Bank,
+    x: Bank,
+    y: Bank,
+    w: Bank,
+    cost: Array,
+    penalty: Array,
+    allowed: Any,
+    found: Bank,
+) -> None:
+    """Put K returns in `found` wherever their score is better and they are `allowed`."""
+    count = len(returns)
+    spread = bank(cost, unknowns, 0)
+    sharp.deviations(order, returns, unknowns, weight, x, y, spread)
+    score = cost + (2.0 * count) * penalty
+    better = (score < found[SCORE]) & allowed
+    zero = 0.0 * cost
+    for k in range(MOST_RETURNS):
+        i = min(k, count - 1)
+        there = 1.0 if k < count else 0.0
+        size = larger(w[i], least(cost))
+        found[X + k] = select(better, there * x[i], found[X + k])
+        found[Y + k] = select(better, there * y[i], found[Y + k])
+        found[WEIGHT + k] = select(better, there * w[i], found[WEIGHT + k])
+        variance = there * spread[i]
+        found[WEIGHT_VARIANCE + k] = select(better, variance, found[WEIGHT_VARIANCE + k])
+        variance = there * (spread[count + i] / (size * size))
+        found[PHASE_VARIANCE + k] = select(better, variance, found[PHASE_VARIANCE + k])
+    for i in range(TAIL, LENGTH_VARIANCE + 1):
+        found[i] = select(better, zero, found[i])
+    found[CHI_SQUARE] = select(better, cost, found[CHI_SQUARE])
+    found[SCORE] = select(better, score, found[SCORE])
+    found[COUNT] = select(better, float(count) + zero, found[COUNT])
+
+
+def start_of_tail(x: Bank, y: Bank, w: Bank, mean: float) -> tuple[Array, ...]:
+    """Return point, light, light of the tail, d over the prior's mean, and its logarithm.
+
+    From two returns, of which the earlier one, within half a turn, is the direct one. A second one
+    without weight says nothing about the delay, which is then the prior's `mean`.
+    """
+    dx, dy = x[0] * x[1] + y[0] * y[1], y[1] * x[0] - x[1] * y[0]
+    first = dy >= 0.0
+    sx, sy = select(first, x[0], x[1]), select(first, y[0], y[1])
+    sw, sv = select(first, w[0], w[1]), select(first, w[1], w[0])
+    # an angle up to its third power: enough for a start
+    sine = select(dy < 0.0, -dy, dy)
+    angle = select(dx > 0.0, sine * (1.0 + sine * sine / 6.0), 1.5 + 0.0 * sine)
+    lone = smaller(w[0], w[1]) < 0.02 * (w[0] + w[1])
+    strong = w[0] > w[1]
+    sx, sy = select(lone & strong, x[0], sx), select(lone & strong, y[0], sy)
+    sx, sy = select(lone & ~strong, x[1], sx), select(lone & ~strong, y[1], sy)
+    sw, sv = select(lone, larger(w[0], w[1]), sw), select(lone, 0.0 * sv, sv)
+    delay = select(lone, mean + 0.0 * angle, angle)
+    ratio = larger(smaller(delay / mean, MOST_RATIO + 0.0 * delay), LEAST_RATIO + 0.0 * delay)
+    return sx, sy, sw, sv, ratio, logarithm(ratio)
+
+
+def offer_tail(
+    order: Length,
+    powers: Length,
+    unknowns: Length,
+    weight: Bank,
+    prior: float,
+    x: Array,
+    y: Array,
+    w: Array,
+    v: Array,
+    d: Array,
+    t: Array,
+    qr: Bank,
+    qi: Bank,
+    rr: Bank,
+    ri: Bank,
+    cost: Array,
+    penalty: Array,
+    allowed: Any,
+    found: Bank,
+) -> None:
+    """Put a return with a tail in `found` wherever its score is better and it is `allowed`."""
+    spread = bank(cost, unknowns, 0)
+    tail.deviations(order, powers, unknowns, weight, prior, x, y, w, v, d, qr, qi, rr, ri, spread)
+    score = cost + 4.0 * penalty
+    better = (score < found[SCORE]) & allowed
+    zero = 0.0 * cost
+    for i in range(LENGTH_VARIANCE + 1):
+        found[i] = select(better, zero, found[i])
+    found[X], found[Y] = select(better, x, found[X]), select(better, y, found[Y])
+    found[WEIGHT] = select(better, w, found[WEIGHT])
+    found[WEIGHT_VARIANCE] = select(better, spread[0], found[WEIGHT_VARIANCE])
+    found[PHASE_VARIANCE] = select(better, spread[2], found[PHASE_VARIANCE])
+    found[TAIL], found[LENGTH] = select(better, v, found[TAIL]), select(better, d, found[LENGTH])
+    found[TAIL_VARIANCE] = select(better, spread[1], found[TAIL_VARIANCE])
+    found[LENGTH_VARIANCE] = select(better, spread[3], found[LENGTH_VARIANCE])
+    found[CHI_SQUARE] = select(better, larger(cost - prior * t * t, zero), found[CHI_SQUARE])
+    found[SCORE] = select(better, score, found[SCORE])
+    found[COUNT] = select(better, 1.0 + zero, found[COUNT])

@@ -1,0 +1,219 @@
+"""The fits of all pixels: each model where the simpler ones leave something to explain."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from transientcam_moments._arrays import Array, namespace
+from transientcam_moments.likelihood import sharp, tail
+from transientcam_moments.likelihood.choice import (
+    DELAY_RAD,
+    MOST_RETURNS,
+    PLANES,
+    PRIOR,
+    SCORE,
+    STEPS,
+    TAIL_STEPS,
+    nothing,
+    offer_returns,
+    offer_tail,
+    phases_of,
+    start_of_tail,
+)
+
+
+class Data(NamedTuple):
+    """What is fitted: planes of pixels, the moments over `scale`.
+
+    Attributes
+    ----------
+    re, im : array, shape (m + 1, P)
+        0 where not measured.
+    weight : array, shape (m + 1, P)
+        Inverse variance of each part; 0 where not measured.
+    penalty : array, shape (P)
+        What an unknown has to lower chi-square by.
+    numbers : array, shape (P)
+        How many real numbers were measured.
+    """
+
+    re: Array
+    im: Array
+    weight: Array
+    penalty: Array
+    numbers: Array
+
+
+def fit(data: Data, most: int, shape: int) -> Array:
+    """Return what is found of every pixel (PLANES, P), as `choice` lays it out.
+
+    `most` is the largest number of sharp returns, 1 to 3; `shape` that of the tail, 0 for none.
+    """
+    xp = namespace(data.re)
+    m = data.re.shape[0] - 1
+    found = [data.re[0]] * PLANES
+    nothing(data.penalty, np.inf + 0 * data.penalty, found)
+    one = _Returns.start(data, 1, None)
+    one.offer(found, data.numbers >= 0)
+    planes = xp.stack(found)
+    further = min(most, m) >= 2
+    if not further and not (shape and m >= 2):
+        return planes
+
+    def more(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+        found = list(planes)
+        two = _Returns.start(data, 2, before)
+        if further:
+            two.offer(found, data.numbers >= 4)
+        if shape:
+            _offer_tail(data, two, shape, found)
+        done = xp.stack(found)
+        if min(most, m) < MOST_RETURNS:
+            return done
+
+        def most_of_all(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+            found = list(planes)
+            _Returns.start(data, 3, before).offer(found, data.numbers >= 6)
+            return namespace(planes).stack(found)
+
+        still = done[SCORE] > 6 * data.penalty
+        return _where(still, most_of_all, data, two.state(), done)
+
+    # chi-square cannot become less than 0: no model with more unknowns is better below
+    return _where(planes[SCORE] > 4 * data.penalty, more, data, one.state(), planes)
+
+
+def _where(
+    mask: Array,
+    function: Callable[[Data, tuple[Array, ...], Array], Array],
+    data: Data,
+    before: tuple[Array, ...],
+    planes: Array,
+) -> Array:
+    """Apply a function of pixels to those of a mask; to all where arrays cannot be cut."""
+    if namespace(mask) is not np:
+        return namespace(mask).where(mask, function(data, before, planes), planes)
+    at = np.flatnonzero(mask)
+    if at.size:
+        planes[:, at] = function(
+            Data(*(part[..., at] for part in data)),
+            tuple(part[..., at] for part in before),
+            planes[:, at],
+        )
+    return planes
+
+
+class _Returns:
+    """A fit of K sharp returns: banks, as `sharp` takes them."""
+
+    def __init__(self, data: Data, count: int, before: tuple[Array, ...] | None) -> None:
+        m = data.re.shape[0] - 1
+        self.data = data
+        self.order, self.returns = (0,) * m, (0,) * count
+        self.unknowns = (0,) * (2 * count)
+        flat = (list(data.re), list(data.im)) if before is None else (before[0], before[1])
+        self.rr, self.ri = list(flat[0]), list(flat[1])
+        points = () if before is None else before[2:]
+        self.x, self.y, self.w = ([*part, data.re[0]] for part in points or ((), (), ()))
+
+    @classmethod
+    def start(cls, data: Data, count: int, before: tuple[Array, ...] | None) -> "_Returns":
+        """Add a return to those of another fit, and fit all of them."""
+        fit = cls(data, count, before)
+        fit.cost = fit._add()
+        damping = sharp.FIRST_DAMPING + 0 * fit.cost
+
+        def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
+            x, y, w, rr, ri = (list(part) for part in state[:5])
+            cost, damping = sharp.step(
+                fit.order, fit.returns, fit.unknowns, data.re, data.im, data.weight,
+                x, y, w, rr, ri, state[5], state[6],
+            )  # fmt: skip
+            return tuple(x), tuple(y), tuple(w), tuple(rr), tuple(ri), cost, damping
+
+        banks = (tuple(part) for part in (fit.x, fit.y, fit.w, fit.rr, fit.ri))
+        state = _times(STEPS[count - 1], step, (*banks, fit.cost, damping))
+        fit.x, fit.y, fit.w, fit.rr, fit.ri = (list(part) for part in state[:5])
+        fit.cost = state[5]
+        return fit
+
+    def _add(self) -> Array:
+        """Put the best return for what is left in the last place; return chi-square."""
+        order, data = self.order, self.data
+        re, im = list(self.rr), list(self.ri)
+        total = sharp.weigh_what_is_left(order, data.weight, self.rr, self.ri, re, im)
+        phases = phases_of(len(order))
+        cosine, sine = np.cos(2 * np.pi / phases), np.sin(2 * np.pi / phases)
+
+        def attempt(state: tuple[Array, ...]) -> tuple[Array, ...]:
+            c, s = state[:2]
+            best = sharp.try_phase(
+                order, self.returns, data.weight, re, im, total, self.x, self.y, c, s, *state[2:]
+            )
+            return c * cosine - s * sine, c * sine + s * cosine, *best
+
+        zero = 0 * total
+        none = zero - 1
+        one = total.dtype.type(1) if namespace(total) is np else 1 + zero
+        state = _times(phases, attempt, (one, 0 * one, none, zero, zero, zero))
+        x, y, w = self.x, self.y, self.w
+        x[-1], y[-1], w[-1] = state[3:]
+        sharp.take_away(order, x[-1], y[-1], w[-1], self.rr, self.ri)
+        return sharp.chi_square(order, data.weight, self.rr, self.ri)
+
+    def state(self) -> tuple[Array, ...]:
+        """Return what a fit of one more return begins with."""
+        xp = namespace(self.cost)
+        return tuple(xp.stack(part) for part in (self.rr, self.ri, self.x, self.y, self.w))
+
+    def offer(self, found: list[Array], allowed: Array) -> None:
+        """Put the returns where they are the better model."""
+        offer_returns(
+            self.order, self.returns, self.unknowns, self.data.weight,
+            self.x, self.y, self.w, self.cost, self.data.penalty, allowed, found,
+        )  # fmt: skip
+
+
+def _offer_tail(data: Data, two: _Returns, shape: int, found: list[Array]) -> None:
+    """Fit a return with a tail, from two returns on, and put it where it is the better model."""
+    order, powers, unknowns = two.order, (0,) * shape, (0,) * 4
+    mean = DELAY_RAD / shape
+    x, y, w, v, ratio, t = start_of_tail(two.x, two.y, two.w, DELAY_RAD)
+    d = ratio * mean
+    planes = [tuple([d] * len(data.re)) for _ in range(4)]
+    qr, qi, rr, ri = (list(part) for part in planes)
+    tail.shape(order, powers, d, qr, qi)
+    tail.remains(order, data.re, data.im, x, y, w, v, qr, qi, rr, ri)
+    cost = sharp.chi_square(order, data.weight, rr, ri) + PRIOR * t * t
+
+    def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
+        banks = [list(part) for part in state[6:10]]
+        new = tail.step(
+            order, powers, unknowns, data.re, data.im, data.weight, PRIOR,
+            *state[:6], *banks, state[10], state[11],
+        )  # fmt: skip
+        return (*new[:6], *(tuple(part) for part in banks), *new[6:])
+
+    banks = (tuple(part) for part in (qr, qi, rr, ri))
+    damping = sharp.FIRST_DAMPING + 0 * cost
+    state = _times(TAIL_STEPS, step, (x, y, w, v, d, t, *banks, cost, damping))
+    qr, qi, rr, ri = (list(part) for part in state[6:10])
+    offer_tail(
+        order, powers, unknowns, data.weight, PRIOR, *state[:6], qr, qi, rr, ri,
+        state[10], data.penalty, data.numbers >= 4, found,
+    )  # fmt: skip
+
+
+def _times(
+    times: int, step: Callable[[tuple[Array, ...]], tuple[Array, ...]], state: tuple[Array, ...]
+) -> tuple[Array, ...]:
+    """Apply a step so many times; JAX compiles it once."""
+    if namespace(state[-1]).__name__ == "jax.numpy":
+        from jax import lax
+
+        result: tuple[Array, ...] = lax.fori_loop(0, times, lambda _, inner: step(inner), state)
+        return result
+    for _ in range(times):
+        state = step(state)
+    return state

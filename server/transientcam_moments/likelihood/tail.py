@@ -1,0 +1,243 @@
+"""Weighted least squares of a return with a tail that begins with it.
+
+b_j = exp(i j phi) (w + v / (1 - i j d)^p): light w at phase phi and light v that comes later, with
+the density of a gamma distribution of shape p and mean delay p d. A normal prior on log d ties d
+down where there is no tail to measure it by.
+
+Names as in `sharp`; ``powers`` is a tuple of length p. The unknowns are w, v, phi and log d, and
+``t`` is log(d) less its mean in the prior, kept beside d.
+"""
+
+from transientcam_moments._arrays import Array
+from transientcam_moments.likelihood.arithmetic import (
+    Bank,
+    Length,
+    bank,
+    larger,
+    rounding,
+    select,
+    smaller,
+    square_bank,
+)
+from transientcam_moments.likelihood.linear import decompose, solve, variances
+from transientcam_moments.likelihood.sharp import (
+    LEAST_DAMPING,
+    LESS_DAMPING,
+    MORE_DAMPING,
+    MOST_DAMPING,
+    REACH,
+    chi_square,
+)
+
+LONGER = 0.7
+"""The most that log d changes in a step."""
+SHORTEST, LONGEST = -3.2, 2.4
+"""Limits of t: d within the prior's mean times their exponentials."""
+
+
+def shape(order: Length, powers: Length, d: Array, qr: Bank, qi: Bank) -> None:
+    """Put the moments of a tail that begins at phase 0 in `qr` and `qi`."""
+    qr[0], qi[0] = 1.0 + 0.0 * d, 0.0 * d
+    for j in range(1, len(order) + 1):
+        size = 1.0 / (1.0 + (float(j) * j) * d * d)
+        a, b = size, float(j) * d * size  # 1 / (1 - i j d)
+        p, q = a, b
+        for _ in range(len(powers) - 1):
+            p, q = p * a - q * b, p * b + q * a
+        qr[j], qi[j] = p, q
+
+
+def weigh(
+    order: Length, data_r: Bank, data_i: Bank, weight: Bank, x: Array, y: Array, qr: Bank, qi: Bank
+) -> tuple[Array, Array]:
+    """Return the light w and v >= 0 that explains most with given phase and tail."""
+    ww, wv, vv = weight[0], weight[0] * qr[0], weight[0] * qr[0] * qr[0]
+    gw = weight[0] * data_r[0]
+    gv = gw * qr[0]
+    p, q = x, y
+    for j in range(1, len(order) + 1):
+        ur, ui = p * data_r[j] + q * data_i[j], p * data_i[j] - q * data_r[j]
+        ww = ww + weight[j]
+        wv = wv + weight[j] * qr[j]
+        vv = vv + weight[j] * (qr[j] * qr[j] + qi[j] * qi[j])
+        gw = gw + weight[j] * ur
+        gv = gv + weight[j] * (ur * qr[j] + ui * qi[j])
+        p, q = p * x - q * y, p * y + q * x
+    ww, vv = ww * (1.0 + rounding(ww)), vv * (1.0 + rounding(ww))
+    inverse = 1.0 / (ww * vv - wv * wv)
+    w, v = (vv * gw - wv * gv) * inverse, (ww * gv - wv * gw) * inverse
+    alone, late = gw / ww, gv / vv
+    zero = 0.0 * w
+    w, v = select(v < 0.0, alone, w), larger(v, zero)
+    return larger(w, zero), larger(select(w < 0.0, late, v), zero)
+
+
+def remains(
+    order: Length,
+    data_r: Bank,
+    data_i: Bank,
+    x: Array,
+    y: Array,
+    w: Array,
+    v: Array,
+    qr: Bank,
+    qi: Bank,
+    rr: Bank,
+    ri: Bank,
+) -> None:
+    """Put what is left of the data in `rr` and `ri`."""
+    rr[0], ri[0] = data_r[0] - (w + v), data_i[0]
+    a, b = x, y
+    for j in range(1, len(order) + 1):
+        p, q = w + v * qr[j], v * qi[j]
+        rr[j] = data_r[j] - (a * p - b * q)
+        ri[j] = data_i[j] - (a * q + b * p)
+        a, b = a * x - b * y, a * y + b * x
+
+
+def information(
+    order: Length,
+    powers: Length,
+    weight: Bank,
+    x: Array,
+    y: Array,
+    w: Array,
+    v: Array,
+    d: Array,
+    qr: Bank,
+    qi: Bank,
+    rr: Bank,
+    ri: Bank,
+    a: Bank,
+    g: Bank,
+) -> None:
+    """Fill the lower half of the information matrix, and the gradient, of w, v, phi and log d."""
+    zero = 0.0 * d
+    a[0] = weight[0]
+    a[4], a[5] = weight[0], weight[0]
+    g[0] = weight[0] * rr[0]
+    g[1] = g[0]
+    a[8], a[9], a[10], g[2] = zero, zero, zero, zero
+    a[12], a[13], a[14], a[15], g[3] = zero, zero, zero, zero, zero
+    p, q = x, y
+    for j in range(1, len(order) + 1):
+        # everything turned back by exp(-i j phi)
+        ur, ui = p * rr[j] + q * ri[j], p * ri[j] - q * rr[j]
+        tr, ti = qr[j], qi[j]
+        fr, fi = -float(j) * (v * ti), float(j) * (w + v * tr)  # i j (w + v q)
+        # v p q i j d / (1 - i j d)
+        size = (len(powers) * float(j)) * (d * v) / (1.0 + (float(j) * j) * d * d)
+        c, s = -(float(j) * d) * size, size  # i / (1 - i j d) = (i - j d) / (1 + (j d)^2)
+        lr, li = tr * c - ti * s, tr * s + ti * c
+        mine = weight[j]
+        a[0] = a[0] + mine
+        a[4] = a[4] + mine * tr
+        a[5] = a[5] + mine * (tr * tr + ti * ti)
+        a[8] = a[8] + mine * fr
+        a[9] = a[9] + mine * (fr * tr + fi * ti)
+        a[10] = a[10] + mine * (fr * fr + fi * fi)
+        a[12] = a[12] + mine * lr
+        a[13] = a[13] + mine * (lr * tr + li * ti)
+        a[14] = a[14] + mine * (lr * fr + li * fi)
+        a[15] = a[15] + mine * (lr * lr + li * li)
+        g[0] = g[0] + mine * ur
+        g[1] = g[1] + mine * (ur * tr + ui * ti)
+        g[2] = g[2] + mine * (ur * fr + ui * fi)
+        g[3] = g[3] + mine * (ur * lr + ui * li)
+        p, q = p * x - q * y, p * y + q * x
+
+
+def step(
+    order: Length,
+    powers: Length,
+    unknowns: Length,
+    data_r: Bank,
+    data_i: Bank,
+    weight: Bank,
+    prior: float,
+    x: Array,
+    y: Array,
+    w: Array,
+    v: Array,
+    d: Array,
+    t: Array,
+    qr: Bank,
+    qi: Bank,
+    rr: Bank,
+    ri: Bank,
+    cost: Array,
+    damping: Array,
+) -> tuple[Array, ...]:
+    """Go one step of Levenberg and Marquardt wherever that lowers chi-square with the prior.
+
+    ``prior`` is the inverse variance of t. Returns all that changed but for the banks.
+    """
+    m = len(order)
+    a, g = square_bank(cost, unknowns, 0), bank(cost, unknowns, 0)
+    information(order, powers, weight, x, y, w, v, d, qr, qi, rr, ri, a, g)
+    a[15] = a[15] + prior
+    g[3] = g[3] - prior * t
+    for i in range(4):
+        a[i * 4 + i] = a[i * 4 + i] * (1.0 + damping)
+    decompose(unknowns, a)
+    solve(unknowns, a, g)
+    reach = 0.5 * REACH / m
+    half = larger(smaller(0.5 * g[2], reach + 0.0 * cost), -reach + 0.0 * cost)
+    scale = 1.0 / (1.0 + half * half)
+    c, s = (1.0 - half * half) * scale, 2.0 * half * scale
+    tx, ty = x * c - y * s, x * s + y * c
+    low, high = larger(-LONGER + 0.0 * t, SHORTEST - t), smaller(LONGER + 0.0 * t, LONGEST - t)
+    change = 0.5 * larger(smaller(g[3], high), low)
+    td = d * ((1.0 + change) / (1.0 - change))
+    square = change * change  # log((1 + c) / (1 - c)), below rounding for |c| < 0.35
+    series = 1.0 + square * (1 / 3 + square * (1 / 5 + square * (1 / 7 + square * (1 / 9))))
+    tt = t + 2.0 * change * series
+    sr, si = bank(cost, order, 1), bank(cost, order, 1)
+    tr, ti = bank(cost, order, 1), bank(cost, order, 1)
+    shape(order, powers, td, sr, si)
+    tw, tv = weigh(order, data_r, data_i, weight, tx, ty, sr, si)
+    remains(order, data_r, data_i, tx, ty, tw, tv, sr, si, tr, ti)
+    tried = chi_square(order, weight, tr, ti) + prior * tt * tt
+    lower = tried < cost
+    for j in range(m + 1):
+        qr[j], qi[j] = select(lower, sr[j], qr[j]), select(lower, si[j], qi[j])
+        rr[j], ri[j] = select(lower, tr[j], rr[j]), select(lower, ti[j], ri[j])
+    factor = select(lower, LESS_DAMPING + 0.0 * cost, MORE_DAMPING + 0.0 * cost)
+    damping = smaller(
+        larger(damping * factor, LEAST_DAMPING + 0.0 * cost), MOST_DAMPING + 0.0 * cost
+    )
+    return (
+        select(lower, tx, x),
+        select(lower, ty, y),
+        select(lower, tw, w),
+        select(lower, tv, v),
+        select(lower, td, d),
+        select(lower, tt, t),
+        select(lower, tried, cost),
+        damping,
+    )
+
+
+def deviations(
+    order: Length,
+    powers: Length,
+    unknowns: Length,
+    weight: Bank,
+    prior: float,
+    x: Array,
+    y: Array,
+    w: Array,
+    v: Array,
+    d: Array,
+    qr: Bank,
+    qi: Bank,
+    rr: Bank,
+    ri: Bank,
+    out: Bank,
+) -> None:
+    """Put the variances of w, v, phi and log d in `out`."""
+    a, g = square_bank(d, unknowns, 0), bank(d, unknowns, 0)
+    information(order, powers, weight, x, y, w, v, d, qr, qi, rr, ri, a, g)
+    a[15] = a[15] + prior
+    decompose(unknowns, a)
+    variances(unknowns, a, out)
