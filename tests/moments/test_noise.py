@@ -471,7 +471,9 @@ def test_noise_by_a_smoothed_brightness_is_the_smoothed_noise() -> None:
     calibration = np.array([1.0, 0.9, 0.7j, 0.3])
 
     def noise_of(light: np.ndarray) -> noise.MomentNoise:
-        return noise.moment_noise(light, noise.Sensor(), calibration=calibration)
+        return noise.moment_noise(
+            light, noise.Sensor(), calibration=calibration, zeroth="low-frequency"
+        )
 
     for sigma_px in (0.0, 0.6, 1.5):
         expected = noise.smoothed(noise_of(brightness), sigma_px).variance

@@ -235,33 +235,44 @@ def _noisy_pair(seed: int = 0) -> tuple[np.ndarray, tm.noise.MomentNoise]:
     random = np.random.default_rng(seed)
     phase = np.stack([random.uniform(1, 2, (8, 9)), random.uniform(3, 4, (8, 9))])
     b = oracles.moments_of_returns(phase, np.full(phase.shape, 600.0), 4)
-    noise = tm.noise.moment_noise(b[0].real, tm.noise.Sensor(), calibration=np.ones(5), takes=4)
+    noise = tm.noise.moment_noise(
+        b[0].real, tm.noise.Sensor(), calibration=np.ones(5), zeroth="low-frequency", takes=4
+    )
     return tm.noise.draw(b, noise, random, draws=1)[:, 0], noise
 
 
 def test_the_likelihood_weighs_the_moments_by_the_noise_of_the_sensor() -> None:
     b, _ = _noisy_pair()
     settings = tm.Settings(
-        estimator="likelihood", sensor=tm.noise.Sensor(), takes=4, smoothing_sigma_px=0.0
+        FREQUENCY_HZ,
+        zeroth="low-frequency",
+        takes=4,
+        estimator="likelihood",
+        sensor=tm.noise.Sensor(),
+        smoothing_sigma_px=0.0,
     )
     found = tm.Reconstruction(b, settings)
 
-    noise = tm.noise.moment_noise(b[0].real, tm.noise.Sensor(), calibration=np.ones(5), takes=4)
+    noise = tm.noise.moment_noise(
+        b[0].real, tm.noise.Sensor(), calibration=np.ones(5), zeroth="low-frequency", takes=4
+    )
     expected = tm.likelihood(b, noise)
     direct, indirect, phase = expected.separate()
     assert np.array_equal(found.direct, direct)
     assert np.array_equal(found.indirect, indirect)
-    assert np.array_equal(found.range_m, tm.range_m(phase, settings.base_frequency_hz))
+    assert np.array_equal(found.range_m, tm.range_m(phase, FREQUENCY_HZ))
     assert np.allclose(found.direct + found.indirect + found.uniform, found.brightness)
     assert np.array_equal(found.reduced_chi_square, expected.reduced_chi_square)
-    std_m = tm.range_m(expected.direct_phase_std_rad(), settings.base_frequency_hz)
+    std_m = tm.range_m(expected.direct_phase_std_rad(), FREQUENCY_HZ)
     assert np.array_equal(found.range_std_m, std_m)
 
 
 def test_gains_and_smoothing_are_in_the_noise_of_a_reconstruction() -> None:
     b, _ = _noisy_pair()
     gains = np.array([1.0, 0.8, 0.6j, 0.5, 0.4])
-    settings = tm.Settings(estimator="likelihood", sensor=tm.noise.Sensor())
+    settings = tm.Settings(
+        zeroth="low-frequency", takes=1, estimator="likelihood", sensor=tm.noise.Sensor()
+    )
 
     found = tm.reconstruct(b * gains[:, None, None], settings, calibration=gains)
 
@@ -269,7 +280,9 @@ def test_gains_and_smoothing_are_in_the_noise_of_a_reconstruction() -> None:
     assert noise is not None
     ratio = noise.variance / noise.variance[0]
     assert np.allclose(ratio, (1 / np.abs(gains) ** 2)[:, None, None])
-    raw = tm.noise.moment_noise(found.smoothed[0].real, tm.noise.Sensor(), calibration=gains)
+    raw = tm.noise.moment_noise(
+        found.smoothed[0].real, tm.noise.Sensor(), calibration=gains, zeroth="low-frequency"
+    )
     expected = tm.noise.smoothed(raw, settings.smoothing_sigma_px)
     assert np.allclose(noise.variance, expected.variance)
 
@@ -288,7 +301,14 @@ def test_a_pixel_without_light_has_neither_range_nor_deviation_by_the_likelihood
     b, _ = _noisy_pair()
     b[:, 3, 4] = 0
     b[2, 5, 5] = np.nan
-    settings = tm.Settings(estimator="likelihood", sensor=tm.noise.Sensor(), smoothing_sigma_px=0.0)
+    settings = tm.Settings(
+        FREQUENCY_HZ,
+        zeroth="low-frequency",
+        takes=1,
+        estimator="likelihood",
+        sensor=tm.noise.Sensor(),
+        smoothing_sigma_px=0.0,
+    )
 
     found = tm.Reconstruction(b, settings)
 
