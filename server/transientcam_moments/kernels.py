@@ -29,6 +29,7 @@ from transientcam_moments.errors import ParameterError
 __all__ = [
     "LANES",
     "MOST_ROOTS",
+    "THREAD",
     "Progress",
     "Spread",
     "State",
