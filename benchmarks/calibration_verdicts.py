@@ -135,7 +135,7 @@ def everything(images: _Array, random: np.random.Generator) -> _Array:
 
 
 def too_bright(images: _Array, _: np.random.Generator) -> _Array:
-    """Let four times the light saturate the sensor where it is brightest."""
+    """Let forty times the light saturate the sensor where it is brightest."""
     black = np.median(images[:, -1])
     return np.asarray(np.minimum(black + 40 * (images - black), FULL_SCALE_DN))
 

@@ -57,9 +57,8 @@ def row(scene: str, sequence: Sequence) -> tuple[str, ...]:
     range_m = np.stack([np.asarray(each.range_m) for each in found])
     flags = np.stack([np.asarray(each.flags) for each in found])
     wrong = [contradictions(recipe, each) for each in found]
-    contradictory = (
-        np.nan if wrong[0] is None else float(np.mean([each for each in wrong if each is not None]))
-    )
+    seen = [each for each in wrong if each is not None]
+    contradictory = float(np.mean(seen)) if seen else np.nan
     is_default = sequence == Sequence(**SequenceSettings().model_dump())
     name = (
         f"m = {sequence.harmonics}, {sequence.exposure_s * 1e3:g} ms, {sequence.zeroth}"

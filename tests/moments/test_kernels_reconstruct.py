@@ -182,7 +182,7 @@ def test_a_pass_gives_what_the_stages_give(
     settings: tm.Settings, calibration: str, bad: str
 ) -> None:
     images = raw_images(settings)
-    prepared = {"calibration": gains(calibration), "bad_pixels": bad_pixels(bad)}
+    prepared: dict[str, Any] = {"calibration": gains(calibration), "bad_pixels": bad_pixels(bad)}
 
     found = in_one_pass(images, settings, **prepared)
 
@@ -343,7 +343,7 @@ def test_takes_and_other_images_join_behind_the_smoothing(bad: str) -> None:
     settings = settings_of(takes=4)
     takes = np.concatenate([raw_images(settings, seed=seed) for seed in range(4)])
     takes[5] //= 2  # an outlier
-    prepared = {"calibration": gains("pixels"), "bad_pixels": bad_pixels(bad)}
+    prepared: dict[str, Any] = {"calibration": gains("pixels"), "bad_pixels": bad_pixels(bad)}
     narrow = np.ascontiguousarray(raw_images(settings_of())[:, :, :20])
 
     found = in_one_pass(takes, settings, **prepared)

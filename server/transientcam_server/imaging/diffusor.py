@@ -256,7 +256,7 @@ def _degree(known: int) -> int:
 def _lit(moments: _Array, usable: _Array) -> _Array:
     """Return the pixels that are usable and not dark."""
     brightness = moments[0].real if moments[0].any() else np.abs(moments[1])
-    lit = usable & np.isfinite(moments).all(axis=0) & (np.abs(moments[1]) > 0)
+    lit: _Array = usable & np.isfinite(moments).all(axis=0) & (np.abs(moments[1]) > 0)
     if not lit.any():
         return np.asarray(lit)
     return np.asarray(lit & (brightness > _DARK * np.median(brightness[lit])))

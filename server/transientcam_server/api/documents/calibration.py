@@ -40,7 +40,7 @@ class FindingDocument(Document):
 
     test: str
     """What was tested: shares of the pixels, ranges in metres, phases in radian."""
-    value: float | None
+    value: float | None = None
     """What was found; null where no pixel could be judged."""
     limit: float
     """The most that a diffusor may have, either sign."""
@@ -57,7 +57,7 @@ class VerdictDocument(Document):
 
     verdict: Literal["diffusor", "in-doubt", "scene"]
     """Only the first is used without `force`."""
-    reason: str | None
+    reason: str | None = None
     """What speaks against a diffusor; null where nothing does."""
     tests: list[FindingDocument]
     block_px: int
