@@ -26,6 +26,6 @@ def _with_route(*arguments: Any) -> FastAPI:
 
 
 if __name__ == "__main__":
-    application.build_app = _with_route
+    application.build_app = _with_route  # type: ignore[assignment]  # takes the same
     sys.argv[0] = "transientcam"
     main()

@@ -225,7 +225,7 @@ def with_pipeline(camera: Camera, **options: Any) -> dict[str, Any]:
                 await frame.reconstruction("moments")
                 return frame.meta()
             finally:
-                await workers.close()
+                await workers.close(within_s=60.0)
 
     return asyncio.run(main())
 

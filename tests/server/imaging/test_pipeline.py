@@ -78,7 +78,7 @@ def with_frame(
             try:
                 await test(pipeline, pipeline.frame(raw, camera.applied))
             finally:
-                await workers.close()
+                await workers.close(within_s=60.0)
 
     asyncio.run(main())
 
