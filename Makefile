@@ -53,6 +53,7 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 	$(BIN)/python -m benchmarks.stream_load --write
 	$(BIN)/python -m benchmarks.robustness --write
 	$(BIN)/python -m benchmarks.soak --write
+	$(BIN)/python -m benchmarks.abuse --write
 	$(BIN)/python -m benchmarks.throughput --write
 	$(BIN)/python -m benchmarks.dashboard --hours 0.1 --write
 	$(BIN)/transientcam paper -o docs

@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import httpx
 import trustme
@@ -177,30 +177,30 @@ def _probing(probe: Probe) -> Iterator[None]:
 
 def prepare(client: httpx.Client) -> float:
     """Set the paper's video setting, wait for the kernels, and return the frame rate in Hz."""
-    applied: dict[str, Any] = client.put("/api/v1/sequence", json=VIDEO).raise_for_status().json()
+    applied = client.put("/api/v1/sequence", json=VIDEO).raise_for_status().json()
     end_s = time.monotonic() + _COMPILED_WITHIN_S
     while client.get("/api/v1/info").json()["kernels"]["compiling"] and time.monotonic() < end_s:
         time.sleep(0.5)
     # what is made once is made now, so that it does not count as growth
     client.get("/api/v1/frames/latest/transient", params={"bins": 100, "wait_s": 10.0})
     time.sleep(_HISTORY_S)
-    return float(applied["frame_rate_hz"])
+    rate_hz: float = applied["frame_rate_hz"]
+    return rate_hz
 
 
 def _frames(viewer: Viewer | None, client: httpx.Client, duration_s: float) -> float:
     """Return frames a second that a viewer has; with TLS, those that are captured."""
     if viewer is None:
-        before = _acquisition(client)["frames"]
+        before = _captured(client)
         time.sleep(duration_s)
-        return float(_acquisition(client)["frames"] - before) / duration_s
+        return (_captured(client) - before) / duration_s
     count = len(viewer.seen.numbers)
     took_s = watch([viewer], duration_s=duration_s)
     return (len(viewer.seen.numbers) - count) / took_s
 
 
-def _acquisition(client: httpx.Client) -> dict[str, Any]:
-    document: dict[str, Any] = client.get("/api/v1/acquisition").json()
-    return document
+def _captured(client: httpx.Client) -> int:
+    return int(client.get("/api/v1/acquisition").json()["frames"])
 
 
 def _lapse(client: httpx.Client) -> float | None:

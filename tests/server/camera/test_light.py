@@ -1,0 +1,90 @@
+"""The light's guard, by a clock that the test moves, and the thread of the camera that asks it."""
+
+import queue
+from collections.abc import Callable
+from typing import cast
+
+from tests.server.camera.test_acquisition import PATIENCE_S, ScriptedCamera
+from transientcam_driver import Camera
+from transientcam_server.camera.acquisition import Acquisition
+from transientcam_server.camera.events import Event, Held, Released
+from transientcam_server.camera.light import LATE_S, LightGuard
+
+
+class Clock:
+    now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def guarded() -> tuple[LightGuard, Clock]:
+    clock = Clock()
+    return LightGuard(unserved_s=1.0, clock=clock), clock
+
+
+def test_the_light_needs_a_loop_that_turned_within_the_time() -> None:
+    guard, clock = guarded()
+    clock.now_s += 1.0
+    assert guard.unserved() is None
+    clock.now_s += 0.01
+    assert guard.unserved() == "no client was served for 1 s, so none could switch it off"
+    guard.turned()
+    assert guard.unserved() is None
+
+
+def test_a_lapse_is_acted_on_once_and_only_where_the_loop_is_late() -> None:
+    guard, clock = guarded()
+    guard.lapses_at(103.0)
+    clock.now_s = 103.0 + 0.5 * LATE_S
+    assert not guard.lapsed()
+    clock.now_s = 103.0 + 2.0 * LATE_S
+    assert [guard.lapsed(), guard.lapsed()] == [True, False]
+
+
+def test_a_lease_that_is_renewed_or_ended_in_time_does_not_lapse() -> None:
+    guard, clock = guarded()
+    guard.lapses_at(103.0)
+    guard.lapses_at(130.0)
+    clock.now_s = 110.0
+    assert not guard.lapsed()
+    guard.lapses_at(None)
+    clock.now_s = 1000.0
+    assert not guard.lapsed()
+
+
+def test_the_thread_of_the_camera_switches_it_off_and_on_again() -> None:
+    guard, clock = guarded()
+    camera = ScriptedCamera()
+    events: queue.SimpleQueue[Event] = queue.SimpleQueue()
+    acquisition = Acquisition(
+        cast("Camera", camera),
+        report=events.put,
+        light=guard,
+        clock=cast("Callable[[], float]", clock),
+    )
+    acquisition.start()
+    try:
+        while camera.calls != ["start"]:
+            acquisition.device_status().result(PATIENCE_S)
+        clock.now_s += 2.0
+        held = events.get(timeout=PATIENCE_S)
+        acquisition.device_status().result(PATIENCE_S)
+        off, status = list(camera.calls), acquisition.status()
+        guard.turned()
+        released = events.get(timeout=PATIENCE_S)
+        while camera.calls == off:
+            acquisition.device_status().result(PATIENCE_S)
+
+        clock.now_s += 0.5
+        guard.lapses_at(clock.now_s - 1.0)  # with a loop that did not act on it
+        while acquisition.status().running:
+            acquisition.device_status().result(PATIENCE_S)
+    finally:
+        acquisition.stop()
+
+    assert isinstance(held, Held)
+    assert isinstance(released, Released)
+    assert off == ["start", "stop"]
+    assert (status.state, status.running, status.reason) == ("held", True, held.reason)
+    assert camera.calls == ["start", "stop", "start", "stop", "safe_off"]
