@@ -9,7 +9,7 @@ CAMERA ?= sim:mirrors
 BIN := .venv/bin
 PAGE := server/transientcam_server/static/index.html
 DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f 2>/dev/null)
-DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium
+DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace
 
 .DEFAULT_GOAL := help
 .PHONY: help serve test check bench paper docs clean dashboard debian-packages
@@ -52,6 +52,8 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 	$(BIN)/python -m benchmarks.first_light --write
 	$(BIN)/python -m benchmarks.stream_load --write
 	$(BIN)/python -m benchmarks.robustness --write
+	$(BIN)/python -m benchmarks.fuzz_recordings --write
+	$(BIN)/python -m benchmarks.power_cuts --write
 	$(BIN)/python -m benchmarks.soak --write
 	$(BIN)/python -m benchmarks.abuse --write
 	$(BIN)/python -m benchmarks.throughput --write

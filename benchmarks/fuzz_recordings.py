@@ -146,7 +146,7 @@ def report(findings: Findings, *, elapsed_s: float) -> str:
         "",
         f"The processes could take {MEMORY_BYTES / 2**30:.0f} GiB beyond what they began with. The "
         "length of a text attribute is the one size that cannot be looked at before HDF5 allocates "
-        "it: that is where the most memory went.",
+        "it, up to 4 GiB for a moment.",
         "",
         "| damage | " + " | ".join(states) + " |",
         "|---|" + "---:|" * len(states),

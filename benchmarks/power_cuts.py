@@ -61,6 +61,7 @@ def survive(events: list[Event], disk: str, number: int, directory: Path) -> Sur
     found = cut(events, draw.choice(moments(events)), DISKS[disk], draw)
     part = directory / f"{number}.h5.part"
     part.write_bytes(found.content)
+    path = directory / f"{number}.h5"
     try:
         with Recording(recover(part)) as recording:
             different = sum(
@@ -71,6 +72,8 @@ def survive(events: list[Event], disk: str, number: int, directory: Path) -> Sur
         opened = True
     except NotARecording:
         recovered, different, opened = 0, 0, False
+    for each in (part, path):
+        each.unlink(missing_ok=True)
     lost = max(0, found.must_be_there - recovered)
     return Survived(found.acknowledged, recovered, lost, different, opened)
 
