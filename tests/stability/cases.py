@@ -49,7 +49,7 @@ def sparse_signals(m: int) -> Iterator[Signal]:
     yield Signal("one return, uniform 0.5", (mp.mpf("1.25"),), one, mp.mpf("0.5"))
     yield Signal("m returns", _spread(m), _uneven(m))
     if m >= 2:
-        for exponent in (1, 2, 3, 4):
+        for exponent in (1, 2, 3, 4, 5, 6):
             apart = mp.mpf(10) ** -exponent
             phase = (mp.mpf(2), mp.mpf(2) + apart)
             yield Signal(f"two returns 1e-{exponent} apart", phase, (mp.mpf(1), mp.mpf("0.6")))

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
+from transientcam_experiments.paper.bench import Bench, Options, ReconstructedShot
 from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.visitor import MOMENTS_S, VIDEO, parts, video
 
 _Array = NDArray[Any]
 _OUTLIER: Final = 0.2
 """Share of a pixel's light that is put to the wrong side in an outlier."""
-_AMBIENT: Final = {**WITHOUT_OUTLIERS, "ambient": "on"}
+_AMBIENT: Final[Options] = {"ambient": "on"}
 
 
 def make(bench: Bench) -> Made:

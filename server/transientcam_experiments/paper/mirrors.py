@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import Sequence
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
+from transientcam_experiments.paper.bench import Bench, ReconstructedShot
 
 _Array = NDArray[Any]
 TIMES_S: Final = (11.3e-9, 19.3e-9, 26.7e-9)
@@ -22,9 +22,7 @@ SINGLE_TAKE: Final = Sequence(harmonics=4, base_frequency_hz=23e6, takes=1)
 
 
 def shots(bench: Bench, sequence: Sequence, *, frames: int = 1) -> list[ReconstructedShot]:
-    """Capture the mirrors, single takes without outliers."""
-    if sequence.takes == 1:
-        return bench.shots("mirrors", sequence, frames=frames, options=WITHOUT_OUTLIERS)
+    """Capture the mirrors."""
     return bench.shots("mirrors", sequence, frames=frames)
 
 

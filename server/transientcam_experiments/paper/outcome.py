@@ -37,6 +37,12 @@ class Outcome:
         return float(np.abs(self.clean - self.truth).mean())
 
     @property
+    def clean_error_of_shape(self) -> float:
+        """The same after the light that is found was brought to the true amount."""
+        found = self.clean * (self.truth[-1] / self.clean[-1])
+        return float(np.abs(found - self.truth).mean())
+
+    @property
     def noisy_error(self) -> float:
         """The same with noise, mean over the draws."""
         return float(np.abs(self.noisy - self.truth[:, None]).mean())

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import Sequence
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
+from transientcam_experiments.paper.bench import Bench, ReconstructedShot
 
 _Array = NDArray[Any]
 VIDEO: Final = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005)
@@ -17,12 +17,9 @@ MOMENTS_S: Final = (4.8, 7.6, 17.0)
 
 
 def video(bench: Bench) -> dict[float, list[ReconstructedShot]]:
-    """Return two successive frames at each moment, or at the first two for a first look.
-
-    The paper fills what outliers took with the frame before; ours are taken without outliers.
-    """
+    """Return two successive frames at each moment, or at the first two for a first look."""
     return {
-        at_s: bench.shots("visitor", VIDEO, frames=2, at_s=at_s, options=WITHOUT_OUTLIERS)
+        at_s: bench.shots("visitor", VIDEO, frames=2, at_s=at_s)
         for at_s in MOMENTS_S[: bench.few(3, 2)]
     }
 
