@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -16,7 +16,8 @@ BASE_HZ: Final = 23e6
 SCENES: Final = ("wall", "mirrors", "corner", "corner-left", "translucent")
 ORDERS: Final = (3, 4)
 TAKES: Final = (1, 3, 12)
-ZEROTHS: Final = ("low-frequency", "estimated")
+Zeroth = Literal["low-frequency", "estimated"]
+ZEROTHS: Final[tuple[Zeroth, ...]] = ("low-frequency", "estimated")
 SEED: Final = 1
 
 
@@ -43,7 +44,7 @@ def tables(
         yield table
 
 
-def _row(bench: Bench, scene: str, m: int, takes: int, zeroth: str) -> tuple[str, ...]:
+def _row(bench: Bench, scene: str, m: int, takes: int, zeroth: Zeroth) -> tuple[str, ...]:
     sequence = Capture(base_frequency_hz=BASE_HZ, harmonics=m, takes=takes, zeroth=zeroth)
     shot = bench.shot(scene, sequence, options=WITHOUT_OUTLIERS)
     gains = bench.calibration(sequence, options=WITHOUT_OUTLIERS).gains.planes

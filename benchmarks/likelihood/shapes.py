@@ -42,7 +42,8 @@ class Responses:
         """Return moments (m + 1, P) over b_0."""
         turn = np.exp(2j * np.pi * BASE_HZ * self.time_s[:, None] * np.arange(m + 1))
         b: Array = (self.light @ turn).T
-        return b / b[0].real
+        share: Array = b / b[0].real
+        return share
 
 
 def tables(data: Path | None) -> Iterator[Table]:

@@ -388,7 +388,7 @@ ODD = (0, -1, np.nan, np.inf, -np.inf, 1e308, 5e-324, 1e-300)
 
 @pytest.mark.parametrize("precision", [np.complex64, np.complex128])
 def test_odd_pixels_have_no_return_and_leave_their_neighbours_alone(precision: type) -> None:
-    b = some_moments().astype(precision)
+    b: np.ndarray = some_moments().astype(precision)
     noise = equal_noise(b, 0.01)
     clean = tm.likelihood(b, noise)
     odd = b.copy()

@@ -216,7 +216,7 @@ def likelihood(
         variance = xp.stack([0 * variance[0] if at is None else variance[at] for at in dense])
     found = _estimated(planes, variance, returns, tail_shape)
     shaped = (part.reshape((*part.shape[:-1], *trailing)) for part in found)
-    return Likelihood(*shaped, tail_shape=tail_shape)
+    return Likelihood._make([*shaped, tail_shape])
 
 
 def _places(harmonics: Sequence[int] | None, count: int) -> tuple[int, ...]:
@@ -290,7 +290,8 @@ def _prepared(b: Array, variance: Array) -> tuple[Data, Array, Array]:
     weight = xp.where(usable, xp.where(seen, 1 / (std * std), 0), 1)
     numbers = xp.where(usable, (2 * seen).sum(axis=0) - seen[0], 1).astype(size.dtype)
     penalty = (logarithm(numbers) + MARGIN).astype(size.dtype)
-    data = Data(*(part.astype(size.dtype) for part in (re, im, weight)), penalty, numbers)
+    re, im, weight = (part.astype(size.dtype) for part in (re, im, weight))
+    data = Data(re, im, weight, penalty, numbers)
     return data, scale, usable
 
 

@@ -1,7 +1,7 @@
 """The fits of all pixels: each model where the simpler ones leave something to explain."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -107,6 +107,8 @@ def _where(
 class _Returns:
     """A fit of K sharp returns: banks, as `sharp` takes them."""
 
+    cost: Array
+
     def __init__(self, data: Data, count: int, before: tuple[Array, ...] | None) -> None:
         m = data.re.shape[0] - 1
         self.data = data
@@ -181,39 +183,37 @@ def _offer_tail(data: Data, two: _Returns, shape: int, found: list[Array]) -> No
     mean = DELAY_RAD / shape
     x, y, w, v, ratio, t = start_of_tail(two.x, two.y, two.w, DELAY_RAD)
     d = ratio * mean
-    planes = [tuple([d] * len(data.re)) for _ in range(4)]
-    qr, qi, rr, ri = (list(part) for part in planes)
+    qr, qi, rr, ri = ([d] * len(data.re) for _ in range(4))
     tail.shape(order, powers, d, qr, qi)
     tail.remains(order, data.re, data.im, x, y, w, v, qr, qi, rr, ri)
     cost = sharp.chi_square(order, data.weight, rr, ri) + PRIOR * t * t
 
-    def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
-        banks = [list(part) for part in state[6:10]]
+    def step(state: Any) -> Any:
+        x, y, w, v, d, t, cost, damping = state[4:]
+        qr, qi, rr, ri = (list(part) for part in state[:4])
         new = tail.step(
             order, powers, unknowns, data.re, data.im, data.weight, PRIOR,
-            *state[:6], *banks, state[10], state[11],
+            x, y, w, v, d, t, qr, qi, rr, ri, cost, damping,
         )  # fmt: skip
-        return (*new[:6], *(tuple(part) for part in banks), *new[6:])
+        return tuple(qr), tuple(qi), tuple(rr), tuple(ri), *new
 
     banks = (tuple(part) for part in (qr, qi, rr, ri))
     damping = sharp.FIRST_DAMPING + 0 * cost
-    state = _times(TAIL_STEPS, step, (x, y, w, v, d, t, *banks, cost, damping))
-    qr, qi, rr, ri = (list(part) for part in state[6:10])
+    state = _times(TAIL_STEPS, step, (*banks, x, y, w, v, d, t, cost, damping))
+    qr, qi, rr, ri = (list(part) for part in state[:4])
+    x, y, w, v, d, t, cost, _ = state[4:]
     offer_tail(
-        order, powers, unknowns, data.weight, PRIOR, *state[:6], qr, qi, rr, ri,
-        state[10], data.penalty, data.numbers >= 4, found,
+        order, powers, unknowns, data.weight, PRIOR, x, y, w, v, d, t, qr, qi, rr, ri,
+        cost, data.penalty, data.numbers >= 4, found,
     )  # fmt: skip
 
 
-def _times(
-    times: int, step: Callable[[tuple[Array, ...]], tuple[Array, ...]], state: tuple[Array, ...]
-) -> tuple[Array, ...]:
+def _times(times: int, step: Callable[[Any], Any], state: Any) -> Any:
     """Apply a step so many times; JAX compiles it once."""
     if namespace(state[-1]).__name__ == "jax.numpy":
         from jax import lax
 
-        result: tuple[Array, ...] = lax.fori_loop(0, times, lambda _, inner: step(inner), state)
-        return result
+        return lax.fori_loop(0, times, lambda _, inner: step(inner), state)
     for _ in range(times):
         state = step(state)
     return state
