@@ -69,6 +69,7 @@ def ranges(
     found = {}
     for name in ESTIMATORS:
         if name == "likelihood" and noise is not None:
+            assert settings.base_frequency_hz is not None
             phase = tm.likelihood(moments, noise).separate(settings.threshold).phase_rad
             found[name] = np.asarray(tm.range_m(phase, settings.base_frequency_hz))
             continue

@@ -337,7 +337,7 @@ class Reconstruction:
         """Standard deviation in m of the range of `likelihood`; NaN where there is none."""
         xp = namespace(self.smoothed)
         std = self.likelihood.direct_phase_std_rad(self.settings.threshold)
-        found = range_m(std, self.settings.base_frequency_hz)
+        found = range_m(std, self._base_frequency_hz)
         return xp.where(self.has_range, found, np.nan).astype(std.dtype)
 
     @cached_property

@@ -27,6 +27,6 @@ def _with_route(camera: Camera, settings: Settings) -> FastAPI:
 
 
 if __name__ == "__main__":
-    application.build_app = _with_route  # type: ignore[assignment]  # takes the same
+    application.build_app = _with_route
     sys.argv[0] = "transientcam"
     main()
