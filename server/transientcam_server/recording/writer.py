@@ -39,6 +39,7 @@ class RecordingWriter:
             swmr.synchronise(path.parent)
             file = swmr.open_to_append(self.part)
             self._rows = swmr.Appender(file, ["raw"], list(layout.SERIES), seal=seal)
+            swmr.synchronise(self.part)  # or a power cut left it marked as open otherwise
         except BaseException:
             self.part.unlink(missing_ok=True)
             self._lock.close()

@@ -204,8 +204,8 @@ def _apply(writes: list[Write], content: bytearray) -> None:
 
 
 def moments(events: list[Event]) -> range:
-    """Return the places of events from the first fsync, with which it starts, to the final name."""
-    first = next(at for at, event in enumerate(events) if isinstance(event, Synchronised))
+    """Return the places of events from the second fsync, with which it starts, to its name."""
+    first = [at for at, event in enumerate(events) if isinstance(event, Synchronised)][1]
     last = next(at for at, event in enumerate(events) if isinstance(event, Renamed))
     return range(first + 1, last + 1)
 
