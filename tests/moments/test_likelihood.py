@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.stats import chi2, gamma
 
 import transientcam_moments as tm
 from tests.moments.oracles import moments_of_returns
@@ -548,3 +548,15 @@ def test_significance_is_a_probability(significance: float) -> None:
 
     with pytest.raises(tm.ParameterError, match="significance"):
         found.explained(significance)
+
+
+def test_the_light_of_a_tail_comes_as_a_gamma_distribution_does_turn_after_turn() -> None:
+    b = moments_of_tail(np.full(1, 4.0), 0.5, 1.0, 1.2, 6)
+    phases = np.array([0.5, 3.9, 4.1, 5.0, 6.2, 2 * np.pi])
+
+    found = tm.comparisons.TECHNIQUES["likelihood"].estimate(b).cumulative(phases)[:, 0]
+
+    turns = 2 * np.pi * np.arange(12)[:, None]
+    tail = gamma(3, scale=0.4)
+    late = (tail.cdf(phases + turns - 4) - tail.cdf(turns - 4)).sum(axis=0)
+    assert found == pytest.approx(0.5 * (phases >= 4) + late, abs=0.01)

@@ -55,8 +55,8 @@ def test_every_technique_says_what_it_is(technique: Technique) -> None:
     assert technique.estimate.__doc__
 
 
-def test_only_the_papers_own_techniques_are_not_labelled_after_others() -> None:
-    own = {"maximum-entropy", "pisarenko", "single-frequency"}
+def test_only_the_papers_and_our_own_techniques_are_not_labelled_after_others() -> None:
+    own = {"maximum-entropy", "pisarenko", "single-frequency", "likelihood"}
 
     assert {each.name for each in ALL if not each.label.startswith("after ")} == own
 

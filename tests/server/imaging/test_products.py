@@ -270,3 +270,26 @@ def test_the_registry_is_the_contract() -> None:
         assert product.description is wire.PRODUCTS[name]
         assert product.over_time == ("time" in product.description.axes)
         assert (product.png_steps is not None) == (len(product.description.axes) == 2)
+
+
+def test_deviation_and_misfit_of_a_frame_are_those_of_its_likelihood() -> None:
+    with open_camera("sim:mirrors?seed=2", clock=VirtualClock()) as camera:
+        applied = camera.configure(Sequence(harmonics=3))
+        sensor = sensor_of(camera, SensorSettings())
+        camera.start()
+        raw = camera.read_frame()
+    recipe = Recipe(applied, ReconstructionSettings(estimator="likelihood"), 4095.0, sensor=sensor)
+    found = recipe.reconstruct(raw)
+
+    std_m = PRODUCTS["range_std"].compute(recipe, found, View())
+    misfit = PRODUCTS["reduced_chi_square"].compute(recipe, found, View())
+
+    expected = tm.likelihood(found.smoothed, moment_noise(recipe, found))
+    # the noise is smoothed in another order
+    assert np.allclose(misfit, expected.reduced_chi_square, rtol=0.02, atol=0.02, equal_nan=True)
+    direct = tm.range_m(expected.direct_phase_std_rad(), recipe.base_frequency_hz)
+    known = np.isfinite(std_m) & np.isfinite(direct)
+    assert known.mean() > 0.9
+    assert np.quantile(np.abs(std_m / direct - 1)[known], 0.99) < 0.02
+    # as much as it says: the truth is within two standard deviations nearly everywhere
+    assert np.nanmedian(misfit) == pytest.approx(1.0, abs=0.5)
