@@ -177,22 +177,27 @@ async def product_answer(
     planned = banded(chosen, encoding, view, applied=applied, height=height, width=width)
     if planned is None:
         data = await found.encoded(chosen, encoding, view)
-    else:
-        bands = await found.bands(planned)
-        head = await anext(bands)
-    headers = {"Cache-Control": "no-store", "Vary": "Accept"}
-    if encoding is not MSGPACK:  # which holds it
-        meta = found.meta() | view.crop.to_meta(*found.shape)
-        headers |= {
-            "Transientcam-Frame": str(found.number),
-            "Transientcam-Unit": _unit(chosen, encoding),
-            "Transientcam-Meta": json.dumps(meta, separators=(",", ":")),
-        }
-    if planned is None:
+        headers = _headers(chosen, encoding, view, found)
         return Response(data, media_type=encoding.media_type, headers=headers)
+    bands = await found.bands(planned)
+    head = await anext(bands)
+    headers = _headers(chosen, encoding, view, found)
     headers["Content-Length"] = str(len(head) + planned.data_bytes)
     whole = _one_after_another(head, None if query.head_alone else bands)
     return StreamingResponse(whole, media_type=encoding.media_type, headers=headers)
+
+
+def _headers(product: Product, encoding: Encoding, view: View, frame: Frame) -> dict[str, str]:
+    """Return the headers of a product that has been computed, with what is known of its frame."""
+    headers = {"Cache-Control": "no-store", "Vary": "Accept"}
+    if encoding is not MSGPACK:  # which holds it
+        meta = frame.meta() | view.crop.to_meta(*frame.shape)
+        headers |= {
+            "Transientcam-Frame": str(frame.number),
+            "Transientcam-Unit": _unit(product, encoding),
+            "Transientcam-Meta": json.dumps(meta, separators=(",", ":")),
+        }
+    return headers
 
 
 async def _one_after_another(

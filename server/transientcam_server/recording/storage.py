@@ -62,7 +62,7 @@ class Storage:
         """Return a dataset with so many axes and, in either byte order, a type."""
         if name not in self:
             raise ValueError(f"it has no {name}")
-        if self._file.id.links.get_info(name.encode()).type != h5py.h5l.TYPE_HARD:
+        if not isinstance(self._file.get(name, getlink=True), h5py.HardLink):
             raise ValueError(f"{name} is a link to elsewhere")
         dataset = self._file[name]
         if not isinstance(dataset, h5py.Dataset):
