@@ -61,6 +61,6 @@ describe("a cloud of points", () => {
   test("is coloured by the gravest flag", () => {
     const out = new Uint8Array(3);
     byFlags([4 | 1])(0, out, 0);
-    expect([...out]).toEqual([0xd5, 0x5e, 0x00]);
+    expect([...out]).toEqual([0xe6, 0x9f, 0x00]);
   });
 });

@@ -4,7 +4,7 @@ import { FLAGS, gravest } from "../../src/ui/flags";
 import { countFlags, paintFlags } from "../../src/views/validity/reasons";
 
 test("every bit has one flag", () => {
-  expect(FLAGS.map(({ bit }) => bit).sort((a, b) => a - b)).toEqual([1, 2, 4, 8, 16, 32]);
+  expect(FLAGS.map(({ bit }) => bit).sort((a, b) => a - b)).toEqual([1, 2, 4, 8, 16, 32, 64]);
 });
 
 test("a pixel with several flags is shown by the gravest and counted for each", () => {
@@ -16,7 +16,7 @@ test("a pixel with several flags is shown by the gravest and counted for each", 
 test("flags have their colours, and what is valid a grey for its light", () => {
   const rgba = new Uint8ClampedArray(16);
   paintFlags(new Uint8Array([4, 0, 0, 0]), new Float32Array([1, 100, 0, 900]), 100, rgba);
-  expect([...rgba.slice(0, 4)]).toEqual([0xd5, 0x5e, 0x00, 255]);
+  expect([...rgba.slice(0, 4)]).toEqual([0xe6, 0x9f, 0x00, 255]);
   expect([...rgba.slice(4, 8)]).toEqual([221, 221, 221, 255]);
   expect([...rgba.slice(8, 12)]).toEqual([34, 34, 34, 255]);
   expect([...rgba.slice(12)]).toEqual([221, 221, 221, 255]);
