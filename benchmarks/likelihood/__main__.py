@@ -38,9 +38,10 @@ whose light comes with the density of a gamma distribution. The Bayesian informa
 chooses, with a margin that keeps noise from splitting a return. What a frame costs, how close the
 errors come to the least possible ones, and what light of other shapes does is below.
 
-The exponent p of the tail is 3. No exponent is best for all tails: 1 suits an exponential one, 2
-the foam and some of the rendering, 3 and 4 the corner and light that ends. With 3 no response is
-far from its best one but the exponential tails, whose bias the tables state."""
+The exponent p of the tail is 3, and no exponent is best for all tails: 1 suits exponential ones, 2
+foam, 3 and 4 the corner and light that ends. With p = 3 exponential tails and sums of two tails
+are taken to begin 30 to 60 mm late, foam 25 to 35 mm; chi-square says so only where that is more
+than the noise."""
 
 
 def main() -> None:

@@ -136,14 +136,18 @@ def test_what_compiled_code_is_kept_for_changes_with_every_source_file() -> None
         "from transientcam_moments._kernels import cache\n"
         "before = cache.digest_of_sources()\n"
         "with tempfile.TemporaryDirectory() as copy:\n"
-        "    shutil.copytree(pathlib.Path(cache.__file__).parent, copy, dirs_exist_ok=True)\n"
-        "    cache.__file__ = copy + '/cache.py'\n"
-        "    same = cache.digest_of_sources()\n"
-        "    with open(copy + '/simd.py', 'a') as file: file.write('# changed')\n"
-        "    print(before == same, before == cache.digest_of_sources())"
+        "    root = pathlib.Path(cache.__file__).parents[1]\n"
+        "    for part in ('_kernels', 'likelihood'):\n"
+        "        shutil.copytree(root / part, pathlib.Path(copy) / part)\n"
+        "    cache.__file__ = copy + '/_kernels/cache.py'\n"
+        "    digests = [before, cache.digest_of_sources()]\n"
+        "    for name in ('_kernels/simd.py', 'likelihood/sharp.py'):\n"
+        "        with open(copy + '/' + name, 'a') as file: file.write('# changed')\n"
+        "        digests.append(cache.digest_of_sources())\n"
+        "    print(digests[0] == digests[1], len(set(digests)))"
     )
 
-    assert in_fresh_process(code) == "True False"
+    assert in_fresh_process(code) == "True 3"
 
 
 def test_progress_names_every_lane_and_ends_at_the_total() -> None:
