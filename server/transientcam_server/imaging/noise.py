@@ -1,6 +1,5 @@
 """The noise of frames: of their moments and of their range, and what it does not explain."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
@@ -49,8 +48,11 @@ class RangeNoise:
 
 def moment_noise(recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoise:
     """Return the noise of a frame's smoothed moments (m + 1, H, W), of the recipe's sensor."""
-    noise = _of_pixels(recipe, np.asarray(found.smoothed[0].real))
-    return tm.noise.smoothed(noise, recipe.settings.smoothing_px)
+    return tm.noise.smoothed_of(
+        partial(_of_pixels, recipe),
+        np.asarray(found.smoothed[0].real),
+        recipe.settings.smoothing_px,
+    )
 
 
 def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
@@ -118,18 +120,18 @@ def contradictions(recipe: Recipe, found: tm.Reconstruction) -> _Array | None:
     """
     if recipe.sensor is None or recipe.applied.sequence.zeroth == "estimated":
         return None
+    dark, lit = np.asarray(_of_pixels(recipe, np.array([0.0, 1.0])).variance).sum(axis=0).tolist()
+
+    def of_all(light: _Array) -> tm.noise.MomentNoise:
+        """Return the variance of all moments together, which grows linearly with the light."""
+        return tm.noise.MomentNoise((dark + (lit - dark) * light)[None])
+
     brightness = np.asarray(found.smoothed[0].real)
-
-    def noise_at(pixels: _Array) -> tm.noise.MomentNoise:
-        noise_of = partial(_of_pixels, recipe)
-        return tm.noise.smoothed_at(noise_of, brightness, pixels, recipe.settings.smoothing_px)
-
-    return beyond_noise(found, noise_at)
+    noise = tm.noise.smoothed_of(of_all, brightness, recipe.settings.smoothing_px)
+    return beyond_noise(found, noise)
 
 
-def beyond_noise(
-    found: tm.Reconstruction, noise_at: Callable[[_Array], tm.noise.MomentNoise]
-) -> _Array:
+def beyond_noise(found: tm.Reconstruction, noise: tm.noise.MomentNoise) -> _Array:
     """Return which lit pixels have moments that noise alone does not explain.
 
     Moments of light have a Toeplitz matrix without negative eigenvalues (Proposition 1); here the
@@ -139,22 +141,18 @@ def beyond_noise(
     ----------
     found
         The frame, (m + 1, H, W).
-    noise_at
-        Returns the noise (m + 1, S) of its smoothed moments at S places in the flattened image.
+    noise
+        Of its smoothed moments, one by one (m + 1, H, W) or all together (1, H, W).
 
     Returns
     -------
     boolean array, shape (H, W)
     """
     eigenvalue = np.asarray(found.validity) * np.asarray(found.smoothed[0].real)
-    beyond = np.zeros(eigenvalue.shape, dtype=bool)
-    suspected = np.flatnonzero((eigenvalue < 0) & _lit(found))
-    if suspected.size:
-        variance = np.asarray(noise_at(suspected).variance)
-        # noise moves no eigenvalue by more than the norm of its own Toeplitz matrix
-        std = np.sqrt(len(variance) * variance.mean(axis=0))
-        beyond.flat[suspected] = eigenvalue.flat[suspected] < -EXPLAINED_DEVIATIONS * std
-    return beyond
+    # noise moves no eigenvalue by more than the norm of its own Toeplitz matrix
+    std = np.sqrt(np.asarray(noise.variance).sum(axis=0))
+    with np.errstate(invalid="ignore"):  # of pixels that are not finite
+        return np.asarray((eigenvalue < -EXPLAINED_DEVIATIONS * std) & _lit(found))
 
 
 def contradictory_share(recipe: Recipe, found: tm.Reconstruction) -> float | None:

@@ -33,11 +33,8 @@ def moments(phase_error_rad: tuple[float, ...], *, seed: int = 1) -> NDArray[np.
 def share(b: NDArray[np.complex64]) -> float | None:
     found = tm.reconstruct(b, tm.Settings(smoothing_sigma_px=0.0))
     lit = (found.flags & tm.Flags.NO_SIGNAL) == 0
-
-    def noise_at(pixels: NDArray[np.intp]) -> tm.noise.MomentNoise:
-        return tm.noise.MomentNoise(np.full((len(b), pixels.size), 2 * STD_DN**2))
-
-    beyond = beyond_noise(found, noise_at)
+    noise = tm.noise.MomentNoise(np.full(b.shape, 2 * STD_DN**2))
+    beyond = beyond_noise(found, noise)
     assert not beyond[~lit].any()
     return float(beyond[lit].mean()) if lit.any() else None
 
