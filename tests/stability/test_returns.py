@@ -76,7 +76,8 @@ def worst_residual(b: np.ndarray) -> np.ndarray:
     m = len(b) - 1
     again = oracles.moments_of_returns(np.nan_to_num(found.phase_rad), found.weight, m)
     again[0] += found.uniform
-    return np.abs(again - b).max(axis=0) / b[0].real
+    left: np.ndarray = np.abs(again - b).max(axis=0) / b[0].real
+    return left
 
 
 @pytest.mark.parametrize("apart_rad", [1e-4, 1e-5, 1e-6, 1e-7])
