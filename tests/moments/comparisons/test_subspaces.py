@@ -6,6 +6,7 @@ returns, with noise they are as good.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,8 +15,8 @@ from numpy.typing import NDArray
 from tests.moments import oracles
 from transientcam_moments.comparisons.matrix_pencil import matrix_pencil
 
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
+Complex = NDArray[Any]
+Real = NDArray[Any]
 M, RETURNS, DRAWS = 9, 2, 300
 PHASE = np.array([1.0, 2.6])
 WEIGHT = np.array([1.0, 0.6])

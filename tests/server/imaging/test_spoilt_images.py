@@ -14,7 +14,7 @@ from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.imaging.workers import Workers
 from transientcam_server.settings import ReconstructionSettings
 
-PAIR = (9, 11)
+PAIR = (7, 9)
 """Opposite images of a frequency, by their index in a take."""
 
 
@@ -38,7 +38,7 @@ def spoil(frame: RawFrame, *images: int) -> RawFrame:
     for number, place in enumerate(images):
         for take in range(frame.labels[-1].take + 1):
             index = frame.index_of(take, place)
-            other = frame.index_of(take, place - 1 if number else (place - 2))
+            other = frame.index_of(take, place - 1 if number else place - 2)
             out[index] = frame.images[other]
     return replace(frame, images=out)
 
@@ -47,8 +47,8 @@ def metas(
     camera: Camera, frames: list[RawFrame], applied: AppliedSequence, spoilt_images: Any
 ) -> list[dict[str, Any]]:
     async def main() -> list[dict[str, Any]]:
-        with ThreadPoolExecutor(1) as executor:
-            workers = Workers(executor, count=1)
+        with ThreadPoolExecutor(2) as executor:
+            workers = Workers(executor, count=2)
             settings = ReconstructionSettings(spoilt_images=spoilt_images)
             pipeline = Pipeline(camera, settings, workers)
             found = []
@@ -101,9 +101,9 @@ def test_nothing_is_filled_in_from_another_sequence(camera: Camera) -> None:
 def test_a_capture_is_kept_with_the_next_one_only_where_it_is_needed(camera: Camera) -> None:
     first, second = captured(camera)
     for spoilt_images, kept in (("repair", None), ("fill", first)):
-        with ThreadPoolExecutor(1) as executor:
+        with ThreadPoolExecutor(2) as executor:
             settings = ReconstructionSettings(spoilt_images=spoilt_images)  # type: ignore[arg-type]
-            pipeline = Pipeline(camera, settings, Workers(executor, count=1))
+            pipeline = Pipeline(camera, settings, Workers(executor, count=2))
             pipeline.frame(first, camera.applied)
 
             assert pipeline.frame(second, camera.applied).previous is kept
