@@ -26,7 +26,7 @@ import transientcam_moments as tm
 noise = tm.noise.moment_noise(b[0].real, tm.noise.Sensor(), calibration=calibration)
 found = tm.likelihood(b, noise)
 found.phase_rad, found.phase_std_rad  # of one to three returns, or of one with a tail
-found.explained()                     # whether these returns explain the moments
+found.explained()  # whether these returns explain the moments
 direct, indirect, phase_rad = found.separate()
 ```
 

@@ -56,7 +56,7 @@ def metas(
                 frame = pipeline.frame(raw, applied).bare()  # as history gives it
                 await frame.reconstruction("light")
                 found.append(frame.meta())
-            await workers.close()
+            await workers.close(within_s=60.0)
             return found
 
     return asyncio.run(main())
