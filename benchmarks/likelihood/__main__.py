@@ -23,7 +23,8 @@ of the sensor as known and looks for the few returns that the moments are likely
 ```python
 import transientcam_moments as tm
 
-noise = tm.noise.moment_noise(b[0].real, tm.noise.Sensor(), calibration=calibration)
+sensor = tm.noise.Sensor()
+noise = tm.noise.moment_noise(b[0].real, sensor, calibration=gain, zeroth="low-frequency")
 found = tm.likelihood(b, noise)
 found.phase_rad, found.phase_std_rad  # of one to three returns, or of one with a tail
 found.explained()  # whether these returns explain the moments

@@ -128,10 +128,13 @@ def compile_in_background(
 ) -> threading.Thread:
     """Start compiling on a thread and return it; arguments and errors as in `compile`.
 
+    Leaves out "likelihood", which takes long to compile and is prepared by itself when it is first
+    needed.
+
     The thread is named "transientcam-compile", and can be joined. A process that ends in the
     meantime waits at most for the lane that is being compiled.
     """
-    keys = _keys(harmonics, precisions)
+    keys = [key for key in _keys(harmonics, precisions) if key.name != "likelihood"]
     main = threading.main_thread()
     # not a daemon: those are frozen at exit wherever they are, which a compiler doesn't survive
     thread = threading.Thread(target=_compile, args=(keys, None, main.is_alive), name=THREAD)

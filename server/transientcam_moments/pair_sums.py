@@ -27,6 +27,8 @@ class PairSums(NamedTuple):
         Of each pair.
     typical : array, shape (S,)
         Median over the pixels of the distance from the median of all sums.
+    rounding : float
+        By how much a sum may be off without any noise: whole numbers are rounded to 1/2 each.
     """
 
     pixels: Array
@@ -34,13 +36,13 @@ class PairSums(NamedTuple):
     earlier: Array
     sums: Array
     typical: Array
+    rounding: float
 
     @property
     def suspicious(self) -> Array:
         """Which sums (S,) deviate more than half of them do among themselves."""
         usual = np.sort(self.typical)[(len(self.typical) - 1) // 2]
-        rounding = 8 * float(np.finfo(self.sums.dtype).eps) * self.values.max(initial=0.0)
-        return self.typical > _SUSPICIOUS * usual + rounding
+        return self.typical > _SUSPICIOUS * usual + self.rounding
 
 
 def pair_sums(images: Array, first: int, *, most: int, full_scale: float) -> PairSums | None:
@@ -60,15 +62,15 @@ def pair_sums(images: Array, first: int, *, most: int, full_scale: float) -> Pai
     Returns
     -------
     PairSums or None
-        None with fewer than three sums, of which none could be called the wrong one, or too few
-        pixels with light.
+        None with fewer than three sums, of which none could be called the wrong one, another number
+        of images than a capture has, or too few pixels with light.
 
     Notes
     -----
     Medians over pixels: what moves in less than half of them decides nothing.
     """
     flat = images.reshape((len(images), -1))
-    if len(flat) < first + 2 * PHASE_STEPS:
+    if len(flat) < first + 2 * PHASE_STEPS or (len(flat) - first) % PHASE_STEPS:
         return None
     step = max(1, flat.shape[1] // most) | 1  # odd, so that all columns of common sizes have a turn
     values = flat[:, ::step].astype(np.float64 if images.dtype == np.float64 else np.float32)
@@ -86,12 +88,16 @@ def pair_sums(images: Array, first: int, *, most: int, full_scale: float) -> Pai
     sums = _opposite(values, first, np.add)
     pairs = np.arange(len(sums))
     deviation = sums - _middle(sums, 0)
+    rounding = 8 * float(np.finfo(sums.dtype).eps) * float(values.max(initial=0.0))
+    if np.issubdtype(images.dtype, np.integer):
+        rounding = max(1.0, rounding)
     return PairSums(
         lit * step,
         values,
         first + PHASE_STEPS * (pairs // 2) + pairs % 2,
         sums,
         _middle(np.abs(deviation, out=deviation), 1),
+        rounding,
     )
 
 

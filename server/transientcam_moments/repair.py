@@ -32,6 +32,7 @@ from transientcam_moments.pair_sums import PHASE_STEPS, PairSums, pair_sums
 _FIRST_LOOK, _SECOND_LOOK = 400, 4096  # pixels of the sensor that are looked at
 _STATIC = 8.0  # times the usual deviation, the span of good sums above which something moves
 _LEAST_STATIC = 0.5  # of the pixels, or the whole picture moves
+_ROUNDED = 0.3  # of the largest rounding error of a sum, its usual one
 _EXPLAINED = 0.5  # of the squared deviation, which f has to explain at least
 _UNEXPLAINED = 2.0  # times the usual deviation, which f may leave at most
 _TOLERANCE = 0.004  # of |f| <= 1
@@ -191,7 +192,8 @@ class _Verdict:
         self._suspicious = look.suspicious
         good = look.sums[~self._suspicious]
         self._middle = np.median(good, axis=0) / 2
-        self._usual = float(np.median(np.abs(np.diff(good, axis=0)))) / np.sqrt(2)
+        usual = float(np.median(np.abs(np.diff(good, axis=0)))) / np.sqrt(2)
+        self._usual = max(usual, _ROUNDED * look.rounding)
         self._static = np.ptp(good, axis=0) <= _STATIC * self._usual
 
     def images(self) -> Iterator[tuple[int, bool]]:

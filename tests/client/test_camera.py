@@ -89,12 +89,17 @@ _CALLS: dict[
     "measure": (
         lambda c: c.calibrations.measure(name="warm", frames=5),
         lambda c: c.calibrations.measure(name="warm", frames=5),
-        ("POST", "calibrations", "", {"name": "warm", "frames": 5, "activate": False}),
+        (
+            "POST",
+            "calibrations",
+            "",
+            {"name": "warm", "frames": 5, "activate": False, "force": False},
+        ),
     ),
     "activate": (
         lambda c: c.calibrations.activate("nominal"),
         lambda c: c.calibrations.activate("nominal"),
-        ("PUT", "calibrations/active", "", {"id": "nominal"}),
+        ("PUT", "calibrations/active", "", {"id": "nominal", "force": False}),
     ),
     "calibration": (
         lambda c: c.calibrations.get("SIM-1"),

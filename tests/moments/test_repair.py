@@ -342,7 +342,7 @@ def test_a_frame_before_of_another_shape_is_refused() -> None:
 
 
 def settings(scene: Scene, spoilt_images: str, takes: int = 1) -> tm.Settings:
-    return tm.Settings(zeroth=scene.zeroth, takes=takes, spoilt_images=spoilt_images)
+    return tm.Settings(23e6, zeroth=scene.zeroth, takes=takes, spoilt_images=spoilt_images)
 
 
 @pytest.mark.parametrize("zeroth", ZEROTHS)
@@ -388,6 +388,22 @@ def test_a_frame_is_filled_from_the_one_before_only_by_the_settings() -> None:
 
     assert filled.filled_images == ((0, 7), (0, 9))
     assert (repaired.filled_images, repaired.unrepaired_images) == ((), 2)
+
+
+@pytest.mark.parametrize("zeroth", ZEROTHS)
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_whole_numbers_without_noise_are_not_spoilt_by_their_rounding(
+    zeroth: str, share: float
+) -> None:
+    """All pixels alike: nothing but rounding makes their sums differ, and no fit is possible."""
+    scene = Scene(zeroth)
+    exact = np.stack([scene.mean(k, 1.0) for k in range(len(scene.labels))])
+    alike = np.broadcast_to(exact.mean(axis=(1, 2), keepdims=True), exact.shape)
+    images = np.rint(share * alike + 200.4).astype(np.uint16)[None]
+
+    found = tm.repair(images, zeroth=zeroth, calibration=np.ones(scene.harmonics + 1))
+
+    assert found.images is images
 
 
 def test_another_treatment_of_spoilt_images_is_refused() -> None:
