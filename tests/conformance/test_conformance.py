@@ -17,12 +17,11 @@ from transientcam.conformance import (
     SLOW,
     Check,
     Device,
-    Rate,
     Report,
     chosen,
     run,
 )
-from transientcam.conformance.rate import measured_rate
+from transientcam.conformance.rate import Rate, measured_rate
 from transientcam.errors import ParameterError, PromiseBroken, ServerUnreachable
 from transientcam.wire import LEASE_HEADER
 from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now

@@ -41,9 +41,9 @@ import numpy as np, transientcam_moments as tm
 phase_rad = np.linspace(0.5, 5.5, 5000)
 b = 100 * np.exp(1j * np.arange(4)[:, None] * phase_rad)
 b[0] += 1
-found = tm.reconstruct(b.astype(np.complex64), tm.Settings(smoothing_sigma_px=0.0), threads=2)
+found = tm.reconstruct(b.astype(np.complex64), tm.Settings(23e6, smoothing_sigma_px=0.0), threads=2)
 density = tm.density(found.coefficients, [0.0, 1.0])
-expected_m = tm.range_m(phase_rad, tm.Settings().base_frequency_hz)
+expected_m = tm.range_m(phase_rad, 23e6)
 print(np.abs(found.range_m - expected_m).max() < 1e-3, density.shape)
 """
 CLIENT = """

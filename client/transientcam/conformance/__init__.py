@@ -6,17 +6,14 @@ leave the camera as they found it.
 
 from transientcam.conformance.check import Check
 from transientcam.conformance.device import Device
-from transientcam.conformance.rate import Rate
 from transientcam.conformance.report import Report, Result
-from transientcam.conformance.running import CHECKS, GROUPS, SLOW, chosen, run
+from transientcam.conformance.running import CHECKS, GROUPS, chosen, run
 
 __all__ = [
     "CHECKS",
     "GROUPS",
-    "SLOW",
     "Check",
     "Device",
-    "Rate",
     "Report",
     "Result",
     "chosen",

@@ -27,6 +27,7 @@ ENTRIES: Final = (
     Contender("pisarenko", _F, 4),
     Contender("maximum-entropy", _F, 4),
     Contender("pisarenko", _F, 3),
+    Contender("likelihood", _F, 3),
     Contender("dorrington", _F, 2),
     Contender("sra", _F, 3),
     Contender("sra-table", _F, 3),

@@ -9,7 +9,7 @@ from transientcam_server.camera.calibration_store import CalibrationStore
 from transientcam_server.camera.calibrator import Calibrator
 from transientcam_server.camera.jobs import Jobs
 from transientcam_server.camera.lease import LeaseManager
-from transientcam_server.camera.source import Camera, open_camera, start_with
+from transientcam_server.camera.source import Camera, open_camera
 from transientcam_server.camera.status import AcquisitionStatus
 
 __all__ = [
@@ -21,5 +21,4 @@ __all__ = [
     "Jobs",
     "LeaseManager",
     "open_camera",
-    "start_with",
 ]

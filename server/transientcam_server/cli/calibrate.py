@@ -174,7 +174,7 @@ def _before_lens(change: Callable[..., object]) -> Iterator[None]:
 
 def _measured_here(order: _Order) -> dict[str, Any]:
     from transientcam_driver import Sequence, open_camera
-    from transientcam_server.camera import start_with
+    from transientcam_server.camera.source import start_with
     from transientcam_server.imaging.diffusor import judge
     from transientcam_server.settings import SequenceSettings
 

@@ -80,7 +80,8 @@ def serve(
 
     import transientcam_moments as tm
     from transientcam_server.api.app import build_app
-    from transientcam_server.camera import open_camera, start_with
+    from transientcam_server.camera import open_camera
+    from transientcam_server.camera.source import start_with
     from transientcam_server.daemon import server
 
     server.configure_logging(settings)

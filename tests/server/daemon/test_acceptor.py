@@ -89,7 +89,7 @@ def test_handshakes_that_never_come_count_and_are_given_up(tmp_path: Path) -> No
     authority.issue_cert("127.0.0.1").private_key_and_cert_chain_pem.write_to_path(str(certificate))
     trusting = ssl.create_default_context()
     authority.configure_trust(trusting)
-    limits = {"max_connections_per_address": 3, "head_s": 0.3}
+    limits = {"max_connections_per_address": 3, "head_s": 3.0}
     with (
         serving("sim:wall?noise=off", tls_certificate=certificate, limits=limits) as served,
         ExitStack() as stack,

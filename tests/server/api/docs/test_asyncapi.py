@@ -76,11 +76,13 @@ def test_what_the_daemon_sends_is_as_described(served: Served) -> None:
         if "time" not in product.axes
         for encoding in product.encodings
     ]
+    # as many as a client may have, those with an encoding of their own among them
+    chosen = sorted(everything, key=lambda each: each["encoding"] == "f32")[
+        : wire.MAX_SUBSCRIPTIONS
+    ]
     seen = set()
     with streaming(served.stream_url) as client:
-        client.send(
-            {"type": "subscribe", "v": 1, "subscriptions": everything[: wire.MAX_SUBSCRIPTIONS]}
-        )
+        client.send({"type": "subscribe", "v": 1, "subscriptions": chosen})
         for _ in range(wire.MAX_SUBSCRIPTIONS + 3):
             message = unpacked(client.connection.recv(timeout=30.0))
             check(message["type"], message)
