@@ -14,7 +14,6 @@ from transientcam.cli import run as command
 from transientcam.conformance import (
     CHECKS,
     GROUPS,
-    SLOW,
     Check,
     Device,
     Report,
@@ -22,6 +21,7 @@ from transientcam.conformance import (
     run,
 )
 from transientcam.conformance.rate import Rate, measured_rate
+from transientcam.conformance.running import SLOW
 from transientcam.errors import ParameterError, PromiseBroken, ServerUnreachable
 from transientcam.wire import LEASE_HEADER
 from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
