@@ -50,7 +50,8 @@ def main() -> None:
             now = measure(name, connections, duration_s=duration_s)
             found.append((name, connections, before, now))
             print(row(*found[-1]), flush=True)
-    text = page(found, duration_s=duration_s)
+    options = " --quick" if arguments.quick else ""
+    text = page(found, duration_s=duration_s, options=options)
     print(text)
     if arguments.write:
         PAGE.write_text(text, encoding="utf-8")

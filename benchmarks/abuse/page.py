@@ -72,14 +72,14 @@ def _seconds(value: float | None) -> str:
     return "never" if value is None else f"{value:.2f} s"
 
 
-def page(found: Sequence[Found], *, duration_s: float) -> str:
+def page(found: Sequence[Found], *, duration_s: float, options: str = "") -> str:
     """Return the page."""
     compared = any(before is not None for _, _, before, _ in found)
     return "\n".join(
         [
             "# Attacks by clients",
             "",
-            f"Written by `python -m benchmarks.abuse --write` on {machine()}.",
+            f"Written by `python -m benchmarks.abuse{options} --write` on {machine()}.",
             "",
             f"Each attack goes on at full speed for {duration_s:g} s and longer, from one process "
             f"at nice {NICE},",
