@@ -46,12 +46,36 @@ class AppliedSequence:
         return self.sequence.to_document() | {"sequence_id": self.epoch} | derived
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Capabilities:
-    """What a camera can do, by its answer to GET_CAPS.
+    """What a camera can do.
 
-    Frequencies are multiples of ``tuning_step_hz``, exposures of 1 ns. A single capture reads an
-    image out in ``readout_s``; back-to-back frames take ``streaming_readout_s`` an image.
+    Attributes
+    ----------
+    model, serial, firmware, protocol_version
+        Which camera it is. Calibrations belong to a serial number.
+    width, height, bits
+        Of an image; the highest code of ``bits`` means that the pixel is saturated.
+    readout_s, streaming_readout_s
+        From the end of an exposure to the begin of the next one, in a single capture and back to
+        back.
+    settle_s
+        What each change of the modulation frequency takes beside that.
+    tuning_step_hz, min_frequency_hz, max_frequency_hz
+        Modulation frequencies: multiples of the step.
+    low_frequency_hz
+        Where the zeroth moment is measured, with ``low-frequency``.
+    min_exposure_s, max_exposure_s, exposure_step_s
+        Exposures of one image: multiples of the step.
+    max_harmonics, max_takes, max_sub_phases, max_images
+        Of a sequence.
+    schemes, zeroths, take_orders
+        What a sequence can ask for.
+    fifo_bytes
+        Room for images in the camera; 0 where that is not known.
+    heartbeat_s
+        The camera switches its light off by itself when it was not asked for anything for so long;
+        0 where it does not.
     """
 
     model: str
@@ -63,21 +87,23 @@ class Capabilities:
     bits: int
     readout_s: float
     streaming_readout_s: float
+    settle_s: float = 0.0
     tuning_step_hz: float
     min_frequency_hz: float
     max_frequency_hz: float
-    low_frequency_hz: float
+    low_frequency_hz: float = 0.0
     max_harmonics: int
     min_exposure_s: float
     max_exposure_s: float
-    max_takes: int
-    max_sub_phases: int
-    max_images: int
-    schemes: tuple[Scheme, ...]
-    zeroths: tuple[Zeroth, ...]
-    take_orders: tuple[TakeOrder, ...]
-    fifo_bytes: int
-    heartbeat_s: float
+    exposure_step_s: float = 1e-9
+    max_takes: int = 256
+    max_sub_phases: int = 1
+    max_images: int = 2048
+    schemes: tuple[Scheme, ...] = ("none",)
+    zeroths: tuple[Zeroth, ...] = ("estimated",)
+    take_orders: tuple[TakeOrder, ...] = ("sequential",)
+    fifo_bytes: int = 0
+    heartbeat_s: float = 0.0
 
     @property
     def image_bytes(self) -> int:
@@ -151,20 +177,21 @@ class Capabilities:
             replace(
                 sequence,
                 base_frequency_hz=self.frequency_hz(self.tuning_word(sequence.base_frequency_hz)),
-                exposure_s=round(sequence.exposure_s * 1e9) / 1e9,
+                exposure_s=self.exposure_grid_s(sequence.exposure_s),
             ),
             epoch=epoch,
         )
 
     def describe(self, sequence: Sequence, *, epoch: int) -> AppliedSequence:
         """Return a sequence that is set already, with its derived fields."""
-        streaming_s = sequence.capture_s(self.streaming_readout_s)
+        settling_s = self.settle_s * sequence.frequency_changes
+        streaming_s = sequence.capture_s(self.streaming_readout_s) + settling_s
         frame_bytes = sequence.images * (IMAGE_HEADER_BYTES + self.image_bytes)
         return AppliedSequence(
             sequence=sequence,
             epoch=epoch,
             images=sequence.images,
-            capture_s=sequence.capture_s(self.readout_s),
+            capture_s=sequence.capture_s(self.readout_s) + settling_s,
             frame_rate_hz=1 / streaming_s,
             unambiguous_range_m=sequence.unambiguous_range_m,
             data_rate_bytes_s=frame_bytes / streaming_s,
@@ -178,6 +205,12 @@ class Capabilities:
     def tuning_word(self, frequency_hz: float) -> int:
         """Nearest tuning word of a frequency; harmonics use multiples of the base's word."""
         return round(frequency_hz / self.tuning_step_hz)
+
+    def exposure_grid_s(self, exposure_s: float) -> float:
+        """Nearest exposure that the timer makes."""
+        # by division, so that 25 us are 25e-6 and not 25.000000000000004e-6
+        steps_per_s = round(1 / self.exposure_step_s)
+        return round(exposure_s * steps_per_s) / steps_per_s
 
 
 def _clamped(value: float, least: float, most: float) -> float:

@@ -201,6 +201,14 @@ class Sequence:
             for index, (take, (harmonic, frequency_hz, phase_rad, illumination)) in enumerate(order)
         )
 
+    @property
+    def frequency_changes(self) -> int:
+        """How often the modulation changes in a frame that others of its kind follow."""
+        groups = self.harmonics + (self.zeroth != "estimated")
+        if groups == 1:
+            return 0
+        return groups * (self.takes if self.take_order == "sequential" else 1)
+
     def capture_s(self, readout_s: float) -> float:
         """Time from the first exposure to the last read-out."""
         return self.images * (self.exposure_s + readout_s)

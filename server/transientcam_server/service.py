@@ -12,7 +12,7 @@ from typing import Any, Final, Protocol
 
 import transientcam_moments as tm
 from transientcam import wire
-from transientcam_driver import AppliedSequence, CalibrationError
+from transientcam_driver import AppliedSequence, CalibrationError, Camera
 from transientcam_driver.calibration.file import DEVICE_FIELDS
 from transientcam_server.broadcast.channel import Channel
 from transientcam_server.broadcast.hub import Hub
@@ -20,7 +20,6 @@ from transientcam_server.camera import (
     Acquisition,
     CalibrationStore,
     Calibrator,
-    Camera,
     Jobs,
     LeaseManager,
 )

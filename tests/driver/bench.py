@@ -15,6 +15,7 @@ from transientcam_driver.simulation.device.firmware import Firmware
 from transientcam_driver.simulation.device.prototype import prototype
 from transientcam_driver.simulation.device.usb_device import EmulatedDevice
 from transientcam_driver.usb import open_transport
+from transientcam_driver.usb_camera import UsbCamera
 
 WIDTH, HEIGHT = 12, 5
 CAPABILITIES = replace(
@@ -82,7 +83,7 @@ class Bench:
         self.bus = SimulatedBus([self.device])
 
     def open(self, sequence: Sequence | None = None) -> Camera:
-        return Camera(
+        return UsbCamera(
             lambda serial: open_transport(serial, backend=self.bus),
             clock=self.clock,
             sequence=sequence,

@@ -29,6 +29,7 @@ from transientcam_driver.simulation.build import build, find_scene
 from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.simulation.device.usb_device import EmulatedDevice
 from transientcam_driver.usb import open_transport
+from transientcam_driver.usb_camera import UsbCamera
 
 from .conftest import OpenCamera
 
@@ -209,7 +210,7 @@ def test_opening_switches_off_what_the_last_owner_left_on(clock: VirtualClock) -
     crashed.close()
     assert light_of(simulation)
 
-    with Camera(lambda serial: open_transport(serial, backend=bus), clock=clock):
+    with UsbCamera(lambda serial: open_transport(serial, backend=bus), clock=clock):
         assert not light_of(simulation)
 
 

@@ -6,6 +6,7 @@ from typing import Final
 
 from fastapi import APIRouter, Depends, FastAPI
 
+from transientcam_driver import Camera
 from transientcam_server.api import problems
 from transientcam_server.api.auth import permissions
 from transientcam_server.api.auth.guard import Authentication, Guard
@@ -36,7 +37,6 @@ from transientcam_server.api.routes import (
     metrics as metrics_route,
 )
 from transientcam_server.api.stream import websocket
-from transientcam_server.camera import Camera
 from transientcam_server.service import VERSION, Service
 from transientcam_server.settings import Settings
 

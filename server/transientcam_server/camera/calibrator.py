@@ -16,6 +16,7 @@ from transientcam_driver import (
     AppliedSequence,
     CalibrationCapture,
     CalibrationMismatch,
+    Camera,
     RawFrame,
     capture_calibration,
 )
@@ -28,7 +29,6 @@ from transientcam_server.camera.calibration_store import (
     verdict_of,
 )
 from transientcam_server.camera.jobs import Job, Jobs
-from transientcam_server.camera.source import Camera
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import (
