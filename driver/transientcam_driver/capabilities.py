@@ -1,6 +1,7 @@
 """What a camera can do, and a sequence as it applies it."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from transientcam_driver.errors import SequenceError
@@ -169,6 +170,23 @@ class Capabilities:
         )
         most_takes = min(self.max_takes, self.max_images // nearest.images_per_take)
         return replace(nearest, takes=min(sequence.takes, most_takes))
+
+    def sequence_of(self, document: Mapping[str, Any]) -> Sequence:
+        """Build a sequence from a JSON document, as `Sequence.from_document` does.
+
+        What is absent takes its default, or where this camera cannot do that what is nearest.
+
+        Raises
+        ------
+        SequenceError
+            Naming the field, its value and the limit.
+        """
+        wanted = Sequence.from_document(document)
+        possible = self.nearest(wanted)
+        absent = {each.name for each in fields(Sequence)} - document.keys()
+        if "scheme" not in document.get("sub_phases", {}):
+            absent.add("sub_phases")
+        return replace(wanted, **{name: getattr(possible, name) for name in absent})
 
     def apply(self, sequence: Sequence, *, epoch: int = 0) -> AppliedSequence:
         """Return a sequence as this camera would apply it, without a request to it."""

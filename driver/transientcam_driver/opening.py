@@ -34,7 +34,7 @@ def open_camera(spec: str = DEFAULT_SPEC, *, clock: Clock | None = None) -> Came
     CameraError
         The camera is absent, busy, or may not be opened.
     """
-    name, plugin = _of(spec)
+    name, plugin = plugin_of(spec)
     return plugin.open(name, clock or RealClock())
 
 
@@ -46,7 +46,7 @@ def check_camera(spec: str) -> None:
     DriverError
         As `open_camera`, as far as it can be known.
     """
-    name, plugin = _of(spec)
+    name, plugin = plugin_of(spec)
     plugin.check(name)
 
 
@@ -55,7 +55,14 @@ def kinds() -> tuple[str, ...]:
     return tuple(sorted({point.name for point in entry_points(group=GROUP)}))
 
 
-def _of(spec: str) -> tuple[CameraName, CameraPlugin]:
+def plugin_of(spec: str) -> tuple[CameraName, CameraPlugin]:
+    """Take a name apart, and return the plug-in that opens it.
+
+    Raises
+    ------
+    SpecError, PluginError
+        As `open_camera`.
+    """
     name = CameraName.parse(spec)
     points = {point.value: point for point in entry_points(group=GROUP, name=name.kind)}
     if not points:

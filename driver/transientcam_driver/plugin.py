@@ -129,6 +129,10 @@ def _nothing_to_check(name: CameraName) -> None:
     pass
 
 
+def _no_facts(name: CameraName) -> tuple[tuple[str, str], ...]:
+    return ()
+
+
 @dataclass(frozen=True, slots=True)
 class CameraPlugin:
     """One kind of camera: how to find one, and how to open it.
@@ -147,6 +151,9 @@ class CameraPlugin:
         a `DriverError` where that is impossible.
     check
         Checks a name without opening the camera, as `transientcam serve --check` does.
+    facts
+        Reads what a report of a fault should hold, as pairs of a name and a text, for
+        `transientcam doctor --camera`.
     options
         What each option means, by its name; others are refused before ``open`` is called.
     """
@@ -156,6 +163,7 @@ class CameraPlugin:
     open: Callable[[CameraName, Clock], Camera]
     find: Callable[[], Iterable[FoundCamera]] = _none_found
     check: Callable[[CameraName], None] = _nothing_to_check
+    facts: Callable[[CameraName], Iterable[tuple[str, str]]] = _no_facts
     options: Mapping[str, str] = field(default_factory=dict)
 
     def require_options(self, name: CameraName) -> None:

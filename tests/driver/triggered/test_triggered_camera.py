@@ -4,16 +4,14 @@ from dataclasses import replace
 
 import pytest
 
-from tests.driver.triggered.scripted import SETTLES_S, Cable
+from tests.driver.triggered.scripted import EXPOSED_S, SETTLES_S, Cable
 from transientcam_driver import CameraNotFound, FrameTimeout, NotStreaming, Sequence, SubPhases
 from transientcam_driver.camera import CameraState
 from transientcam_driver.clock import VirtualClock
 
 NONE = SubPhases("none")
-TWO = Sequence(
-    base_frequency_hz=10e6, harmonics=2, zeroth="low-frequency", takes=2, sub_phases=NONE
-)
 ONE = Sequence(base_frequency_hz=10e6, harmonics=1, zeroth="estimated", sub_phases=NONE)
+TWO = replace(ONE, harmonics=2, zeroth="low-frequency", takes=2)
 
 
 def test_images_stand_where_their_labels_say() -> None:
@@ -36,8 +34,8 @@ def test_each_frequency_settles_before_its_four_phases_are_exposed() -> None:
 
     assert [harmonic for harmonic, _ in cable.asked] == [0, 1, 2, 0, 1, 2]
     between_s = [b - a for (_, a), (_, b) in zip(cable.asked, cable.asked[1:], strict=False)]
-    assert between_s == pytest.approx([SETTLES_S] * 5)
-    assert frame.capture_s == pytest.approx(5 * SETTLES_S)
+    assert between_s == pytest.approx([SETTLES_S + EXPOSED_S] * 5)
+    assert frame.capture_s == pytest.approx(5 * SETTLES_S + 6 * EXPOSED_S)
 
 
 def test_the_time_to_settle_is_in_what_a_capture_is_said_to_take() -> None:

@@ -186,7 +186,7 @@ def test_a_name_says_how_to_replay(spec: str, wanted: ReplaySpec) -> None:
         ("recording:a.h5?speed=0", "speed = '0'"),
         ("recording:a.h5?speed=nan", "speed = 'nan'"),
         ("recording:a.h5?speed=quick", "original, fast or a factor"),
-        ("recording:a.h5?loop=yes", "one of on, off"),
+        ("recording:a.h5?loop=yes", "one of off, on"),
     ],
 )
 def test_a_name_that_cannot_be_read_says_why(spec: str, reason: str) -> None:
