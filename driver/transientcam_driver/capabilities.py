@@ -24,7 +24,7 @@ class AppliedSequence:
     """What was really set, after rounding to the grid of the camera's synthesiser and timer.
 
     ``epoch`` is the number the camera gave this configuration; every image carries it. It is 0
-    when a sequence was only checked.
+    when a sequence was only checked. ``delay_s`` is that of the capabilities.
     """
 
     sequence: Sequence
@@ -35,6 +35,7 @@ class AppliedSequence:
     unambiguous_range_m: float
     data_rate_bytes_s: float
     low_frequency_hz: float
+    delay_s: float = 0.0
 
     @property
     def labels(self) -> tuple[ImageLabel, ...]:
@@ -72,6 +73,9 @@ class Capabilities:
         Of a sequence.
     schemes, zeroths, take_orders
         What a sequence can ask for.
+    delay_s
+        What the light takes on its way inside of the camera, so that a moment at the frequency f
+        comes with a phase of 2 pi f delay_s more; nominal gains take it away.
     fifo_bytes
         Room for images in the camera; 0 where that is not known.
     heartbeat_s
@@ -103,6 +107,7 @@ class Capabilities:
     schemes: tuple[Scheme, ...] = ("none",)
     zeroths: tuple[Zeroth, ...] = ("estimated",)
     take_orders: tuple[TakeOrder, ...] = ("sequential",)
+    delay_s: float = 0.0
     fifo_bytes: int = 0
     heartbeat_s: float = 0.0
 
@@ -214,6 +219,7 @@ class Capabilities:
             unambiguous_range_m=sequence.unambiguous_range_m,
             data_rate_bytes_s=frame_bytes / streaming_s,
             low_frequency_hz=self.low_frequency_hz,
+            delay_s=self.delay_s,
         )
 
     def frequency_hz(self, tuning_word: int) -> float:

@@ -146,9 +146,9 @@ class CameraPlugin:
     open
         Opens the camera of a name. The clock is real time, unless a test has another one; a real
         device may leave it aside. Raises a `DriverError`: `CameraNotFound`, `CameraBusy` and so on.
-    find
-        Lists the cameras that are there, within about a second and without disturbing any. Raises
-        a `DriverError` where that is impossible.
+    find, find_on_network
+        List the cameras that are at this machine, and those on the network, within about a second
+        and without disturbing any. Raise a `DriverError` where that is impossible.
     check
         Checks a name without opening the camera, as `transientcam serve --check` does.
     facts
@@ -162,6 +162,7 @@ class CameraPlugin:
     usage: str
     open: Callable[[CameraName, Clock], Camera]
     find: Callable[[], Iterable[FoundCamera]] = _none_found
+    find_on_network: Callable[[], Iterable[FoundCamera]] = _none_found
     check: Callable[[CameraName], None] = _nothing_to_check
     facts: Callable[[CameraName], Iterable[tuple[str, str]]] = _no_facts
     options: Mapping[str, str] = field(default_factory=dict)

@@ -6,6 +6,7 @@ Each kind of camera lists its own, through its entry point of the group ``transi
 import json
 from dataclasses import asdict
 from importlib.metadata import EntryPoint, entry_points
+from itertools import chain
 from typing import Annotated, Any, Final
 
 import typer
@@ -34,7 +35,7 @@ def devices(
     as_json: JsonOption = False,
 ) -> None:
     """List the cameras that each plug-in finds, those on the network, and how to open each."""
-    document = {**_found_here(), "network": [], "network_problem": None}
+    document = {**_found(network=network), "network": [], "network_problem": None}
     console = Console(stderr=True)
     if network:
         with console.status("listening on the network"):
@@ -46,12 +47,12 @@ def devices(
         _print(document, network=network)
 
 
-def _found_here() -> dict[str, Any]:
+def _found(*, network: bool) -> dict[str, Any]:
     """Return the kinds of cameras, what each finds, and why one could not look."""
     document: dict[str, Any] = {"kinds": [], "cameras": [], "problems": {}, "simulated": []}
     for point in sorted(entry_points(group=GROUP), key=lambda each: each.name):
         try:
-            _look(point, document)
+            _look(point, document, network=network)
         except ModuleNotFoundError as error:
             extra = extra_of(error.name or "", _VERB) or extra_of(point.module, _VERB)
             missing = CommandUnavailable(_VERB, error.name or "", extra)
@@ -64,7 +65,7 @@ def _found_here() -> dict[str, Any]:
     return document
 
 
-def _look(point: EntryPoint, document: dict[str, Any]) -> None:
+def _look(point: EntryPoint, document: dict[str, Any], *, network: bool) -> None:
     plugin = point.load()
     document["kinds"].append(
         {
@@ -74,7 +75,8 @@ def _look(point: EntryPoint, document: dict[str, Any]) -> None:
             "options": dict(plugin.options),
         }
     )
-    for camera in plugin.find():
+    elsewhere = plugin.find_on_network() if network else ()
+    for camera in chain(plugin.find(), elsewhere):
         found = asdict(camera)
         if found.pop("simulated"):
             document["simulated"].append(camera.spec)
@@ -102,7 +104,7 @@ def _print(document: dict[str, Any], *, network: bool) -> None:
     if cameras:
         console.print(_camera_table(cameras))
     else:
-        console.print("No camera was found at this machine.")
+        console.print("No camera was found.")
     for camera in cameras:
         if camera["problem"] is not None:
             where = camera["node"] or camera["spec"]

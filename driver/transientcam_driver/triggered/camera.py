@@ -45,6 +45,8 @@ class TriggeredCamera:
         Real time by default.
     simulation
         The handle on a simulated camera; None for a real one.
+    on_close
+        Called once the device was given back.
 
     Raises
     ------
@@ -58,10 +60,12 @@ class TriggeredCamera:
         *,
         clock: Clock | None = None,
         simulation: Simulation | None = None,
+        on_close: Callable[[], None] = lambda: None,
     ) -> None:
         self.simulation = simulation
         self.counters = Counters()
         self._connect = connect
+        self._on_close = on_close
         self._clock = clock or RealClock()
         self._since_s = self._clock.now_s()
         self._control = threading.RLock()  # requests, the state and what is exposed
@@ -192,6 +196,7 @@ class TriggeredCamera:
             self._state = CameraState.DISCONNECTED
         with self._reading:  # the device must not be closed while a thread reads
             self._device.close()
+            self._on_close()
 
     def __enter__(self) -> "TriggeredCamera":
         return self

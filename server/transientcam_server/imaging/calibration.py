@@ -80,15 +80,20 @@ def calibration_id(gains: Gains | None) -> str:
     return NOMINAL_ID if gains is None else gains.id
 
 
-def nominal_gains(sequence: Sequence) -> _Array:
-    """Return the gains (m + 1,) that sub-phases alone give an ideal modulation."""
+def nominal_gains(sequence: Sequence, *, delay_s: float = 0.0) -> _Array:
+    """Return the gains (m + 1,) that sub-phases and a delay give an ideal modulation.
+
+    ``delay_s`` is what the light takes inside of the camera: a phase of 2 pi j f delay_s. The
+    zeroth moment, a modulus or a difference, has none.
+    """
     gains: _Array = tm.nominal_calibration(
         sequence.harmonics,
         sequence.sub_phases.phases_rad,
         sequence.sub_phases.weights,
         zeroth=sequence.zeroth,
     )
-    return gains
+    turns = sequence.base_frequency_hz * delay_s * np.arange(sequence.harmonics + 1)
+    return gains * np.exp(2j * np.pi * turns) if delay_s else gains
 
 
 def _brightness(measured: _Array, nominal: _Array) -> _Array:

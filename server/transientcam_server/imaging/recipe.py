@@ -130,7 +130,11 @@ class Recipe:
         )
         return tm.Reconstructor(
             settings,
-            calibration=nominal_gains(sequence) if gains is None else gains.planes,
+            calibration=(
+                nominal_gains(sequence, delay_s=self.applied.delay_s)
+                if gains is None
+                else gains.planes
+            ),
             bad_pixels=None if gains is None else gains.bad,
         )
 

@@ -150,7 +150,7 @@ def _create(file: swmr.File, header: Header, annotations: Mapping[str, Any]) -> 
     for name in _AXES:
         file[name].make_scale(name)
     _create_columns(file, image_columns(labels))
-    _create_columns(file, moment_columns(header.applied.sequence, labels, header.gains))
+    _create_columns(file, moment_columns(header.applied, labels, header.gains))
     if header.calibration_planes is not None:
         # names that readers of the first version of this format look for, of the same datasets
         file["calibration_planes"] = file["gain"]

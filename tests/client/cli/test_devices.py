@@ -91,7 +91,7 @@ def test_an_empty_bus_and_a_silent_network_are_no_failure(
 ) -> None:
     words = printed_by(capsys)
 
-    assert "No camera was found at this machine." in words
+    assert "No camera was found." in words
     assert "No camera announces itself on the network." in words
 
 
