@@ -75,8 +75,11 @@ clean:  ## Remove everything that was built or installed here
 	$(BIN)/python -m pip install --quiet --editable '.[server,plot]'
 	@touch $@
 
+# The client of the TOFcam660's vendor, which drives our emulation of it. What the tests use of it needs NumPy
+# alone; its own requirements (OpenCV, Bluetooth, a serial port, 150 MB and more) are of its other cameras.
 .venv/test.stamp: pyproject.toml | .venv/bin/python
 	$(BIN)/python -m pip install --quiet --editable '.[test]'
+	$(BIN)/python -m pip install --quiet --no-deps 'epc-tofcam-toolkit==0.13.0'
 	@touch $@ .venv/serve.stamp
 
 client/dashboard/node_modules/.package-lock.json: client/dashboard/package-lock.json

@@ -74,7 +74,8 @@ class ControlConnection:
             payload = self._payload(pack_request(command, data))
         except (OSError, EOFError, ProtocolError) as error:
             self.close()
-            reason = str(error) or f"no answer within {self._answer_s:g} s"
+            late = isinstance(error, TimeoutError)
+            reason = f"no answer within {self._answer_s:g} s" if late else str(error)
             raise CameraLost(f"{command.name} at {self._peer}: {reason}") from error
         return Answer.of(payload, command)
 

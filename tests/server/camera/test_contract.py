@@ -9,10 +9,13 @@ import pytest
 
 from tests.driver.mounts import PyusbMount
 from tests.server.recording.made import record
-from transientcam_driver import Camera, open_camera
-from transientcam_driver.clock import VirtualClock
+from transientcam_driver import Camera, TriggeredCamera, open_camera
+from transientcam_driver.clock import RealClock, VirtualClock
 from transientcam_driver.contract import CLAUSES, Bench, Clause, ContractSkipped
 from transientcam_driver.opening import kinds
+from transientcam_driver.simulation.build import find_scene, without_noise
+from transientcam_driver.simulation.tofcam660 import build_tofcam660
+from transientcam_driver.tofcam660 import DeviceOptions, Region, Tofcam660
 
 SKIPPED = {
     "recording": {
@@ -51,7 +54,32 @@ def recorded(directory: Path, closing: ExitStack) -> Bench:
     return Bench(partial(open_camera, f"recording:{path}?speed=fast&loop=on"))
 
 
-BENCHES = {"sim": simulated, "usb": on_usb, "recording": recorded}
+def emulated_tofcam660(directory: Path, closing: ExitStack) -> Bench:
+    device, simulation = build_tofcam660(
+        without_noise(find_scene("wall")), seed=1, clock=RealClock()
+    )
+    closing.callback(device.close)
+    options = DeviceOptions(
+        settle_s=0.0,
+        image_s=0.2,
+        region=Region(152, 112, 168, 128),
+        control_port=device.control_port,
+        data_port=device.data_port,
+    )
+    return Bench(
+        lambda: TriggeredCamera(lambda: Tofcam660(device.host, options)),
+        unplug=lambda camera: device.unplug(),
+        replug=lambda camera: device.replug(),
+        lose_image=lambda camera: simulation.drop_next(),
+    )
+
+
+BENCHES = {
+    "tofcam660": emulated_tofcam660,
+    "sim": simulated,
+    "usb": on_usb,
+    "recording": recorded,
+}
 
 
 @pytest.fixture(scope="module", params=sorted(BENCHES))
