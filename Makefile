@@ -49,6 +49,7 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 	$(BIN)/python -m benchmarks.simulation --write
 	$(BIN)/python -m benchmarks.recording --write
 	$(BIN)/python -m benchmarks.by_hand --write
+	$(BIN)/python -m benchmarks.cameras --write
 	$(BIN)/python -m benchmarks.first_light --write
 	$(BIN)/python -m benchmarks.stream_load --write
 	$(BIN)/python -m benchmarks.robustness --write
@@ -76,7 +77,7 @@ clean:  ## Remove everything that was built or installed here
 	@touch $@
 
 # The client of the TOFcam660's vendor, which drives our emulation of it. What the tests use of it needs NumPy
-# alone; its own requirements (OpenCV, Bluetooth, a serial port, 150 MB and more) are of its other cameras.
+# alone; its own requirements (OpenCV, Bluetooth, serial ports) are for its other cameras.
 .venv/test.stamp: pyproject.toml | .venv/bin/python
 	$(BIN)/python -m pip install --quiet --editable '.[test]'
 	$(BIN)/python -m pip install --quiet --no-deps 'epc-tofcam-toolkit==0.13.0'

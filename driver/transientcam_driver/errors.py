@@ -14,6 +14,7 @@
     │   └── CalibrationFileError  a file holds no calibration
     └── CameraError
         ├── CameraNotFound     no such camera is plugged in
+        │   └── CameraUnreachable  no camera answers at an address of the network
         ├── PermissionDenied   it is there, and this user may not open it
         ├── CameraBusy         another program holds it
         ├── LibusbMissing      the USB library of the system is missing
@@ -155,6 +156,14 @@ class CameraNotFound(CameraError):
         if self.serial is None:
             return "no camera is plugged in"
         return f"no camera with serial number {self.serial!r} is plugged in"
+
+
+@dataclass(eq=False, repr=False)
+class CameraUnreachable(CameraNotFound):
+    """No camera answers at an address of the network."""
+
+    def __str__(self) -> str:
+        return f"no camera answers at {self.serial}"
 
 
 @dataclass(eq=False, repr=False)

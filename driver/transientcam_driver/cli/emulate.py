@@ -17,7 +17,7 @@ from transientcam_driver.tofcam660.wire import CONTROL_PORT, DATA_PORT
 def emulate(
     scene: Annotated[
         str, typer.Argument(help="A scene's name or .toml, with options as in 'wall?noise=off'.")
-    ] = "mirrors",
+    ] = "hall",
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
     control_port: Annotated[
         int, typer.Option(min=0, max=65535, help="For commands; 0 takes any free one.")

@@ -23,7 +23,7 @@ from transientcam_driver.tofcam660.wire import (
 from transientcam_driver.triggered import TriggeredCamera
 
 EMULATED: Final = "emulated"
-DEFAULT_SCENE: Final = "mirrors"
+DEFAULT_SCENE: Final = "hall"
 _LOOK_S: Final = 0.3
 _EMULATED_ANSWER_S: Final = 60.0
 """An emulated camera may compute for seconds what a scene looks like at another frequency."""

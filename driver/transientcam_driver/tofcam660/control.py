@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from transientcam_driver.errors import CameraLost, CameraNotFound, ProtocolError
+from transientcam_driver.errors import CameraLost, CameraUnreachable, ProtocolError
 from transientcam_driver.tofcam660.wire import (
     HEAD_BYTES,
     TAIL_BYTES,
@@ -34,7 +34,7 @@ class ControlConnection:
 
     Raises
     ------
-    CameraNotFound
+    CameraUnreachable
         Nothing answers at that address.
     """
 
@@ -52,7 +52,7 @@ class ControlConnection:
         try:
             self._socket = socket.create_connection((host, port), timeout=answer_s)
         except OSError as error:
-            raise CameraNotFound(self._peer) from error
+            raise CameraUnreachable(self._peer) from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     @property

@@ -101,7 +101,7 @@ class Tofcam660:
 
     Raises
     ------
-    CameraNotFound
+    CameraUnreachable
         Nothing answers at that address.
     CameraError
         Its firmware is too old, or refuses a setting.

@@ -27,6 +27,8 @@ from transientcam_driver.triggered.partial_frame import PartialFrame
 
 READ_S: Final = 0.1
 """Longest single wait: how long a stop may have to wait for a reader."""
+_LOSSES: Final = 5
+"""Losses in a row from which on the camera counts as lost, with the reason."""
 _SHORTEST_S: Final = 1e-9  # where the clock does not move meanwhile
 _T = TypeVar("_T")
 
@@ -34,7 +36,8 @@ _T = TypeVar("_T")
 class TriggeredCamera:
     """A `Camera` of a device that exposes on request.
 
-    A frame with a lost image is dropped as a whole; the next one has their number. Nothing is
+    A frame with a lost image is dropped as a whole; the next one has their number. Where nothing
+    else than losses comes, the camera is lost. Nothing is
     exposed, and so no light is on, unless ``read_frame`` is called.
 
     Parameters
@@ -77,6 +80,7 @@ class TriggeredCamera:
         self._device = connect()
         self._capabilities = self._device.capabilities
         self._number = 0
+        self._losses = 0
         self._lost = 0
         self._applied = self._capabilities.apply(self._capabilities.nearest(Sequence()))
         try:
@@ -246,10 +250,10 @@ class TriggeredCamera:
         """Wait for images, and return the frame if they complete it."""
         try:
             images = self._device.receive(max(0.0, timeout_s))
-        except ImagesLost:
+        except ImagesLost as error:
             with self._control:
                 if partial is self._partial:
-                    self._drop(partial)
+                    self._drop(partial, error)
             return None
         except CameraLost:
             with self._control:
@@ -259,17 +263,23 @@ class TriggeredCamera:
         with self._control:
             if images is None or partial is not self._partial:  # stopped or set anew meanwhile
                 return None
+            self._losses = 0
             self.counters.images += len(images)
             partial.store(images)
             return self._delivered(partial) if partial.complete else None
 
-    def _drop(self, partial: PartialFrame) -> None:
+    def _drop(self, partial: PartialFrame, error: ImagesLost) -> None:
         lost = len(partial.next_group)
         self.counters.lost += lost
         self.counters.incomplete_frames += 1
         self._lost += lost
+        self._losses += 1
         self._number += 1
         self._begin_frame()
+        if self._losses >= _LOSSES:
+            self._losses = 0
+            self._state = CameraState.DISCONNECTED
+            raise CameraLost(f"{_LOSSES} times in a row {error}") from error
 
     def _delivered(self, partial: PartialFrame) -> RawFrame:
         assert partial.begun_s is not None  # noqa: S101  (it is complete)

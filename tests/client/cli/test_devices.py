@@ -10,9 +10,10 @@ import pytest
 from transientcam.cli import devices, run
 from transientcam.discovery import FoundCamera
 from transientcam.errors import ServerUnreachable
-from transientcam_driver import LibusbMissing
-from transientcam_driver.entries import usb
+from transientcam_driver import CameraUnreachable, LibusbMissing
+from transientcam_driver.entries import tofcam660, usb
 from transientcam_driver.plugin import FoundCamera as Camera
+from transientcam_driver.tofcam660.wire import Answer, AnswerType
 
 FREE = Camera("usb:A-17", "A-17", "AMCW lidar", "/dev/bus/usb/001/004")
 FORBIDDEN = Camera("usb", node="/dev/bus/usb/001/005", problem="no permission to open it")
@@ -24,6 +25,11 @@ def nothing_there(monkeypatch: pytest.MonkeyPatch) -> None:
     """Start from empty buses and silent networks."""
     monkeypatch.setattr(usb, "list_cameras", lambda: ())
     monkeypatch.setattr(devices, "discover", lambda **_: ())
+
+    def nobody(address: str, *_: object, **__: object) -> None:
+        raise CameraUnreachable(address)
+
+    monkeypatch.setattr(tofcam660, "ControlConnection", nobody)
 
 
 def plug(monkeypatch: pytest.MonkeyPatch, *cameras: Camera) -> None:
@@ -110,7 +116,7 @@ def test_the_network_is_asked_as_told_or_not_at_all(
     words = printed_by(capsys, "--no-network")
 
     assert asked == [{"timeout_s": 0.5, "interfaces": ["127.0.0.1"]}]
-    assert "network" not in words
+    assert "announces itself on the network" not in words
 
 
 def test_a_missing_libusb_is_told_beside_the_others(
@@ -185,3 +191,27 @@ def test_a_plug_in_that_fails_hides_no_other(
     assert problem in document["problems"]["odd"]
     assert [camera["spec"] for camera in document["cameras"]] == ["usb:A-17"]
     assert len(document["network"]) == 1
+
+
+class _Answering:
+    """The connection to a TOFcam660 that has its factory's address."""
+
+    def __init__(self, address: str, *_: object, **__: object) -> None:
+        self.address = address
+
+    def exchange(self, command: int) -> Answer:
+        return Answer(AnswerType.CHIP, bytes([0, 7, 0x10, 0x92]))
+
+    def close(self) -> None:
+        pass
+
+
+def test_a_tofcam660_is_looked_for_at_its_factorys_address_on_the_network_only(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(tofcam660, "ControlConnection", _Answering)
+
+    (camera,) = listed(capsys)["cameras"]
+
+    assert (camera["spec"], camera["serial"]) == ("tofcam660:10.10.31.180", "7-4242")
+    assert listed(capsys, "--no-network")["cameras"] == []

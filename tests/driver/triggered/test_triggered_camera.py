@@ -5,7 +5,14 @@ from dataclasses import replace
 import pytest
 
 from tests.driver.triggered.scripted import EXPOSED_S, SETTLES_S, Cable
-from transientcam_driver import CameraNotFound, FrameTimeout, NotStreaming, Sequence, SubPhases
+from transientcam_driver import (
+    CameraLost,
+    CameraNotFound,
+    FrameTimeout,
+    NotStreaming,
+    Sequence,
+    SubPhases,
+)
 from transientcam_driver.camera import CameraState
 from transientcam_driver.clock import VirtualClock
 
@@ -135,3 +142,14 @@ def test_time_is_the_clocks() -> None:
 
     assert frame.device_time_s == pytest.approx(cable.asked[len(cable.asked) // 2][1] - 50.0)
     assert frame.host_time_s == pytest.approx(1.7e9 + cable.clock.now_s() - 50.0)
+
+
+def test_a_camera_whose_images_never_come_is_lost_with_the_reason() -> None:
+    cable = Cable(groups_to_lose=5)
+    with cable.camera() as camera:
+        camera.start()
+        with pytest.raises(CameraLost, match="5 times in a row images were lost: as the test"):
+            camera.read_frame()
+        assert camera.state == CameraState.DISCONNECTED
+        camera.reconnect()
+        assert camera.read_frame().lost_images == 20

@@ -18,7 +18,7 @@ from transientcam_driver.contract import CLAUSES, Bench, Clause, ContractSkipped
 
 DISTANCE_M = 2.5
 # the others record, replay, or wait for long; they do not depend on the camera
-GROUPS = ("parameters", "tags", "stream")
+GROUPS = ("parameters", "tags")
 
 
 @pytest.fixture(scope="module", autouse=True)
