@@ -13,6 +13,7 @@ from transientcam import Camera
 from transientcam.cli import run as command
 from transientcam.conformance import Device, chosen
 from transientcam.conformance import run as check
+from transientcam.errors import ProblemError
 from transientcam_driver import CameraNotFound, SpecError, open_camera
 from transientcam_driver.contract import CLAUSES, Bench, Clause, ContractSkipped
 
@@ -82,10 +83,14 @@ def test_its_daemon_measures_the_distance_and_passes_the_checks(wall: Path) -> N
     with serving(f"wall:{wall}", sequence={"base_frequency_hz": 20e6}) as daemon:
         with Camera(daemon.url, timeout_s=60.0) as client:
             frame = client.frame("range")
+            with pytest.raises(ProblemError, match="only a simulated camera knows the true range"):
+                client.frame("truth")
+            absent = {each["name"]: each["reason"] for each in client.info["absent_products"]}
         with Device(daemon.url, timeout_s=20.0) as device:
             report = check(device, chosen(GROUPS, quick=True))
 
     assert frame.array == pytest.approx(DISTANCE_M, abs=2e-3)
+    assert absent == {"truth": "only a simulated camera knows the true range"}
     assert not report.failed, [(each.check.name, each.reason) for each in report.failed]
 
 
