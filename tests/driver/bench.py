@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver import Camera, Capabilities, ImageLabel, RawFrame, Sequence
+from transientcam_driver import Capabilities, ImageLabel, RawFrame, Sequence
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.protocol import Request, Status
 from transientcam_driver.protocol.capabilities import pack_capabilities
@@ -82,7 +82,7 @@ class Bench:
         self.device = EmulatedDevice(capabilities, power_on, clock=self.clock)
         self.bus = SimulatedBus([self.device])
 
-    def open(self, sequence: Sequence | None = None) -> Camera:
+    def open(self, sequence: Sequence | None = None) -> UsbCamera:
         return UsbCamera(
             lambda serial: open_transport(serial, backend=self.bus),
             clock=self.clock,

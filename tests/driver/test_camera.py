@@ -43,6 +43,7 @@ def state_of(camera: Camera) -> CameraState:
 
 def device_of(simulation: Simulation) -> EmulatedDevice:
     assert isinstance(simulation, SimulationHandle)
+    assert isinstance(simulation._device, EmulatedDevice)
     return simulation._device
 
 
@@ -405,6 +406,7 @@ def test_an_opened_interlock_is_a_fault_that_start_clears(
 def test_an_answer_that_cannot_be_is_a_protocol_error(
     camera: Camera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    assert isinstance(camera, UsbCamera)
     transport: Any = camera._transport
     control_in = transport.control_in
 

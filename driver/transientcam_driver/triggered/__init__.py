@@ -5,6 +5,6 @@ expose, and to hand images over.
 """
 
 from transientcam_driver.triggered.camera import TriggeredCamera
-from transientcam_driver.triggered.device import TriggeredDevice
+from transientcam_driver.triggered.device import Group, Images, TriggeredDevice
 
-__all__ = ["TriggeredCamera", "TriggeredDevice"]
+__all__ = ["Group", "Images", "TriggeredCamera", "TriggeredDevice"]

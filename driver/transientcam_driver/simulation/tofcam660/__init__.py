@@ -5,6 +5,8 @@ sockets, ``handle`` what a simulated camera offers beside its frames.
 """
 
 from transientcam_driver.simulation.tofcam660.build import build_tofcam660
+from transientcam_driver.simulation.tofcam660.firmware import EmulatedFirmware
 from transientcam_driver.simulation.tofcam660.network import EmulatedTofcam660
+from transientcam_driver.simulation.tofcam660.pixels import DifferentialPixels
 
-__all__ = ["EmulatedTofcam660", "build_tofcam660"]
+__all__ = ["DifferentialPixels", "EmulatedFirmware", "EmulatedTofcam660", "build_tofcam660"]
