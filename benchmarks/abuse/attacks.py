@@ -142,7 +142,7 @@ def _asking_for(*choices: Callable[[], tuple[str, str | None]]) -> _Attack:
 def _archive() -> tuple[str, None]:
     """As large an answer as there is in one piece; another one each time."""
     form = random.choice(("npz", "tiff"))
-    return f"/api/v1/frames/latest/transient.{form}?bins={random.randint(200, 400)}", None
+    return f"/api/v1/frames/latest/transient.{form}?bins={random.randint(200, 320)}", None
 
 
 def _document(path: str) -> tuple[str, None]:
