@@ -23,8 +23,10 @@ PAUSE_S: Final = 0.5
 """Before the next one is accepted where the system has no descriptors left."""
 REQUESTS_SHARE: Final = 0.4
 """Of the event loop's thread, for requests and their answers, as far as they are made there."""
+UNWATCHED_SHARE: Final = 0.9
+"""The same while no frames are sent or recorded."""
 STREAMS_SHARE: Final = 0.2
-"""The same, for what the clients of streams send. The rest is for what these are sent."""
+"""Of it, for what the clients of streams send. The rest is for what these are sent."""
 _REMEMBERED_ADDRESSES: Final = 1024
 
 
@@ -93,6 +95,8 @@ class Acceptor:
         It stays the caller's.
     protocol
         Makes the protocol of a connection.
+    watched
+        Whether frames are sent or recorded at present, for which time has to be left.
     tls
         With what connections are encrypted; None for not at all.
     """
@@ -103,6 +107,7 @@ class Acceptor:
         *,
         protocol: Callable[[], asyncio.Protocol],
         limits: LimitSettings,
+        watched: Callable[[], bool],
         tls: ssl.SSLContext | None = None,
     ) -> None:
         self._loop = asyncio.get_running_loop()
@@ -110,8 +115,10 @@ class Acceptor:
         self._protocol = protocol
         self._tls = tls
         self._limits = limits
-        self._requests = Turns(self._loop, share=REQUESTS_SHARE)
-        self._streams = Turns(self._loop, share=STREAMS_SHARE)
+        self._requests = Turns(
+            self._loop, share=lambda: REQUESTS_SHARE if watched() else UNWATCHED_SHARE
+        )
+        self._streams = Turns(self._loop, share=lambda: STREAMS_SHARE)
         self._admission = Admission(limits, clock=self._loop.time)
         self._refusals: dict[str, bytes] = {}
         self._handshakes: set[asyncio.Task[None]] = set()

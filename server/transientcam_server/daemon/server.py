@@ -166,7 +166,11 @@ class Server(uvicorn.Server):
             _loop=asyncio.get_running_loop(),
         )
         return Acceptor(
-            listener, protocol=protocol, limits=self._settings.limits, tls=self.config.ssl
+            listener,
+            protocol=protocol,
+            limits=self._settings.limits,
+            watched=lambda: self._service.watched,
+            tls=self.config.ssl,
         )
 
     @contextmanager

@@ -58,7 +58,7 @@ class Turns:
     loop
         Whose time is shared.
     share
-        How much of its thread's processor time there is to share, in the long run.
+        How much of its thread's processor time there is to share at present, in the long run.
     clock
         Real time in s.
     spent
@@ -69,7 +69,7 @@ class Turns:
         self,
         loop: asyncio.AbstractEventLoop,
         *,
-        share: float,
+        share: Callable[[], float],
         clock: Callable[[], float] = time.monotonic,
         spent: Callable[[], float] = time.thread_time,
     ) -> None:
@@ -147,7 +147,7 @@ class Turns:
 
     def _has_time(self) -> bool:
         now_s = self._clock()
-        self._left_s = min(BURST_S, self._left_s + self._share * (now_s - self._counted_s))
+        self._left_s = min(BURST_S, self._left_s + self._share() * (now_s - self._counted_s))
         self._counted_s = now_s
         return self._left_s > 0.0
 
@@ -155,5 +155,5 @@ class Turns:
         if self._later is None and self._has_time():
             self._later = self._loop.call_soon(self._serve)
         elif self._later is None:
-            pause_s = max(_LEAST_PAUSE_S, -self._left_s / self._share)
+            pause_s = max(_LEAST_PAUSE_S, -self._left_s / self._share())
             self._later = self._loop.call_later(pause_s, self._serve)

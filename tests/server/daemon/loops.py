@@ -52,7 +52,7 @@ class Loop:
         """Return turns by these clocks."""
         return Turns(
             cast("Any", self),
-            share=share,
+            share=lambda: share,
             clock=lambda: self.now_s,
             spent=lambda: self.spent_s,
         )

@@ -19,7 +19,9 @@ class Served:
     def __init__(self) -> None:
         self.time = Loop()
         self.sent: list[Any] = []
-        self.turns = Turns(asyncio.get_running_loop(), share=0.5, spent=lambda: self.time.spent_s)
+        self.turns = Turns(
+            asyncio.get_running_loop(), share=lambda: 0.5, spent=lambda: self.time.spent_s
+        )
         self.account = self.turns.account("client")
 
     async def send(self, message: Any) -> None:
