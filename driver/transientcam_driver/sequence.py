@@ -28,7 +28,6 @@ DERIVED_FIELDS = (
     "data_rate_bytes_s",
 )
 """What follows from a sequence on one camera: fields of an applied one and of its document."""
-_INTEGERS = frozenset({"harmonics", "takes", "n"})
 READ_ONLY_FIELDS = frozenset({"sequence_id", *DERIVED_FIELDS})
 """What a client may send back unchanged with a sequence's document; it is ignored."""
 
@@ -78,7 +77,7 @@ class SubPhases:
     def from_document(cls, document: Mapping[str, Any]) -> "SubPhases":
         """Build from ``{"scheme", "n"}``; what is absent keeps its default."""
         _known_keys("sub_phases", document, {"scheme", "n"})
-        return cls(**_with_integers(document))
+        return cls(**document)
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,20 +236,10 @@ class Sequence:
         """
         known = {each.name for each in fields(cls)}
         _known_keys("", document, known | READ_ONLY_FIELDS)
-        given = _with_integers({name: value for name, value in document.items() if name in known})
+        given = {name: value for name, value in document.items() if name in known}
         if "sub_phases" in given:
             given["sub_phases"] = SubPhases.from_document(given["sub_phases"])
         return cls(**given)
-
-
-def _with_integers(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a document with integers where they stand as 4.0, which is one in JSON, too."""
-    whole = {
-        name: int(value)
-        for name, value in document.items()
-        if name in _INTEGERS and isinstance(value, float) and value.is_integer()
-    }
-    return {**document, **whole}
 
 
 def _known_keys(prefix: str, document: object, known: set[str] | frozenset[str]) -> None:

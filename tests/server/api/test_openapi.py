@@ -187,9 +187,10 @@ def bounds(schema: dict[str, Any]) -> Iterator[tuple[dict[str, Any], bool]]:
             yield from (({name: body}, fits) for body, fits in bounds(field))
         for limit, beyond in (("minimum", -1), ("maximum", 1)):
             if limit in field:
-                step = 1 if field["type"] == "integer" else field[limit] * 1e-3
-                yield {name: field[limit]}, True
-                yield {name: field[limit] + beyond * step}, False
+                whole = field["type"] == "integer"
+                at = int(field[limit]) if whole else field[limit]
+                yield {name: at}, True
+                yield {name: at + beyond * (1 if whole else at * 1e-3)}, False
         for value in field.get("enum", ()):
             yield {name: value}, True
     yield {"unheard_of": 1}, False

@@ -12,7 +12,7 @@ from tests.conftest import ROOT
 from tests.server.fuzzing.damage import lookup3
 from tests.server.fuzzing.recordings import KINDS, MEMORY_BYTES, in_memory
 
-CASES = 120
+CASES = 1000
 
 
 @pytest.mark.timeout(300)
