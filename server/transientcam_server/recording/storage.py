@@ -64,9 +64,10 @@ class Storage:
             raise ValueError(f"it has no {name}")
         if self._file.id.links.get_info(name.encode()).type != h5py.h5l.TYPE_HARD:
             raise ValueError(f"{name} is a link to elsewhere")
-        dataset = self._file[name]
-        if not isinstance(dataset, h5py.Dataset):
+        opened = h5py.h5o.open(self._file.id, name.encode())
+        if not isinstance(opened, h5py.h5d.DatasetID):
             raise ValueError(f"{name} is no dataset")
+        dataset = h5py.Dataset(opened)
         _require_inside(dataset, name)
         if axes is not None and dataset.ndim != axes:
             raise ValueError(f"{name} has {dataset.ndim} axes, not {axes}")
