@@ -97,7 +97,7 @@ def test_errors_and_cancellation_reach_the_application() -> None:
                 seen.append("cancelled")
                 raise
 
-        task = asyncio.create_task(served.answer(app))  # type: ignore[arg-type]
+        task = asyncio.create_task(served.answer(app))
         await asyncio.sleep(0)
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
