@@ -72,14 +72,15 @@ def _limited(sequence: dict[str, Any], camera: Capabilities) -> dict[str, Any]:
     schema = copy.deepcopy(sequence)  # other applications have other cameras
     properties = schema["properties"]
     least_hz, most_hz = camera.min_frequency_hz, camera.max_frequency_hz
-    for name, limits in {
+    stated: dict[str, dict[str, Any]] = {
         "base_frequency_hz": {"minimum": least_hz, "maximum": most_hz},
         "harmonics": {"maximum": camera.max_harmonics},
         "zeroth": {"enum": list(camera.zeroths)},
         "exposure_s": {"minimum": camera.min_exposure_s, "maximum": camera.max_exposure_s},
         "takes": {"maximum": camera.max_takes},
         "take_order": {"enum": list(camera.take_orders)},
-    }.items():
+    }
+    for name, limits in stated.items():
         properties[name] |= limits
         if "minimum" in limits:
             properties[name].pop("exclusiveMinimum", None)
