@@ -179,6 +179,12 @@ class Service:
         return tuple(each.describe(self.camera.capabilities, self.applied) for each in channels)
 
     @property
+    def watched(self) -> bool:
+        """Whether frames are sent to anybody or recorded."""
+        recorded = self.recordings.active_id is not None
+        return recorded or bool(self.hub.clients or self.mjpeg_clients)
+
+    @property
     def intrinsics(self) -> Intrinsics:
         """Where the pixels look; another simulated scene may have another lens."""
         camera, simulation = self.camera, self.camera.simulation
