@@ -31,6 +31,12 @@ from transientcam_moments.errors import (
 )
 from transientcam_moments.flags import INVALID, Flags, flags
 from transientcam_moments.four_bucket import four_bucket, measure, saturated
+from transientcam_moments.harmonics import (
+    Corrected,
+    HarmonicCorrection,
+    sweep_offsets_rad,
+    waveform_of,
+)
 from transientcam_moments.labels import Labels
 from transientcam_moments.levinson import (
     Coefficients,
@@ -57,7 +63,9 @@ __all__ = [
     "Average",
     "Biased",
     "Coefficients",
+    "Corrected",
     "Flags",
+    "HarmonicCorrection",
     "Labels",
     "Likelihood",
     "MomentsError",
@@ -104,4 +112,6 @@ __all__ = [
     "smallest_eigenvalue",
     "smooth",
     "smoothed_density",
+    "sweep_offsets_rad",
+    "waveform_of",
 ]
