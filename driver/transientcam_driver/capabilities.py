@@ -51,7 +51,8 @@ class Capabilities:
     """What a camera can do, by its answer to GET_CAPS.
 
     Frequencies are multiples of ``tuning_step_hz``, exposures of 1 ns. A single capture reads an
-    image out in ``readout_s``; back-to-back frames take ``streaming_readout_s`` an image.
+    image out in ``readout_s``; back-to-back frames take ``streaming_readout_s`` an image. With
+    ``phase_offsets`` the phases of a sequence can be shifted together.
     """
 
     model: str
@@ -78,6 +79,7 @@ class Capabilities:
     take_orders: tuple[TakeOrder, ...]
     fifo_bytes: int
     heartbeat_s: float
+    phase_offsets: bool = False
 
     @property
     def image_bytes(self) -> int:
@@ -118,6 +120,8 @@ class Capabilities:
         if sequence.take_order not in self.take_orders:
             limit = f"one of {', '.join(self.take_orders)} on this camera"
             raise SequenceError("take_order", sequence.take_order, limit)
+        if sequence.phase_offset_rad and not self.phase_offsets:
+            raise SequenceError("phase_offset_rad", sequence.phase_offset_rad, "0 on this camera")
         most_takes = min(self.max_takes, self.max_images // sequence.images_per_take)
         if sequence.takes > most_takes:
             limit = f"at most {most_takes} with {sequence.images_per_take} images a take"
