@@ -34,6 +34,7 @@ from transientcam_moments.four_bucket import four_bucket, measure, saturated
 from transientcam_moments.harmonics import (
     Corrected,
     HarmonicCorrection,
+    checked_waveform,
     sweep_offsets_rad,
     waveform_of,
 )
@@ -84,6 +85,7 @@ __all__ = [
     "bounds",
     "calibrate",
     "calibration_of",
+    "checked_waveform",
     "comparisons",
     "cumulative",
     "density",

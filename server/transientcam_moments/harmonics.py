@@ -161,7 +161,7 @@ class HarmonicCorrection:
     ) -> None:
         waveform = checked_waveform(waveform)
         m, pixels = len(waveform), math.prod(shape)
-        kept = np.flatnonzero((np.abs(waveform) > NEGLIGIBLE).any(axis=0))
+        kept = np.flatnonzero(_matters(waveform))
         self._estimated = estimated
         self._orders = tuple(int(2 * i + 3) for i in kept)
         inverse = inverse_gains(calibration, (m + 1, *shape))[1:]  # of the opposite phase
@@ -215,11 +215,18 @@ class HarmonicCorrection:
 
 
 def checked_waveform(waveform: Array) -> Array:
-    """Return a waveform (m, K) as complex128, or say what is wrong with it.
+    """Return a waveform (m, K) as complex128, where `HarmonicCorrection` can take it out.
 
     By (1) the phase of a gain is that of u (1 + r), r the sum of |c_k / c_1| u^(k - 1) and
     u^-(k + 1). It tells u as long as the phase of 1 + r turns more slowly than u, so that
     the sum of (k - 1) |c_k| or (k + 1) |c_k| over |c_1| must be below 1.
+
+    Raises
+    ------
+    ShapeError
+        When it is not (m, K) numbers.
+    ParameterError
+        When harmonics are not finite, or that sum is not below 1.
     """
     found = np.asarray(waveform)
     if found.ndim != 2 or not len(found) or found.dtype.kind not in "iufc":
@@ -229,6 +236,15 @@ def checked_waveform(waveform: Array) -> Array:
         limit = "finite, the sum of (k - 1) |c_k / c_1| (k = 5, 9, ..) and (k + 1) |c_k / c_1| < 1"
         raise ParameterError("waveform", float(turning.max()), limit)
     return found.astype(np.complex128)
+
+
+def matters(waveform: Array) -> bool:
+    """Say whether any harmonic is large enough to be taken out."""
+    return bool(_matters(waveform).any())
+
+
+def _matters(waveform: Array) -> Array:
+    return (np.abs(waveform) > NEGLIGIBLE).any(axis=0)
 
 
 def _orders(count: int) -> range:

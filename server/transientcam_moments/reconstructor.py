@@ -16,7 +16,7 @@ from transientcam_moments.bad_pixels import Replacement, checked_mask, fill_bad_
 from transientcam_moments.calibration import calibrate, inverse_gains
 from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.four_bucket import harmonics_of, measure, saturated, takes_first
-from transientcam_moments.harmonics import HarmonicCorrection, checked_waveform
+from transientcam_moments.harmonics import HarmonicCorrection, checked_waveform, matters
 from transientcam_moments.labels import Labels
 from transientcam_moments.ranging import range_m
 from transientcam_moments.reconstruction import PassedReconstruction, Reconstruction, Settings
@@ -59,9 +59,11 @@ class Reconstructor:
         self.settings = Settings() if settings is None else settings
         self._calibration = calibration
         self._bad = bad_pixels
-        self._waveform = None if waveform is None else checked_waveform(waveform)
-        if waveform is not None and calibration is None:
-            raise ParameterError("calibration", None, "given, for the phases of the waveform")
+        if waveform is not None:
+            waveform = checked_waveform(waveform)
+            if calibration is None:
+                raise ParameterError("calibration", None, "given, for the phases of the waveform")
+        self._waveform = waveform if waveform is not None and matters(waveform) else None
         self._lock = threading.Lock()
         self._prepared: dict[tuple[Any, ...], OnePass] = {}
         self._corrections: dict[tuple[int, ...], HarmonicCorrection] = {}

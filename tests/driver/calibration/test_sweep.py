@@ -104,7 +104,7 @@ def test_documents_of_a_sequence_have_no_offset() -> None:
 
 def test_a_simulated_device_shows_its_correlation_at_every_phase() -> None:
     # its third harmonic at 46 MHz, without sub-phases (imperfections.py)
-    spec = "sim:calibration?device=prototype&noise=off&outliers=off&pixel-pattern=off&thermal-drift=off"
+    spec = "sim:calibration?device=prototype&noise=off&outliers=off&pixel-pattern=off"
     with open_camera(spec, clock=VirtualClock()) as camera:
         swept = Swept()
         camera.configure(Sequence(harmonics=2, zeroth="estimated", sub_phases=SubPhases("none")))
