@@ -9,7 +9,8 @@ what noise does not explain.
 
 import argparse
 import tempfile
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 import transientcam_moments as tm
+from benchmarks.data import PAPER, SETTINGS, VGA, images
 from benchmarks.machine import machine
 from benchmarks.tables import Table
 from transientcam_driver import Camera, SubPhases, Truth, capture_calibration
@@ -36,6 +38,8 @@ from transientcam_server.imaging.waveform import SweepEvaluation
 PAGE: Final = Path(__file__).parents[1] / "docs" / "harmonics.md"
 _BEGIN: Final = "<!-- measured -->"
 _TAKES: Final = 16
+_FRAMES: Final = 15
+_LANES: Final = ("measure", "smooth", "smallest_eigenvalue", "levinson", "harmonics", "reconstruct")
 _SEQUENCE: Final = Capture(harmonics=4, takes=_TAKES)
 _SCENES: Final = ("wall", "mirrors", "corner")
 _SCHEMES: Final = (
@@ -98,7 +102,7 @@ def errors(scene: str, waveform: Path, sequence: Capture, known: Calibration) ->
     with camera_at(scene, waveform, sequence) as camera:
         assert camera.simulation is not None
         camera.start()
-        images = camera.read_frame().images
+        captured = camera.read_frame().images
         camera.stop()
         truth = camera.simulation.truth()
     settings = tm.Settings(
@@ -110,7 +114,7 @@ def errors(scene: str, waveform: Path, sequence: Capture, known: Calibration) ->
     gains = known.gains
     found = []
     for each in (None, gains.waveform):
-        result = tm.reconstruct(images, settings, calibration=gains.planes, waveform=each)
+        result = tm.reconstruct(captured, settings, calibration=gains.planes, waveform=each)
         off_m = np.asarray(result.range_m) - truth.range_m
         found.append(Errors(_moment_errors(np.asarray(result.smoothed), truth, sequence), off_m))
     return found
@@ -176,19 +180,47 @@ def table(measured: Path | None) -> Table:
     return Table("Before and after", columns, rows, notes)
 
 
+def cost() -> Table:
+    """Measure the processor time of a frame without and with the correction."""
+    rows: list[Sequence[str]] = []
+    for m, shape in ((3, PAPER), (4, PAPER), (4, VGA)):
+        tm.kernels.compile([m], ["float32"], names=_LANES)
+        raw = images(m, shape)
+        gains = np.exp(0.2j * np.random.default_rng(m).normal(size=(m + 1, *shape)))
+        texts = []
+        for waveform in (None, np.tile(0.01 / np.arange(1, 5), (m, 1))):
+            reconstruct = tm.Reconstructor(SETTINGS, calibration=gains, waveform=waveform)
+            texts.append(f"{_processor_s(lambda: reconstruct(raw)) * 1e3:.1f}")  # noqa: B023 - called now
+        rows.append([f"m = {m}, {shape[1]} x {shape[0]}", *texts])
+    notes = ["Processor time in ms of a frame in single precision, with four harmonics."]
+    return Table("What it costs", ("frame", "calibrated", "harmonics taken out"), rows, notes)
+
+
+def _processor_s(frame: Callable[[], object]) -> float:
+    frame()
+    measured = []
+    for _ in range(_FRAMES):
+        begin_s = time.process_time()
+        frame()
+        measured.append(time.process_time() - begin_s)
+    return float(np.median(measured))
+
+
 def main() -> None:
     """Measure, print, and with ``--write`` keep the table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.harmonics", description=__doc__)
     parser.add_argument("--waveform", type=Path, help="a measured correlation function, .npy")
     parser.add_argument("--write", action="store_true", help=f"write the table of docs/{PAGE.name}")
     options = parser.parse_args()
-    found = table(options.waveform)
-    found.show(Console(width=200))
+    tables = [table(options.waveform), cost()]
+    for each in tables:
+        each.show(Console(width=200))
     if options.write:
         above = PAGE.read_text(encoding="utf-8").partition(_BEGIN)[0]
         command = "python -m benchmarks.harmonics --waveform FILE --write"
+        shown = "\n".join(each.markdown() for each in tables)
         said = f"Written by `{command}` on: {machine()}.\n"
-        PAGE.write_text(f"{above}{_BEGIN}\n\n{found.markdown()}\n{said}", encoding="utf-8")
+        PAGE.write_text(f"{above}{_BEGIN}\n\n{shown}\n{said}", encoding="utf-8")
 
 
 if __name__ == "__main__":

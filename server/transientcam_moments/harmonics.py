@@ -41,9 +41,9 @@ from transientcam_moments.smoothing import smooth
 
 ROUNDS = 3
 """Of the iteration; the third changes moments by 1e-4 b_0 where harmonics have 3 % (docs)."""
-NEGLIGIBLE = 2e-4
+NEGLIGIBLE = 5e-4
 """A harmonic with less than this share of the fundamental at all frequencies is left out."""
-_BLOCK_PIXELS = 2048  # of up to 60 planes, which stay in the second cache
+_BLOCK_PIXELS = 2048  # of up to 120 planes, which stay in the second cache
 _PHASE_STEPS = 30  # at most, of the fixed point for the phase of a pixel
 _PHASE_TOLERANCE = 1e-8
 

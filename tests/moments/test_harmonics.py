@@ -1,5 +1,7 @@
 """Harmonics of the modulation: measured by a phase sweep, and taken out of the moments."""
 
+from pathlib import Path
+
 import mpmath
 import numpy as np
 import pytest
@@ -283,6 +285,46 @@ def test_the_lane_gives_what_the_planes_give() -> None:
 
     np.testing.assert_allclose(compiled.moments, planar.moments, atol=2e-5)
     assert compiled.corrected.mean() == pytest.approx(planar.corrected.mean(), abs=0.02)
+
+
+@pytest.mark.data
+@pytest.mark.parametrize(("n", "gain"), [(4, 15), (8, 8)])
+def test_a_measured_waveform_behind_measured_delays_comes_out(
+    data_dir: Path, n: int, gain: float
+) -> None:
+    """The measured correlation of a KEA camera, behind arccos sub-phases, and a board's delays."""
+    rows = np.load(data_dir / "modulation" / "keatof_2MHz_ham-k3_min.npy")
+    spectrum = np.conj(np.fft.rfft(rows[0] - rows[1]))
+    p = np.arccos(1 - (2 * np.arange(n) + 1) / n)
+    content = {k: spectrum[k] * np.exp(-1j * k * p).mean() for k in range(1, 32, 2)}
+    codes = np.fromfile(data_dir / "modulation" / "TintinCDKCameraPhaseOffset.bin", "<i2")[2:]
+    delay_rad = codes[:: len(codes) // 400] * (2 * np.pi / 4096)
+    phase_rad = np.random.default_rng(1).uniform(0.5, 3.5, (2, len(delay_rad)))
+    phase_rad[1] += 0.6  # most of them apart
+
+    def a(j: int, phases_rad: Array, weights: tuple[float, ...]) -> Array:
+        def b(k: int) -> Array:
+            return sum(
+                w * np.exp(1j * k * j * (phi + delay_rad))
+                for phi, w in zip(phases_rad, weights, strict=True)
+            )
+
+        parts = (np.conj(c * b(k)) if k % 4 == 3 else c * b(k) for k, c in content.items())
+        return np.asarray(sum(parts))
+
+    one = np.ones_like(delay_rad)
+    gains = np.stack([one] + [a(j, 0 * phase_rad[:1], (1.0,)) for j in range(1, 5)])
+    measured_ = np.stack([1.5 * one] + [a(j, phase_rad, (1.0, 0.5)) for j in range(1, 5)])
+    true = np.stack(
+        [np.exp(1j * j * phase_rad[0]) + np.exp(1j * j * phase_rad[1]) / 2 for j in range(5)]
+    )
+
+    b = measured_ / gains
+    correction = tm.HarmonicCorrection(columns(content, 4, 14), gains, delay_rad.shape)
+
+    before, after = (np.abs(each - true).max(0) for each in (b, correction(b).moments))
+    assert np.median(after) < np.median(before) / gain
+    assert np.percentile(after, 90) < np.percentile(before, 90) / 4
 
 
 # -- in a reconstruction ---------------------------------------------------------------------------

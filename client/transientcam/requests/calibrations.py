@@ -55,7 +55,7 @@ class Calibrations(Generic[_Document, _Bytes]):
         Put filter and diffusor before the lens first, so that the light shines at the sensor. The
         job's result says in ``verdict`` whether the images look so; what was measured on a scene
         is not used, and ``activated`` false, unless with ``force``. ``harmonics`` sweeps the phase
-        as well, with 24 frames or more and a camera that can.
+        as well, with 30 frames or more and a camera that can.
         """
         body = {"name": name, "frames": frames, "activate": activate, "force": force}
         if not harmonics:  # true by itself; a daemon of an earlier version knows no such field

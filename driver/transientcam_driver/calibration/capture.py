@@ -93,7 +93,7 @@ def capture_calibration(
         From the takes of an image to one; their mean by default.
     waveform
         Evaluates a phase sweep, which follows; none is captured, when left out, with fewer than
-        24 takes, and with a camera that cannot shift its phases.
+        30 takes, and with a camera that cannot shift its phases.
     progress
         Called after each frame, and while waiting for one.
 

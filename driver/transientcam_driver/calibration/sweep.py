@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from transientcam_driver.sequence import Sequence
 
-SWEEP_STEPS = 8
-"""Phase offsets of a sweep, a quarter of a turn in all: 32 phases."""
-LEAST_TAKES = 24
+SWEEP_STEPS = 16
+"""Phase offsets of a sweep, a quarter of a turn in all: 64 phases."""
+LEAST_TAKES = 30
 """A calibration with fewer has no sweep: its steps would have too few takes to tell outliers."""
-_TAKES_SHARE = 8  # of the takes of a calibration, each step of the sweep has one in so many
+_TAKES_SHARE = 10  # of the takes of a calibration, each step of the sweep has one in so many
 
 Waveform = Callable[[Iterator[NDArray[np.uint16]]], NDArray[Any] | None]
 """From the takes (takes, N, H, W) at each step to the harmonics (m, K) relative to the

@@ -30,7 +30,7 @@ isn't finite
 or None for other than the usual models
 
 ``harmonics(given, current, polynomial (m+1, P), mixed (K m, P), inverse (m, P), orders) ->
-following (m+1, P), misfit (P)``, or None for orders above 15
+following (m+1, P), misfit (P)``, or None for orders above 31
 
 ``reconstruct(shape, constants) -> OnePass``, found by `lookup`
 

@@ -17,8 +17,8 @@ from transientcam_moments._kernels.compiled_entry import (
 )
 from transientcam_moments._kernels.parallel import Spread, at_once
 
-MOST_ODD = 15
-"""The highest harmonic there is room for: b_0 .. b_15m in (m + 12)^2 registers."""
+MOST_ODD = 31
+"""The highest harmonic there is room for: b_0 .. b_31m in (m + 12)^2 registers."""
 
 
 @njit(nogil=True, error_model="numpy")

@@ -24,7 +24,7 @@ from transientcam_driver.clock import VirtualClock
 
 SEQUENCE = Sequence(harmonics=2, zeroth="low-frequency", exposure_s=0.5e-3)
 WAVEFORM = np.array([[0.1, 0.02j], [0.2, 0.0]])
-STEPS = 8
+STEPS = 16
 
 
 class Swept:
@@ -42,14 +42,14 @@ class Swept:
 def test_each_step_is_the_same_sequence_at_phases_between_the_four() -> None:
     bench, swept = Bench(), Swept()
     with bench.open(SEQUENCE) as camera:
-        capture = capture_calibration(camera, takes=24, waveform=swept)
+        capture = capture_calibration(camera, takes=30, waveform=swept)
         assert camera.applied.sequence == SEQUENCE
     assert not bench.lit
 
     shown = sorted(bench.images.labels.items())
-    first = 24 * (6 + 12)  # behind 24 dark frames and 24 of the calibration
-    turns = [round(label.phase_rad / (2 * math.pi) * 32, 9) for _, label in shown[first:]]
-    expected = [q * 8 + step for step in range(STEPS) for _ in range(3 * 3) for q in range(4)]
+    first = 30 * (6 + 12)  # behind 30 dark frames and 30 of the calibration
+    turns = [round(label.phase_rad / (2 * math.pi) * 64, 9) for _, label in shown[first:]]
+    expected = [q * 16 + step for step in range(STEPS) for _ in range(3 * 3) for q in range(4)]
     assert turns == expected
     assert [step.shape for step in swept.steps] == [(3, 12, 5, 12)] * STEPS
     numbers = [number for number, _ in shown[first:]]
@@ -65,17 +65,17 @@ def test_progress_counts_the_frames_of_the_sweep() -> None:
     reported: list[tuple[int, int]] = []
     with Bench().open(SEQUENCE) as camera:
         capture_calibration(
-            camera, takes=24, waveform=Swept(), progress=lambda *each: reported.append(each)
+            camera, takes=30, waveform=Swept(), progress=lambda *each: reported.append(each)
         )
 
-    total = 24 + 24 + 3 * STEPS
+    total = 30 + 30 + 3 * STEPS
     assert reported == [(done, total) for done in range(1, total + 1)]
 
 
 def test_a_camera_that_cannot_shift_its_phases_is_not_swept() -> None:
     swept = Swept()
     with Bench(replace(CAPABILITIES, phase_offsets=False)).open(SEQUENCE) as camera:
-        capture = capture_calibration(camera, takes=24, waveform=swept)
+        capture = capture_calibration(camera, takes=30, waveform=swept)
         with pytest.raises(SequenceError, match=r"phase_offset_rad.*0 on this camera"):
             camera.configure(replace(SEQUENCE, phase_offset_rad=0.1))
 
@@ -85,7 +85,7 @@ def test_a_camera_that_cannot_shift_its_phases_is_not_swept() -> None:
 
 def test_too_few_takes_to_tell_outliers_have_no_sweep() -> None:
     with Bench().open(SEQUENCE) as camera:
-        assert capture_calibration(camera, takes=23, waveform=Swept()).waveform is None
+        assert capture_calibration(camera, takes=29, waveform=Swept()).waveform is None
 
 
 @pytest.mark.parametrize("offset_rad", [-0.1, 2 * math.pi, math.nan])
@@ -108,10 +108,10 @@ def test_a_simulated_device_shows_its_correlation_at_every_phase() -> None:
     with open_camera(spec, clock=VirtualClock()) as camera:
         swept = Swept()
         camera.configure(Sequence(harmonics=2, zeroth="estimated", sub_phases=SubPhases("none")))
-        capture_calibration(camera, takes=24, waveform=swept)
+        capture_calibration(camera, takes=30, waveform=swept)
 
     images = np.mean(swept.steps, axis=1)[:, 4:]  # (steps, 4, H, W)
-    correlation = images.transpose(1, 0, 2, 3).reshape(32, -1).mean(axis=1)
+    correlation = images.transpose(1, 0, 2, 3).reshape(64, -1).mean(axis=1)
     spectrum = np.abs(np.fft.rfft(correlation))
     assert spectrum[3] / spectrum[1] == pytest.approx(0.032, abs=1e-4)
 

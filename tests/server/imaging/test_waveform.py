@@ -94,7 +94,7 @@ def test_harmonics_that_are_too_strong_are_left_alone_and_said_so() -> None:
     for number, step in enumerate(swept):  # a third harmonic of 30 %
         for index, label in enumerate(SEQUENCE.labels):
             if label.frequency_hz:
-                phase_rad = label.phase_rad + number * np.pi / 16
+                phase_rad = label.phase_rad + number * np.pi / 32
                 step[:, index] = 1000 + 400 * np.cos(phase_rad) + 120 * np.cos(3 * phase_rad)
 
     assert sweep(iter(swept)) is None
@@ -104,9 +104,9 @@ def test_harmonics_that_are_too_strong_are_left_alone_and_said_so() -> None:
 
 
 def test_a_camera_or_calibration_without_a_sweep_says_so() -> None:
-    few = SweepEvaluation(CAPABILITIES, takes=23, zeroth="on-off")
+    few = SweepEvaluation(CAPABILITIES, takes=29, zeroth="on-off")
 
-    assert few.reason == "a phase sweep needs a calibration of 24 takes or more"
+    assert few.reason == "a phase sweep needs a calibration of 30 takes or more"
     assert evaluation(phase_offsets=False).reason == (
         "the camera cannot shift the phases of its images"
     )

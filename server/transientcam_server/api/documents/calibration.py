@@ -159,7 +159,7 @@ class CalibrationRequest(Document):
     force: bool = False
     """Let it be used whatever the verdict on it."""
     harmonics: bool = True
-    """Sweep the phase as well, to measure the harmonics of the modulation; with 24 frames or more,
+    """Sweep the phase as well, to measure the harmonics of the modulation; with 30 frames or more,
     if the camera can."""
 
 
