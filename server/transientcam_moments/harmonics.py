@@ -19,6 +19,7 @@ extension of the maximum entropy estimate, see `extend`), which are subtracted f
 
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -299,17 +300,17 @@ def _without_harmonics(
     Planes of pixels: ``mixed`` (K m, P) is d_kj, k by k, ``inverse`` (m, P) is 1 / (1 - s_j).
     """
     arrays = (given, current, polynomial, mixed, inverse)
-    found = by_blocks(lambda *parts: _unmixed(*parts, orders), *arrays, pixels=_BLOCK_PIXELS)
+    found = by_blocks(partial(_unmixed, orders), *arrays, pixels=_BLOCK_PIXELS)
     return found[0], found[1]
 
 
 def _unmixed(
+    orders: tuple[int, ...],
     given: Array,
     current: Array,
     polynomial: Array,
     mixed: Array,
     inverse: Array,
-    orders: tuple[int, ...],
 ) -> tuple[Array, Array]:
     m = len(given) - 1
     known = list(current)

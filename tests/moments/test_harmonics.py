@@ -1,6 +1,8 @@
 """Harmonics of the modulation: measured by a phase sweep, and taken out of the moments."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -14,35 +16,36 @@ from tests.moments.kernel_lanes import lanes, without_lanes
 from transientcam_moments.harmonics import ROUNDS
 
 Array = NDArray[np.complex128]
+Content = Mapping[int, complex]
 SQUARE = {k: (-1) ** ((k - 1) // 2) / k for k in range(1, 400, 2)}
 """Fourier coefficients of a square wave over those of its fundamental: 4 / (pi k), in turn."""
 
 
-def images(content: dict[int, complex], theta_rad: float, b: dict[int, complex]) -> complex:
+def images(content: Content, theta_rad: float, b: Content) -> float:
     """Correlation at one phase: I = sum_k Re(c_k b_k exp(-i k theta)) (usb-protocol 5.5)."""
-    return sum((c * b[k] * np.exp(-1j * k * theta_rad)).real for k, c in content.items())
+    return float(sum((c * b[k] * np.exp(-1j * k * theta_rad)).real for k, c in content.items()))
 
 
-def phasor(content: dict[int, complex], offset_rad: float, b: dict[int, complex]) -> complex:
+def phasor(content: Content, offset_rad: float, b: Content) -> complex:
     """Four-bucket phasor of Sec. 3.1, from its definition."""
     i = [images(content, offset_rad + q * np.pi / 2, b) for q in range(4)]
     return complex(i[0] - i[2], i[1] - i[3])
 
 
 def measured(
-    content: dict[int, complex], returns: list[tuple[float, float]], m: int, delay_rad: float
+    content: Content, returns: list[tuple[float, float]], m: int, delay_rad: float
 ) -> Array:
     """Moments a_0 .. a_m / 2 that a pixel of this delay measures of sharp returns."""
 
     def b(n: int) -> complex:
-        return sum(w * np.exp(1j * n * (phi + delay_rad)) for phi, w in returns)
+        return complex(sum(w * np.exp(1j * n * (phi + delay_rad)) for phi, w in returns))
 
     rest = [phasor(content, 0.0, {k: b(k * j) for k in content}) / 2 for j in range(1, m + 1)]
     return np.array([b(0), *rest])
 
 
 def calibrated(
-    content: dict[int, complex], returns: list[tuple[float, float]], m: int, delay_rad: float
+    content: Content, returns: list[tuple[float, float]], m: int, delay_rad: float
 ) -> tuple[Array, Array, Array]:
     """Return moments b~ as a calibration leaves them, its gains, and the true moments."""
     gains = measured(content, [(0.0, 1.0)], m, delay_rad)
@@ -50,7 +53,7 @@ def calibrated(
     return measured(content, returns, m, delay_rad) / gains, gains, true
 
 
-def columns(content: dict[int, complex], m: int, count: int) -> Array:
+def columns(content: Content, m: int, count: int) -> Array:
     """Waveform (m, K) of a correlation that is the same at all frequencies."""
     first = content[1]
     turn = np.conj(first) / abs(first)
@@ -173,9 +176,7 @@ def test_smoothed_moments_are_corrected_by_smoothed_gains() -> None:
     assert error(found, true) < 0.1 * error(tm.smooth(b, 0.6), true)
 
 
-def misfit(
-    b: Array, given: Array, content: dict[int, complex], gains: Array, delay: float
-) -> float:
+def misfit(b: Array, given: Array, content: Content, gains: Array, delay: float) -> float:
     """Distance of what the model makes of moments and their extension from the measured ones.
 
     By a recursion of mpmath's numbers: nothing of the code under test but the biased moments.
@@ -302,17 +303,17 @@ def test_a_measured_waveform_behind_measured_delays_comes_out(
     phase_rad = np.random.default_rng(1).uniform(0.5, 3.5, (2, len(delay_rad)))
     phase_rad[1] += 0.6  # most of them apart
 
-    def a(j: int, phases_rad: Array, weights: tuple[float, ...]) -> Array:
-        def b(k: int) -> Array:
+    def a(j: int, phases_rad: NDArray[np.float64], weights: tuple[float, ...]) -> Any:
+        def b(k: int) -> Any:
             return sum(
                 w * np.exp(1j * k * j * (phi + delay_rad))
                 for phi, w in zip(phases_rad, weights, strict=True)
             )
 
         parts = (np.conj(c * b(k)) if k % 4 == 3 else c * b(k) for k, c in content.items())
-        return np.asarray(sum(parts))
+        return sum(parts)
 
-    one = np.ones_like(delay_rad)
+    one = np.ones(len(delay_rad), complex)
     gains = np.stack([one] + [a(j, 0 * phase_rad[:1], (1.0,)) for j in range(1, 5)])
     measured_ = np.stack([1.5 * one] + [a(j, phase_rad, (1.0, 0.5)) for j in range(1, 5)])
     true = np.stack(

@@ -160,10 +160,11 @@ def _steps(
 ) -> Iterator[NDArray[np.uint16]]:
     """Capture the takes (takes, N, H, W) of one step of a sweep after the other."""
     for step, sequence in enumerate(sweep.sequences(single)):
-        first = done_before + step * sweep.takes
-        frames = _frames(
-            camera, sequence, sweep.takes, lambda done, first=first: report(first + done)
-        )
+
+        def done(frames: int, before: int = done_before + step * sweep.takes) -> None:
+            report(before + frames)
+
+        frames = _frames(camera, sequence, sweep.takes, done)
         yield np.stack([frame.images for frame in frames])
 
 

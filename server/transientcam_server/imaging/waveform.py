@@ -63,10 +63,11 @@ class SweepEvaluation:
             return None
         found: _Array = tm.waveform_of(swept[:, :, lit], COUNT)
         try:
-            return tm.checked_waveform(found)
+            checked: _Array = tm.checked_waveform(found)
         except tm.ParameterError as error:
             self.reason = f"the harmonics are too strong to be taken out ({error})"
             return None
+        return checked
 
 
 def usable(waveform: _Array | None) -> _Array | None:

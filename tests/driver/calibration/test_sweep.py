@@ -145,9 +145,7 @@ def test_the_harmonics_are_kept_in_the_file_and_old_files_open(tmp_path: Path) -
         np.zeros((2, 2)),
     ],
 )
-def test_other_harmonics_in_a_file_are_refused(
-    tmp_path: Path, waveform: NDArray[np.generic]
-) -> None:
+def test_other_harmonics_in_a_file_are_refused(tmp_path: Path, waveform: NDArray[Any]) -> None:
     with Bench().open(SEQUENCE) as camera:
         capture = capture_calibration(camera, takes=2)
     replace(capture, waveform=waveform).save(tmp_path / "c.npz")

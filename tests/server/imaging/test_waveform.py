@@ -71,6 +71,7 @@ def test_a_sweep_gives_the_harmonics_of_the_sensor() -> None:
     found = sweep(iter(steps(Modulated())))
 
     assert sweep.reason is None
+    assert found is not None
     expected = np.zeros((3, COUNT), complex)
     expected[:, :3] = list(HARMONICS.values())
     np.testing.assert_allclose(found, expected, atol=3e-4)  # images are whole numbers
