@@ -73,6 +73,8 @@ class Capabilities:
         Of a sequence.
     schemes, zeroths, take_orders
         What a sequence can ask for.
+    phase_offsets
+        Whether the phases of a sequence can be shifted together.
     delay_s
         What the light takes on its way inside of the camera, so that a moment at the frequency f
         comes with a phase of 2 pi f delay_s more; nominal gains take it away.
@@ -107,6 +109,7 @@ class Capabilities:
     schemes: tuple[Scheme, ...] = ("none",)
     zeroths: tuple[Zeroth, ...] = ("estimated",)
     take_orders: tuple[TakeOrder, ...] = ("sequential",)
+    phase_offsets: bool = False
     delay_s: float = 0.0
     fifo_bytes: int = 0
     heartbeat_s: float = 0.0
@@ -150,6 +153,8 @@ class Capabilities:
         if sequence.take_order not in self.take_orders:
             limit = f"one of {', '.join(self.take_orders)} on this camera"
             raise SequenceError("take_order", sequence.take_order, limit)
+        if sequence.phase_offset_rad and not self.phase_offsets:
+            raise SequenceError("phase_offset_rad", sequence.phase_offset_rad, "0 on this camera")
         most_takes = min(self.max_takes, self.max_images // sequence.images_per_take)
         if sequence.takes > most_takes:
             limit = f"at most {most_takes} with {sequence.images_per_take} images a take"

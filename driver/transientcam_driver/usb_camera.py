@@ -305,7 +305,7 @@ class UsbCamera:
             # usb-protocol 3.1: the new epoch is above this one, also after a power cycle
             above = 0 if self._applied is None else self._applied.epoch
             answer = Commitment.unpack(
-                self._request_in(Request.COMMIT, value=above, length=Commitment.BYTES)
+                self._request_in(Request.COMMIT, value=above, length=Commitment.MOST_BYTES)
             )
             really_set = answer.words.sequence(self._capabilities)
             # usb-protocol 8.4, 10.12

@@ -262,6 +262,7 @@ class Service:
             calibration={"id": calibration_id(gains)},
             calibration_planes=None if gains is None else gains.planes,
             calibration_bad=None if gains is None else gains.bad,
+            calibration_waveform=None if gains is None else gains.waveform,
             reconstruction=self.pipeline.reconstruction.settings.model_dump(),
         )
 

@@ -66,6 +66,9 @@ class ReconstructionSettings(_Group):
     spoilt_images: SpoiltImages = "repair"
     """Images that lost their synchronisation: rebuilt from the frame's other images, and (`fill`)
     taken from the frame before where that is impossible; or kept."""
+    modulation_harmonics: Literal["take-out", "keep"] = "take-out"
+    """Odd harmonics of the modulation, where the calibration has measured them: taken out of the
+    moments, or kept in them."""
 
     @property
     def least_harmonics(self) -> int:

@@ -10,7 +10,7 @@ THREAD: Final = "transientcam-compile"
 """Name of every thread that compiles."""
 MOST_ROOTS: Final = 8
 """The largest m with lanes for eigenvalues and returns."""
-_SINGLE_ONLY: Final = ("smooth", "measure", "separate", "reconstruct", "likelihood")
+_SINGLE_ONLY: Final = ("smooth", "measure", "separate", "reconstruct", "likelihood", "harmonics")
 _FEW_ROOTS: Final = ("pisarenko", "smallest_eigenvalue", "reconstruct", "likelihood")
 _log = logging.getLogger("transientcam_moments")
 

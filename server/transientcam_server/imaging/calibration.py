@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import CalibrationCapture, Sequence
+from transientcam_server.imaging.waveform import usable
 
 _Array = NDArray[Any]
 NOMINAL_ID = "nominal"
@@ -28,11 +29,15 @@ class Gains:
     bad : boolean array, shape (H, W)
         Pixels that are hot, stuck, noisy or dead, and show their neighbours' mean instead; None
         where none are known.
+    waveform : array, shape (m, K), complex128
+        Odd harmonics of the modulation that are taken out of the moments; None where none are
+        known.
     """
 
     id: str
     planes: _Array
     bad: _Array | None
+    waveform: _Array | None = None
 
     @property
     def bad_pixels(self) -> int:
@@ -72,7 +77,7 @@ def evaluate(capture: CalibrationCapture) -> Calibration:
     measured[0] = _brightness(measured, nominal)
     # a brightness stays in digital numbers, as with nominal gains
     gains = tm.calibration_of(measured) * np.complex64(nominal[0])
-    return Calibration(capture, Gains(capture.id, gains, bad))
+    return Calibration(capture, Gains(capture.id, gains, bad, usable(capture.waveform)))
 
 
 def calibration_id(gains: Gains | None) -> str:

@@ -53,7 +53,8 @@ def moment_columns(
     """Return how the images become moments: weights, gains, and how an exposure is divided.
 
     ``gain`` is nominal, (moment), where no ``gains`` were measured, else theirs, (moment, y, x),
-    and then ``bad`` (y, x) says which pixels to replace by the mean of their neighbours.
+    and then ``bad`` (y, x) says which pixels to replace by the mean of their neighbours, and
+    ``waveform`` (modulated, odd) which harmonics of the modulation are known.
     """
     sequence = applied.sequence
     how = moment_labels(labels)
@@ -88,7 +89,19 @@ def moment_columns(
     if gains is not None and gains.bad is not None:
         says = {"long_name": "1 where the mean of the neighbours stands for a pixel"}
         columns["bad"] = Column(("y", "x"), gains.bad.astype(np.uint8), says)
+    if gains is not None and gains.waveform is not None:
+        columns |= _waveform_columns(gains.waveform)
     return columns
+
+
+def _waveform_columns(waveform: NDArray[Any]) -> dict[str, Column]:
+    modulated, odd = (np.arange(1, size + 1, dtype=np.int32) for size in waveform.shape)
+    says = {"long_name": "harmonics of the modulation over its fundamental, at each moment from 1"}
+    return {
+        "modulated": Column(("modulated",), modulated),
+        "odd": Column(("odd",), 2 * odd + 1),
+        "waveform": Column(("modulated", "odd"), waveform, says),
+    }
 
 
 def moment_labels(labels: Sequence[ImageLabel]) -> tm.Labels:

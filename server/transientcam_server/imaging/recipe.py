@@ -94,6 +94,12 @@ class Recipe:
     sensor: tm.noise.Sensor | None = None
 
     @property
+    def waveform(self) -> NDArray[Any] | None:
+        """Harmonics of the modulation (m, K) that are taken out of the moments, if any."""
+        known = None if self.gains is None else self.gains.waveform
+        return known if self.settings.modulation_harmonics == "take-out" else None
+
+    @property
     def fills(self) -> bool:
         """Whether the frame before is needed."""
         return self.settings.spoilt_images == "fill"
@@ -136,6 +142,7 @@ class Recipe:
                 else gains.planes
             ),
             bad_pixels=None if gains is None else gains.bad,
+            waveform=self.waveform,
         )
 
 
