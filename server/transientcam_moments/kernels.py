@@ -51,6 +51,7 @@ LANES = (
     "density",
     "reconstruct",
     "likelihood",
+    "covariance",
 )
 Progress = Callable[[int, int, str], None]
 """Takes lanes done, lanes in all, and the name of the lane that is next ("" after the last)."""

@@ -267,8 +267,7 @@ class Reconstruction:
         where : boolean array, shape (...)
         """
         xp = namespace(self.flags)
-        added = xp.where(xp.asarray(where), int(flag), 0)
-        self.flags = (self.flags | added).astype(xp.uint8)
+        self.flags = self.flags | xp.asarray(where).astype(xp.uint8) * xp.uint8(flag)
 
     @property
     def has_range(self) -> Array:

@@ -11,7 +11,14 @@ THREAD: Final = "transientcam-compile"
 MOST_ROOTS: Final = 8
 """The largest m with lanes for eigenvalues and returns."""
 _SINGLE_ONLY: Final = ("smooth", "measure", "separate", "reconstruct", "likelihood")
-_FEW_ROOTS: Final = ("pisarenko", "smallest_eigenvalue", "reconstruct", "likelihood")
+_DOUBLE_ONLY: Final = ("covariance",)
+_FEW_ROOTS: Final = (
+    "pisarenko",
+    "smallest_eigenvalue",
+    "reconstruct",
+    "likelihood",
+    "covariance",
+)
 _log = logging.getLogger("transientcam_moments")
 
 
@@ -62,6 +69,8 @@ def want(key: Key) -> None:
 def is_offered(key: Key) -> bool:
     """Say whether there is such a lane; the planar statement does all orders."""
     if key.name in _SINGLE_ONLY and key.precision != "f":
+        return False
+    if key.name in _DOUBLE_ONLY and key.precision != "d":
         return False
     # a characteristic polynomial with more roots underflows where they cluster
     return key.harmonics <= MOST_ROOTS or key.name not in _FEW_ROOTS
