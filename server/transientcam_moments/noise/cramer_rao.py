@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from transientcam_moments._arrays import Array, as_array, namespace
+from transientcam_moments._shown import summary
 from transientcam_moments.errors import ShapeError
 from transientcam_moments.noise.interpolation import determined_covariance
 from transientcam_moments.noise.moments import MomentNoise
@@ -29,6 +30,10 @@ class CramerRao(NamedTuple):
     phase_std_rad: Array
     weight_std: Array
     covariance: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
 
 def cramer_rao(phase_rad: Array, weight: Array, noise: MomentNoise) -> CramerRao:

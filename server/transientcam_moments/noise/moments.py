@@ -16,6 +16,7 @@ from transientcam_moments._arrays import (
     namespace,
     squared,
 )
+from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.four_bucket import ZEROTH_IMAGES
 from transientcam_moments.noise.sensor import Sensor
@@ -32,6 +33,10 @@ class MomentNoise(NamedTuple):
     """
 
     variance: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
     def covariance(self) -> Array:
         """Return the covariance (2m + 1, 2m + 1, ...) of b_0, Re b_1, Im b_1, ..., Im b_m."""
