@@ -4,6 +4,7 @@ import logging
 import threading
 from typing import Final
 
+from transientcam_moments._kernels.parallel import start_threads
 from transientcam_moments._kernels.registry import REGISTRY, Key
 
 THREAD: Final = "transientcam-compile"
@@ -84,6 +85,7 @@ def _is_long(key: Key) -> bool:
 def _work() -> None:
     """Compile what is wanted until nothing is, or the process ends."""
     main = threading.main_thread()
+    start_threads()
     while True:
         with _WANTED.lock:
             if not _WANTED.waiting or not main.is_alive():
