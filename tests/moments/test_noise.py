@@ -364,7 +364,7 @@ def test_bound_of_two_returns_is_the_inverse_of_differentiated_moments() -> None
     np.testing.assert_allclose(bound.phase_std_rad[:, 0], expected[2:], rtol=1e-7)
 
 
-@pytest.mark.parametrize("m", [1, 2, 3, 4, 8])
+@pytest.mark.parametrize("m", [1, 3, 8])
 def test_bound_of_as_many_returns_as_harmonics_is_exact_however_close_they_are(m: int) -> None:
     """The Jacobian inverted with 60 digits: Fisher's information squares its condition."""
     random = np.random.default_rng(m)
