@@ -227,7 +227,8 @@ def test_several_threads_compile_each_lane_once(monkeypatch: pytest.MonkeyPatch)
         thread.join()
 
     assert len(made) == len(set(made))
-    in_background = set(compiler.LANES) - {"likelihood"}  # long to compile: prepared when first used
+    # that of the likelihood takes long to compile, and is prepared when it is first used
+    in_background = set(compiler.LANES) - {"likelihood"}
     assert {(name, m) for name, m, _ in made} == {(n, m) for n in in_background for m in (3, 5)}
 
 

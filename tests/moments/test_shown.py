@@ -72,7 +72,8 @@ def test_a_traced_result_has_a_text_too() -> None:
     def traced(b: jax.Array) -> jax.Array:
         found = tm.levinson(b)
         texts.append(repr(found))
-        return found.error
+        error: jax.Array = found.error
+        return error
 
     jax.jit(traced)(jax.numpy.asarray(MOMENTS.astype(np.complex64)))
 
