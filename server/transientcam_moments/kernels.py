@@ -53,6 +53,7 @@ LANES = (
     "reconstruct",
     "likelihood",
     "harmonics",
+    "covariance",
 )
 WHEN_NEEDED = ("likelihood", "harmonics")
 """Those that `compile_in_background` leaves out."""

@@ -27,6 +27,7 @@ from transientcam_moments._arrays import (
 )
 from transientcam_moments._kernels import accelerated
 from transientcam_moments._kernels.parallel import on_threads
+from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 
 
@@ -46,6 +47,10 @@ class Coefficients(NamedTuple):
     error: Array
     polynomial: Array
     reflection: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
     @property
     def brightness(self) -> Array:

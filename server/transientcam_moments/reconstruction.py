@@ -3,11 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
+from html import escape
 
 import numpy as np
 
 from transientcam_moments._arrays import Array, chosen, in_range, in_turn, namespace
 from transientcam_moments._kernels.one_pass import Planes
+from transientcam_moments._shown import map_html
 from transientcam_moments.biasing import EPSILON, bias, estimate_zeroth, smallest_eigenvalue
 from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
 from transientcam_moments.cumulative import cumulative
@@ -287,8 +289,7 @@ class Reconstruction:
         where : boolean array, shape (...)
         """
         xp = namespace(self.flags)
-        added = xp.where(xp.asarray(where), int(flag), 0)
-        self.flags = (self.flags | added).astype(xp.uint8)
+        self.flags = self.flags | xp.asarray(where).astype(xp.uint8) * xp.uint8(flag)
 
     @property
     def has_range(self) -> Array:
@@ -454,9 +455,19 @@ class Reconstruction:
         parts = [f"m = {order}{at}", f"pixels {' x '.join(map(str, shape)) or '1'}"]
         parts += [f"estimator {self.settings.estimator}"]
         if "range_m" in known:
-            parts.append(_spread(self.range_m))
+            parts.append(_in_metres(self.range_m))
         computed = [name for name in _SHOWN if name in known]
         return f"<Reconstruction {', '.join(parts)}; computed: {', '.join(computed) or 'nothing'}>"
+
+    def _repr_html_(self) -> str:
+        """Return its range as a map, for notebooks; the brightness without a base frequency."""
+        shown = ""
+        if len(self._shape[1]) == 2:
+            if self.settings.base_frequency_hz is None:
+                shown = map_html(self.brightness, title="brightness", unit="(as the moments)")
+            else:
+                shown = map_html(self.range_m, title="range", unit="m")
+        return f"<p>{escape(repr(self))}</p>{shown}"
 
     @property
     def _shape(self) -> tuple[int, tuple[int, ...]]:
@@ -530,7 +541,7 @@ class PassedReconstruction(Reconstruction):
         return moments, biased
 
 
-def _spread(range_m: Array) -> str:
+def _in_metres(range_m: Array) -> str:
     """Return the least, middle and greatest range in words."""
     values = np.asarray(range_m)
     there = values[np.isfinite(values)]

@@ -17,6 +17,8 @@ The lanes and their signatures, each that of the planar statement it stands besi
 
 ``pisarenko(b, eigenvalue (...) or None) -> phase_rad, weight (m, ...), uniform, count (...)``
 
+``covariance(phase (m, P), variance (m, P)) -> (2m, 2m, P)``, of returns, in double precision
+
 For whole frames in single precision:
 
 ``measure(images (N, ...) uint16, zeroth) -> moments (m+1, ...)``

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+from transientcam_moments._kernels.covariance import covariance_lane
 from transientcam_moments._kernels.density import density_lane
 from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue_lane
 from transientcam_moments._kernels.frames import measure_lane, separate_lane, smooth_lane
@@ -24,6 +25,7 @@ LANES: dict[str, Callable[[int, str], Callable[..., Any]]] = {
     "reconstruct": reconstruct_lane,
     "likelihood": likelihood_lane,
     "harmonics": harmonics_lane,
+    "covariance": covariance_lane,
 }
 
 

@@ -17,6 +17,7 @@ from transientcam_moments._arrays import (
     namespace,
 )
 from transientcam_moments._kernels import accelerated
+from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.likelihood import choice
 from transientcam_moments.likelihood.arithmetic import logarithm
@@ -71,6 +72,10 @@ class Likelihood(NamedTuple):
     degrees_of_freedom: Array
     count: Array
     tail_shape: int
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
     @property
     def has_tail(self) -> Array:

@@ -327,7 +327,7 @@ def _read(path: Path, size_bytes: int) -> StoredCalibration | None:
 
 
 def load_given(path: Path) -> Calibration:
-    """Read and evaluate a file that somebody names, unless it was not measured on a diffusor.
+    """Read and evaluate a file that a request names, unless it was not measured on a diffusor.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""The verbs ``serve`` and ``replay`` of the ``transientcam`` command.
+"""The verb ``serve`` of the ``transientcam`` command.
 
-What is heavy is imported when a verb runs, so that ``transientcam --help`` stays quick.
+What is heavy is imported when the verb runs, so that ``transientcam --help`` stays quick.
 """
 
 import json
@@ -12,7 +12,6 @@ import typer
 from rich.console import Console
 
 from transientcam.cli.options import JsonOption
-from transientcam_server.cli.options import RecordingArgument
 
 
 def serve(
@@ -145,26 +144,3 @@ def _announce(url: str, camera: str, *, as_json: bool) -> None:
         f"transientcam serves {camera} at [bold link={url}]{url}[/] (Ctrl-C ends it)",
         soft_wrap=True,
     )
-
-
-def replay(
-    recording: RecordingArgument,
-    speed: Annotated[
-        str, typer.Option(help="original, fast (as fast as it can be read) or a factor.")
-    ] = "original",
-    loop: Annotated[bool, typer.Option("--loop", help="Begin anew after the last frame.")] = False,
-    host: Annotated[
-        str | None, typer.Option(help="Address to listen on.  [default: 127.0.0.1]")
-    ] = None,
-    port: Annotated[
-        int | None, typer.Option(help="TCP port; 0 takes any free one.  [default: 8000]")
-    ] = None,
-    config: Annotated[
-        Path | None, typer.Option(help="Settings in TOML.  [default: ./transientcam.toml]")
-    ] = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Serve a recording as if it were the camera: every frame again, bit for bit."""
-    looped = "on" if loop else "off"
-    spec = f"recording:{recording}?speed={speed}&loop={looped}"
-    serve(camera=spec, host=host, port=port, config=config, as_json=as_json)

@@ -115,6 +115,11 @@ class Recipe:
         """The frequency whose period is the unambiguous time of flight."""
         return self.applied.sequence.base_frequency_hz
 
+    @cached_property
+    def nominal_gains(self) -> NDArray[np.complex128]:
+        """The gains (m + 1,) that sub-phases and the camera's delay alone give."""
+        return nominal_gains(self.applied.sequence, delay_s=self.applied.delay_s)
+
     def reconstruct(self, raw: RawFrame, previous: RawFrame | None = None) -> tm.Reconstruction:
         """Return the reconstruction of a capture; it computes what is read of it.
 
@@ -136,11 +141,7 @@ class Recipe:
         )
         return tm.Reconstructor(
             settings,
-            calibration=(
-                nominal_gains(sequence, delay_s=self.applied.delay_s)
-                if gains is None
-                else gains.planes
-            ),
+            calibration=self.nominal_gains if gains is None else gains.planes,
             bad_pixels=None if gains is None else gains.bad,
             waveform=self.waveform,
         )
