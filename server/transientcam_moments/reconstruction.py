@@ -8,6 +8,7 @@ import numpy as np
 
 from transientcam_moments._arrays import Array, chosen, in_range, in_turn, namespace
 from transientcam_moments._kernels.one_pass import Planes
+from transientcam_moments._kernels.parallel import Spread, at_once
 from transientcam_moments.biasing import EPSILON, bias, estimate_zeroth, smallest_eigenvalue
 from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
 from transientcam_moments.cumulative import cumulative
@@ -15,7 +16,8 @@ from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.flags import INVALID, Flags, flags
 from transientcam_moments.four_bucket import ZEROTH_IMAGES
 from transientcam_moments.levinson import Coefficients, levinson
-from transientcam_moments.likelihood import Likelihood, likelihood
+from transientcam_moments.likelihood import MODEL_ERROR, Likelihood
+from transientcam_moments.likelihood.estimate import fitted
 from transientcam_moments.maximum_entropy import density
 from transientcam_moments.noise.moments import MomentNoise, moment_noise, smoothed_of
 from transientcam_moments.noise.sensor import Sensor
@@ -150,6 +152,8 @@ class Reconstruction:
         What was done to the images before.
     calibration : array, shape (m + 1,) or (m + 1, ...), optional
         Gains that the moments were divided by, for their noise; 1, when left out.
+    spread : callable, optional
+        How the likelihood uses several threads, as `kernels.over` returns it.
     """
 
     def __init__(
@@ -162,8 +166,10 @@ class Reconstruction:
         kept: Array | None = None,
         repaired: Repair | None = None,
         calibration: Array | None = None,
+        spread: Spread = at_once,
     ) -> None:
         self.settings = settings
+        self._spread = spread
         self._measured = moments
         self._saturated = saturated_pixels
         self._bad = bad_pixels
@@ -242,6 +248,16 @@ class Reconstruction:
     @cached_property
     def flags(self) -> Array:
         """Flags of every pixel, uint8 of `Flags`."""
+        if self.settings.estimator != "likelihood" or self.noise is None:
+            return self._flags_of_moments
+        xp = namespace(self.smoothed)
+        unexplained = self.has_range & ~self.likelihood.explained()
+        found = self._flags_of_moments | xp.where(unexplained, int(Flags.UNEXPLAINED), 0)
+        return found.astype(xp.uint8)
+
+    @cached_property
+    def _flags_of_moments(self) -> Array:
+        """Those that follow from moments and images alone."""
         xp = namespace(self.smoothed)
         found = flags(
             self.smoothed,
@@ -273,7 +289,7 @@ class Reconstruction:
     @property
     def has_range(self) -> Array:
         """Where there is light and all moments are finite."""
-        return (self.flags & int(INVALID)) == 0
+        return (self._flags_of_moments & int(INVALID)) == 0
 
     @cached_property
     def coefficients(self) -> Coefficients:
@@ -323,7 +339,7 @@ class Reconstruction:
     @cached_property
     def likelihood(self) -> Likelihood:
         """Few returns, or one with a tail, with what they are worth; of moments as measured."""
-        return likelihood(self.smoothed, self.noise)
+        return fitted(self.smoothed, self.noise, self._spread, model_error=MODEL_ERROR)
 
     @cached_property
     def reduced_chi_square(self) -> Array:
@@ -462,6 +478,8 @@ class PassedReconstruction(Reconstruction):
         What was done to the images before.
     calibration : array, optional
         As of `Reconstruction`.
+    spread : callable, optional
+        As of `Reconstruction`.
     """
 
     def __init__(
@@ -472,12 +490,15 @@ class PassedReconstruction(Reconstruction):
         kept: Array | None = None,
         repaired: Repair | None = None,
         calibration: Array | None = None,
+        spread: Spread = at_once,
     ) -> None:
-        super().__init__(None, settings, kept=kept, repaired=repaired, calibration=calibration)
+        super().__init__(
+            None, settings, kept=kept, repaired=repaired, calibration=calibration, spread=spread
+        )
         self._measure = measure
         self.smoothed = planes.smoothed
         self.validity = planes.validity
-        self.flags = planes.flags
+        self._flags_of_moments = planes.flags
         self.returns = Returns(planes.phase_rad, planes.weight, planes.uniform, planes.count)
         self.brightness = planes.brightness
         if settings.estimator == "pisarenko":  # else they follow from another estimate
@@ -498,7 +519,7 @@ class PassedReconstruction(Reconstruction):
 
     @cached_property
     def _biased(self) -> tuple[Array, Array]:
-        biased = (self.flags & int(Flags.BIASED)) > 0
+        biased = (self._flags_of_moments & int(Flags.BIASED)) > 0
         if self.settings.zeroth == "estimated":
             return self.smoothed, biased
         moments = self.smoothed.copy()

@@ -77,7 +77,8 @@ class Reconstructor:
         previous : array, optional
             Images of the frame before, like `data`, for ``spoilt_images="fill"``.
         spread : callable
-            How the compiled pass uses several threads, as `kernels.over` returns it.
+            How the compiled pass, and the likelihood, use several threads, as `kernels.over`
+            returns it.
 
         Returns
         -------
@@ -111,6 +112,7 @@ class Reconstructor:
                 lambda: self._measured(takes)[0],
                 repaired=repaired,
                 calibration=self._calibration,
+                spread=spread,
             )
         moments, kept = self._measured(takes, None if repaired is None else repaired.left_out)
         if saturated_pixels is None:
@@ -147,13 +149,14 @@ class Reconstructor:
                 kept=kept,
                 repaired=repaired,
                 calibration=self._calibration,
+                spread=spread,
             )
         smoothed = moments
         if moments.ndim == 3:
             smoothed = smooth(moments, self.settings.smoothing_sigma_px)
         planes = one_pass.moments(smoothed, saturated_pixels, spread)
         return PassedReconstruction(
-            planes, self.settings, lambda: moments, kept, repaired, self._calibration
+            planes, self.settings, lambda: moments, kept, repaired, self._calibration, spread
         )
 
     def _repaired(self, takes: Array, previous: Array | None) -> Repair | None:

@@ -27,7 +27,7 @@ FLAG_COLOURS = {
     1: "7f93a3",
 }
 NAMES = {1: "biased", 2: "no_signal", 4: "saturated", 8: "non_finite", 16: "degenerate"}
-NAMES |= {64: "contradictory"}
+NAMES |= {64: "contradictory", 128: "unexplained"}
 
 
 def show(page: Page, served: Served, title: str, canvas: str) -> None:
