@@ -128,13 +128,14 @@ def compile_in_background(
 ) -> threading.Thread:
     """Start compiling on a thread and return it; arguments and errors as in `compile`.
 
-    Leaves out "likelihood", which takes long to compile and is prepared by itself when it is first
-    needed.
+    Of "likelihood", which takes long to compile, only the lane of the first order is among them;
+    those of other orders are prepared by themselves when they are first needed.
 
     The thread is named "transientcam-compile", and can be joined. A process that ends in the
     meantime waits at most for the lane that is being compiled.
     """
-    keys = [key for key in _keys(harmonics, precisions) if key.name != "likelihood"]
+    keys = _keys(harmonics, precisions)
+    keys = [key for key in keys if key.name != "likelihood" or key.harmonics == harmonics[0]]
     main = threading.main_thread()
     # not a daemon: those are frozen at exit wherever they are, which a compiler doesn't survive
     thread = threading.Thread(target=_compile, args=(keys, None, main.is_alive), name=THREAD)

@@ -17,8 +17,9 @@ from transientcam_moments.flags import INVALID, Flags, flags
 from transientcam_moments.four_bucket import ZEROTH_IMAGES
 from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.likelihood import MODEL_ERROR, Likelihood
-from transientcam_moments.likelihood.estimate import fitted
+from transientcam_moments.likelihood.estimate import assumed_noise, fitted
 from transientcam_moments.maximum_entropy import density
+from transientcam_moments.merging import merge_returns
 from transientcam_moments.noise.moments import MomentNoise, moment_noise, smoothed_of
 from transientcam_moments.noise.sensor import Sensor
 from transientcam_moments.peaks import Peaks, peaks
@@ -36,7 +37,7 @@ from transientcam_moments.smoothing import SIGMA_PX, smooth
 SPOILT_IMAGES = ("keep", "repair", "fill")
 """What becomes of images that lost their synchronisation; see `Settings`."""
 
-_OWN = ("pisarenko", "maximum-entropy", "likelihood", "single-frequency")
+_OWN = ("pisarenko", "maximum-entropy", "likelihood", "single-frequency", "pisarenko-merged")
 ESTIMATORS = (
     *_OWN,
     *(
@@ -71,8 +72,9 @@ class Settings:
         The range is that of the first return, or peak, with this share of the strongest one's
         weight, or density.
     estimator : str
-        What the range is taken from: "pisarenko", "maximum-entropy", "likelihood",
-        "single-frequency", which is the usual arg b_1, or another of the `comparisons` of moments.
+        What the range is taken from: "pisarenko" as the paper has it, "pisarenko-merged" (see
+        `merge_returns`), "maximum-entropy", "likelihood", "single-frequency", which is the usual
+        arg b_1, or another of the `comparisons` of moments.
     minimum_brightness : float
         Pixels with b_0 at or below it have no signal, in the unit of the moments.
     full_scale : float
@@ -82,8 +84,8 @@ class Settings:
         opposite images find them (`repair`), and where those don't tell also filled in from the
         frame before, or kept as they are.
     sensor : noise.Sensor, optional
-        Whose noise the images have; "likelihood" weighs the moments by it, and without one takes
-        the noise that `likelihood` assumes.
+        Whose noise the images have; "likelihood" weighs the moments by it, and
+        "pisarenko-merged" merges by it; both assume some without one, see `likelihood`.
     """
 
     base_frequency_hz: float | None = None
@@ -339,7 +341,8 @@ class Reconstruction:
     @cached_property
     def likelihood(self) -> Likelihood:
         """Few returns, or one with a tail, with what they are worth; of moments as measured."""
-        return fitted(self.smoothed, self.noise, self._spread, model_error=MODEL_ERROR)
+        error = 0.0 if self.noise is None else MODEL_ERROR  # which assumed noise is large beside
+        return fitted(self.smoothed, self.noise, self._spread, model_error=error)
 
     @cached_property
     def reduced_chi_square(self) -> Array:
@@ -361,6 +364,10 @@ class Reconstruction:
         technique = self._technique
         if self.settings.estimator == "likelihood":
             return self.likelihood.separate(self.settings.threshold)
+        if self.settings.estimator == "pisarenko-merged":
+            noise = assumed_noise(self.smoothed) if self.noise is None else self.noise
+            merged = merge_returns(self.returns, noise)
+            return separate(merged, self.settings.threshold)
         if technique is None:
             return separate(self.returns, self.settings.threshold)
         xp = namespace(self.smoothed)
@@ -387,7 +394,7 @@ class Reconstruction:
 
         That is negative where noise, or a contradiction, makes the returns brighter than b_0.
         """
-        if self._technique is not None or self.settings.estimator == "likelihood":
+        if self.settings.estimator not in ("pisarenko", "maximum-entropy", "single-frequency"):
             return self.brightness - self.direct - self.indirect
         return self.returns.uniform
 
@@ -505,8 +512,8 @@ class PassedReconstruction(Reconstruction):
             self.uniform = planes.uniform
             self.direct = planes.direct
             self.indirect = planes.indirect
-        if settings.base_frequency_hz is not None:
-            self.range_m = planes.range_m
+            if settings.base_frequency_hz is not None:
+                self.range_m = planes.range_m
 
     @cached_property
     def measured(self) -> Array:

@@ -23,6 +23,8 @@ from transientcam_moments.repair import Repair, repair
 from transientcam_moments.smoothing import gaussian_taps, smooth
 from transientcam_moments.takes import average_takes
 
+_BY_THE_PASS = ("pisarenko", "pisarenko-merged", "likelihood")
+"""Estimators that follow from the pass's returns or moments."""
 _SHAPES = 4  # of images that a reconstructor keeps prepared
 
 
@@ -211,7 +213,7 @@ class Reconstructor:
 
     def _pass(self, m: int, shape: tuple[int, ...]) -> OnePass | None:
         usual = self.settings.keep == "harmonics"
-        usual = usual and self.settings.estimator in ("pisarenko", "likelihood")
+        usual = usual and self.settings.estimator in _BY_THE_PASS
         prepare = _kernels.lookup("reconstruct", m, math.prod(shape))
         masked = self._bad is None or np.shape(self._bad) == shape
         if not usual or prepare is None or not masked:

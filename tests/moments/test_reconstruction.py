@@ -9,6 +9,7 @@ import transientcam_moments as tm
 from tests.moments import oracles
 from transientcam_driver import SubPhases
 from transientcam_moments.comparisons import sra_table
+from transientcam_moments.likelihood import MODEL_ERROR
 from transientcam_moments.reconstruction import ESTIMATORS
 
 SHAPE = (6, 7)
@@ -256,7 +257,7 @@ def test_the_likelihood_weighs_the_moments_by_the_noise_of_the_sensor() -> None:
     noise = tm.noise.moment_noise(
         b[0].real, tm.noise.Sensor(), calibration=np.ones(5), zeroth="low-frequency", takes=4
     )
-    expected = tm.likelihood(b, noise)
+    expected = tm.likelihood(b, noise, model_error=MODEL_ERROR)
     direct, indirect, phase = expected.separate()
     assert np.array_equal(found.direct, direct)
     assert np.array_equal(found.indirect, indirect)

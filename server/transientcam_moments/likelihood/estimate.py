@@ -262,8 +262,7 @@ def _variance(noise: MomentNoise | None, planes: Array, trailing: tuple[int, ...
     xp = namespace(planes)
     real = planes.real.dtype
     if noise is None:
-        size = xp.maximum(abs(planes.real), abs(planes.imag)).max(axis=0)
-        return xp.broadcast_to((ASSUMED_NOISE * size) ** 2, planes.shape).astype(real)
+        return as_array(assumed_noise(planes).variance)
     variance = as_array(noise.variance)
     shape = tuple(variance.shape)
     if shape not in ((planes.shape[0],), (planes.shape[0], *trailing)):
@@ -271,6 +270,13 @@ def _variance(noise: MomentNoise | None, planes: Array, trailing: tuple[int, ...
         raise ShapeError("noise", f"of shape {shape}", expected)
     flat = variance.reshape((planes.shape[0], -1))
     return xp.broadcast_to(xp.asarray(flat).astype(real), planes.shape)
+
+
+def assumed_noise(b: Array) -> MomentNoise:
+    """Return the noise of moments (m + 1, ...) where none is known: `ASSUMED_NOISE`."""
+    xp = namespace(b)
+    size = xp.maximum(abs(b.real), abs(b.imag)).max(axis=0)
+    return MomentNoise(xp.broadcast_to((ASSUMED_NOISE * size) ** 2, b.shape).astype(b.real.dtype))
 
 
 @accelerated("likelihood")
