@@ -1,7 +1,7 @@
-"""Run ``python -m benchmarks.likelihood [--data FOLDER] [--only PART] [--write]``.
+"""Run ``python -m benchmarks.likelihood [--only PART] [--write]``.
 
-``--data`` names a folder with measured and rendered responses, without which their rows are left
-out; ``--only`` does one part; ``--write`` keeps the page as docs/likelihood.md.
+TRANSIENTCAM_TEST_DATA names a folder with measured and rendered responses, without which their
+tables are left out; ``--only`` does one part; ``--write`` keeps the page as docs/likelihood.md.
 """
 
 import argparse
@@ -12,6 +12,7 @@ from rich.console import Console
 
 from benchmarks.likelihood import captures, shapes, sparse, speed
 from benchmarks.machine import machine
+from benchmarks.measured_scenes import data_folder
 from benchmarks.tables import Table
 
 PAGE = Path(__file__).parents[2] / "docs" / "likelihood.md"
@@ -48,14 +49,13 @@ than the noise."""
 def main() -> None:
     """Measure, print, and with ``--write`` keep the page."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, help="folder of measured and rendered responses")
     parser.add_argument("--only", choices=("sparse", "captures", "shapes", "speed"))
     parser.add_argument("--write", action="store_true", help="write docs/likelihood.md")
     arguments = parser.parse_args()
     parts: dict[str, Callable[[], Iterable[Table]]] = {
         "sparse": sparse.tables,
         "captures": captures.tables,
-        "shapes": lambda: shapes.tables(arguments.data),
+        "shapes": lambda: shapes.tables(data_folder()),
         "speed": speed.tables,
     }
     chosen = parts if arguments.only is None else {arguments.only: parts[arguments.only]}
