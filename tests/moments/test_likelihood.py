@@ -542,6 +542,33 @@ def test_noise_and_harmonics_have_to_fit_the_moments() -> None:
         tm.likelihood(b, harmonics=(0, 1))
 
 
+def test_a_model_error_counts_as_noise_of_the_largest_moment() -> None:
+    random = np.random.default_rng(8)
+    b = 700 * moments_of_returns(random.uniform(1, 5, (2, 50)), np.full((2, 50), 0.5), 4)
+    noise = tm.noise.MomentNoise(np.full(b.shape, 3.0**2))
+    drawn = tm.noise.draw(b, noise, random, draws=1)[:, 0]
+
+    found = tm.likelihood(drawn, noise, model_error=0.01)
+
+    largest = np.maximum(abs(drawn.real), abs(drawn.imag)).max(axis=0)
+    both = tm.noise.MomentNoise(noise.variance + (0.01 * largest) ** 2)
+    for mine, theirs in zip(found[:-1], tm.likelihood(drawn, both)[:-1], strict=True):
+        assert np.allclose(mine, theirs, rtol=1e-6, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"model_error": -0.1}, "model_error"),
+        ({"model_error": 1.5}, "model_error"),
+        ({"threads": 0}, "threads"),
+    ],
+)
+def test_model_error_and_threads_are_checked(options: dict[str, Any], field: str) -> None:
+    with pytest.raises(tm.ParameterError, match=field):
+        tm.likelihood(np.ones((4, 5), complex), **options)
+
+
 @pytest.mark.parametrize("significance", [0.0, 1.0, -1.0, np.nan])
 def test_significance_is_a_probability(significance: float) -> None:
     found = tm.likelihood(np.ones((3, 2), complex))

@@ -219,8 +219,8 @@ FIGURE: Final = PaperFigure(
     "A corner of which only the left wall is lit",
     "A corner three times as large as the scene `corner-left`, m = 4, f = 23 MHz, 40 takes: "
     "density at three times of flight, and the cumulative density of one pixel of each wall. In "
-    "the small one the smallest eigenvalue of the right wall's light is 0.004 % of b_0, below any error: at "
-    "23 MHz that light is as good as sharp. A strip right of the edge is lit directly, because our "
-    "plate ends there.",
+    "the small one the smallest eigenvalue of the right wall's light is 0.004 % of b_0, below any "
+    "error: at 23 MHz that light is as good as sharp. A strip right of the edge is lit directly, "
+    "because our plate ends there.",
     make,
 )
