@@ -4,7 +4,7 @@ import numpy as np
 
 from transientcam_moments._arrays import Array, as_array, in_turn, namespace, squared
 from transientcam_moments.errors import ShapeError
-from transientcam_moments.likelihood.estimate import SIGNIFICANCE, chi_square_quantile
+from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, chi_square_quantile
 from transientcam_moments.noise.moments import MomentNoise
 from transientcam_moments.pisarenko import Returns
 

@@ -12,7 +12,7 @@ from scipy.stats import chi2, gamma
 
 import transientcam_moments as tm
 from tests.moments.oracles import moments_of_returns
-from transientcam_moments.likelihood import choice, estimate, sharp, tail
+from transientcam_moments.likelihood import chi_square, choice, estimate, sharp, tail
 
 NOISE_SHARE = 1 / 100
 
@@ -103,7 +103,7 @@ def test_deviations_of_returns_are_the_cramer_rao_bound() -> None:
 @pytest.mark.parametrize("free", [1, 2, 3, 6, 9, 64])
 @pytest.mark.parametrize("significance", [0.3, 1e-3, 1e-9])
 def test_quantiles_of_chi_square_are_scipys(free: int, significance: float) -> None:
-    found = estimate.chi_square_quantile(free, significance)
+    found = chi_square.chi_square_quantile(free, significance)
 
     assert found == pytest.approx(chi2.isf(significance, free), rel=1e-9)
 

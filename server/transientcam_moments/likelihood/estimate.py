@@ -1,8 +1,6 @@
 """The likelihood estimate of every pixel, with what it is worth."""
 
-import math
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -22,6 +20,7 @@ from transientcam_moments._kernels.parallel import Spread, on_threads
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.likelihood import choice
 from transientcam_moments.likelihood.arithmetic import logarithm
+from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, chi_square_quantile
 from transientcam_moments.likelihood.choice import MARGIN, MOST_RETURNS, TAIL_SHAPE
 from transientcam_moments.likelihood.planar import Data, fit
 from transientcam_moments.noise.moments import MomentNoise
@@ -32,7 +31,6 @@ ASSUMED_NOISE: Final = 0.01
 MODEL_ERROR: Final = 4e-3
 """What calibration, and light of no model, leave in the moments of a camera, over the largest: as
 large as the bias of Sec. 4.3. docs/likelihood.md has the evidence."""
-SIGNIFICANCE: Final = 1e-3
 
 
 class Likelihood(NamedTuple):
@@ -378,30 +376,3 @@ def _results(
         free.astype(np.int32),
         used.sum(axis=0).astype(np.int32),
     )
-
-
-@lru_cache(maxsize=256)
-def chi_square_quantile(free: int, significance: float) -> float:
-    """Return what chi-square of so many degrees of freedom exceeds with a given probability.
-
-    By bisection on the distribution's closed form for whole numbers of degrees of freedom.
-    """
-    if free < 1:
-        return 0.0
-    low, high = 0.0, free + 10.0
-    while _exceeding(free, high) > significance:
-        high *= 2
-    for _ in range(80):
-        middle = (low + high) / 2
-        low, high = (middle, high) if _exceeding(free, middle) > significance else (low, middle)
-    return high
-
-
-def _exceeding(free: int, value: float) -> float:
-    """Return the probability that chi-square exceeds a value (Abramowitz and Stegun, 26.4.4-5)."""
-    half, odd = value / 2, free % 2
-    total = math.erfc(math.sqrt(half)) if odd else 0.0
-    for k in range(free // 2):
-        power = k + odd / 2
-        total += math.exp(power * math.log(half) - half - math.lgamma(power + 1))
-    return total
