@@ -156,7 +156,7 @@ def _many_returns(m: int) -> Iterator[tuple[str, str, str]]:
     weight = random.uniform(0.05, 1, (m, pixels)) * there
     b = oracles.moments_of_returns(random.uniform(0, 2 * np.pi, (m, pixels)), weight, m)
     for precision, dtype in PRECISIONS.items():
-        given = b.astype(dtype)
+        given: Complex = b.astype(dtype)
         found = tm.pisarenko(given)
         phase = np.where(found.weight > 0, found.phase_rad, 0).astype(float)
         again = oracles.moments_of_returns(phase, found.weight.astype(float), m)

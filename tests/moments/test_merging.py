@@ -26,7 +26,8 @@ def test_a_return_that_noise_split_is_one_again(m: int) -> None:
 
     def off(returns: tm.Returns) -> np.ndarray:
         found = tm.separate(returns).phase_rad
-        return np.remainder(found - phase[0] + np.pi, 2 * np.pi) - np.pi
+        around: np.ndarray = np.remainder(found - phase[0] + np.pi, 2 * np.pi) - np.pi
+        return around
 
     strong = merged.weight > 0.1 * merged.weight.max(axis=0)
     assert (strong.sum(axis=0) == 1).mean() > 0.998
