@@ -91,7 +91,7 @@ _INTRODUCTION = (
     "The range of a frame is that of its first return. Which method finds it is the setting "
     "`reconstruction.estimator` of the daemon, `PUT /api/v1/reconstruction` while it runs, and "
     "`tm.Settings(estimator=...)` in Python. The daemon's default is `likelihood`, which errs "
-    "least over the scenes and measured data of [likelihood.md](likelihood.md). The paper's own "
+    "least over the scenes of [likelihood.md](likelihood.md) together. The paper's own "
     "are `pisarenko`, as printed and the default of `tm.Settings`, and `maximum-entropy`; "
     "`pisarenko-merged` merges returns that noise split. All others are there to be compared with. "
     "Direct and indirect light are those of the estimator, too, and uniform light is what they "

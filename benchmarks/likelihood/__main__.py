@@ -33,7 +33,8 @@ direct, indirect, phase_rad = found.separate()
 ```
 
 In the daemon it is the default of `reconstruction.estimator`: over all captures of the table "All
-captures" it errs least, in median, 90 % and RMSE together. The products `range_std` and
+captures" it errs least, in median, 90 % and RMSE together; in some, as the composite of measured
+responses, maximum entropy errs less. The products `range_std` and
 `reduced_chi_square` come from it, whatever the estimator is; the flag `unexplained` and
 `predicted_range_std_m` where it is the estimator. Until its compiled lane is ready NumPy computes
 the same, more slowly: no frame waits for a compiler.
