@@ -61,8 +61,8 @@ class ReconstructionSettings(_Group):
     """Weight from which a return counts as the first, over the pixel's strongest return."""
     estimator: Estimator = "likelihood"
     """What range, direct and indirect light are taken from. `likelihood` errs least over the
-    scenes of docs/likelihood.md together; the paper's are `pisarenko` and `maximum-entropy`, the others are there
-    for comparison."""
+    scenes of docs/likelihood.md together; the paper's are `pisarenko` and `maximum-entropy`, the
+    others are there for comparison."""
     minimum_brightness_dn: _Finite = Field(default=0.0, ge=0.0)
     """Pixels with no more light than this have no range."""
     spoilt_images: SpoiltImages = "repair"
