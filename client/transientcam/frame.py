@@ -26,6 +26,8 @@ class PixelCounts(TypedDict):
     replaced: int
     contradictory: NotRequired[int]
     """More than noise explains; absent from daemons that do not look for it."""
+    unexplained: NotRequired[int]
+    """The returns do not explain the moments; absent from daemons that do not look for it."""
 
 
 class PredictedStd(TypedDict):

@@ -48,6 +48,7 @@ from transientcam_moments.levinson import (
 )
 from transientcam_moments.likelihood import Likelihood, likelihood
 from transientcam_moments.maximum_entropy import density
+from transientcam_moments.merging import merge_returns
 from transientcam_moments.modulation import modulation_gain
 from transientcam_moments.peaks import Peaks, peaks
 from transientcam_moments.pisarenko import Returns, Separation, pisarenko, separate
@@ -100,6 +101,7 @@ __all__ = [
     "levinson",
     "likelihood",
     "measure",
+    "merge_returns",
     "modulation_gain",
     "moments_of",
     "noise",

@@ -24,6 +24,8 @@ from transientcam_moments.repair import Repair, repair
 from transientcam_moments.smoothing import gaussian_taps, smooth
 from transientcam_moments.takes import average_takes
 
+_BY_THE_PASS = ("pisarenko", "pisarenko-merged", "likelihood")
+"""Estimators that follow from the pass's returns or moments."""
 _SHAPES = 4  # of images that a reconstructor keeps prepared
 
 
@@ -88,7 +90,8 @@ class Reconstructor:
         previous : array, optional
             Images of the frame before, like `data`, for ``spoilt_images="fill"``.
         spread : callable
-            How the compiled pass uses several threads, as `kernels.over` returns it.
+            How the compiled pass, and the likelihood, use several threads, as `kernels.over`
+            returns it.
 
         Returns
         -------
@@ -123,6 +126,7 @@ class Reconstructor:
                 lambda: self._measured(takes)[0],
                 repaired=repaired,
                 calibration=self._calibration,
+                spread=spread,
             )
         moments, kept = self._measured(takes, None if repaired is None else repaired.left_out)
         if saturated_pixels is None:
@@ -161,6 +165,7 @@ class Reconstructor:
                 repaired=repaired,
                 calibration=self._calibration,
                 correction=correction,
+                spread=spread,
             )
         smoothed = moments
         if moments.ndim == 3:
@@ -170,7 +175,14 @@ class Reconstructor:
             smoothed, corrected = correction(smoothed, spread=spread)
         planes = one_pass.moments(smoothed, saturated_pixels, spread)
         return PassedReconstruction(
-            planes, self.settings, lambda: moments, kept, repaired, self._calibration, corrected
+            planes,
+            self.settings,
+            lambda: moments,
+            kept=kept,
+            repaired=repaired,
+            calibration=self._calibration,
+            corrected=corrected,
+            spread=spread,
         )
 
     def _correction(self, moments: Array) -> HarmonicCorrection | None:
@@ -243,7 +255,7 @@ class Reconstructor:
 
     def _pass(self, m: int, shape: tuple[int, ...]) -> OnePass | None:
         usual = self.settings.keep == "harmonics"
-        usual = usual and self.settings.estimator in ("pisarenko", "likelihood")
+        usual = usual and self.settings.estimator in _BY_THE_PASS
         prepare = _kernels.lookup("reconstruct", m, math.prod(shape))
         masked = self._bad is None or np.shape(self._bad) == shape
         if not usual or prepare is None or not masked:

@@ -93,7 +93,9 @@ def serve(
         with open_camera(settings.camera) as opened:
             start_with(opened, settings.sequence)
             # NumPy serves until the compiled kernels are ready
-            compiling = tm.kernels.compile_in_background()
+            first = opened.applied.sequence.harmonics
+            orders = tuple(dict.fromkeys((first, 3, 4, 8)))
+            compiling = tm.kernels.compile_in_background(orders)
             leave(compiling)
             app = build_app(opened, settings)
             server.freeze_startup_objects(compiling)

@@ -32,8 +32,8 @@ class RangeNoise:
     median_m, p90_m
         Half of the pixels, and 90 % of them, are better.
     first_order_share
-        Share of the pixels where first order holds; that of the others is by the order of
-        magnitude.
+        Share of the pixels where first order holds, which with the likelihood is where its returns
+        explain the moments; that of the others is by the order of magnitude.
     """
 
     median_m: float
@@ -59,14 +59,30 @@ def moment_noise(recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoi
 
 
 def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
-    """Predict the deviation of a frame's range from its own returns, by a sample of pixels.
+    """Predict the deviation of a frame's range from its own returns.
 
-    None where no pixel has a range. With another estimator than Pisarenko's it is that of
-    Pisarenko's nevertheless, which is cheap enough for every frame.
+    None where no pixel has a range. That of the likelihood is its own, of all pixels; of another
+    estimator it is that of Pisarenko's returns in a sample of pixels, which is cheap enough for
+    every frame.
     """
-    sample = _sample(np.asarray(found.has_range).ravel())
-    if not sample.size:
+    if not np.asarray(found.has_range).any():
         return None
+    if recipe.settings.estimator == "likelihood":
+        std_m = np.asarray(found.range_std_m)
+        first_order = np.asarray(found.likelihood.explained())[np.asarray(found.has_range)]
+    else:
+        std_m, first_order = _of_pisarenko(recipe, found)
+    known = std_m[np.isfinite(std_m)]
+    if not known.size:
+        return None
+    return RangeNoise(
+        float(np.median(known)), float(np.quantile(known, 0.9)), float(first_order.mean())
+    )
+
+
+def _of_pisarenko(recipe: Recipe, found: tm.Reconstruction) -> tuple[_Array, _Array]:
+    """Return the deviation of the range in m in a sample of pixels, and where first order holds."""
+    sample = _sample(np.asarray(found.has_range).ravel())
 
     def sampled(planes: _Array) -> _Array:
         return np.asarray(planes).reshape((planes.shape[0], -1))[:, sample]
@@ -85,14 +101,7 @@ def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
     )
     deviation = tm.noise.return_noise(returns, noise, threshold=recipe.settings.return_threshold)
     std_m = tm.range_m(deviation.direct_phase_std_rad, recipe.base_frequency_hz)
-    known = np.isfinite(std_m)
-    if not known.any():
-        return None
-    return RangeNoise(
-        float(np.median(std_m[known])),
-        float(np.quantile(std_m[known], 0.9)),
-        float(deviation.holds.mean()),
-    )
+    return np.asarray(std_m), np.asarray(deviation.holds)
 
 
 def _sample(seen: _Array) -> _Array:

@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence, open_camera
 from transientcam_server.camera.source import sensor_of
-from transientcam_server.imaging.noise import beyond_noise, contradictions, contradictory_share
+from transientcam_server.imaging.noise import (
+    beyond_noise,
+    contradictions,
+    contradictory_share,
+    range_noise,
+)
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
@@ -141,3 +146,24 @@ def test_an_estimated_zeroth_moment_hides_contradictions_and_says_so() -> None:
 
     assert contradictions(recipe("estimated"), found) is None
     assert contradictory_share(recipe("estimated"), found) is None
+
+
+def test_the_predicted_deviation_is_that_of_the_default_estimator() -> None:
+    likely = recipe("low-frequency")
+    assert likely.settings.estimator == "likelihood"
+    settings = likely.settings.for_moments(
+        base_frequency_hz=likely.base_frequency_hz,
+        zeroth="low-frequency",
+        takes=1,
+        sensor=likely.sensor,
+    )
+    found = tm.Reconstruction(moments((0.0, 0.0, 0.0, 0.0)), settings)
+
+    predicted = range_noise(likely, found)
+
+    assert predicted is not None
+    assert predicted.median_m == pytest.approx(float(np.nanmedian(found.range_std_m)))
+    assert predicted.p90_m >= predicted.median_m
+    assert predicted.first_order_share == found.likelihood.explained().mean()
+    dark = tm.Reconstruction(np.zeros((4, *SHAPE), np.complex64), settings)
+    assert range_noise(likely, dark) is None

@@ -17,6 +17,8 @@ class PixelCountsDocument(Document):
     replaced: int
     contradictory: int
     """Moments that contradict each other by more than noise explains: something is wrong."""
+    unexplained: int
+    """Moments that the returns of the likelihood do not explain: the range may be biased."""
 
 
 class PredictedStdDocument(Document):
