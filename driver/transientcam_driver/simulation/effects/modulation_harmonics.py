@@ -47,7 +47,7 @@ class ModulationHarmonics(Effect):
         )
         scheme = conditions.sequence.sub_phases.scheme
         reason = f"sub-phases ({scheme}) leave {left / gain:.2%} of other harmonics"
-        return weigh(conditions, left * conditions.brightness_dn, reason, 0.0)
+        return weigh(conditions, conditions.of_light(left), reason)
 
     def harmonics(self, frequency_hz: float) -> dict[int, complex]:
         """Content of the harmonics of a frequency, relative to the fundamental."""

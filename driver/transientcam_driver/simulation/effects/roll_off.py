@@ -30,8 +30,8 @@ class AmplitudeRollOff(PlaneEffect):
         if roll_off is None:
             return Call(False, "the device modulates alike at all frequencies", 0.0, 0.0)
         least = min(amplitude(roll_off, f_hz) for f_hz in conditions.frequencies_hz)
-        size_dn = (1 - least) * conditions.brightness_dn
-        return weigh(conditions, size_dn, f"down to {least:.0%} of the amplitude", 0.0)
+        changes = conditions.of_light(1 - least)
+        return weigh(conditions, changes, f"down to {least:.0%} of the amplitude")
 
     def on_light(self, planes: LightPlanes) -> None:
         """Weaken the modulated part."""

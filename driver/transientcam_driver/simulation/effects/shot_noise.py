@@ -4,7 +4,13 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, Exposure, ImageEffect
+from transientcam_driver.simulation.effects.effect import (
+    Call,
+    Conditions,
+    Exposure,
+    ImageEffect,
+    always,
+)
 
 FEW_E = 100.0
 """Below this mean a pixel is drawn from the Poisson distribution itself.
@@ -25,15 +31,13 @@ class ShotNoise(ImageEffect):
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
-        """Wherever there is light."""
+        """Call for it always: what is dark now may be lit later."""
         mean_e = conditions.mean_e
         # a moment is made of four images and has twice their noise
         size_dn = 2 * math.sqrt(mean_e / conditions.sequence.takes)
         size_dn /= conditions.sensor.gain_e_per_dn
         cost_s = conditions.pixels * _COST_S_PER_PIXEL
-        if mean_e == 0:
-            return Call(False, "no light reaches the sensor", 0.0, cost_s)
-        return Call(True, f"{mean_e:.0f} electrons in a typical pixel", size_dn, cost_s)
+        return always(conditions, size_dn, f"{mean_e:.0f} electrons in a typical pixel", cost_s)
 
     def apply(self, exposure: Exposure) -> None:
         """Draw few electrons one by one; give many their variance."""

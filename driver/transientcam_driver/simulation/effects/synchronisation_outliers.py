@@ -36,8 +36,8 @@ class SynchronisationOutliers(ShotEffect):
             return Call(False, "the device never loses its synchronisation", 0.0, 0.0)
         # a random phase for a part uniform in [0.2, 1]: E part^2 = 0.41; two images a component
         error = math.sqrt(outliers.share * 2 * 0.41 * 2) / 2
-        size_dn = error * conditions.brightness_dn * abs(conditions.sub_phase_gain(1))
-        return weigh(conditions, size_dn, f"{outliers.share:.0%} of the images", 1e-5)
+        changes = conditions.of_light(error * abs(conditions.sub_phase_gain(1)))
+        return weigh(conditions, changes, f"{outliers.share:.0%} of the images", 1e-5)
 
     def on_shot(self, shot: Shot) -> None:
         """Give a share of the images a random phase."""

@@ -34,7 +34,7 @@ class ThermalDrift(ShotEffect):
         delay_s = abs(drift.rise_c * drift.delay_s_per_c)
         turn = abs(np.exp(2j * np.pi * conditions.highest_hz * delay_s) - 1)
         reason = f"{delay_s * 1e12:.0f} ps by {drift.rise_c:g} degrees in the end"
-        return weigh(conditions, float(turn) * conditions.brightness_dn, reason, 0.0)
+        return weigh(conditions, conditions.of_light(float(turn)), reason)
 
     def rise_c(self, device_time_s: float) -> float:
         """How much warmer the device is than at its start."""

@@ -1,0 +1,23 @@
+"""Gloss: surfaces that send some light on as a dull mirror does."""
+
+from transientcam_driver.simulation.effects.effect import (
+    Call,
+    Conditions,
+    LightEffect,
+    weigh,
+)
+
+
+class Gloss(LightEffect):
+    """A highlight around the direction of reflection; costs nothing once the scene is traced."""
+
+    name = "gloss"
+
+    @classmethod
+    def called_for(cls, conditions: Conditions) -> Call:
+        """Where the camera sees a highlight."""
+        changes = conditions.changes(cls.name)
+        if not changes:
+            return Call(False, "all surfaces are matt", 0.0, 0.0)
+        reason = "{share} of the pixels see a highlight"
+        return weigh(conditions, changes, reason)
