@@ -69,13 +69,15 @@ class ExplainedEffect:
 
     Attributes
     ----------
+    what
+        The effect in a few words.
     choice
         "auto", "on" or "off"; "always" where there is no choice.
     called_for, built
         Whether the conditions call for the effect, and whether the choice lets it be built.
     size_dn, relative
-        The error it causes in one moment, as a root mean square over the lit pixels, and that of the
-        errors over each pixel's own noise, at the worst of the times judged.
+        The error it causes in one moment, as a root mean square over the lit pixels, and the same of
+        the errors over each pixel's own noise, at the worst of the times judged.
     worst
         The largest such ratio of any pixel judged.
     cost_s
@@ -83,6 +85,7 @@ class ExplainedEffect:
     """
 
     effect: str
+    what: str
     choice: str
     called_for: bool
     built: bool

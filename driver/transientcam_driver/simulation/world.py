@@ -145,15 +145,22 @@ class World:
 
     def image(self, label: ImageLabel, *, number: int, device_time_s: float) -> NDArray[np.uint16]:
         """Expose and read one image: 1/2 (b_0 + Re(b_j G_1 exp(-i theta))), then the effects."""
+        random = np.random.Generator(np.random.SFC64(np.random.SeedSequence((self._seed, number))))
+        mean_e = self.mean_image_e(label, number=number, device_time_s=device_time_s)
+        exposure = Exposure(mean_e, random)
+        for stage in self._configured().stages:
+            stage.apply(exposure)
+        return exposure.signal.astype(np.uint16)
+
+    def mean_image_e(
+        self, label: ImageLabel, *, number: int, device_time_s: float
+    ) -> NDArray[np.float32]:
+        """Electrons (H, W) of an image on average, before noise and the converter."""
         plan = self._configured()
         shot = Shot(number, device_time_s, self._seed)
         for effect in plan.on_shot:
             effect.on_shot(shot)
-        random = np.random.Generator(np.random.SFC64(np.random.SeedSequence((self._seed, number))))
-        exposure = Exposure(self._mean_e(plan, label, shot), random)
-        for stage in plan.stages:
-            stage.apply(exposure)
-        return exposure.signal.astype(np.uint16)
+        return self._mean_e(plan, label, shot)
 
     def temperature_c(self, device_time_s: float) -> float:
         """Temperature of the sensor, which rises where thermal drift is built."""
@@ -195,6 +202,7 @@ class World:
             choice = self.choice(effect)
             explained = ExplainedEffect(
                 effect=effect.name,
+                what=effect.what,
                 choice=choice if effect.optional else "always",
                 called_for=bool(call.called),
                 built=choice == "on" or (choice == "auto" and bool(call.called)),

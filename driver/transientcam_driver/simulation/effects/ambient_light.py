@@ -21,6 +21,7 @@ class AmbientLight(PlaneEffect):
     """
 
     name = "ambient"
+    what = "light other than the camera's own"
 
     def __init__(self, conditions: Conditions) -> None:
         super().__init__(conditions)

@@ -17,6 +17,7 @@ class DarkCurrentElectrons(PlaneEffect):
     """Adds the same electrons to every pixel, and with them their shot noise."""
 
     name = "dark-current"
+    what = "electrons that come without light"
     figures = "dark_current"
 
     def __init__(self, conditions: Conditions) -> None:

@@ -10,6 +10,7 @@ class Distortion(LightEffect):
     """Bends the camera's rays; costs nothing once the scene is traced."""
 
     name = "distortion"
+    what = "straight lines bend in the lens"
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:

@@ -28,6 +28,7 @@ from transientcam_driver.simulation.imperfections import (
     DeviceProfile,
     Lens,
 )
+from transientcam_driver.simulation.normal import standard_normal
 
 CALLED_ABOVE = 0.1
 """Effects are called for above this share of the noise, as a root mean square over the lit pixels.
@@ -218,7 +219,8 @@ def always(conditions: Conditions, size_dn: float, reason: str, cost_s: float) -
 class LightPlanes:
     """Mean electrons of all images of one frequency, in a region (rows, columns) of the image.
 
-    ``reflectance`` computes that of all pixels, (H, W) or one for all. An image at phase theta has ``constant + mean + sum_k Re(terms[k] exp(-i k theta))``, without
+    ``reflectance`` computes that of all pixels, (H, W) or one for all.
+    An image at phase theta has ``constant + mean + sum_k Re(terms[k] exp(-i k theta))``, without
     light only ``constant``.
     """
 
@@ -273,20 +275,21 @@ class NormalDraw(Stage):
 
     def apply(self, exposure: Exposure) -> None:
         """Add it to the signal."""
-        noise = exposure.random.standard_normal(exposure.signal.shape, dtype=np.float32)
+        noise = standard_normal(exposure.random, exposure.signal.shape)
         noise *= np.sqrt(exposure.variance_e2)
         exposure.signal += noise
         exposure.variance_e2 = _NONE
 
 
 class Effect(ABC):
-    """An effect, and whether a scene calls for it.
+    """An effect, what it is in a few words, and whether a scene calls for it.
 
     ``figures`` names the field of the device's profile that it depends on, if there is one. An
     effect that is forced on where the device has no such figures takes typical ones.
     """
 
     name: ClassVar[str]
+    what: ClassVar[str]
     optional: ClassVar[bool] = True
     figures: ClassVar[str] = ""
 

@@ -12,6 +12,7 @@ class Gloss(LightEffect):
     """A highlight around the direction of reflection; costs nothing once the scene is traced."""
 
     name = "gloss"
+    what = "highlights on glossy surfaces"
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:

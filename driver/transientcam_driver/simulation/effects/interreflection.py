@@ -7,6 +7,7 @@ class DiffuseInterreflection(LightEffect):
     """A continuous tail of late light, by radiosity with times of flight."""
 
     name = "interreflection"
+    what = "light that surfaces give each other"
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:

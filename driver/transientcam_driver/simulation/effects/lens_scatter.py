@@ -18,6 +18,7 @@ class LensScatter(PlaneEffect):
     """A share of the light is spread by a wide Gaussian; light that leaves the image is lost."""
 
     name = "lens-scatter"
+    what = "light goes astray in the lens"
     figures = "lens_scatter"
     local = False
 

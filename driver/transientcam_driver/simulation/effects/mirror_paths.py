@@ -12,6 +12,7 @@ class MirrorPaths(LightEffect):
     """Further returns, by image points; costs nothing once the scene is traced."""
 
     name = "mirror-paths"
+    what = "light over mirrors"
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:

@@ -14,6 +14,7 @@ class MixedPixels(LightEffect):
     """Pixels that silhouettes, shadows or edges of colours cross see the mean over their area."""
 
     name = "mixed-pixels"
+    what = "a pixel at an edge sees both sides of it"
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:

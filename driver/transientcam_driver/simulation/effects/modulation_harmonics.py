@@ -23,6 +23,7 @@ class ModulationHarmonics(Effect):
     """
 
     name = "modulation-harmonics"
+    what = "the modulation is no pure sinusoid"
     figures = "waveform"
 
     def __init__(self, conditions: Conditions) -> None:

@@ -17,6 +17,7 @@ class MotionDuringSequence(LightEffect):
     """
 
     name = "motion"
+    what = "the scene moves while a sequence is captured"
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:

@@ -26,6 +26,7 @@ class PixelPattern(PlaneEffect):
     """
 
     name = "pixel-pattern"
+    what = "each pixel has a delay and a gain of its own"
     figures = "pattern"
 
     def __init__(self, conditions: Conditions) -> None:

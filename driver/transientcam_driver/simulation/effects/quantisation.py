@@ -19,6 +19,7 @@ class Quantisation(ImageEffect):
     """Round to the nearest code. Always there: an image holds integers."""
 
     name = "quantisation"
+    what = "images hold whole numbers"
     optional = False
 
     def __init__(self, conditions: Conditions) -> None:

@@ -19,6 +19,7 @@ class ReadNoise(ImageEffect):
     """Normal, the same for every pixel, independent of the light."""
 
     name = "read-noise"
+    what = "the amplifier adds noise"
     adds_variance = True
 
     def __init__(self, conditions: Conditions) -> None:

@@ -16,6 +16,7 @@ class AmplitudeRollOff(PlaneEffect):
     """Multiplies the modulated part by an amplitude that depends on the frequency."""
 
     name = "roll-off"
+    what = "high frequencies are modulated less"
     figures = "roll_off"
 
     def __init__(self, conditions: Conditions) -> None:

@@ -17,6 +17,7 @@ class Saturation(ImageEffect):
     """Light beyond the full well is lost."""
 
     name = "saturation"
+    what = "full pixels hold no more light"
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:

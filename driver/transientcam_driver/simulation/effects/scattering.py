@@ -12,6 +12,7 @@ class Scattering(LightEffect):
     """Each return of such a surface is an exponentially modified Gaussian."""
 
     name = "scattering"
+    what = "light that enters a surface and comes back late"
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:

@@ -27,6 +27,7 @@ class ShotNoise(ImageEffect):
     """Variance equal to the mean."""
 
     name = "shot-noise"
+    what = "light comes in single electrons"
     adds_variance = True
 
     @classmethod
@@ -42,9 +43,10 @@ class ShotNoise(ImageEffect):
     def apply(self, exposure: Exposure) -> None:
         """Draw few electrons one by one; give many their variance."""
         signal = exposure.signal
-        few = signal < FEW_E
-        if few.any():
-            exposure.variance_e2 = exposure.variance_e2 + np.where(few, np.float32(0), signal)
-            signal[few] = exposure.random.poisson(signal[few])
-        else:
-            exposure.variance_e2 = exposure.variance_e2 + signal
+        few = np.flatnonzero(signal < FEW_E)
+        exposure.variance_e2 = exposure.variance_e2 + signal
+        if few.size:
+            flat, variance_e2 = signal.reshape(-1), exposure.variance_e2.reshape(-1)
+            variance_e2[few] -= flat[few]
+            lit = few[flat[few] > 0]
+            flat[lit] = exposure.random.poisson(flat[lit])

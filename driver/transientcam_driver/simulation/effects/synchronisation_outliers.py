@@ -21,6 +21,7 @@ class SynchronisationOutliers(ShotEffect):
     """
 
     name = "outliers"
+    what = "images that lose their synchronisation"
     figures = "outliers"
 
     def __init__(self, conditions: Conditions) -> None:

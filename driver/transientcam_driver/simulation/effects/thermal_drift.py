@@ -18,6 +18,7 @@ class ThermalDrift(ShotEffect):
     """All times of flight grow with the temperature above that at the start."""
 
     name = "thermal-drift"
+    what = "the light comes later as the camera warms up"
     figures = "drift"
 
     def __init__(self, conditions: Conditions) -> None:

@@ -18,6 +18,7 @@ class Vignetting(PlaneEffect):
     """Light falls with a power of the cosine to the lens's axis; the fourth is a thin lens's."""
 
     name = "vignetting"
+    what = "the lens is darker towards the corners"
 
     def __init__(self, conditions: Conditions) -> None:
         super().__init__(conditions)

@@ -19,8 +19,8 @@ from transientcam_driver.simulation.scene.geometry import Points, Rectangle
 from transientcam_driver.simulation.scene.scene import Scene, Viewpoint
 
 _PIXELS = 20_000  # judged of a still scene, about; of larger images every second pixel a side, ...
-_PIXELS_MOVING = 2_000  # the same at each time
-_TIMES = 12  # of the longest period, at which a moving scene is judged
+_PIXELS_MOVING = 1_500  # the same at each time
+_TIMES = 8  # of the longest period, at which a moving scene is judged
 _WITHIN = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))  # of a pixel
 _FREQUENCIES = 8  # judged at most; the highest one always
 _ROUNDING = 1e-9

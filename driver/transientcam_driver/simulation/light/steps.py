@@ -93,11 +93,11 @@ class Between:
         return mean
 
     def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Returns at the nearer time."""
+        """Return those at the nearer time."""
         return self._nearer.returns()
 
     def of_pixel(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Response of one pixel at the nearer time."""
+        """Return that of one pixel at the nearer time."""
         return self._nearer.of_pixel(x, y)
 
     @property

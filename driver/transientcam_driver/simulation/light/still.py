@@ -1,4 +1,4 @@
-"""The light of what stands still: rays through the pixels' centres, and more where light differs."""
+"""The light of what stands still: a ray a pixel, and more where light differs within it."""
 
 from functools import cached_property
 

@@ -10,6 +10,8 @@ class EffectDocument(Document):
     """One effect's answer for the scene and the sequence."""
 
     effect: str
+    what: str
+    """The effect in a few words."""
     choice: Literal["auto", "on", "off", "always"]
     called_for: bool
     built: bool

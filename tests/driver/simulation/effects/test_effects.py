@@ -21,6 +21,7 @@ from transientcam_driver.simulation.effects.pixel_pattern import read_offsets_ra
 from transientcam_driver.simulation.imperfections import (
     IDEAL,
     PROTOTYPE,
+    TYPICAL,
     DeviceProfile,
     Drift,
     LensScatter,
@@ -49,12 +50,13 @@ def world(
     electrons: float = 20_000.0,
     ambient: float = 0.0,
     plane: NDArray[np.float64] | None = None,
+    sensor: Sensor | None = None,
 ) -> World:
     """One return, read without noise and with 16 bits."""
     weight = np.ones(SHAPE) if plane is None else plane
     return World(
         GivenScenery(SparseResponses(np.full_like(weight, DELAY_S)[None], weight[None])),
-        Sensor().ideal(),
+        sensor or Sensor().ideal(),
         electrons_per_s=electrons / EXPOSURE_S,
         effects=QUIET if effects is None else effects,
         seed=1,
@@ -153,19 +155,19 @@ def test_outliers_draw_from_a_stream_of_their_own() -> None:
 
 
 @pytest.mark.parametrize("effect", OPTIONAL)
-def test_each_effect_answers_for_an_ideal_device_and_a_prototype(effect: type[Effect]) -> None:
+def test_each_effect_answers_for_an_ideal_device_and_a_typical_one(effect: type[Effect]) -> None:
     sequence = Sequence(exposure_s=EXPOSURE_S)
-    for device in (IDEAL, PROTOTYPE):
+    for device in (IDEAL, TYPICAL):
         of = world(device, ambient=0.0 if device is IDEAL else 4000.0)
         call = effect.called_for(of.conditions(sequence))
         assert call.reason
         assert call.size_dn >= 0
         assert math.isfinite(call.size_dn)
     ideal = effect.called_for(world().conditions(sequence))
-    prototype = effect.called_for(world(PROTOTYPE).conditions(sequence))
+    typical_device = effect.called_for(world(TYPICAL).conditions(sequence))
     if effect.figures:
         assert not ideal.called
-        assert prototype.called
+        assert typical_device.called
 
 
 def test_an_effect_is_called_for_above_a_tenth_of_the_noise_floor() -> None:
@@ -364,9 +366,12 @@ def test_ambient_light_adds_its_shot_noise() -> None:
     assert light / dark == pytest.approx(2, rel=6 * math.sqrt(2 * 2 / values))
 
 
-def test_saturation_is_called_for_where_a_pixel_may_be_full() -> None:
-    assert not world(electrons=39_000).calls(PLAIN)["saturation"].called
-    assert world(electrons=41_000).calls(PLAIN)["saturation"].called
+def test_saturation_is_called_for_where_a_pixel_may_be_full_before_the_converter_ends() -> None:
+    small = replace(Sensor(), full_well_e=20_000.0)
+
+    assert not world(sensor=small, electrons=15_000).calls(PLAIN)["saturation"].called
+    assert world(sensor=small, electrons=21_000).calls(PLAIN)["saturation"].called
+    assert not world(sensor=Sensor(), electrons=60_000).calls(PLAIN)["saturation"].called
     assert images(world(electrons=200_000)).max() == pytest.approx(
         min(40_000, (65_535 - 1024) * 9 / 16)
     )
@@ -399,7 +404,7 @@ def test_effects_of_the_prototype_spoil_nominal_moments_and_the_ideal_device_non
 
 
 def test_every_file_of_an_effect_has_its_entry_and_a_name_of_its_own() -> None:
-    files = {each.name for each in pkgutil.iter_modules(package.__path__)} - {"effect"}
+    files = {each.name for each in pkgutil.iter_modules(package.__path__)} - {"effect", "glimpses"}
 
     assert {effect.__module__.rpartition(".")[2] for effect in EFFECTS} == files
     assert len({effect.name for effect in EFFECTS}) == len(EFFECTS)

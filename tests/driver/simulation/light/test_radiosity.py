@@ -114,7 +114,7 @@ def test_energy_is_conserved_over_many_bounces_in_a_closed_room() -> None:
     exchange = further(box(albedo, bounces=bounces))._exchange
     direct = exchange.radiosity.sum(axis=(0, 2)) / albedo * exchange.patches.area
 
-    indirect = exchange.irradiance(0.0).real * exchange.patches.area
+    indirect = exchange.irradiance(0.0, bounces).real * exchange.patches.area
 
     # a geometric series, cut off after some bounces
     expected = albedo * (1 - albedo**bounces) / (1 - albedo)
