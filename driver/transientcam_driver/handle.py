@@ -76,8 +76,8 @@ class ExplainedEffect:
     called_for, built
         Whether the conditions call for the effect, and whether the choice lets it be built.
     size_dn, relative
-        The error it causes in one moment, as a root mean square over the lit pixels, and the same of
-        the errors over each pixel's own noise, at the worst of the times judged.
+        The error it causes in one moment, as a root mean square over the lit pixels, and the same
+        of the errors over each pixel's own noise, at the worst of the times judged.
     worst
         The largest such ratio of any pixel judged.
     cost_s

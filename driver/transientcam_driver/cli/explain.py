@@ -134,8 +134,8 @@ def described(explanation: Explanation) -> str:
 
 
 def _lines(each: ExplainedEffect) -> list[str]:
-    """What an effect is; how large, at what cost, by whose choice; and why."""
-    size = f"{each.relative:.2g} x the noise, at most {each.worst:.2g} x"
+    """Say what an effect is, how large, at what cost, by whose choice, and why."""
+    size = f"{_figure(each.relative)} x the noise, at most {_figure(each.worst)} x"
     cost = f"{each.cost_s * 1e3:.2g} ms a frame" if each.cost_s else "no time a frame"
     choice = "" if each.choice in ("auto", "always") else f"; switched {each.choice}"
     return [
@@ -163,5 +163,10 @@ def scenes_table(explanations: list[Explanation]) -> str:
 def _cell(each: ExplainedEffect) -> str:
     if not each.size_dn:
         return ""
-    size = f"{each.relative:.2g} ({each.worst:.2g})"
+    size = f"{_figure(each.relative)} ({_figure(each.worst)})"
     return f"**{size}**" if each.built else size
+
+
+def _figure(value: float) -> str:
+    """Two digits, and no powers of ten for what is large."""
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"

@@ -20,7 +20,7 @@ class Bundle:
     Attributes
     ----------
     near
-        (H, W) t from which a line counts, or one for all; it counts up to ``far``.
+        (H, W) t from which a line counts; it counts up to ``far``.
     axis, cosine, sine
         (R, C, 3) mean direction of a tile's lines, and (R, C) of the largest angle to it.
     counts
@@ -29,8 +29,8 @@ class Bundle:
 
     apex: Points
     way: tuple[Plane, Plane, Plane]
-    near: Plane | np.float32
-    far: Plane | np.float32
+    near: Plane
+    far: Plane
     axis: NDArray[np.float64]
     cosine: NDArray[np.float64]
     sine: NDArray[np.float64]
@@ -43,8 +43,8 @@ class Bundle:
         way: Points,
         counts: NDArray[np.bool_],
         *,
-        near: Points | float,
-        far: Points | float,
+        near: NDArray[np.floating] | float,
+        far: NDArray[np.floating] | float,
     ) -> "Bundle":
         """Make one of ways (H, W, 3); lines that do not count have any."""
         height, width = counts.shape
@@ -64,12 +64,12 @@ class Bundle:
         return cls(
             apex,
             (x, y, z),
-            np.float32(near),
-            np.float32(far),
+            np.broadcast_to(np.asarray(near, dtype=np.float32), counts.shape),
+            np.broadcast_to(np.asarray(far, dtype=np.float32), counts.shape),
             axis,
             np.cos(angle),
             np.sin(angle),
-            there.any(axis=-1),
+            np.asarray(there.any(axis=-1)),
         )
 
     def meeting(self, shape: Shape) -> Region | None:
@@ -88,8 +88,7 @@ class Bundle:
     def within(self, region: Region) -> tuple[tuple[Plane, ...], Plane, Plane]:
         """Return the ways of a region's lines, and from where to where they count."""
         ways = tuple(each[region] for each in self.way)
-        near, far = (each[region] if np.ndim(each) else each for each in (self.near, self.far))
-        return ways, np.asarray(near), np.asarray(far)
+        return ways, self.near[region], self.far[region]
 
 
 def _bounds(tiles: NDArray[np.bool_], shape: tuple[int, ...]) -> Region | None:

@@ -54,16 +54,16 @@ def crossing(shape: Shape, apex: Points, way: tuple[Plane, ...]) -> Crossing:
 def _ellipsoid(shape: Ellipsoid, apex: Points, way: tuple[Plane, ...]) -> Crossing:
     origin = (apex - shape.centre) / shape.radii
     x, y, z = (w * np.float32(1 / r) for w, r in zip(way, shape.radii, strict=True))
-    squared = x * x
+    squared: Plane = x * x
     squared += y * y
     squared += z * z
     squared += _TINY
-    along = x * np.float32(origin[0])
+    along: Plane = x * np.float32(origin[0])
     along += y * np.float32(origin[1])
     along += z * np.float32(origin[2])
-    closest = along / squared
+    closest: Plane = along / squared
     # 1 minus the squared distance of the line from the centre, where the ellipsoid is a unit sphere
-    inside = along * closest
+    inside: Plane = along * closest
     inside += np.float32(1 - origin @ origin)
     np.negative(closest, out=closest)
     return Crossing((inside,), closest, np.sqrt(squared))
@@ -73,10 +73,12 @@ def _rectangle(shape: Rectangle, apex: Points, way: tuple[Plane, ...]) -> Crossi
     origin = apex - shape.centre
 
     def part(axis: Points) -> Plane:
-        return sum((w * np.float32(a) for w, a in zip(way, axis, strict=True)), _TINY)
+        x, y, z = (w * np.float32(a) for w, a in zip(way, axis, strict=True))
+        total: Plane = x + y + z + _TINY
+        return total
 
-    at = np.float32(-(origin @ shape.normal)) / part(shape.normal)
-    inside = []
+    at: Plane = np.float32(-(origin @ shape.normal)) / part(shape.normal)
+    inside: list[Plane] = []
     for axis, length in ((shape.right, shape.width), (shape.up, shape.height)):
         place = at * part(axis)
         place += np.float32(origin @ axis)

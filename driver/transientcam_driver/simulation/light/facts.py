@@ -63,7 +63,7 @@ class SceneFacts:
         )
         self._shape = rows.shape
         self._rows, self._columns = rows.ravel(), columns.ravel()
-        self._times_s = (0.0,)
+        self._times_s: tuple[float, ...] = (0.0,)
         if scene.moves:
             period_s = max(each.period_s for surface in scene.surfaces for each in surface.motions)
             self._times_s = tuple((k + 0.5) / _TIMES * period_s for k in range(_TIMES))

@@ -92,7 +92,7 @@ class MovingLight:
         if mirrored := self._seen_in_mirrors(scene):
             layers.append(mirrored)
         shadows = [shadow for k in range(len(self._chains)) if (shadow := self._shadow(scene, k))]
-        region = union([each.region for each in (*layers, *shadows)])
+        region = union([*(each.region for each in layers), *(each.region for each in shadows)])
         return MovingResponses(self.still, scene, tuple(layers), tuple(shadows), region)
 
     def _cover(self, scene: Scene, index: int) -> _Seen | None:

@@ -11,7 +11,7 @@ from transientcam_driver.simulation.light.bundle import Region, union
 from transientcam_driver.simulation.light.layers import MovingResponses
 from transientcam_driver.simulation.scene.scene import Scene
 
-_PIXELS = 1.0
+_PIXELS = 0.5
 """That the fastest surface moves from one time to the next. In between, light is interpolated: a
 silhouette that crosses a pixel does so at an even rate, and range is continuous."""
 

@@ -233,7 +233,12 @@ class SurfaceScenery:
         if tolerance is not None:
             mixed = (still.mixed, still.fine) if still.mixed.size else None
             light = Interreflection(
-                still.scene, still.lit, **self._size, mixed=mixed, tolerance=tolerance
+                still.scene,
+                still.lit,
+                width=still.width,
+                height=still.height,
+                mixed=mixed,
+                tolerance=tolerance,
             )
             responses = WithInterreflection(responses, light)
         return View(responses, lambda: still.reflectance.reshape(shape))

@@ -22,8 +22,10 @@ from transientcam_driver.simulation.imperfections import (
     IDEAL,
     PROTOTYPE,
     TYPICAL,
+    DarkCurrent,
     DeviceProfile,
     Drift,
+    Lens,
     LensScatter,
     Outliers,
     Pattern,
@@ -32,6 +34,7 @@ from transientcam_driver.simulation.imperfections import (
 )
 from transientcam_driver.simulation.light.transport import GivenScenery
 from transientcam_driver.simulation.responses import SparseResponses
+from transientcam_driver.simulation.scene.motion import Motion
 from transientcam_driver.simulation.world import World
 
 SHAPE = (12, 16)
@@ -445,3 +448,62 @@ def test_the_fano_factor_is_that_of_real_counts(data_dir: Path) -> None:
 def _fano(takes: NDArray[np.float64]) -> float:
     """Variance over mean, of all bins with counts."""
     return float(takes.var(axis=0, ddof=1).sum() / takes.mean(axis=0).sum())
+
+
+def test_vignetting_takes_light_by_the_cosine_to_the_axis() -> None:
+    scene = find_scene("wall")
+    assert scene.camera is not None
+    lens = Lens(vignetting=4.0)
+    dark = replace(scene, camera=replace(scene.camera, lens=lens))
+    sequence = Sequence(exposure_s=0.5e-3)
+    frames = []
+    for each in (scene, dark):
+        of = world_of(each, width=41, height=31, readout_s=4e-3)
+        of.configure(sequence, sequence.labels)
+        frames.append(of.mean_image_e(sequence.labels[0], number=0, device_time_s=0.0))
+    x = math.tan(math.radians(20)) * (2 * (np.arange(41) + 0.5) / 41 - 1)
+    y = math.tan(math.radians(20)) * (31 / 41) * (2 * (np.arange(31) + 0.5) / 31 - 1)
+
+    expected = (1 + x[None, :] ** 2 + y[:, None] ** 2) ** -2
+
+    assert frames[1] / frames[0] == pytest.approx(expected, rel=1e-5)
+
+
+def test_dark_current_is_there_without_light_and_cancels_in_the_moments() -> None:
+    device = replace(IDEAL, dark_current=DarkCurrent(2e5))
+    of = world(device, effects=QUIET | {"dark-current": "on"})
+
+    _on, off, *_ = images(of, electrons_images())
+
+    assert off.mean() == pytest.approx(2e5 * EXPOSURE_S, abs=1)
+    assert moment(of).mean() == pytest.approx(IDEAL_MOMENT, abs=2)
+
+
+def test_what_is_dark_at_the_start_is_judged_by_what_comes_later() -> None:
+    """A ball before nothing that comes into view after some seconds."""
+    scene = find_scene("visitor")
+    ball = replace(scene.surfaces[3], motions=(Motion(np.array([[-3.0, 0, 0], [0.2, 0, 0]]), 20),))
+    void = replace(scene, surfaces=(ball,))
+    of = world_of(void, width=41, height=30, readout_s=4e-3)
+    sequence = Sequence(exposure_s=0.5e-3)
+
+    calls = of.calls(sequence)
+    of.configure(sequence, sequence.labels)
+
+    assert not of.mean_image_e(sequence.labels[0], number=0, device_time_s=0.0).any()
+    assert all(calls[name].called for name in ("shot-noise", "motion", "mixed-pixels"))
+
+
+def test_motion_counts_from_the_first_image_of_a_sequence_to_the_last() -> None:
+    scene = find_scene("visitor")
+    slow = Motion(np.array([[-0.2, 0, 0], [0.2, 0, 0]]), 2e4, "back")
+    ball = replace(scene.surfaces[3], motions=(slow,))
+    of = world_of(
+        replace(scene, surfaces=(scene.surfaces[0], ball)), width=41, height=30, readout_s=4e-3
+    )
+
+    short, long = (of.calls(Sequence(takes=takes))["motion"] for takes in (1, 256))
+
+    # 256 takes: 16 times less noise, and 256 times as far
+    assert long.relative > 16 * short.relative
+    assert long.called
