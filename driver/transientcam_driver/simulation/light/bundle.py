@@ -43,8 +43,8 @@ class Bundle:
         way: Points,
         counts: NDArray[np.bool_],
         *,
-        near: NDArray[np.floating] | float,
-        far: NDArray[np.floating] | float,
+        near: NDArray[np.floating] | np.floating | float,
+        far: NDArray[np.floating] | np.floating | float,
     ) -> "Bundle":
         """Make one of ways (H, W, 3); lines that do not count have any."""
         height, width = counts.shape
