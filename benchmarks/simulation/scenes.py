@@ -7,7 +7,6 @@ from transientcam_driver.simulation.build import find_scene
 from transientcam_driver.simulation.scene.scene import Scene
 
 HERE = Path(__file__).parent / "scenes"
-STILL = ("wall", "corner", "mirrors", "corner-left", "translucent", "calibration")
 BUILT_IN = tuple(info.name for info in list_scenes() if info.name != "measured")
 
 

@@ -224,9 +224,7 @@ class SurfaceScenery:
     def _lit_view(self, now: MovingResponses, tolerance: float) -> View:
         """View of a moving scene with light over several surfaces, computed anew."""
         width, height = self._size["width"], self._size["height"]
-        light = Interreflection(
-            now.scene, now.lit, width=width, height=height, tolerance=tolerance
-        )
+        light = Interreflection(now.scene, now.lit, width=width, height=height, tolerance=tolerance)
         return View(WithInterreflection(now, light), lambda: now.reflectance)
 
     def _still_view(self, still: StillLight, tolerance: float | None) -> View:

@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.build import find_scene
+from transientcam_driver.simulation.light.exchange import Exchange
 from transientcam_driver.simulation.light.patches import Patches, form_factors
 from transientcam_driver.simulation.light.paths import camera_rays, light_rays
 from transientcam_driver.simulation.light.radiosity import Interreflection
@@ -120,6 +121,21 @@ def test_energy_is_conserved_over_many_bounces_in_a_closed_room() -> None:
     expected = albedo * (1 - albedo**bounces) / (1 - albedo)
     assert direct.sum() == pytest.approx(4 * math.pi, rel=0.01)
     assert indirect.sum() / direct.sum() == pytest.approx(expected, rel=5e-3)
+
+
+def test_bounces_are_followed_until_what_is_left_is_negligible_and_no_further() -> None:
+    room = replace(box(0.7, bounces=1), transport=Transport(diffuse_bounces=None, patches=6))
+    exchange = Exchange.of(room, 6)
+    tolerance = 1e-3 * float(exchange.radiosity.sum(axis=(0, 2)).max())
+
+    bounces = exchange.bounces(tolerance)
+
+    all_light = exchange.irradiance(0.0, 80).real
+
+    def left(after: int) -> float:
+        return float((0.7 * (all_light - exchange.irradiance(0.0, after).real)).max())
+
+    assert left(bounces) < tolerance < left(bounces - 3)
 
 
 def right_angle(*, bounces: int = 1, patches: int = 24) -> Scene:
