@@ -15,8 +15,9 @@ from benchmarks.simulation.scenes import scene_named
 from transientcam_driver import Sequence
 from transientcam_driver.sequence import ImageLabel
 from transientcam_driver.simulation.build import world_of
-from transientcam_driver.simulation.light.paths import Lit, camera_rays, light_rays, rays_through
+from transientcam_driver.simulation.light.paths import Lit, light_rays
 from transientcam_driver.simulation.light.radiosity import Interreflection
+from transientcam_driver.simulation.light.rays import camera_rays, rays_through
 from transientcam_driver.simulation.scene.scene import Scene
 from transientcam_driver.simulation.world import World
 

@@ -15,7 +15,6 @@ from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_driver.simulation.build import world_of
 from transientcam_driver.simulation.light.exchange import Exchange
 from transientcam_driver.simulation.light.paths import (
-    camera_rays,
     first_scattering,
     image_lights,
     light_on,
@@ -23,6 +22,7 @@ from transientcam_driver.simulation.light.paths import (
     normals_at,
 )
 from transientcam_driver.simulation.light.radiosity import Interreflection
+from transientcam_driver.simulation.light.rays import camera_rays
 from transientcam_driver.simulation.scene.scene import Scene
 
 WIDTH, HEIGHT = 163, 120

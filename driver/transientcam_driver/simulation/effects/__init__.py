@@ -6,15 +6,15 @@ number. A new effect is a file here and an entry in ``EFFECTS``.
 """
 
 from transientcam_driver.simulation.effects.ambient_light import AmbientLight
-from transientcam_driver.simulation.effects.dark_current import DarkCurrentElectrons
-from transientcam_driver.simulation.effects.distortion import Distortion
-from transientcam_driver.simulation.effects.effect import (
+from transientcam_driver.simulation.effects.conditions import (
     CALLED_ABOVE,
     WORST_ABOVE,
     Call,
     Conditions,
-    Effect,
 )
+from transientcam_driver.simulation.effects.dark_current import DarkCurrentElectrons
+from transientcam_driver.simulation.effects.distortion import Distortion
+from transientcam_driver.simulation.effects.effect import Effect
 from transientcam_driver.simulation.effects.glimpses import Facts, Glimpse
 from transientcam_driver.simulation.effects.gloss import Gloss
 from transientcam_driver.simulation.effects.interreflection import DiffuseInterreflection

@@ -5,13 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    LightPlanes,
-    PlaneEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightPlanes, PlaneEffect
 
 
 class AmbientLight(PlaneEffect):

@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, LightEffect, weigh
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightEffect
 from transientcam_driver.simulation.imperfections import TYPICAL_LENS
 
 

@@ -1,11 +1,7 @@
 """Gloss: surfaces that send some light on as a dull mirror does."""
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    LightEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightEffect
 
 
 class Gloss(LightEffect):

@@ -1,6 +1,7 @@
 """Interreflection: light that goes from one scattering surface to another."""
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, LightEffect, weigh
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightEffect
 
 
 class DiffuseInterreflection(LightEffect):

@@ -3,13 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    LightPlanes,
-    PlaneEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightPlanes, PlaneEffect
 
 _COST_S_PER_PIXEL = 2e-7  # only where the scene moves; else it is done once
 

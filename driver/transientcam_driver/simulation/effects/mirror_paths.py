@@ -1,11 +1,7 @@
 """Mirror paths: light that comes to a surface over mirrors."""
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    LightEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightEffect
 
 
 class MirrorPaths(LightEffect):

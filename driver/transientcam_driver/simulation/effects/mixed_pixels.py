@@ -1,11 +1,7 @@
 """Mixed pixels: a pixel sees an area, with all that is in it."""
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    LightEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightEffect
 
 _COST_S_PER_PIXEL = 3e-9  # only where the scene moves, else it is done once
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.errors import SceneError
-from transientcam_driver.simulation.effects.effect import Call, Conditions, Effect, weigh
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import Effect
 from transientcam_driver.simulation.imperfections import Waveform
 
 _HIGHEST = 9

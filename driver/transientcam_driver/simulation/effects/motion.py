@@ -1,11 +1,7 @@
 """Motion: the scene changes from one image of a sequence to the next."""
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    LightEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightEffect
 
 _COST_S_PER_PIXEL = 8e-8
 

@@ -6,13 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.errors import SceneError
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    LightPlanes,
-    PlaneEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightPlanes, PlaneEffect
 from transientcam_driver.simulation.imperfections import Pattern
 
 _CODES = 4096  # of a turn, in files of phase offsets

@@ -4,13 +4,8 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    Exposure,
-    ImageEffect,
-    always,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, always
+from transientcam_driver.simulation.effects.effect import Exposure, ImageEffect
 
 _COST_S_PER_PIXEL = 3e-9
 

@@ -2,13 +2,8 @@
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    LightPlanes,
-    PlaneEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightPlanes, PlaneEffect
 from transientcam_driver.simulation.imperfections import RollOff
 
 

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, Exposure, ImageEffect
+from transientcam_driver.simulation.effects.conditions import Call, Conditions
+from transientcam_driver.simulation.effects.effect import Exposure, ImageEffect
 
 _COST_S_PER_PIXEL = 4e-10
 _SPREADS = (

@@ -1,11 +1,7 @@
 """Scattering: light enters a translucent surface and comes back later."""
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    LightEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightEffect
 
 
 class Scattering(LightEffect):

@@ -4,13 +4,8 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    Shot,
-    ShotEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import Shot, ShotEffect
 
 
 class SynchronisationOutliers(ShotEffect):

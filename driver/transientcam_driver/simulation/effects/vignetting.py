@@ -4,13 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    LightPlanes,
-    PlaneEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightPlanes, PlaneEffect
 from transientcam_driver.simulation.imperfections import TYPICAL_LENS
 
 

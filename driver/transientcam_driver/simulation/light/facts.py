@@ -12,8 +12,9 @@ from transientcam_driver.simulation.effects import Glimpse
 from transientcam_driver.simulation.effects.glimpses import Values
 from transientcam_driver.simulation.imperfections import PINHOLE
 from transientcam_driver.simulation.light.exchange import Exchange
-from transientcam_driver.simulation.light.paths import Lit, light_rays, rays_through
+from transientcam_driver.simulation.light.paths import Lit, light_rays
 from transientcam_driver.simulation.light.radiosity import Interreflection
+from transientcam_driver.simulation.light.rays import rays_through
 from transientcam_driver.simulation.light.variants import without_gloss, without_mirrors
 from transientcam_driver.simulation.scene.geometry import Points, Rectangle
 from transientcam_driver.simulation.scene.scene import Scene, Viewpoint

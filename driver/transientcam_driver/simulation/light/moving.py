@@ -21,11 +21,7 @@ from transientcam_driver.simulation.light.bundle import (
 from transientcam_driver.simulation.light.coverage import Crossing, Plane, covered, crossing
 from transientcam_driver.simulation.light.ends import Ends
 from transientcam_driver.simulation.light.layers import Layer, MovingResponses, Shadow
-from transientcam_driver.simulation.light.paths import (
-    ImageLight,
-    image_lights,
-    light_rays,
-)
+from transientcam_driver.simulation.light.paths import ImageLight, image_lights, light_rays
 from transientcam_driver.simulation.light.still import StillLight
 from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene

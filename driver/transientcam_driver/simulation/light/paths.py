@@ -14,13 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
-from transientcam_driver.simulation.imperfections import Lens
 from transientcam_driver.simulation.responses import Scatter, SparseResponses
 from transientcam_driver.simulation.scene.geometry import Points, Rectangle, blocked_by_mask
 from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Viewpoint
 
 _BLOCK = 8192  # rays at a time, so that what is computed for them stays in the cache
-_LENS_STEPS = 20
 FAR_M = 1e3  # longer than any path in a scene
 
 
@@ -106,18 +104,6 @@ def scatter_of(scene: Scene, surface: NDArray[np.intp]) -> Scatter | None:
     )
 
 
-def trace(scene: Scene, *, width: int, height: int) -> SparseResponses:
-    """Impulse responses of all pixels by direct light and any chain of mirrors up to the limit."""
-    lit = light_rays(scene, camera_rays(_camera(scene), width=width, height=height))
-    return sparse(scene, lit, width=width, height=height)
-
-
-def sparse(scene: Scene, lit: Lit, *, width: int, height: int) -> SparseResponses:
-    """Arrange the light of the pixels' rays as an image."""
-    surfaces = np.broadcast_to(lit.surface, lit.weight.shape)
-    return sparse_image(lit.delay_s, lit.weight, scatter_of(scene, surfaces), (height, width))
-
-
 def sparse_image(
     delay_s: NDArray[np.float64],
     weight: NDArray[np.float64],
@@ -131,57 +117,6 @@ def sparse_image(
     if scatter is not None:
         scatter = Scatter(scatter.width_s[there], scatter.decay_s[there]).reshaped(planes)
     return SparseResponses(delay_s[there].reshape(planes), weight[there].reshape(planes), scatter)
-
-
-def camera_rays(view: Viewpoint, *, width: int, height: int) -> Points:
-    """Return unit vectors through the pixels' centres, row by row from the top."""
-    columns, rows = np.meshgrid(np.arange(width), np.arange(height))
-    return rays_through(view, columns.ravel(), rows.ravel(), width=width, height=height)
-
-
-def rays_through(
-    view: Viewpoint,
-    column: NDArray[Any],
-    row: NDArray[Any],
-    *,
-    width: int,
-    height: int,
-) -> Points:
-    """Return unit vectors through places on the sensor; whole numbers are pixels' centres."""
-    forward = view.look_at_m - view.position_m
-    forward = forward / np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
-    half = np.tan(np.radians(view.field_of_view_deg) / 2)
-    x = half * (2 * (column + 0.5) / width - 1)
-    y = half * (height / width) * (1 - 2 * (row + 0.5) / height)
-    if view.lens.bends:
-        x, y = _straightened(
-            view.lens, x - 2 * half * view.lens.centre[0], y + 2 * half * view.lens.centre[1]
-        )
-    rays = forward + x[:, None] * right + y[:, None] * up
-    directions: Points = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
-    return directions
-
-
-def _straightened(
-    lens: Lens, x: NDArray[np.float64], y: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where a pinhole would see what this lens shows at (x, y); y points up.
-
-    Brown's model is inverted by fixed-point iteration, as is usual.
-    """
-    k1, k2, p1, p2 = lens.distortion
-    shown_x, shown_y = x, y
-    for _step in range(_LENS_STEPS):
-        squared = x * x + y * y
-        radial = np.maximum(1 + squared * (k1 + squared * k2), 0.2)
-        x, y = (
-            (shown_x - 2 * p1 * x * y - p2 * (squared + 2 * x * x)) / radial,
-            (shown_y - p1 * (squared + 2 * y * y) - 2 * p2 * x * y) / radial,
-        )
-    return x, y
 
 
 def light_rays(scene: Scene, directions: Points) -> Lit:

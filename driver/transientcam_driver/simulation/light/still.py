@@ -10,13 +10,12 @@ from transientcam_driver.simulation.light.bundle import Bundle
 from transientcam_driver.simulation.light.paths import (
     FAR_M,
     Lit,
-    camera_rays,
     hit,
     light_rays,
-    rays_through,
     scatter_of,
     sparse_image,
 )
+from transientcam_driver.simulation.light.rays import camera_rays, rays_through
 from transientcam_driver.simulation.responses import Scatter, SparseResponses
 from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene

@@ -21,8 +21,8 @@ from transientcam_driver.simulation.light.bundle import Region
 from transientcam_driver.simulation.light.facts import SceneFacts, cosine_to_axis
 from transientcam_driver.simulation.light.layers import MovingResponses
 from transientcam_driver.simulation.light.moving import MovingLight, still_scene
-from transientcam_driver.simulation.light.paths import camera_rays
 from transientcam_driver.simulation.light.radiosity import Interreflection, WithInterreflection
+from transientcam_driver.simulation.light.rays import camera_rays
 from transientcam_driver.simulation.light.steps import Between, Steps
 from transientcam_driver.simulation.light.still import StillLight
 from transientcam_driver.simulation.light.variants import (

@@ -177,7 +177,12 @@ def test_an_effect_is_called_for_above_a_tenth_of_the_noise_floor() -> None:
     sequence = Sequence(exposure_s=EXPOSURE_S, sub_phases=SubPhases("none"))
     conditions = world().conditions(sequence)
     for factor, called in ((0.9, False), (1.1, True)):
-        third = factor * CALLED_ABOVE * conditions.floor_dn / conditions.brightness_dn
+        third = (
+            factor
+            * CALLED_ABOVE
+            * conditions.floor_dn
+            / (conditions.brightness_e / conditions.sensor.gain_e_per_dn)
+        )
         device = replace(IDEAL, waveform=Waveform(None, (1e6, 1e9), (third, third)))
         call = world(device).calls(sequence)["modulation-harmonics"]
         assert call.called == called
@@ -407,7 +412,11 @@ def test_effects_of_the_prototype_spoil_nominal_moments_and_the_ideal_device_non
 
 
 def test_every_file_of_an_effect_has_its_entry_and_a_name_of_its_own() -> None:
-    files = {each.name for each in pkgutil.iter_modules(package.__path__)} - {"effect", "glimpses"}
+    files = {each.name for each in pkgutil.iter_modules(package.__path__)} - {
+        "conditions",
+        "effect",
+        "glimpses",
+    }
 
     assert {effect.__module__.rpartition(".")[2] for effect in EFFECTS} == files
     assert len({effect.name for effect in EFFECTS}) == len(EFFECTS)

@@ -10,13 +10,20 @@ from numpy.typing import NDArray
 from transientcam_driver.sensor import Sensor
 from transientcam_driver.simulation.build import find_scene
 from transientcam_driver.simulation.imperfections import Lens
-from transientcam_driver.simulation.light.paths import light_rays, rays_through, trace
+from transientcam_driver.simulation.light.paths import light_rays
+from transientcam_driver.simulation.light.rays import rays_through
+from transientcam_driver.simulation.light.still import StillLight
+from transientcam_driver.simulation.responses import SparseResponses
 from transientcam_driver.simulation.scene.geometry import Rectangle
 from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Transport, Viewpoint
 
 C = 299_792_458.0
 WIDTH, HEIGHT = 33, 25
 CENTRE = (HEIGHT // 2, WIDTH // 2)
+
+
+def trace(of: Scene, *, width: int, height: int) -> SparseResponses:
+    return StillLight(of, width=width, height=height).responses()
 
 
 def v(*values: float) -> NDArray[np.float64]:

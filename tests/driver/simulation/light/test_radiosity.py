@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from transientcam_driver.simulation.build import find_scene
 from transientcam_driver.simulation.light.exchange import Exchange
 from transientcam_driver.simulation.light.patches import Patches, form_factors
-from transientcam_driver.simulation.light.paths import camera_rays, light_rays
+from transientcam_driver.simulation.light.paths import light_rays
 from transientcam_driver.simulation.light.radiosity import Interreflection
+from transientcam_driver.simulation.light.rays import camera_rays
 from transientcam_driver.simulation.responses import BIN_S
 from transientcam_driver.simulation.scene.geometry import Ellipsoid, Rectangle
 from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Transport, Viewpoint
