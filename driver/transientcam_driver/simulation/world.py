@@ -132,7 +132,9 @@ class World:
             sequence,
             {label.harmonic: label.frequency_hz for label in labels},
             conditions,
-            self._scenery.view(Wanted(of_light, noise, conditions.highest_hz, lens)),
+            self._scenery.view(
+                Wanted(of_light, noise, conditions.highest_hz, lens, conditions.image_period_s)
+            ),
             MotionDuringSequence.name in of_light,
             next((each for each in made if isinstance(each, ModulationHarmonics)), None),
             tuple(each for each in made if isinstance(each, PlaneEffect)),

@@ -11,7 +11,7 @@ from transientcam_driver.simulation.light.bundle import Region, union
 from transientcam_driver.simulation.light.layers import MovingResponses
 from transientcam_driver.simulation.scene.scene import Scene
 
-_PIXELS = 0.5
+_PIXELS = 1.0
 """That the fastest surface moves from one time to the next. In between, light is interpolated: a
 silhouette that crosses a pixel does so at an even rate, and range is continuous."""
 
@@ -27,11 +27,19 @@ class Steps:
         Computes the light at a time.
     pixel_rad
         Angle of a pixel.
+    every_s
+        Time between images: where a step is shorter, each image has its own light.
     """
 
     def __init__(
-        self, scene: Scene, at: Callable[[float], MovingResponses], *, pixel_rad: float
+        self,
+        scene: Scene,
+        at: Callable[[float], MovingResponses],
+        *,
+        pixel_rad: float,
+        every_s: float = 0.0,
     ) -> None:
+        self._every_s = every_s
         self._scene = scene
         self._at = at
         self.step_s = _step_s(scene, pixel_rad)
@@ -41,7 +49,7 @@ class Steps:
         """Return the light at a time."""
         step = int(np.floor(time_s / self.step_s + 1e-9))
         share = time_s / self.step_s - step
-        if self._jumps(step):
+        if self.step_s <= self._every_s or self._jumps(step):
             return self._at(time_s)
         return Between(self._of(step), self._of(step + 1), min(1.0, max(0.0, share)))
 

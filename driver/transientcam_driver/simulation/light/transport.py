@@ -40,14 +40,15 @@ Values = NDArray[np.float64]
 class Wanted:
     """What a sequence asks of the light: effects by name, and how exactly.
 
-    ``noise`` is that of a moment, ``highest_hz`` the highest frequency that is measured, and
-    ``lens`` the one before the sensor.
+    ``noise`` is that of a moment, ``highest_hz`` the highest frequency that is measured, ``lens``
+    the one before the sensor, and ``image_period_s`` the time from image to image.
     """
 
     effects: frozenset[str] = frozenset()
     noise: Noise = field(default_factory=lambda: Noise(1e6, 0.0, 900.0, 1))
     highest_hz: float = 0.0
     lens: Lens = PINHOLE
+    image_period_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +218,7 @@ class SurfaceScenery:
             at = Latest(lambda time_s: self._lit_view(moving.at(time_s), tolerance))
             return Views(at, at)
         exact = Latest(lambda time_s: _view_of(moving.at(time_s)))
-        steps = Steps(scene, moving.at, pixel_rad=still.pixel_rad)
+        steps = Steps(scene, moving.at, pixel_rad=still.pixel_rad, every_s=wanted.image_period_s)
         between = Latest(lambda time_s: _view_of(steps.at(time_s)))
         return Views(between, exact, self._still_view(still, None))
 
