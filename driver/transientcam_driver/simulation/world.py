@@ -120,6 +120,7 @@ class World:
 
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
         """Build the effects that the sequence calls for."""
+        sequence = replace(sequence, phase_offset_rad=0.0)  # which the labels have in them
         if self._plan is not None and self._plan.sequence == sequence:
             return
         conditions = self.conditions(sequence)
