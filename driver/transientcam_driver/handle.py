@@ -69,23 +69,30 @@ class ExplainedEffect:
 
     Attributes
     ----------
+    what
+        The effect in a few words.
     choice
         "auto", "on" or "off"; "always" where there is no choice.
     called_for, built
         Whether the conditions call for the effect, and whether the choice lets it be built.
     size_dn, relative
-        The error it causes in one moment, as a root mean square, and that over the noise floor.
+        The error it causes in one moment, as a root mean square over the lit pixels, and the same
+        of the errors over each pixel's own noise, at the worst of the times judged.
+    worst
+        The largest such ratio of any pixel judged.
     cost_s
         Of one frame, by the order of magnitude; what is computed once a sequence costs nothing.
     """
 
     effect: str
+    what: str
     choice: str
     called_for: bool
     built: bool
     reason: str
     size_dn: float
     relative: float
+    worst: float
     cost_s: float
 
 
@@ -94,7 +101,8 @@ class Explanation:
     """What all effects make of a scene and a sequence.
 
     ``floor_dn`` is the noise floor of one moment of a typical pixel: shot noise, read noise and
-    rounding, averaged over the takes. An effect is called for above ``threshold`` of it.
+    rounding, averaged over the takes. An effect is called for above ``threshold`` of the noise as a
+    root mean square, or above ``threshold_of_worst`` of its noise in any pixel.
     """
 
     scene: str
@@ -103,6 +111,7 @@ class Explanation:
     floor_dn: float
     effects: tuple[ExplainedEffect, ...]
     threshold: float
+    threshold_of_worst: float
 
     def to_document(self) -> dict[str, Any]:
         """Return it as a JSON document."""
@@ -112,6 +121,7 @@ class Explanation:
             "sequence": self.sequence.to_document(),
             "noise_floor_dn": self.floor_dn,
             "called_above": self.threshold,
+            "called_above_worst": self.threshold_of_worst,
             "effects": [
                 {name: getattr(each, name) for name in ExplainedEffect.__slots__}
                 for each in self.effects

@@ -1,14 +1,12 @@
 """The verb ``explain``: the effects that a scene and a sequence call for."""
 
 import json
+import textwrap
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from transientcam_driver.cli.options import JsonOption
 from transientcam_driver.entries.sim import resolution, scene_of
@@ -16,10 +14,12 @@ from transientcam_driver.errors import DriverError, SpecError
 from transientcam_driver.handle import ExplainedEffect, Explanation
 from transientcam_driver.plugin import CameraName
 from transientcam_driver.sequence import Sequence
-from transientcam_driver.simulation import world_of
+from transientcam_driver.simulation import list_scenes, world_of
+from transientcam_driver.simulation.build import MEASURED
 from transientcam_driver.simulation.device import prototype
 
 _BAD_USAGE = 2
+_COLUMNS = 80
 
 
 def explain(
@@ -29,7 +29,10 @@ def explain(
             help="A scene's name or .toml, or the whole name of a simulated camera: "
             "mirrors, my.toml, 'sim:corner?device=prototype&ambient=on'."
         ),
-    ],
+    ] = "",
+    all_scenes: Annotated[
+        bool, typer.Option("--all-scenes", help="All built-in scenes, as a table in Markdown.")
+    ] = False,
     sequence: Annotated[
         Path | None, typer.Option("--sequence", help="A sequence document, as JSON.")
     ] = None,
@@ -54,15 +57,25 @@ def explain(
         "exposure_s": exposure_s,
         "takes": takes,
     }
+    if bool(scene) == all_scenes:
+        typer.echo("transientcam explain: name a scene, or give --all-scenes", err=True)
+        raise typer.Exit(_BAD_USAGE)
+    names = (
+        [info.name for info in list_scenes() if info.name != MEASURED] if all_scenes else [scene]
+    )
     try:
-        explanation = _explained(scene, _sequence(sequence, options))
+        wanted = _sequence(sequence, options)
+        explanations = [_explained(name, wanted) for name in names]
     except DriverError as error:
         typer.echo(f"transientcam explain: {error}", err=True)
         raise typer.Exit(_BAD_USAGE) from error
     if as_json:
-        typer.echo(json.dumps(explanation.to_document(), indent=2))
+        documents = [each.to_document() for each in explanations]
+        typer.echo(json.dumps(documents if all_scenes else documents[0], indent=2))
+    elif all_scenes:
+        typer.echo(scenes_table(explanations))
     else:
-        _print(explanation)
+        typer.echo(described(explanations[0]))
 
 
 def _sequence(path: Path | None, options: dict[str, Any]) -> Sequence:
@@ -91,36 +104,64 @@ def _explained(name: str, sequence: Sequence) -> Explanation:
     return world.explain(scene.name, sequence)
 
 
-def _print(explanation: Explanation) -> None:
-    console = Console()
+def described(explanation: Explanation) -> str:
+    """Return an explanation as text of 80 columns: what is built, and what is left out."""
     sequence = explanation.sequence
-    console.print(
-        f"{escape(explanation.scene)}, device {explanation.device}: "
-        f"m = {sequence.harmonics} at {sequence.base_frequency_hz / 1e6:g} MHz, "
-        f"{sequence.exposure_s * 1e3:g} ms, {sequence.images} images. "
-        f"Noise floor of a moment: {explanation.floor_dn:.1f} DN; "
-        f"an effect is called for above {explanation.threshold:g} of it.",
-        soft_wrap=True,
+    head = (
+        f"{explanation.scene}, {explanation.device} device: m = {sequence.harmonics} at "
+        f"{sequence.base_frequency_hz / 1e6:g} MHz, {sequence.exposure_s * 1e3:g} ms, "
+        f"{sequence.images} images. The noise of a moment is {explanation.floor_dn:.1f} DN. "
+        f"An effect is called for above {explanation.threshold:g} of the noise over all lit "
+        f"pixels, or above {explanation.threshold_of_worst:g} of it in any pixel."
     )
-    table = Table(box=None)
-    for heading in ("effect", "called", "choice", "size", "/ noise", "a frame"):
-        table.add_column(heading, no_wrap=True)
-    table.add_column("why")
-    for each in explanation.effects:
-        table.add_row(*_row(each))
-    console.print(table)
+    lines = textwrap.wrap(head, _COLUMNS)
+    parts = (
+        ("Built:", [each for each in explanation.effects if each.built]),
+        ("Left out:", [each for each in explanation.effects if not each.built and each.size_dn]),
+    )
+    for title, effects in parts:
+        lines += ["", title] if effects else []
+        for each in effects:
+            lines += _lines(each)
+    absent = [each.effect for each in explanation.effects if not each.built and not each.size_dn]
+    lines += ["", *textwrap.wrap("Not there: " + ", ".join(absent) + ".", _COLUMNS)]
+    return "\n".join(lines)
 
 
-def _row(each: ExplainedEffect) -> tuple[str, ...]:
-    """One line; an effect that is built shows its name in bold."""
-    name = f"[bold]{each.effect}[/bold]" if each.built else each.effect
-    there = each.size_dn > 0
-    return (
-        name,
-        "yes" if each.called_for else "no",
-        each.choice,
-        f"{each.size_dn:.2g} DN" if there else "-",
-        f"{each.relative:.2g}" if there else "-",
-        f"{each.cost_s * 1e3:.2g} ms" if each.cost_s else "-",
-        escape(each.reason),
-    )
+def _lines(each: ExplainedEffect) -> list[str]:
+    """Say what an effect is, how large, at what cost, by whose choice, and why."""
+    size = f"{_figure(each.relative)} x the noise, at most {_figure(each.worst)} x"
+    cost = f"{each.cost_s * 1e3:.2g} ms a frame" if each.cost_s else "no time a frame"
+    choice = "" if each.choice in ("auto", "always") else f"; switched {each.choice}"
+    return [
+        f"  {each.effect}: {each.what}",
+        f"      {size}; {cost}{choice}",
+        *textwrap.wrap(each.reason, _COLUMNS, initial_indent="      ", subsequent_indent="      "),
+    ]
+
+
+def scenes_table(explanations: list[Explanation]) -> str:
+    """Return the sizes of effects over the noise by scene: root mean square, and largest."""
+    names = [each.effect for each in explanations[0].effects]
+    there = [
+        name
+        for k, name in enumerate(names)
+        if any(explanation.effects[k].size_dn for explanation in explanations)
+    ]
+    rows = ["| scene | " + " | ".join(there) + " |", "|---" * (1 + len(there)) + "|"]
+    for explanation in explanations:
+        cells = [_cell(each) for each in explanation.effects if each.effect in there]
+        rows.append(f"| {explanation.scene} | " + " | ".join(cells) + " |")
+    return "\n".join(rows)
+
+
+def _cell(each: ExplainedEffect) -> str:
+    if not each.size_dn:
+        return ""
+    size = f"{_figure(each.relative)} ({_figure(each.worst)})"
+    return f"**{size}**" if each.built else size
+
+
+def _figure(value: float) -> str:
+    """Two digits, and no powers of ten for what is large."""
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"

@@ -4,7 +4,7 @@ The figures of ``PROTOTYPE`` are those of the CamBoard nano family, on which the
 built, as far as they are known; the rest is chosen, and marked so.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 
@@ -77,6 +77,41 @@ class LensScatter:
 
 
 @dataclass(frozen=True, slots=True)
+class DarkCurrent:
+    """Electrons that come without light, the same in every pixel."""
+
+    electrons_per_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Lens:
+    """How a lens departs from a pinhole.
+
+    Attributes
+    ----------
+    distortion
+        k1, k2, p1, p2 of Brown's model, in units of the focal length: a point at (x, y) before the
+        lens is seen at x (1 + k1 r^2 + k2 r^4) + 2 p1 x y + p2 (r^2 + 2 x^2), and likewise in y.
+    centre
+        Where the axis meets the image, right of and below its middle, in widths of the image.
+    vignetting
+        Light falls with this power of the cosine to the axis; 4 is that of a thin lens.
+    """
+
+    distortion: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    centre: tuple[float, float] = (0.0, 0.0)
+    vignetting: float = 0.0
+
+    @property
+    def bends(self) -> bool:
+        """Whether it shows places elsewhere than a pinhole does."""
+        return any(self.distortion) or any(self.centre)
+
+
+PINHOLE = Lens()
+
+
+@dataclass(frozen=True, slots=True)
 class DeviceProfile:
     """One specimen of a make; None where it is perfect.
 
@@ -90,6 +125,7 @@ class DeviceProfile:
     drift: Drift | None = None
     outliers: Outliers | None = None
     lens_scatter: LensScatter | None = None
+    dark_current: DarkCurrent | None = None
     seed: int = 0
 
 
@@ -113,5 +149,9 @@ PROTOTYPE = DeviceProfile(
     outliers=Outliers(share=0.07),  # "5-10 % of all captured images" (Sec. 6)
     lens_scatter=LensScatter(share=0.02, width=0.15),  # chosen
 )
+
+TYPICAL = replace(PROTOTYPE, name="typical", dark_current=DarkCurrent(2e5))
+"""The prototype, and chosen figures of what is not known of it: for effects that are forced on."""
+TYPICAL_LENS = Lens((-0.12, 0.02, 0.0, 0.0), (0.0, 0.0), 4.0)
 
 PROFILES = {profile.name: profile for profile in (IDEAL, PROTOTYPE)}

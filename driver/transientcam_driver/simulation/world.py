@@ -9,7 +9,15 @@ from numpy.typing import NDArray
 from transientcam_driver.handle import ExplainedEffect, Explanation, Truth
 from transientcam_driver.sensor import Sensor
 from transientcam_driver.sequence import ImageLabel, Sequence
-from transientcam_driver.simulation.effects import CALLED_ABOVE, EFFECTS, Call, Conditions, Effect
+from transientcam_driver.simulation.effects import (
+    CALLED_ABOVE,
+    EFFECTS,
+    WORST_ABOVE,
+    Call,
+    Conditions,
+    Effect,
+)
+from transientcam_driver.simulation.effects.distortion import Distortion
 from transientcam_driver.simulation.effects.effect import (
     Exposure,
     ImageEffect,
@@ -24,50 +32,40 @@ from transientcam_driver.simulation.effects.effect import (
 from transientcam_driver.simulation.effects.modulation_harmonics import ModulationHarmonics
 from transientcam_driver.simulation.effects.motion import MotionDuringSequence
 from transientcam_driver.simulation.effects.thermal_drift import ThermalDrift
-from transientcam_driver.simulation.imperfections import IDEAL, DeviceProfile
-from transientcam_driver.simulation.light import Scenery, View, ViewAt
+from transientcam_driver.simulation.imperfections import IDEAL, PINHOLE, DeviceProfile
+from transientcam_driver.simulation.light import Scenery, View, Views, Wanted
+from transientcam_driver.simulation.light.bundle import Region
+from transientcam_driver.simulation.quadratures import Canvas, Quadratures
 
 _AMBIENT_C = 25.0
-
-
-@dataclass(frozen=True, slots=True)
-class _Quadratures:
-    """Electrons at phase theta: ``offset + sum_k re_k cos(k theta) + im_k sin(k theta)``."""
-
-    constant: NDArray[np.float32] | np.float32
-    offset: NDArray[np.float32]
-    terms: tuple[tuple[int, NDArray[np.float32], NDArray[np.float32]], ...]
-
-    @classmethod
-    def of(cls, planes: LightPlanes) -> "_Quadratures":
-        """Take planes apart into contiguous ones."""
-        terms = tuple(
-            (k, np.ascontiguousarray(term.real), np.ascontiguousarray(term.imag))
-            for k, term in planes.terms.items()
-        )
-        return cls(planes.constant, planes.mean + planes.constant, terms)
 
 
 @dataclass(slots=True)
 class _Plan:
     """Everything that is the same for all images of a sequence.
 
-    ``view`` is that of the last image, ``mean`` its brightness, and ``quadratures`` its planes by
-    harmonic.
+    ``time_s`` is that of the last image. ``quadratures`` are planes of ``view`` by harmonic, and
+    ``canvases`` such planes over a background.
     """
 
     sequence: Sequence
     frequencies_hz: dict[int, float]
     conditions: Conditions
-    view_at: ViewAt
+    views: Views
     per_image: bool
     waveform: ModulationHarmonics | None
     on_light: tuple[PlaneEffect, ...]
     on_shot: tuple[ShotEffect, ...]
     stages: tuple[Stage, ...]
     view: View | None = None
-    mean: NDArray[np.float64] | None = None
-    quadratures: dict[int, _Quadratures] = field(default_factory=dict)
+    time_s: float = 0.0
+    quadratures: dict[int, Quadratures] = field(default_factory=dict)
+    canvases: dict[int, Canvas] = field(default_factory=dict)
+
+    @property
+    def local(self) -> bool:
+        """Whether a region of the planes can be computed by itself."""
+        return all(effect.local for effect in self.on_light)
 
 
 class World:
@@ -113,7 +111,6 @@ class World:
         self._device = device
         self._ambient_electrons_per_s = ambient_electrons_per_s
         self._readout_s = readout_s
-        self._brightness = scenery.preview.responses.moments(0.0).real
         self._plan: _Plan | None = None
 
     @property
@@ -130,11 +127,15 @@ class World:
         built = [effect for effect in EFFECTS if self._is_built(effect, conditions)]
         of_light = frozenset(each.name for each in built if issubclass(each, LightEffect))
         made = [effect(self._forced(effect, conditions)) for effect in built]
+        lens = next((self._forced(e, conditions).lens for e in built if e is Distortion), PINHOLE)
+        noise = replace(conditions.noise, white_e=conditions.white_e)
         self._plan = _Plan(
             sequence,
             {label.harmonic: label.frequency_hz for label in labels},
             conditions,
-            self._scenery.view(of_light),
+            self._scenery.view(
+                Wanted(of_light, noise, conditions.highest_hz, lens, conditions.image_period_s)
+            ),
             MotionDuringSequence.name in of_light,
             next((each for each in made if isinstance(each, ModulationHarmonics)), None),
             tuple(each for each in made if isinstance(each, PlaneEffect)),
@@ -147,15 +148,22 @@ class World:
 
     def image(self, label: ImageLabel, *, number: int, device_time_s: float) -> NDArray[np.uint16]:
         """Expose and read one image: 1/2 (b_0 + Re(b_j G_1 exp(-i theta))), then the effects."""
+        random = np.random.Generator(np.random.SFC64(np.random.SeedSequence((self._seed, number))))
+        mean_e = self.mean_image_e(label, number=number, device_time_s=device_time_s)
+        exposure = Exposure(mean_e, random)
+        for stage in self._configured().stages:
+            stage.apply(exposure)
+        return exposure.signal.astype(np.uint16)
+
+    def mean_image_e(
+        self, label: ImageLabel, *, number: int, device_time_s: float
+    ) -> NDArray[np.float32]:
+        """Electrons (H, W) of an image on average, before noise and the converter."""
         plan = self._configured()
         shot = Shot(number, device_time_s, self._seed)
         for effect in plan.on_shot:
             effect.on_shot(shot)
-        random = np.random.Generator(np.random.SFC64(np.random.SeedSequence((self._seed, number))))
-        exposure = Exposure(self._mean_e(plan, label, shot), random)
-        for stage in plan.stages:
-            stage.apply(exposure)
-        return exposure.signal.astype(np.uint16)
+        return self._mean_e(plan, label, shot)
 
     def temperature_c(self, device_time_s: float) -> float:
         """Temperature of the sensor, which rises where thermal drift is built."""
@@ -166,20 +174,18 @@ class World:
     def conditions(self, sequence: Sequence) -> Conditions:
         """Conditions by which effects are judged."""
         scale_e = self._electrons_per_s * sequence.exposure_s
-        lit = self._brightness[self._brightness > 0]
-        white_e = self._ambient_electrons_per_s * sequence.exposure_s
         return Conditions(
             sensor=self._sensor,
             sequence=sequence,
-            brightness_e=float(lit.mean()) * scale_e if lit.size else 0.0,
-            pixels=self._brightness.size,
-            brightest_e=float(self._brightness.max(initial=0.0)) * scale_e,
-            ambient_white_e=white_e,
-            ambient_e=white_e * float(np.mean(self._scenery.preview.reflectance)),
+            scale_e=scale_e,
+            glimpses=self._scenery.glimpses,
+            white_e=self._ambient_electrons_per_s * sequence.exposure_s,
             image_period_s=sequence.exposure_s + self._readout_s,
             device=self._device,
+            lens=self._scenery.lens,
             facts=self._scenery.facts,
-            shape=(self._brightness.shape[0], self._brightness.shape[1]),
+            cosine=self._scenery.cosine,
+            moves=self._scenery.moves,
         )
 
     def calls(self, sequence: Sequence) -> dict[str, Call]:
@@ -199,17 +205,25 @@ class World:
             choice = self.choice(effect)
             explained = ExplainedEffect(
                 effect=effect.name,
+                what=effect.what,
                 choice=choice if effect.optional else "always",
                 called_for=bool(call.called),
                 built=choice == "on" or (choice == "auto" and bool(call.called)),
                 reason=call.reason,
                 size_dn=float(call.size_dn),
-                relative=float(call.size_dn) / floor_dn,
+                relative=float(call.relative),
+                worst=float(call.worst),
                 cost_s=call.cost_s * sequence.images,
             )
             effects.append(explained)
         return Explanation(
-            scene, self._device.name, sequence, floor_dn, tuple(effects), CALLED_ABOVE
+            scene,
+            self._device.name,
+            sequence,
+            floor_dn,
+            tuple(effects),
+            CALLED_ABOVE,
+            WORST_ABOVE,
         )
 
     def choice(self, effect: type[Effect]) -> str:
@@ -219,11 +233,8 @@ class World:
     def truth(self, *, device_time_s: float | None = None) -> Truth:
         """Ground truth, in DN at the exposure set; of the image that was made last."""
         plan = self._configured()
-        if device_time_s is not None or plan.view is None:
-            view = plan.view_at(device_time_s or 0.0)
-        else:
-            view = plan.view
-        responses = view.responses
+        time_s = plan.time_s if device_time_s is None else device_time_s
+        responses = plan.views.exact(time_s).responses
         scale_dn = self._electrons_per_s * plan.sequence.exposure_s / self._sensor.gain_e_per_dn
         delay_s, weight = responses.returns()
         return Truth(delay_s, weight * scale_dn, responses.kind, responses.of_pixel, scale_dn)
@@ -232,52 +243,50 @@ class World:
         time_s = shot.device_time_s
         if not plan.per_image:
             time_s -= label.index * plan.conditions.image_period_s
-        light = self._quadratures(plan, label.harmonic, time_s)
-        if not label.illumination:
-            return np.zeros_like(light.offset) + light.constant
-        electrons = light.offset.copy()
         turn_rad = label.phase_rad - 2 * np.pi * label.frequency_hz * shot.delay_s
-        for k, in_phase, quadrature in light.terms:
-            # the phasor of theta, turned back by light that is late or out of step
-            phasor = np.exp(1j * k * turn_rad)
-            if shot.factor != 1.0:
-                phasor *= np.conj(shot.factor)
-            electrons += in_phase * np.float32(phasor.real)
-            electrons += quadrature * np.float32(phasor.imag)
-        # |b_j| <= b_0, except for rounding
-        np.maximum(electrons, np.float32(0), out=electrons)
-        return electrons
+        # the phasor of theta, turned back by light that is late or out of step
+        out_of_step = np.conj(complex(shot.factor))
+        light = self._quadratures(plan, label.harmonic, time_s)
+        phasors = {k: complex(np.exp(1j * k * turn_rad)) * out_of_step for k, *_ in light.terms}
+        return light.at(phasors, illumination=label.illumination)
 
-    def _quadratures(self, plan: _Plan, harmonic: int, time_s: float) -> _Quadratures:
+    def _quadratures(self, plan: _Plan, harmonic: int, time_s: float) -> Quadratures:
         """Planes of the images of a harmonic; computed again only where the scene moves."""
-        view = plan.view_at(time_s)
+        view = plan.views.at(time_s)
+        plan.time_s = time_s
+        frequency_hz = plan.frequencies_hz[harmonic]
+
+        def of(view: View, region: Region | None) -> Quadratures:
+            return Quadratures.of(self._planes(plan, frequency_hz, view, region))
+
+        background = plan.views.background
+        if background is not None and view.region is not None and plan.local:
+            if harmonic not in plan.canvases:
+                plan.canvases[harmonic] = Canvas(background, of)
+            return plan.canvases[harmonic].showing(view)
         if plan.view is not view:
             plan.view = view
-            plan.mean = view.responses.moments(0.0).real
             plan.quadratures.clear()
-        assert plan.mean is not None  # noqa: S101  (set with view)
         if harmonic not in plan.quadratures:
-            frequency_hz = plan.frequencies_hz[harmonic]
-            plan.quadratures[harmonic] = _Quadratures.of(
-                self._planes(plan, frequency_hz, view, plan.mean)
-            )
+            plan.quadratures[harmonic] = of(view, None)
         return plan.quadratures[harmonic]
 
     def _planes(
-        self, plan: _Plan, frequency_hz: float, view: View, mean: NDArray[np.float64]
+        self, plan: _Plan, frequency_hz: float, view: View, region: Region | None
     ) -> LightPlanes:
         scale_e = 0.5 * self._electrons_per_s * plan.sequence.exposure_s
         planes = LightPlanes(
             frequency_hz,
+            (slice(None), slice(None)) if region is None else region,
             np.float32(0),
             view.reflectance,
-            (scale_e * mean).astype(np.float32),
+            (scale_e * view.moments(0.0, region).real).astype(np.float32),
         )
         if frequency_hz:
             contents = plan.waveform.harmonics(frequency_hz) if plan.waveform else {1: 1.0}
             for k, content in contents.items():
                 factor = scale_e * content * plan.conditions.sub_phase_gain(k)
-                moments = view.responses.moments(k * frequency_hz)
+                moments = view.moments(k * frequency_hz, region)
                 planes.terms[k] = (factor * moments).astype(np.complex64)
         for effect in plan.on_light:
             effect.on_light(planes)

@@ -220,11 +220,11 @@ def test_effects_say_whether_why_and_how_large() -> None:
     assert all(call.cost_s > 0 for call in calls.values() if call.called)
 
 
-def test_what_is_not_there_is_not_called_for() -> None:
+def test_shot_noise_is_called_for_in_the_dark_and_read_noise_where_there_is_any() -> None:
     dark = world(weights=(0.0,)).calls(Sequence(exposure_s=EXPOSURE_S))
     ideal = world(sensor=SENSOR.ideal()).calls(Sequence(exposure_s=EXPOSURE_S))
 
-    assert not dark["shot-noise"].called
+    assert dark["shot-noise"].called
     assert not ideal["read-noise"].called
     assert isinstance(ShotNoise.called_for(world().conditions(Sequence())), Call)
 

@@ -8,7 +8,7 @@ import pytest
 
 from transientcam_driver import open_camera
 from transientcam_driver.simulation.build import find_scene
-from transientcam_driver.simulation.light.paths import camera_rays
+from transientcam_driver.simulation.light.rays import camera_rays
 from transientcam_server.imaging.lens import Intrinsics, known_intrinsics
 from transientcam_server.settings import LensSettings
 

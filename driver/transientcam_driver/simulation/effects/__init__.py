@@ -6,13 +6,17 @@ number. A new effect is a file here and an entry in ``EFFECTS``.
 """
 
 from transientcam_driver.simulation.effects.ambient_light import AmbientLight
-from transientcam_driver.simulation.effects.effect import (
+from transientcam_driver.simulation.effects.conditions import (
     CALLED_ABOVE,
+    WORST_ABOVE,
     Call,
     Conditions,
-    Effect,
-    Facts,
 )
+from transientcam_driver.simulation.effects.dark_current import DarkCurrentElectrons
+from transientcam_driver.simulation.effects.distortion import Distortion
+from transientcam_driver.simulation.effects.effect import Effect
+from transientcam_driver.simulation.effects.glimpses import Facts, Glimpse
+from transientcam_driver.simulation.effects.gloss import Gloss
 from transientcam_driver.simulation.effects.interreflection import DiffuseInterreflection
 from transientcam_driver.simulation.effects.lens_scatter import LensScatter
 from transientcam_driver.simulation.effects.mirror_paths import MirrorPaths
@@ -30,6 +34,7 @@ from transientcam_driver.simulation.effects.synchronisation_outliers import (
     SynchronisationOutliers,
 )
 from transientcam_driver.simulation.effects.thermal_drift import ThermalDrift
+from transientcam_driver.simulation.effects.vignetting import Vignetting
 
 CHOICES = ("auto", "on", "off")
 
@@ -37,7 +42,9 @@ NOISE = (ShotNoise, ReadNoise)
 """Switched off by ``noise=off``."""
 
 EFFECTS: tuple[type[Effect], ...] = (
+    Distortion,
     MirrorPaths,
+    Gloss,
     DiffuseInterreflection,
     Scattering,
     MixedPixels,
@@ -46,7 +53,9 @@ EFFECTS: tuple[type[Effect], ...] = (
     AmbientLight,
     AmplitudeRollOff,
     LensScatter,
+    Vignetting,
     PixelPattern,
+    DarkCurrentElectrons,
     ThermalDrift,
     SynchronisationOutliers,
     Saturation,
@@ -60,8 +69,10 @@ __all__ = [
     "CHOICES",
     "EFFECTS",
     "NOISE",
+    "WORST_ABOVE",
     "Call",
     "Conditions",
     "Effect",
     "Facts",
+    "Glimpse",
 ]

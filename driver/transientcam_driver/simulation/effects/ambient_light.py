@@ -1,16 +1,12 @@
 """Ambient light: unmodulated, in every image, also without the camera's own."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    LightPlanes,
-    PlaneEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightPlanes, PlaneEffect
 
 
 class AmbientLight(PlaneEffect):
@@ -20,29 +16,33 @@ class AmbientLight(PlaneEffect):
     """
 
     name = "ambient"
+    what = "light other than the camera's own"
 
     def __init__(self, conditions: Conditions) -> None:
         super().__init__(conditions)
-        self._electrons = np.float32(conditions.ambient_white_e)
+        self._electrons = np.float32(conditions.white_e)
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
         """Where there is any whose shot noise counts."""
         if not conditions.ambient_e:
             return Call(False, "no light but the camera's", 0.0, 0.0)
-        noise_e = 2 * np.sqrt(conditions.ambient_e / conditions.sequence.takes)
-        size_dn = float(noise_e / conditions.sensor.gain_e_per_dn)
+        per_e = 2 / conditions.scale_e / math.sqrt(conditions.sequence.takes)
+        noise = tuple(
+            per_e * np.sqrt(conditions.white_e * each.reflectance) for each in conditions.glimpses
+        )
         reason = f"{conditions.ambient_e:.0f} electrons in a typical pixel of each image"
-        return weigh(conditions, size_dn, reason, 0.0)
+        return weigh(replace(conditions, white_e=0.0), noise, reason)
 
     @classmethod
     def forced_on(cls, conditions: Conditions) -> Conditions:
         """Return conditions with ambient light: a tenth of a full well, where there is none."""
-        if conditions.ambient_white_e:
+        if conditions.white_e:
             return conditions
-        ambient_e = 0.1 * conditions.sensor.full_well_e
-        return replace(conditions, ambient_white_e=ambient_e, ambient_e=ambient_e)
+        return replace(conditions, white_e=0.1 * conditions.sensor.full_well_e)
 
     def on_light(self, planes: LightPlanes) -> None:
         """Add it to the part without the camera's light."""
-        planes.constant = planes.constant + self._electrons * planes.reflectance
+        reflectance = np.asarray(planes.reflectance())
+        of_region = reflectance[planes.region] if reflectance.ndim else reflectance
+        planes.constant = planes.constant + self._electrons * of_region

@@ -3,13 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    LightPlanes,
-    PlaneEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightPlanes, PlaneEffect
 
 _COST_S_PER_PIXEL = 2e-7  # only where the scene moves; else it is done once
 
@@ -18,7 +13,9 @@ class LensScatter(PlaneEffect):
     """A share of the light is spread by a wide Gaussian; light that leaves the image is lost."""
 
     name = "lens-scatter"
+    what = "light goes astray in the lens"
     figures = "lens_scatter"
+    local = False
 
     def __init__(self, conditions: Conditions) -> None:
         super().__init__(conditions)
@@ -35,9 +32,16 @@ class LensScatter(PlaneEffect):
         scatter = conditions.device.lens_scatter
         if scatter is None or not scatter.share:
             return Call(False, "the lens of the device is clear", 0.0, 0.0)
-        cost_s = conditions.pixels * _COST_S_PER_PIXEL if _moves(conditions) else 0.0
+        cost_s = conditions.pixels * _COST_S_PER_PIXEL if conditions.moves else 0.0
         reason = f"{scatter.share:.1%} of the light goes astray"
-        return weigh(conditions, scatter.share * conditions.brightness_dn, reason, cost_s)
+        changes = []
+        for each in conditions.glimpses:
+            plane = each.brightness.reshape(each.shape)
+            rows, columns = (_spread(n, scatter.width * each.shape[1]) for n in each.shape)
+            # light that comes from elsewhere may have any phase
+            astray = rows @ plane @ columns.T + plane
+            changes.append(scatter.share * astray.ravel())
+        return weigh(conditions, tuple(changes), reason, cost_s)
 
     def on_light(self, planes: LightPlanes) -> None:
         """Spread all light."""
@@ -61,7 +65,3 @@ def _spread(count: int, sigma: float) -> NDArray[np.float32]:
     # normalised over all places, not only those on the sensor
     spread = density / np.exp(-0.5 * (reach / sigma) ** 2).sum()
     return np.asarray(spread, dtype=np.float32)
-
-
-def _moves(conditions: Conditions) -> bool:
-    return bool(conditions.facts and conditions.facts.speed_m_s)

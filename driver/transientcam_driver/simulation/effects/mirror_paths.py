@@ -1,18 +1,19 @@
 """Mirror paths: light that comes to a surface over mirrors."""
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, LightEffect, weigh
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightEffect
 
 
 class MirrorPaths(LightEffect):
     """Further returns, by image points; costs nothing once the scene is traced."""
 
     name = "mirror-paths"
+    what = "light over mirrors"
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
         """Where mirrors send light to what the camera sees."""
-        share = conditions.facts.mirror_share if conditions.facts else 0.0
-        if not share:
+        changes = conditions.changes(cls.name)
+        if not changes:
             return Call(False, "no light comes over mirrors", 0.0, 0.0)
-        reason = f"{share:.1%} of the light comes over mirrors"
-        return weigh(conditions, share * conditions.brightness_dn, reason, 0.0)
+        return weigh(conditions, changes, "{share} of the pixels see light over mirrors")

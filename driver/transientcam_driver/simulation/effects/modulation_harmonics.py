@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.errors import SceneError
-from transientcam_driver.simulation.effects.effect import Call, Conditions, Effect, weigh
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import Effect
 from transientcam_driver.simulation.imperfections import Waveform
 
 _HIGHEST = 9
@@ -23,6 +24,7 @@ class ModulationHarmonics(Effect):
     """
 
     name = "modulation-harmonics"
+    what = "the modulation is no pure sinusoid"
     figures = "waveform"
 
     def __init__(self, conditions: Conditions) -> None:
@@ -47,7 +49,7 @@ class ModulationHarmonics(Effect):
         )
         scheme = conditions.sequence.sub_phases.scheme
         reason = f"sub-phases ({scheme}) leave {left / gain:.2%} of other harmonics"
-        return weigh(conditions, left * conditions.brightness_dn, reason, 0.0)
+        return weigh(conditions, conditions.of_light(left), reason)
 
     def harmonics(self, frequency_hz: float) -> dict[int, complex]:
         """Content of the harmonics of a frequency, relative to the fundamental."""

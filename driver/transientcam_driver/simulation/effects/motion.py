@@ -1,11 +1,9 @@
 """Motion: the scene changes from one image of a sequence to the next."""
 
-import numpy as np
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightEffect
 
-from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
-from transientcam_driver.simulation.effects.effect import Call, Conditions, LightEffect, weigh
-
-_COST_S_PER_PIXEL = 1.2e-7
+_COST_S_PER_PIXEL = 8e-8
 
 
 class MotionDuringSequence(LightEffect):
@@ -15,20 +13,15 @@ class MotionDuringSequence(LightEffect):
     """
 
     name = "motion"
+    what = "the scene moves while a sequence is captured"
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
-        """Where something moves far enough during the images of one moment.
-
-        Its error is that of a pixel that the silhouette leaves, over the share of such pixels, and
-        the phase of the distance moved.
-        """
-        facts = conditions.facts
-        cost_s = conditions.pixels * _COST_S_PER_PIXEL
-        if facts is None or not facts.speed_m_s:
+        """Where the light of any pixel changes from the first image of a sequence to the last."""
+        changes = conditions.changes(cls.name)
+        if not changes:
             return Call(False, "nothing moves", 0.0, 0.0)
-        way_m = facts.speed_m_s * conditions.images_per_moment_s
-        phase_rad = 4 * np.pi * conditions.highest_hz * way_m / SPEED_OF_LIGHT_M_S
-        size_dn = phase_rad * np.sqrt(facts.moving_share) * conditions.brightness_dn
-        reason = f"up to {way_m * 1e3:.1f} mm during the images of one moment"
-        return weigh(conditions, float(size_dn), reason, cost_s)
+        cost_s = conditions.pixels * _COST_S_PER_PIXEL
+        took = f"the {conditions.sequence_s:.3g} s of a sequence"
+        reason = f"{{share}} of the pixels change within {took}"
+        return weigh(conditions, changes, reason, cost_s)

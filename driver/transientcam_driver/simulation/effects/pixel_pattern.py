@@ -6,13 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.errors import SceneError
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    LightPlanes,
-    PlaneEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightPlanes, PlaneEffect
 from transientcam_driver.simulation.imperfections import Pattern
 
 _CODES = 4096  # of a turn, in files of phase offsets
@@ -26,6 +21,7 @@ class PixelPattern(PlaneEffect):
     """
 
     name = "pixel-pattern"
+    what = "each pixel has a delay and a gain of its own"
     figures = "pattern"
 
     def __init__(self, conditions: Conditions) -> None:
@@ -52,17 +48,18 @@ class PixelPattern(PlaneEffect):
         phase_rad = 2 * np.pi * conditions.highest_hz * delay_s
         # of normal phases, E|exp(i phase) - 1|^2 = 2 - 2 exp(-variance / 2)
         turned = 2 - 2 * np.exp(-0.5 * phase_rad**2)
-        size_dn = float(np.sqrt(turned + pattern.gain**2)) * conditions.brightness_dn
+        changes = conditions.of_light(float(np.sqrt(turned + pattern.gain**2)))
         reason = f"{delay_s * 1e12:.0f} ps and {pattern.gain:.1%} from pixel to pixel"
-        return weigh(conditions, size_dn, reason, 0.0)
+        return weigh(conditions, changes, reason)
 
     def on_light(self, planes: LightPlanes) -> None:
         """Turn and scale each pixel."""
-        planes.constant = planes.constant * self._gain
-        planes.mean *= self._gain
+        gain, delay_s = self._gain[planes.region], self._delay_s[planes.region]
+        planes.constant = planes.constant * gain
+        planes.mean *= gain
         for k, term in planes.terms.items():
-            phase_rad = 2 * np.pi * k * planes.frequency_hz * self._delay_s
-            term *= self._gain * np.exp(1j * phase_rad).astype(np.complex64)
+            phase_rad = 2 * np.pi * k * planes.frequency_hz * delay_s
+            term *= gain * np.exp(1j * phase_rad).astype(np.complex64)
 
 
 def delays_s(

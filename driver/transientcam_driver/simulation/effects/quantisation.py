@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, Exposure, ImageEffect
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, always
+from transientcam_driver.simulation.effects.effect import Exposure, ImageEffect
 
 _COST_S_PER_PIXEL = 3e-9
 
@@ -13,6 +14,7 @@ class Quantisation(ImageEffect):
     """Round to the nearest code. Always there: an image holds integers."""
 
     name = "quantisation"
+    what = "images hold whole numbers"
     optional = False
 
     def __init__(self, conditions: Conditions) -> None:
@@ -26,7 +28,7 @@ class Quantisation(ImageEffect):
         """Call for it always; its error is that of rounding four images, 1 / sqrt(12) each."""
         reason = f"{conditions.sensor.bits} bits of {conditions.sensor.gain_e_per_dn:g} electrons"
         size_dn = 2 / math.sqrt(12 * conditions.sequence.takes)
-        return Call(True, reason, size_dn, conditions.pixels * _COST_S_PER_PIXEL)
+        return always(conditions, size_dn, reason, conditions.pixels * _COST_S_PER_PIXEL)
 
     def apply(self, exposure: Exposure) -> None:
         """Turn electrons into codes."""

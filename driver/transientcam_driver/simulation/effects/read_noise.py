@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, Exposure, ImageEffect
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, always
+from transientcam_driver.simulation.effects.effect import Exposure, ImageEffect
 
 _COST_S_PER_PIXEL = 8e-9
 
@@ -13,6 +14,7 @@ class ReadNoise(ImageEffect):
     """Normal, the same for every pixel, independent of the light."""
 
     name = "read-noise"
+    what = "the amplifier adds noise"
     adds_variance = True
 
     def __init__(self, conditions: Conditions) -> None:
@@ -29,7 +31,7 @@ class ReadNoise(ImageEffect):
         # a moment is made of four images and has twice their noise
         size_dn = 2 * noise_e / math.sqrt(conditions.sequence.takes)
         size_dn /= conditions.sensor.gain_e_per_dn
-        return Call(True, f"{noise_e:g} electrons at each read-out", size_dn, cost_s)
+        return always(conditions, size_dn, f"{noise_e:g} electrons at each read-out", cost_s)
 
     def apply(self, exposure: Exposure) -> None:
         """Add its variance."""

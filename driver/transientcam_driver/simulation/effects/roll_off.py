@@ -2,13 +2,8 @@
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    LightPlanes,
-    PlaneEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import LightPlanes, PlaneEffect
 from transientcam_driver.simulation.imperfections import RollOff
 
 
@@ -16,6 +11,7 @@ class AmplitudeRollOff(PlaneEffect):
     """Multiplies the modulated part by an amplitude that depends on the frequency."""
 
     name = "roll-off"
+    what = "high frequencies are modulated less"
     figures = "roll_off"
 
     def __init__(self, conditions: Conditions) -> None:
@@ -30,8 +26,8 @@ class AmplitudeRollOff(PlaneEffect):
         if roll_off is None:
             return Call(False, "the device modulates alike at all frequencies", 0.0, 0.0)
         least = min(amplitude(roll_off, f_hz) for f_hz in conditions.frequencies_hz)
-        size_dn = (1 - least) * conditions.brightness_dn
-        return weigh(conditions, size_dn, f"down to {least:.0%} of the amplitude", 0.0)
+        changes = conditions.of_light(1 - least)
+        return weigh(conditions, changes, f"down to {least:.0%} of the amplitude")
 
     def on_light(self, planes: LightPlanes) -> None:
         """Weaken the modulated part."""

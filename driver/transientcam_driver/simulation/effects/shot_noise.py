@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import Call, Conditions, Exposure, ImageEffect
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, always
+from transientcam_driver.simulation.effects.effect import Exposure, ImageEffect
 
 FEW_E = 100.0
 """Below this mean a pixel is drawn from the Poisson distribution itself.
@@ -21,26 +22,26 @@ class ShotNoise(ImageEffect):
     """Variance equal to the mean."""
 
     name = "shot-noise"
+    what = "light comes in single electrons"
     adds_variance = True
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
-        """Wherever there is light."""
+        """Call for it always: what is dark now may be lit later."""
         mean_e = conditions.mean_e
         # a moment is made of four images and has twice their noise
         size_dn = 2 * math.sqrt(mean_e / conditions.sequence.takes)
         size_dn /= conditions.sensor.gain_e_per_dn
         cost_s = conditions.pixels * _COST_S_PER_PIXEL
-        if mean_e == 0:
-            return Call(False, "no light reaches the sensor", 0.0, cost_s)
-        return Call(True, f"{mean_e:.0f} electrons in a typical pixel", size_dn, cost_s)
+        return always(conditions, size_dn, f"{mean_e:.0f} electrons in a typical pixel", cost_s)
 
     def apply(self, exposure: Exposure) -> None:
         """Draw few electrons one by one; give many their variance."""
         signal = exposure.signal
-        few = signal < FEW_E
-        if few.any():
-            exposure.variance_e2 = exposure.variance_e2 + np.where(few, np.float32(0), signal)
-            signal[few] = exposure.random.poisson(signal[few])
-        else:
-            exposure.variance_e2 = exposure.variance_e2 + signal
+        few = np.flatnonzero(signal < FEW_E)
+        exposure.variance_e2 = exposure.variance_e2 + signal
+        if few.size:
+            flat, variance_e2 = signal.reshape(-1), exposure.variance_e2.reshape(-1)
+            variance_e2[few] -= flat[few]
+            lit = few[flat[few] > 0]
+            flat[lit] = exposure.random.poisson(flat[lit])

@@ -4,13 +4,8 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    Shot,
-    ShotEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import Shot, ShotEffect
 
 
 class SynchronisationOutliers(ShotEffect):
@@ -21,6 +16,7 @@ class SynchronisationOutliers(ShotEffect):
     """
 
     name = "outliers"
+    what = "images that lose their synchronisation"
     figures = "outliers"
 
     def __init__(self, conditions: Conditions) -> None:
@@ -36,8 +32,8 @@ class SynchronisationOutliers(ShotEffect):
             return Call(False, "the device never loses its synchronisation", 0.0, 0.0)
         # a random phase for a part uniform in [0.2, 1]: E part^2 = 0.41; two images a component
         error = math.sqrt(outliers.share * 2 * 0.41 * 2) / 2
-        size_dn = error * conditions.brightness_dn * abs(conditions.sub_phase_gain(1))
-        return weigh(conditions, size_dn, f"{outliers.share:.0%} of the images", 1e-5)
+        changes = conditions.of_light(error * abs(conditions.sub_phase_gain(1)))
+        return weigh(conditions, changes, f"{outliers.share:.0%} of the images", 1e-5)
 
     def on_shot(self, shot: Shot) -> None:
         """Give a share of the images a random phase."""

@@ -4,13 +4,8 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.effects.effect import (
-    Call,
-    Conditions,
-    Shot,
-    ShotEffect,
-    weigh,
-)
+from transientcam_driver.simulation.effects.conditions import Call, Conditions, weigh
+from transientcam_driver.simulation.effects.effect import Shot, ShotEffect
 from transientcam_driver.simulation.imperfections import Drift
 
 
@@ -18,6 +13,7 @@ class ThermalDrift(ShotEffect):
     """All times of flight grow with the temperature above that at the start."""
 
     name = "thermal-drift"
+    what = "the light comes later as the camera warms up"
     figures = "drift"
 
     def __init__(self, conditions: Conditions) -> None:
@@ -34,7 +30,7 @@ class ThermalDrift(ShotEffect):
         delay_s = abs(drift.rise_c * drift.delay_s_per_c)
         turn = abs(np.exp(2j * np.pi * conditions.highest_hz * delay_s) - 1)
         reason = f"{delay_s * 1e12:.0f} ps by {drift.rise_c:g} degrees in the end"
-        return weigh(conditions, float(turn) * conditions.brightness_dn, reason, 0.0)
+        return weigh(conditions, conditions.of_light(float(turn)), reason)
 
     def rise_c(self, device_time_s: float) -> float:
         """How much warmer the device is than at its start."""

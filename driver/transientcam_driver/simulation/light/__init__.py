@@ -1,8 +1,9 @@
 """Light transport: from a scene to the impulse response of each pixel.
 
-``paths`` follows rays and mirrors, ``moving`` what moves, ``radiosity`` diffuse interreflection,
-``mixed_pixels`` the pixels at edges; ``measured`` reads responses from files. ``transport`` puts
-together what is called for.
+``paths`` follows rays and mirrors, ``still`` traces what stands still and the areas of its pixels,
+``moving`` what moves, by ``bundle``s of lines and the ``coverage`` of pixels, as ``layers``;
+``radiosity`` is diffuse interreflection, ``measured`` reads responses from files. ``facts`` leaves
+effects out to see what they are worth; ``transport`` puts together what is called for.
 """
 
 from transientcam_driver.simulation.light.measured import load_responses
@@ -11,7 +12,16 @@ from transientcam_driver.simulation.light.transport import (
     Scenery,
     SurfaceScenery,
     View,
-    ViewAt,
+    Views,
+    Wanted,
 )
 
-__all__ = ["GivenScenery", "Scenery", "SurfaceScenery", "View", "ViewAt", "load_responses"]
+__all__ = [
+    "GivenScenery",
+    "Scenery",
+    "SurfaceScenery",
+    "View",
+    "Views",
+    "Wanted",
+    "load_responses",
+]

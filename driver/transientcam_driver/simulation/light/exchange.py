@@ -18,6 +18,9 @@ from transientcam_driver.simulation.responses import BIN_S, Scatter
 from transientcam_driver.simulation.scene import Scene
 from transientcam_driver.simulation.scene.geometry import Points
 
+_MOST_BOUNCES = 200  # in a room of white walls light is followed no further
+_HISTORY_BOUNCES = 4
+_HISTORY_LEFT = 0.02  # of the highest radiosity
 _SAMPLES = 3  # a side, of the direct light on a patch: its edge may cross the patch
 
 
@@ -62,8 +65,27 @@ class Exchange:
             radiosity,
         )
 
-    def irradiance(self, frequency_hz: float) -> NDArray[np.complex128]:
-        """Moments (N) of the light that patches get from each other, over all bounces."""
+    def bounces(self, tolerance: float) -> int:
+        """Return how often light is followed from patch to patch.
+
+        As the scene says; or until all that is left, at the rate at which it falls from bounce to
+        bounce, gives no patch more than ``tolerance`` of radiosity. The bound holds at every
+        frequency, as no moment exceeds the zeroth.
+        """
+        if self.scene.transport.diffuse_bounces is not None:
+            return self.scene.transport.diffuse_bounces
+        light = self.radiosity.sum(axis=(0, 2))
+        highest = [float(light.max(initial=0.0))]
+        for bounce in range(_MOST_BOUNCES):
+            light = self.patches.albedo * (self.factors @ light)
+            highest.append(float(light.max(initial=0.0)))
+            share = min(highest[-1] / highest[-2], 0.999) if highest[-2] else 0.0
+            if highest[-1] / (1 - share) <= tolerance:
+                return bounce
+        return _MOST_BOUNCES
+
+    def irradiance(self, frequency_hz: float, bounces: int) -> NDArray[np.complex128]:
+        """Moments (N) of the light that patches get from each other, over some bounces."""
         omega = 2 * np.pi * frequency_hz
         scatter = scatter_of(self.scene, self.patches.surface)
         transfer = 1.0 if scatter is None else scatter.transfer(frequency_hz)
@@ -71,7 +93,7 @@ class Exchange:
         phase = np.float32(omega / SPEED_OF_LIGHT_M_S) * self.distance_m
         in_phase, quadrature = self.factors * np.cos(phase), self.factors * np.sin(phase)
         total = np.zeros(len(self.patches), dtype=np.complex128)
-        for _bounce in range(self.scene.transport.diffuse_bounces):
+        for _bounce in range(bounces):
             given = (light * transfer).astype(np.complex64)
             of_real, of_imag = given.real.copy(), given.imag.copy()
             got = (in_phase @ of_real - quadrature @ of_imag) + 1j * (
@@ -85,14 +107,18 @@ class Exchange:
     def history(self) -> tuple[float, NDArray[np.float64]]:
         """Irradiance (N, T) over time in bins of ``BIN_S``, and the time of the first bin's start.
 
-        Light is moved by whole bins, so that each bounce is off by half a bin at most.
+        Of the first bounces only; who reads it scales it to the light of all. Light is moved by
+        whole bins, so that each bounce is off by half a bin at most.
         """
         shift = np.rint(self.distance_m / (SPEED_OF_LIGHT_M_S * BIN_S)).astype(np.intp)
         scatter = scatter_of(self.scene, self.patches.surface)
         first_s = float(self.delay_s[self.radiosity > 0].min(initial=1.0))
         placed = np.rint((self.delay_s - first_s) / BIN_S).astype(np.intp)
         placed[self.radiosity <= 0] = 0
-        bounces = self.scene.transport.diffuse_bounces
+        bounces = min(
+            _HISTORY_BOUNCES,
+            self.bounces(_HISTORY_LEFT * float(self.radiosity.sum(axis=2).max(initial=0.0))),
+        )
         tail = 0
         if scatter is not None:
             tail = int((8 * scatter.width_s.max() + 12 * scatter.decay_s.max()) / BIN_S) + 1

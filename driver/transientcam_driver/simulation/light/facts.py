@@ -1,156 +1,206 @@
-"""Figures of a scene by which effects are judged, still or over time."""
+"""How far each effect moves the light of a scene, still or over its life: by leaving it out."""
 
-from dataclasses import replace
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.effects import Facts
-from transientcam_driver.simulation.light.mixed_pixels import edges
-from transientcam_driver.simulation.light.paths import Lit, camera_rays, light_rays
+from transientcam_driver.simulation.effects import Glimpse
+from transientcam_driver.simulation.effects.glimpses import Values
+from transientcam_driver.simulation.imperfections import PINHOLE
+from transientcam_driver.simulation.light.exchange import Exchange
+from transientcam_driver.simulation.light.paths import Lit, light_rays
 from transientcam_driver.simulation.light.radiosity import Interreflection
-from transientcam_driver.simulation.responses import Scatter
-from transientcam_driver.simulation.scene import Scene
-from transientcam_driver.simulation.scene.geometry import Rectangle
+from transientcam_driver.simulation.light.rays import rays_through
+from transientcam_driver.simulation.light.variants import without_gloss, without_mirrors
+from transientcam_driver.simulation.scene.geometry import Points, Rectangle
+from transientcam_driver.simulation.scene.scene import Scene, Viewpoint
 
-_ROUGH_PATCHES = 6  # a side, to estimate the share of interreflection
-_JUDGED_TIMES = 5  # of a period, at which a moving scene is judged
-_COARSER = 3  # times fewer pixels a side than the image, where a moving scene is judged
-
-
-def facts_of(scene: Scene, lit: Lit, *, width: int, height: int) -> Facts:
-    """Judge a scene that stands still by what the camera's rays see of it."""
-    return _StillFacts(scene, lit, width, height)
-
-
-def facts_over_time(scene: Scene, *, width: int, height: int) -> Facts:
-    """Judge a moving scene at several times of its longest period, with fewer rays."""
-    period_s = max(motion.period_s for each in scene.surfaces for motion in each.motions)
-    times_s = (np.arange(_JUDGED_TIMES) + 0.5) / _JUDGED_TIMES * period_s
-    width, height = max(2, width // _COARSER), max(2, height // _COARSER)
-    assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
-    rays = camera_rays(scene.camera, width=width, height=height)
-    scenes = [scene.at(float(time_s)) for time_s in times_s]
-    return _MovingFacts(
-        scene, [_StillFacts(still, light_rays(still, rays), width, height) for still in scenes]
-    )
+_PIXELS = 20_000  # judged of a still scene, about; of larger images every second pixel a side, ...
+_PIXELS_MOVING = 1_500  # the same at each time
+_TIMES = 8  # of the longest period, at which a moving scene is judged
+_WITHIN = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))  # of a pixel
+_FREQUENCIES = 8  # judged at most; the highest one always
+_ROUNDING = 1e-9
+_ROUGH_PATCHES = 6  # a side, to estimate interreflection
+_ROUGH_ERROR = 1.5  # by which that may be too low
 
 
-class _StillFacts:
-    """Of a scene that stands still."""
+@dataclass(frozen=True)
+class _Seen:
+    """Rays into pixels at one time, one or several a pixel, and the light that they see.
 
-    speed_m_s = 0.0
-    moving_share = 0.0
+    ``sharp``: as if no surface let light in.
+    """
 
-    def __init__(self, scene: Scene, lit: Lit, width: int, height: int) -> None:
+    scene: Scene
+    lits: tuple[Lit, ...]
+    sharp: bool = False
+
+    def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
+        """Means over the rays of each pixel."""
+        total = np.zeros(len(self.lits[0].surface), dtype=np.complex128)
+        for lit in self.lits:
+            total += lit.moments(frequency_hz, None if self.sharp else lit.scatter(self.scene))
+        mean: NDArray[np.complex128] = total / len(self.lits)
+        return mean
+
+
+class SceneFacts:
+    """Of a scene of surfaces before a camera of so many pixels."""
+
+    def __init__(self, scene: Scene, *, width: int, height: int) -> None:
+        assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
+        self._camera = scene.camera
         self._scene = scene
-        self._lit = lit
-        self._width, self._height = width, height
+        self._size = width, height
+        pixels = _PIXELS_MOVING if scene.moves else _PIXELS
+        stride = max(1, math.floor(math.sqrt(width * height / pixels)))
+        columns, rows = np.meshgrid(
+            np.arange(stride // 2, width, stride), np.arange(stride // 2, height, stride)
+        )
+        self._shape = rows.shape
+        self._rows, self._columns = rows.ravel(), columns.ravel()
+        self._times_s: tuple[float, ...] = (0.0,)
+        if scene.moves:
+            period_s = max(each.period_s for surface in scene.surfaces for each in surface.motions)
+            self._times_s = tuple((k + 0.5) / _TIMES * period_s for k in range(_TIMES))
+        self._found: dict[tuple[str, tuple[float, ...], float], tuple[Values, ...]] = {}
 
     @cached_property
-    def brightness(self) -> float:
-        """All light but that of interreflection."""
-        return float(self._lit.weight.sum())
+    def glimpses(self) -> tuple[Glimpse, ...]:
+        """Direct light and mirrors on the pixels judged."""
+        cosine = cosine_to_axis(self._camera, self._rays(self._camera))
+        return tuple(
+            Glimpse(each.lits[0].weight.sum(axis=0), each.lits[0].reflectance, cosine, self._shape)
+            for each in self._seen
+        )
 
-    @property
-    def mirror_share(self) -> float:
-        if not self.brightness:
-            return 0.0
-        return float(self._lit.weight[1:].sum() / self.brightness)
+    def changes(
+        self, effect: str, frequencies_hz: tuple[float, ...], *, during_s: float = 0.0
+    ) -> tuple[Values, ...]:
+        """Return how far leaving out an effect moves each pixel's moments, at most, by time."""
+        key = effect, frequencies_hz, during_s if effect == "motion" else 0.0
+        if key not in self._found:
+            self._found[key] = self._changes(effect, _some(frequencies_hz), during_s)
+        return self._found[key]
 
-    @property
-    def indirect_share(self) -> float:
-        return self._indirect_share
+    def further_bounces(self, tolerance: float) -> int:
+        """Return how often light goes from surface to surface until less than this is left."""
+        return Exchange.of(self._rough(self._scene.at(self._times_s[0])), _ROUGH_PATCHES).bounces(
+            tolerance
+        )
+
+    def _changes(
+        self, effect: str, frequencies_hz: tuple[float, ...], during_s: float
+    ) -> tuple[Values, ...]:
+        if effect == "interreflection":
+            return self._further_light()
+        surfaces, camera, there = self._scene.surfaces, self._camera, self._seen
+        variants: dict[str, tuple[bool, Callable[[], list[list[_Seen]]]]] = {
+            "mirror-paths": (
+                any(each.kind == "mirror" for each in surfaces),
+                lambda: [[self._look(without_mirrors(each.scene), camera) for each in there]],
+            ),
+            "gloss": (
+                any(each.gloss for each in surfaces),
+                lambda: [[self._look(without_gloss(each.scene), camera) for each in there]],
+            ),
+            "scattering": (
+                any(each.scatter for each in surfaces),
+                lambda: [[replace(each, sharp=True) for each in there]],
+            ),
+            "mixed-pixels": (
+                True,
+                lambda: [[self._look(each.scene, camera, _WITHIN) for each in there]],
+            ),
+            "distortion": (
+                camera.lens.bends,
+                lambda: [[self._look(each.scene, replace(camera, lens=PINHOLE)) for each in there]],
+            ),
+            "motion": (
+                self._scene.moves,
+                lambda: [
+                    [self._look(self._scene.at(t + part * during_s), camera) for t in self._times_s]
+                    for part in (0.5, 1.0)
+                ],
+            ),
+        }
+        happens, others = variants[effect]
+        return self._apart(others(), frequencies_hz) if happens else ()
 
     @cached_property
-    def _indirect_share(self) -> float:
+    def _seen(self) -> list[_Seen]:
+        return [self._look(self._scene.at(time_s), self._camera) for time_s in self._times_s]
+
+    def _look(
+        self,
+        scene: Scene,
+        camera: Viewpoint,
+        places: tuple[tuple[float, float], ...] = ((0.0, 0.0),),
+    ) -> _Seen:
+        """Follow rays through places in the pixels judged, from their centres."""
+        return _Seen(scene, tuple(light_rays(scene, self._rays(camera, at)) for at in places))
+
+    def _rays(self, camera: Viewpoint, at: tuple[float, float] = (0.0, 0.0)) -> Points:
+        width, height = self._size
+        return rays_through(
+            camera, self._columns + at[0], self._rows + at[1], width=width, height=height
+        )
+
+    def _apart(
+        self, others: list[list[_Seen]], frequencies_hz: tuple[float, ...]
+    ) -> tuple[Values, ...]:
+        """Return the largest difference of moments from those of several variants."""
+        apart = tuple(np.zeros(len(self._rows)) for _ in self._seen)
+        for frequency_hz in frequencies_hz:
+            for k, one in enumerate(self._seen):
+                moments = one.moments(frequency_hz)
+                for other in others:
+                    change = np.abs(moments - other[k].moments(frequency_hz))
+                    # what rounding alone makes is no change
+                    change[change < _ROUNDING * np.abs(moments)] = 0
+                    np.maximum(apart[k], change, out=apart[k])
+        return apart
+
+    def _further_light(self) -> tuple[Values, ...]:
+        """Estimate the brightness of light over several surfaces, which bounds its moments."""
         transport = self._scene.transport
         scattering = [each for each in self._scene.surfaces if each.scatters]
         flat = len(scattering) == 1 and isinstance(scattering[0].shape, Rectangle)
-        if flat or not scattering or not transport.diffuse_bounces or not self.brightness:
-            return 0.0
-        rough = replace(transport, patches=min(_ROUGH_PATCHES, transport.patches))
-        scene = replace(self._scene, transport=rough)
-        further = Interreflection(scene, self._lit, width=self._width, height=self._height)
-        indirect = float(further.moments(0.0).real.sum())
-        return indirect / (indirect + self.brightness)
+        if flat or not scattering or transport.diffuse_bounces == 0:
+            return ()
+        height, width = self._shape
+        found = []
+        for each in self._seen:
+            further = Interreflection(
+                self._rough(each.scene), each.lits[0], width=width, height=height
+            )
+            found.append(_ROUGH_ERROR * further.moments(0.0).real.ravel())
+        return tuple(found)
 
-    @property
-    def _depths(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        scatter = self._lit.scatter(self._scene)
-        none = np.zeros(len(self._lit.surface))
-        return (none, none) if scatter is None else (scatter.width_s, scatter.decay_s)
-
-    @property
-    def scatter(self) -> Scatter | None:
-        width_s, decay_s = self._depths
-        slowest = int(decay_s.argmax())
-        return Scatter(width_s[slowest], decay_s[slowest]) if decay_s[slowest] else None
-
-    @property
-    def scatter_share(self) -> float:
-        return float(np.mean(self._depths[1] > 0))
-
-    @property
-    def edges(self) -> tuple[float, float]:
-        return self._edges
-
-    @cached_property
-    def _edges(self) -> tuple[float, float]:
-        edge, steps = edges(self._lit.distance_m.reshape(self._height, self._width))
-        return float(edge.mean()), float(np.sqrt(np.mean(steps**2))) if steps.size else 0.0
-
-    @property
-    def surface(self) -> NDArray[np.intp]:
-        """What the rays see."""
-        return self._lit.surface
+    def _rough(self, scene: Scene) -> Scene:
+        patches = min(_ROUGH_PATCHES, scene.transport.patches)
+        return replace(scene, transport=replace(scene.transport, patches=patches))
 
 
-class _MovingFacts:
-    """Of a scene that moves: means over several times, or the largest of them."""
+def _some(frequencies_hz: tuple[float, ...]) -> tuple[float, ...]:
+    """Choose a few of many frequencies, evenly, up to the highest."""
+    step = math.ceil(len(frequencies_hz) / _FREQUENCIES)
+    return tuple(sorted(frequencies_hz)[::-1][::step])
 
-    def __init__(self, scene: Scene, still: list[_StillFacts]) -> None:
-        self._scene = scene
-        self._still = still
 
-    def _mean(self, values: list[float]) -> float:
-        return float(np.mean(values))
-
-    @property
-    def mirror_share(self) -> float:
-        return self._mean([each.mirror_share for each in self._still])
-
-    @property
-    def indirect_share(self) -> float:
-        return self._indirect_share
-
-    @cached_property
-    def _indirect_share(self) -> float:
-        return self._mean([each.indirect_share for each in self._still])
-
-    @property
-    def scatter(self) -> Scatter | None:
-        found = [each.scatter for each in self._still if each.scatter is not None]
-        return max(found, key=lambda scatter: float(scatter.decay_s), default=None)
-
-    @property
-    def scatter_share(self) -> float:
-        return self._mean([each.scatter_share for each in self._still])
-
-    @property
-    def edges(self) -> tuple[float, float]:
-        shares, steps = zip(*(each.edges for each in self._still), strict=True)
-        # on the coarser grid the share of pixels at an edge is as many times higher
-        return float(np.mean(shares)) / _COARSER, float(max(steps))
-
-    @property
-    def speed_m_s(self) -> float:
-        return max(
-            sum(motion.speed_m_s for motion in each.motions) for each in self._scene.surfaces
-        )
-
-    @property
-    def moving_share(self) -> float:
-        moving = [index for index, each in enumerate(self._scene.surfaces) if each.motions]
-        return self._mean([float(np.isin(still.surface, moving).mean()) for still in self._still])
+def cosine_to_axis(camera: Viewpoint, rays: Points) -> Values:
+    """Return the cosine of each ray's angle to the axis of the lens."""
+    half_width = math.tan(math.radians(camera.field_of_view_deg) / 2)
+    x, y = camera.lens.centre
+    axis = camera.look_at_m - camera.position_m
+    axis = axis / np.linalg.norm(axis)
+    right = np.cross(axis, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    axis = axis + 2 * half_width * (x * right - y * np.cross(right, axis))
+    cosine: Values = rays @ (axis / np.linalg.norm(axis))
+    return cosine

@@ -1,80 +1,58 @@
 """Light in a scene some of whose surfaces move.
 
-What stands still is traced once. At each time only what the moving surfaces change is computed:
-the rays of the camera that end on one of them, and the paths of light that they block.
+What stands still is traced once. At each time only what the moving surfaces change is computed: the
+pixels that show one of them, by the share of the pixel that it covers, and the ways of light that
+it blocks. Everything follows the device's time without steps.
 """
 
-from dataclasses import replace
-from typing import Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.light.paths import (
-    ImageLight,
-    Lit,
-    RayEnds,
-    first_scattering,
-    image_lights,
-    light_on_ends,
-    light_rays,
+from transientcam_driver.simulation.light.bundle import (
+    Bundle,
+    Region,
+    extent,
+    inside,
+    overlap,
+    union,
 )
-from transientcam_driver.simulation.light.paths import sparse as sparse_of
-from transientcam_driver.simulation.responses import SparseResponses
-from transientcam_driver.simulation.scene.geometry import Ellipsoid, Points, Shape
+from transientcam_driver.simulation.light.coverage import Crossing, Plane, covered, crossing
+from transientcam_driver.simulation.light.ends import Ends
+from transientcam_driver.simulation.light.layers import Layer, MovingResponses, Shadow
+from transientcam_driver.simulation.light.paths import ImageLight, image_lights, light_rays
+from transientcam_driver.simulation.light.still import StillLight
+from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene
 
-_FAR_M = 1e3  # longer than any path in a scene
-_END = 1 - 1e-5  # of a segment, in single precision
-_START = 1e-5
-_PIXELS = 1.0  # that the fastest surface may move before the scene is computed again
+_SIDE_IN_MIRRORS = 2  # rays a side of pixels that show something that moves in a mirror
+_AWAY = np.array([0.0, 0.0, -1e6])  # where surfaces that move are put while the rest is traced
 
 
-class _Segments:
-    """Fixed segments, intersected with a shape at many places.
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """A surface that moves, where the camera sees it: shares (h, w) of the pixels of a region."""
 
-    What does not depend on the place of an ellipsoid is computed once.
-    """
+    index: int
+    region: Region
+    share: Plane
+    at_m: Plane
 
-    def __init__(self, index: NDArray[np.intp], start: Points, end: Points) -> None:
-        self.index = index
-        self._start, self._end = start, end
-        self._of_radii: dict[tuple[float, ...], tuple[NDArray[np.float32], ...]] = {}
 
-    def hit(self, shape: Shape) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Return the segments that the shape blocks by index, and the fraction of their length."""
-        if not isinstance(shape, Ellipsoid):
-            at = shape.hit(self._start, self._end)
-            near = np.flatnonzero(at < _END)
-            return near, at[near]
-        key = tuple(shape.radii.tolist())
-        if key not in self._of_radii:
-            origin, direction = self._start / shape.radii, (self._end - self._start) / shape.radii
-            parts = (
-                origin,
-                direction,
-                np.einsum("nc,nc->n", direction, direction),
-                np.einsum("nc,nc->n", origin, direction),
-                np.einsum("nc,nc->n", origin, origin) - 1,
-            )
-            self._of_radii[key] = tuple(part.astype(np.float32) for part in parts)
-        start, way, a, along, beyond = self._of_radii[key]
-        centre = (shape.centre / shape.radii).astype(np.float32)
-        # |start + fraction way - centre| = 1
-        b = along - way @ centre
-        c = beyond - start @ (2 * centre)
-        c += centre @ centre
-        discriminant = b * b
-        discriminant -= a * c
-        near = np.flatnonzero(discriminant > 0)
-        first = -(b[near] + np.sqrt(discriminant[near])) / a[near]
-        between = (first > _START) & (first < _END)
-        return near[between], first[between].astype(np.float64)
+@dataclass(frozen=True, slots=True)
+class _Grid:
+    """Where points lie in a region of the image of so many rows and columns."""
 
-    def exact(self, shape: Shape, chosen: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Fraction of some segments in double precision."""
-        at = shape.hit(self._start[chosen], self._end[chosen])
-        return np.where(at < 1, at, 1.0)  # grazing rays may differ between precisions
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    shape: tuple[int, int]
+
+    def plane(self, on: NDArray[np.intp], values: Plane, there: NDArray[np.bool_]) -> Plane:
+        """Return values of some points as a plane; NaN is where there are none."""
+        plane = np.full(self.shape, np.nan, dtype=np.float32)
+        plane[self.rows[on], self.columns[on]] = np.where(there, values, np.nan)
+        return plane
 
 
 class MovingLight:
@@ -84,241 +62,198 @@ class MovingLight:
     ----------
     scene
         With moving surfaces that scatter light.
-    directions
-        (H W, 3) rays of the camera.
+    still
+        Light of what stands still (see ``still_scene``).
+    soft
+        Whether pixels that a silhouette or a shadow crosses take a share of it.
     """
 
-    def __init__(self, scene: Scene, directions: Points, *, width: int, height: int) -> None:
+    def __init__(self, scene: Scene, still: StillLight, *, soft: bool) -> None:
         assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
         self.scene = scene
-        self._directions = directions
-        self._width, self._height = width, height
-        # surfaces keep their indices; what moves is put far below while the rest is traced
+        self.still = still
+        self._soft = soft
         self._movers = tuple(k for k, each in enumerate(scene.surfaces) if each.motions)
-        self._still_scene = replace(
-            scene,
-            surfaces=tuple(
-                replace(each, shape=each.shape.moved(np.array([0.0, 0.0, -1e6])), motions=())
-                if each.motions
-                else each
-                for each in scene.surfaces
-            ),
-        )
-        self.still = light_rays(self._still_scene, directions)
         self._lights = tuple(image_lights(scene))
+        self._sight, *self._mirrored = still.lines_of_sight()
         self._chains = tuple(
             tuple(self._light_segments(k, light)) for k, light in enumerate(self._lights)
         )
-        self._reach_m = np.zeros(len(directions))
-        self._sight = self._lines_of_sight()
-        self._phasors: dict[float, tuple[NDArray[np.complex64], NDArray[np.complex128]]] = {}
-        self.step_s = self._step_s(directions, width)
 
-    def tick_s(self, time_s: float) -> float:
-        """Return the last multiple of ``step_s``."""
-        return float(np.floor(time_s / self.step_s + 1e-9) * self.step_s)
-
-    def at(self, time_s: float) -> "MovingResponses":
+    def at(self, time_s: float) -> MovingResponses:
         """Impulse responses at a time."""
         scene = self.scene.at(time_s)
-        assert scene.camera is not None  # noqa: S101  (checked when made)
-        shapes = {index: scene.surfaces[index].shape for index in self._movers}
-        straight, *by_mirrors = self._sight
-        nearest = np.full(len(self._directions), np.inf)
-        which = np.full(len(self._directions), -1)
-        for index, shape in shapes.items():
-            rays, at = straight.hit(shape)
-            closer = at < nearest[rays]
-            nearest[rays[closer]], which[rays[closer]] = at[closer], index
-        front = np.flatnonzero(which >= 0)
-        for index, shape in shapes.items():  # in double precision, or points shade themselves
-            mine = np.flatnonzero(which == index)
-            nearest[mine] = straight.exact(shape, mine)
-        ends = self._in_front(scene, front, which[front], nearest[front])
-        over = np.zeros(len(self._directions), dtype=bool)
-        for segments in by_mirrors:
-            for shape in shapes.values():
-                over[segments.index[segments.hit(shape)[0]]] = True
-        over[front] = False
-        mirrored = np.flatnonzero(over)
-        if mirrored.size:
-            eye = scene.camera.position_m
-            ends = ends.with_more(first_scattering(scene, eye, self._directions[mirrored]), front)
-            front = np.concatenate([front, mirrored])
-        lit = light_on_ends(scene, self._lights, ends, rays=len(front))
-        hidden = np.zeros(len(self._directions), dtype=bool)
-        hidden[front] = True
-        shadows = []
-        for chain in self._chains:
-            dark = np.zeros(len(self._directions), dtype=bool)
-            for segments in chain:
-                for shape in shapes.values():
-                    dark[segments.index[segments.hit(shape)[0]]] = True
-            shadows.append(np.flatnonzero(dark & ~hidden))
-        return MovingResponses(self, scene, front, lit, tuple(shadows))
+        seen = self._visible([each for k in self._movers if (each := self._cover(scene, k))])
+        layers = [self._lit(scene, seen)] if seen else []
+        if mirrored := self._seen_in_mirrors(scene):
+            layers.append(mirrored)
+        shadows = [shadow for k in range(len(self._chains)) if (shadow := self._shadow(scene, k))]
+        region = union([*(each.region for each in layers), *(each.region for each in shadows)])
+        return MovingResponses(self.still, scene, tuple(layers), tuple(shadows), region)
 
-    def _in_front(
-        self,
-        scene: Scene,
-        front: NDArray[np.intp],
-        surface: NDArray[np.intp],
-        at: NDArray[np.float64],
-    ) -> RayEnds:
-        """Return the ends of rays on moving surfaces that the camera sees without a mirror."""
-        assert scene.camera is not None  # noqa: S101  (checked when made)
-        distance_m = at * self._reach_m[front]
-        point = scene.camera.position_m + distance_m[:, None] * self._directions[front]
-        count = len(front)
-        return RayEnds(np.arange(count), point, surface, distance_m, np.ones(count))
+    def _cover(self, scene: Scene, index: int) -> _Seen | None:
+        """Shares of pixels that a surface covers, where nothing that stands still is before it."""
+        shape = scene.surfaces[index].shape
+        region = self._sight.meeting(shape)
+        if region is None:
+            return None
+        way, _near, far = self._sight.within(region)
+        cross = crossing(shape, self._sight.apex, way)
+        share, root = self._share(cross, rooted=True)
+        at_m = cross.entered(root)
+        share[~((at_m > 0) & (at_m < far))] = 0
+        return _Seen(index, region, share, at_m) if share.any() else None
 
-    def phasors(self, frequency_hz: float) -> tuple[NDArray[np.complex64], NDArray[np.complex128]]:
-        """Moments of what stands still: (K, H W) by chain of mirrors, and (H W) in all."""
-        if frequency_hz not in self._phasors:
-            phase_rad = 2 * np.pi * frequency_hz * self.still.delay_s
-            each = self.still.weight * np.exp(1j * phase_rad)
-            scatter = self.still.scatter(self.scene)
-            if scatter is not None:
-                each = each * scatter.transfer(frequency_hz)
-            self._phasors[frequency_hz] = each.astype(np.complex64), each.sum(axis=0)
-        return self._phasors[frequency_hz]
+    def _share(self, cross: Crossing, *, rooted: bool = False) -> tuple[Plane, Plane]:
+        """Share of each pixel that a shape covers; with the mean root that says where, if asked."""
+        if not self._soft:
+            shares = [(each > 0).astype(np.float32) for each in cross.inside]
+            root = np.sqrt(np.maximum(cross.inside[0], 0)) if rooted else shares[0]
+            return _product(shares), root
+        parts = [covered(each, rooted=rooted) for each in cross.inside]
+        return _product([share for share, _root in parts]), parts[0][1]
 
-    def _light_segments(self, chain: int, light: ImageLight) -> list[_Segments]:
-        """Segments of the paths of light to what stands still, where it arrives."""
-        index = np.flatnonzero(self.still.weight[chain])
-        if not index.size:
-            return []
-        segments, start = [], self.still.point[index]
-        for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
-            fraction = mirror.shape.hit(start, np.broadcast_to(image_m, start.shape))
-            end = start + fraction[:, None] * (image_m - start)
-            segments.append(_Segments(index, start, end))
-            start = end
-        lamp = np.broadcast_to(light.positions_m[-1], start.shape)
-        return [*segments, _Segments(index, start, lamp)]
+    def _visible(self, seen: list[_Seen]) -> list[_Seen]:
+        """Take from each share what nearer surfaces that move cover of it."""
+        left = [each.share.copy() for each in seen]
+        for k, one in enumerate(seen):
+            for other, share in zip(seen[k + 1 :], left[k + 1 :], strict=True):
+                both = overlap(one.region, other.region)
+                if both is None:
+                    continue
+                mine, its = inside(both, one.region), inside(both, other.region)
+                nearer = one.at_m[mine] <= other.at_m[its]
+                share[its] *= 1 - one.share[mine] * nearer
+                left[k][mine] *= 1 - other.share[its] * ~nearer
+        return [replace(each, share=share) for each, share in zip(seen, left, strict=True)]
 
-    def _lines_of_sight(self) -> list[_Segments]:
-        """Segments of the camera's rays: the first ones, and those behind mirrors."""
-        assert self.scene.camera is not None  # noqa: S101  (checked when made)
-        lines: list[_Segments] = []
-        start = np.broadcast_to(self.scene.camera.position_m, self._directions.shape)
-        index, direction = np.arange(len(self._directions)), self._directions
-        surfaces = self._still_scene.surfaces
-        for _bounce in range(self.scene.mirror_bounces + 1):
-            far = start + _FAR_M * direction
-            hits = np.stack([each.shape.hit(start, far) for each in surfaces])
-            for k, each in enumerate(surfaces):
-                if each.kind == "stencil":
-                    hits[k] = np.inf  # rays pass its open cells; what it hides stays hidden
-            nearest = hits.min(axis=0)
-            end = start + np.minimum(nearest, 1.0)[:, None] * _FAR_M * direction
-            if not lines:
-                self._reach_m = np.minimum(nearest, 1.0) * _FAR_M
-            lines.append(_Segments(index, start, end))
-            which = np.where(np.isfinite(nearest), hits.argmin(axis=0), -1)
-            on = np.array([each.kind == "mirror" for each in surfaces] + [False])[which]
-            if not on.any():
-                break
-            index, start, direction, which = index[on], end[on], direction[on].copy(), which[on]
-            for k in np.unique(which):
-                mine = which == k
-                direction[mine] = surfaces[k].mirror.mirrored_direction(direction[mine])
-        return lines
-
-    def _step_s(self, directions: Points, width: int) -> float:
-        """Longest time in which nothing moves by more than ``_PIXELS``."""
-        assert self.scene.camera is not None  # noqa: S101  (checked when made)
-        eye = self.scene.camera.position_m
-        pixel_rad = float(
-            np.arccos(np.clip(directions[width // 2] @ directions[width // 2 - 1], -1, 1))
+    def _lit(self, scene: Scene, seen: list[_Seen]) -> Layer:
+        """Light the parts of surfaces that are seen, all at once."""
+        region = union([each.region for each in seen])
+        places = [np.nonzero(each.share) for each in seen]
+        rows, columns = (
+            np.concatenate(
+                [
+                    place[axis] + each.region[axis].start
+                    for each, place in zip(seen, places, strict=True)
+                ]
+            )
+            for axis in (0, 1)
         )
-        steps_s = []
-        for index in self._movers:
-            surface = self.scene.surfaces[index]
-            speed_m_s = sum(motion.speed_m_s for motion in surface.motions)
-            reach_m = np.linalg.norm(surface.shape.extent() - eye, axis=-1).min()
-            if speed_m_s:
-                steps_s.append(_PIXELS * pixel_rad * max(reach_m, 1e-3) / speed_m_s)
-        return float(min(steps_s, default=1.0))
+        owner = np.repeat([each.index for each in seen], [len(place[0]) for place in places])
+        found = list(zip(seen, places, strict=True))
+        at_m = np.concatenate([each.at_m[place] for each, place in found])
+        share = np.concatenate([each.share[place] for each, place in found])
+        x, y, z = (
+            way[rows, columns] * at_m + np.float32(start)
+            for way, start in zip(self._sight.way, self._sight.apex, strict=True)
+        )
+        grid = _Grid(rows - region[0].start, columns - region[1].start, extent(region))
+
+        def cover(cross: Crossing, on: NDArray[np.intp], counts: NDArray[np.bool_]) -> Plane:
+            planes = tuple(grid.plane(on, each, counts) for each in cross.inside)
+            share = self._share(replace(cross, inside=planes))[0]
+            of_points: Plane = share[grid.rows[on], grid.columns[on]] * counts
+            return of_points
+
+        lit = Ends(self.still.scene, scene.surfaces, owner, (x, y, z), at_m).lit(
+            self._lights, eye=self._sight.apex, movers=self._movers, cover=cover
+        )
+        return Layer(region, rows * self.still.width + columns, share, lit)
+
+    def _shadow(self, scene: Scene, chain: int) -> Shadow | None:
+        """Share of the light by a chain of mirrors that is left on what stands still."""
+        dark: list[tuple[Region, Plane]] = []
+        for bundle in self._chains[chain]:
+            for index in self._movers:
+                shape = scene.surfaces[index].shape
+                region = bundle.meeting(shape)
+                if region is None:
+                    continue
+                way, near, far = bundle.within(region)
+                cross = crossing(shape, bundle.apex, way)
+                share = self._share(cross)[0] * cross.between(near, far)
+                if share.any():
+                    dark.append((region, share))
+        if not dark:
+            return None
+        whole = union([region for region, _share in dark])
+        left = np.ones(extent(whole), dtype=np.float32)
+        for region, share in dark:
+            left[inside(region, whole)] *= 1 - share
+        return Shadow(chain, whole, left)
+
+    def _seen_in_mirrors(self, scene: Scene) -> Layer | None:
+        """Follow again the rays that meet something that moves behind a mirror, four a pixel."""
+        over = np.zeros((self.still.height, self.still.width), dtype=bool)
+        for bundle in self._mirrored:
+            for index in self._movers:
+                shape = scene.surfaces[index].shape
+                region = bundle.meeting(shape)
+                if region is not None:
+                    way, near, far = bundle.within(region)
+                    cross = crossing(shape, bundle.apex, way)
+                    over[region] |= (self._share(cross)[0] > 0) & cross.between(near, far)
+        pixel = np.flatnonzero(over)
+        if not pixel.size:
+            return None
+        rays = self.still.rays_in(pixel, _SIDE_IN_MIRRORS) if self._soft else self.still.rays[pixel]
+        rows, columns = np.nonzero(over)
+        region = (
+            slice(int(rows.min()), int(rows.max()) + 1),
+            slice(int(columns.min()), int(columns.max()) + 1),
+        )
+        share = np.ones(len(pixel), dtype=np.float32)
+        return Layer(region, pixel, share, light_rays(scene, rays), last=True)
+
+    def _light_segments(self, chain: int, light: ImageLight) -> list[Bundle]:
+        """Ways of light to what stands still, where it arrives, one bundle a segment."""
+        lit = self.still.lit
+        shape = self.still.height, self.still.width
+        on = lit.weight[chain] > 0
+        if not on.any():
+            return []
+        return [
+            Bundle.of(
+                apex,
+                (start - apex).reshape(*shape, 3),
+                on.reshape(shape),
+                near=near.reshape(shape) if np.ndim(near) else near,
+                far=1.0,
+            )
+            for apex, start, near in _segments(light, lit.point)
+        ]
 
 
-class MovingResponses:
-    """Impulse responses at one time: of what stands still and is visible, and of what moves."""
+def still_scene(scene: Scene) -> Scene:
+    """Return the scene without what moves; surfaces keep their indices."""
+    surfaces = tuple(
+        replace(each, shape=each.shape.moved(_AWAY), motions=()) if each.motions else each
+        for each in scene.surfaces
+    )
+    return replace(scene, surfaces=surfaces)
 
-    def __init__(
-        self,
-        of: MovingLight,
-        scene: Scene,
-        front: NDArray[np.intp],
-        in_front: Lit,
-        shadows: tuple[NDArray[np.intp], ...],
-    ) -> None:
-        self._of = of
-        self._scene = scene
-        self._front = front
-        self._in_front = in_front
-        self._shadows = shadows
-        self._shape = (of._height, of._width)  # noqa: SLF001
-        self._all: SparseResponses | None = None
 
-    @property
-    def kind(self) -> Literal["sparse", "dense"]:
-        """Dense where a surface spreads light."""
-        return self._whole.kind
+def _segments(
+    light: ImageLight, point: Points
+) -> list[tuple[Points, Points, NDArray[np.float32] | np.float32]]:
+    """Ways of light to points: of each segment its apex, its end, and the t where it begins.
 
-    def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
-        """Sum of the phasors that are not in shadow."""
-        each, total = self._of.phasors(frequency_hz)
-        moments = total.copy()
-        for chain, dark in zip(each, self._shadows, strict=True):
-            moments[dark] -= chain[dark]
-        scatter = self._in_front.scatter(self._scene)
-        moments[self._front] = self._in_front.moments(frequency_hz, scatter)
-        return moments.reshape(self._shape)
+    A segment's line goes on to the light's image in the mirrors that are left.
+    """
+    segments: list[tuple[Points, Points, NDArray[np.float32] | np.float32]] = []
+    start = point
+    for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
+        fraction = mirror.shape.hit(start, np.broadcast_to(image_m, start.shape))
+        fraction = np.where(fraction < 1, fraction, 0.0)
+        segments.append((image_m, start, (1 - fraction).astype(np.float32)))
+        start = start + fraction[:, None] * (image_m - start)
+    segments.append((light.positions_m[-1], start, np.float32(0)))
+    return segments
 
-    def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the returns of all pixels."""
-        return self._whole.returns()
 
-    def of_pixel(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Response of one pixel."""
-        return self._whole.of_pixel(x, y)
-
-    @property
-    def scene(self) -> Scene:
-        """The scene at this time."""
-        return self._scene
-
-    @property
-    def lit(self) -> Lit:
-        """Light of the camera's rays at this time."""
-        still, front = self._of.still, self._front
-        surface, distance_m = still.surface.copy(), still.distance_m.copy()
-        point, reflectance = still.point.copy(), still.reflectance.copy()
-        delay_s, weight = still.delay_s.copy(), still.weight.copy()
-        for chain, dark in enumerate(self._shadows):
-            weight[chain, dark] = 0
-        surface[front], distance_m[front] = self._in_front.surface, self._in_front.distance_m
-        point[front], reflectance[front] = self._in_front.point, self._in_front.reflectance
-        delay_s[:, front], weight[:, front] = self._in_front.delay_s, self._in_front.weight
-        return Lit(surface, point, distance_m, reflectance, delay_s, weight)
-
-    @property
-    def distance_m(self) -> NDArray[np.float64]:
-        """(H, W) length of the camera's rays."""
-        distance_m = self._of.still.distance_m.copy()
-        distance_m[self._front] = self._in_front.distance_m
-        return distance_m.reshape(self._shape)
-
-    @property
-    def reflectance(self) -> NDArray[np.float64]:
-        """(H, W) of what the camera's rays end on."""
-        reflectance = self._of.still.reflectance.copy()
-        reflectance[self._front] = self._in_front.reflectance
-        return reflectance.reshape(self._shape)
-
-    @property
-    def _whole(self) -> SparseResponses:
-        if self._all is None:
-            height, width = self._shape
-            self._all = sparse_of(self._scene, self.lit, width=width, height=height)
-        return self._all
+def _product(planes: list[Plane]) -> Plane:
+    product = planes[0]
+    for plane in planes[1:]:
+        product = product * plane
+    return product

@@ -9,6 +9,7 @@ from transientcam_driver.simulation.light.paths import blocked
 from transientcam_driver.simulation.scene.geometry import Cells, Points
 from transientcam_driver.simulation.scene.scene import Scene
 
+_LEAST = 4  # patches along the longest side of a surface
 _BLOCK = 1 << 18  # segments at a time
 
 
@@ -39,11 +40,19 @@ class Patches:
 
     @classmethod
     def of(cls, scene: Scene, per_side: int) -> "Patches":
-        """Cut the longest side of all surfaces into so many patches, the others as finely."""
+        """Cut the longest side of all surfaces into so many patches, the others as finely.
+
+        The longest side of a small one is cut into a few all the same.
+        """
         scattering = {k: each for k, each in enumerate(scene.surfaces) if each.scatters}
         longest_m = max(np.ptp(s.shape.extent(), axis=0).max() for s in scattering.values())
         edge_m = float(longest_m) / per_side
-        cells = {index: surface.shape.cells(edge_m) for index, surface in scattering.items()}
+        cells = {
+            index: each.shape.cells(
+                min(edge_m, float(np.ptp(each.shape.extent(), axis=0).max()) / _LEAST)
+            )
+            for index, each in scattering.items()
+        }
         counts = {index: len(grid.area) for index, grid in cells.items()}
         first = dict(zip(counts, np.cumsum([0, *counts.values()]).tolist(), strict=False))
         grids = list(cells.values())

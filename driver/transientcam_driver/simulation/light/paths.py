@@ -19,14 +19,15 @@ from transientcam_driver.simulation.scene.geometry import Points, Rectangle, blo
 from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Viewpoint
 
 _BLOCK = 8192  # rays at a time, so that what is computed for them stays in the cache
-_FAR_M = 1e3  # longer than any path in a scene
+FAR_M = 1e3  # longer than any path in a scene
 
 
 @dataclass(frozen=True, slots=True)
 class RayEnds:
     """The scattering points on which rays of the camera end, flat.
 
-    ``ray`` is the index of the ray, ``throughput`` the share of light left by mirrors on the way.
+    ``ray`` is the index of the ray, ``direction`` the way it comes along, ``throughput`` the share
+    of light left by mirrors on the way.
     """
 
     ray: NDArray[np.intp]
@@ -34,16 +35,7 @@ class RayEnds:
     surface: NDArray[np.intp]
     distance_m: NDArray[np.float64]
     throughput: NDArray[np.float64]
-
-    def with_more(self, more: "RayEnds", rays: NDArray[np.intp]) -> "RayEnds":
-        """Append the ends of further rays behind those of ``rays``."""
-        return RayEnds(
-            np.concatenate([self.ray, more.ray + len(rays)]),
-            np.concatenate([self.point, more.point]),
-            np.concatenate([self.surface, more.surface]),
-            np.concatenate([self.distance_m, more.distance_m]),
-            np.concatenate([self.throughput, more.throughput]),
-        )
+    direction: Points
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,13 +74,19 @@ class Lit:
 
     def moments(self, frequency_hz: float, scatter: Scatter | None) -> NDArray[np.complex128]:
         """``int g(tau) exp(2 pi i f tau) dtau`` of each ray (P), over all chains of mirrors."""
-        moments = np.zeros(len(self.surface), dtype=np.complex128)
-        for delay_s, weight in zip(self.delay_s, self.weight, strict=True):
-            if weight.any():
-                moments += weight * np.exp(2j * np.pi * frequency_hz * delay_s)
-        if scatter is not None:
-            moments *= scatter.transfer(frequency_hz)
+        moments: NDArray[np.complex128] = self.phasors(frequency_hz, scatter).sum(axis=0)
         return moments
+
+    def phasors(self, frequency_hz: float, scatter: Scatter | None) -> NDArray[np.complex128]:
+        """Terms of ``moments``, (K, P) by chain of mirrors."""
+        phasors = self.weight.astype(np.complex128)
+        if frequency_hz:
+            for phasor, delay_s in zip(phasors, self.delay_s, strict=True):
+                if phasor.any():
+                    phasor *= np.exp(2j * np.pi * frequency_hz * delay_s)
+            if scatter is not None:
+                phasors *= scatter.transfer(frequency_hz)
+        return phasors
 
     def scatter(self, scene: Scene) -> Scatter | None:
         """Spread of each ray's light inside the surface it ends on; None if no surface has any."""
@@ -106,51 +104,19 @@ def scatter_of(scene: Scene, surface: NDArray[np.intp]) -> Scatter | None:
     )
 
 
-def trace(scene: Scene, *, width: int, height: int) -> SparseResponses:
-    """Impulse responses of all pixels by direct light and any chain of mirrors up to the limit."""
-    lit = light_rays(scene, camera_rays(_camera(scene), width=width, height=height))
-    return sparse(scene, lit, width=width, height=height)
-
-
-def sparse(scene: Scene, lit: Lit, *, width: int, height: int) -> SparseResponses:
-    """Arrange the light of the pixels' rays as an image."""
-    reaching = np.any(lit.weight > 0, axis=1)
-    reaching[0] |= not reaching.any()  # a dark scene has one return, of weight 0
-    shape = (-1, height, width)
-    scatter = lit.scatter(scene)
-    return SparseResponses(
-        lit.delay_s[reaching].reshape(shape),
-        lit.weight[reaching].reshape(shape),
-        None if scatter is None else scatter.reshaped((height, width)),
-    )
-
-
-def camera_rays(view: Viewpoint, *, width: int, height: int) -> Points:
-    """Return unit vectors through the pixels' centres, row by row from the top."""
-    columns, rows = np.meshgrid(np.arange(width), np.arange(height))
-    return rays_through(view, columns.ravel(), rows.ravel(), width=width, height=height)
-
-
-def rays_through(
-    view: Viewpoint,
-    column: NDArray[Any],
-    row: NDArray[Any],
-    *,
-    width: int,
-    height: int,
-) -> Points:
-    """Return unit vectors through places on the sensor; whole numbers are pixels' centres."""
-    forward = view.look_at_m - view.position_m
-    forward = forward / np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
-    half = np.tan(np.radians(view.field_of_view_deg) / 2)
-    x = half * (2 * (column + 0.5) / width - 1)
-    y = half * (height / width) * (1 - 2 * (row + 0.5) / height)
-    rays = forward + x[:, None] * right + y[:, None] * up
-    directions: Points = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
-    return directions
+def sparse_image(
+    delay_s: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    scatter: Scatter | None,
+    shape: tuple[int, int],
+) -> SparseResponses:
+    """Arrange returns (K, H W) as an image, without those that are nowhere."""
+    there = np.any(weight > 0, axis=1)
+    there[0] |= not there.any()  # a dark scene has one return, of weight 0
+    planes = (-1, *shape)
+    if scatter is not None:
+        scatter = Scatter(scatter.width_s[there], scatter.decay_s[there]).reshaped(planes)
+    return SparseResponses(delay_s[there].reshape(planes), weight[there].reshape(planes), scatter)
 
 
 def light_rays(scene: Scene, directions: Points) -> Lit:
@@ -195,11 +161,30 @@ def light_on_ends(scene: Scene, lights: tuple[ImageLight, ...], ends: RayEnds, *
     lit.point[ends.ray] = ends.point
     lit.distance_m[ends.ray] = ends.distance_m
     lit.reflectance[ends.ray] = reflectance
+    glossy = any(surface.gloss for surface in scene.surfaces)
     for k, light in enumerate(lights):
         length_m, irradiance = light_on(scene, light, ends.point, normal)
         lit.delay_s[k, ends.ray] = (length_m + ends.distance_m) / SPEED_OF_LIGHT_M_S
-        lit.weight[k, ends.ray] = irradiance * reflectance
+        sent = reflectance + highlight(scene, light, ends, normal) if glossy else reflectance
+        lit.weight[k, ends.ray] = irradiance * sent
     return lit
+
+
+def highlight(
+    scene: Scene, light: ImageLight, ends: RayEnds, normal: Points
+) -> NDArray[np.float64]:
+    """Reflectance of gloss towards the camera: Blinn's lobe around the half vector.
+
+    Its factor (n + 8) / 8, beside a diffuse surface's albedo, keeps the energy of the lobe.
+    """
+    gloss = np.array([surface.gloss for surface in scene.surfaces])[ends.surface]
+    exponent = np.array([surface.gloss_exponent for surface in scene.surfaces])[ends.surface]
+    way = light.positions_m[0] - ends.point
+    half = way / np.linalg.norm(way, axis=-1, keepdims=True) - ends.direction
+    half /= np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-12)
+    cosine = np.clip(np.einsum("pc,pc->p", half, normal), 0, 1)
+    lobe: NDArray[np.float64] = gloss * (exponent + 8) / 8 * cosine**exponent * ends.throughput
+    return lobe
 
 
 def _camera(scene: Scene) -> Viewpoint:
@@ -213,23 +198,25 @@ def first_scattering(scene: Scene, eye: Points, direction: Points) -> RayEnds:
     start = np.broadcast_to(eye, direction.shape)
     ray = np.arange(count)
     distance_m, throughput = np.zeros(count), np.ones(count)
-    ended: list[tuple[NDArray[np.intp], Points, NDArray[np.intp], Points, Points]] = []
+    ended: list[tuple[NDArray[Any], ...]] = []
     scatters = np.array([surface.scatters for surface in scene.surfaces] + [False])
     reflects = np.array([surface.kind == "mirror" for surface in scene.surfaces] + [False])
     for _bounce in range(scene.mirror_bounces + 1):
         nearest = np.full(len(ray), np.inf)
         which = np.full(len(ray), -1)
         for index, surface in enumerate(scene.surfaces):
-            at = _hit(surface, start, start + _FAR_M * direction)
+            at = hit(surface, start, start + FAR_M * direction)
             closer = at < nearest
             nearest[closer], which[closer] = at[closer], index
-        length_m = np.where(which < 0, 0.0, nearest) * _FAR_M
+        length_m = np.where(which < 0, 0.0, nearest) * FAR_M
         point = start + length_m[:, None] * direction
         distance_m = distance_m + length_m
         normal = normals_at(scene, point, which)
         facing = np.einsum("pc,pc->p", normal, direction) < 0
         end = scatters[which] & facing
-        ended.append((ray[end], point[end], which[end], distance_m[end], throughput[end]))
+        ended.append(
+            (ray[end], point[end], which[end], distance_m[end], throughput[end], direction[end])
+        )
         on = reflects[which] & facing
         if not on.any():
             break
@@ -281,7 +268,7 @@ def light_on(
     towards = way / distance_m[:, None]
     cosine = np.einsum("pc,pc->p", towards, normal)
     received = np.maximum(cosine, 0) / distance_m**2
-    received *= _beam(scene.light, -towards @ light.axis)
+    received *= beam(scene.light, -towards @ light.axis)
     for mirror in light.mirrors:
         received *= mirror.reflectivity
     shone_at = np.flatnonzero(received)
@@ -301,7 +288,7 @@ def normals_at(scene: Scene, point: Points, surface: NDArray[np.intp]) -> Points
     return normals
 
 
-def _beam(light: Light, cosine: NDArray[np.float64]) -> NDArray[np.float64]:
+def beam(light: Light, cosine: NDArray[np.float64]) -> NDArray[np.float64]:
     """Intensity relative to the beam's axis."""
     if light.beam_exponent == 0:
         return np.ones_like(cosine)
@@ -358,7 +345,8 @@ def _box(start: Points, end: Points) -> tuple[Points, Points]:
     return np.array(low), np.array(high)
 
 
-def _hit(surface: Surface, start: Points, end: Points) -> NDArray[np.float64]:
+def hit(surface: Surface, start: Points, end: Points) -> NDArray[np.float64]:
+    """Fraction of the way at which segments hit a surface, or an opaque cell of a stencil."""
     at = surface.shape.hit(start, end)
     if surface.opaque is None:
         return at

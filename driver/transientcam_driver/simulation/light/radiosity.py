@@ -18,6 +18,7 @@ from transientcam_driver.simulation.light.exchange import Exchange
 from transientcam_driver.simulation.light.patches import Patches
 from transientcam_driver.simulation.light.paths import Lit
 from transientcam_driver.simulation.responses import BIN_S, Responses
+from transientcam_driver.simulation.scene.geometry import Bilinear
 from transientcam_driver.simulation.scene.scene import Scene
 
 _CENTROID_HZ = 1e5  # low enough that a phase is proportional to the mean delay
@@ -31,14 +32,31 @@ class Interreflection:
     ----------
     scene, lit
         A scene, and the light that the camera's rays see of it.
+    mixed
+        Pixels by index that are the mean over several rays, and the light of these.
+    tolerance
+        Brightness that light may lack, where the scene does not say how far it is followed.
     """
 
-    def __init__(self, scene: Scene, lit: Lit, *, width: int, height: int) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        lit: Lit,
+        *,
+        width: int,
+        height: int,
+        mixed: tuple[NDArray[np.intp], Lit] | None = None,
+        tolerance: float = 1e-4,
+    ) -> None:
         self._scene = scene
         self._lit = lit
         self._shape = (height, width)
+        self._mixed = mixed
         self._exchange = Exchange.of(scene, scene.transport.patches)
-        self._cells, self._weights = self._between(self._exchange.patches)
+        self._bounces = self._exchange.bounces(tolerance)
+        self._places = self._between(self._exchange.patches, lit)
+        if mixed is not None:
+            self._mixed_places = self._between(self._exchange.patches, mixed[1])
 
     @property
     def patches(self) -> int:
@@ -47,7 +65,13 @@ class Interreflection:
 
     def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
         """``int g(tau) exp(2 pi i f tau) dtau`` of this light, (H, W)."""
-        return self._gathered(self._exchange.irradiance(frequency_hz), frequency_hz)
+        irradiance = self._exchange.irradiance(frequency_hz, self._bounces)
+        moments = self._gathered(irradiance, frequency_hz, self._lit, self._places)
+        if self._mixed is not None:
+            pixel, fine = self._mixed
+            of_rays = self._gathered(irradiance, frequency_hz, fine, self._mixed_places)
+            moments[pixel] = of_rays.reshape(-1, len(pixel)).mean(axis=0)
+        return moments.reshape(self._shape)
 
     def error(self, frequency_hz: float) -> float:
         """Estimate the error of the moments by their change when patches are twice as large.
@@ -83,27 +107,26 @@ class Interreflection:
         return start_s, mass * (weight / mass.sum())
 
     def _gathered(
-        self, irradiance: NDArray[np.complex128], frequency_hz: float
+        self, irradiance: NDArray[np.complex128], frequency_hz: float, lit: Lit, places: Bilinear
     ) -> NDArray[np.complex128]:
-        lit = self._lit
-        on_pixel = np.einsum("pk,pk->p", self._weights, irradiance[self._cells])
+        on_pixel = np.einsum("pk,pk->p", places[1], irradiance[places[0]])
         way = np.exp(2j * np.pi * frequency_hz / SPEED_OF_LIGHT_M_S * lit.distance_m)
         moments = lit.reflectance * on_pixel * way
         scatter = lit.scatter(self._scene)
         if scatter is not None:
             moments *= scatter.transfer(frequency_hz)
-        result: NDArray[np.complex128] = moments.reshape(self._shape)
+        result: NDArray[np.complex128] = moments
         return result
 
-    def _between(self, patches: Patches) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Patches around the end of each pixel's ray, and weights of the interpolation."""
-        count = len(self._lit.surface)
+    def _between(self, patches: Patches, lit: Lit) -> Bilinear:
+        """Patches around the end of each ray, and weights of the interpolation."""
+        count = len(lit.surface)
         index, weights = np.zeros((count, 4), dtype=np.intp), np.zeros((count, 4))
         for surface, cells in patches.cells.items():
-            mine = self._lit.surface == surface
+            mine = lit.surface == surface
             if mine.any():
                 index[mine], weights[mine] = self._scene.surfaces[surface].shape.between_cells(
-                    self._lit.point[mine], cells.rows, cells.columns
+                    lit.point[mine], cells.rows, cells.columns
                 )
                 index[mine] += patches.first[surface]
         return index, weights
@@ -114,8 +137,8 @@ class Interreflection:
         return Exchange.of(self._scene, few)
 
     @cached_property
-    def _between_few(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        return self._between(self._histogram.patches)
+    def _between_few(self) -> Bilinear:
+        return self._between(self._histogram.patches, self._lit)
 
 
 class WithInterreflection:

@@ -1,46 +1,105 @@
 """What is in front of the camera as light, still or moving, with the effects called for."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.effects import Facts
+from transientcam_driver.simulation.effects import CALLED_ABOVE, Facts, Glimpse
+from transientcam_driver.simulation.effects.distortion import Distortion
+from transientcam_driver.simulation.effects.glimpses import Noise
+from transientcam_driver.simulation.effects.gloss import Gloss
 from transientcam_driver.simulation.effects.interreflection import DiffuseInterreflection
 from transientcam_driver.simulation.effects.mirror_paths import MirrorPaths
 from transientcam_driver.simulation.effects.mixed_pixels import MixedPixels
 from transientcam_driver.simulation.effects.scattering import Scattering
-from transientcam_driver.simulation.light.facts import facts_of, facts_over_time
-from transientcam_driver.simulation.light.mixed_pixels import with_mixed_pixels
-from transientcam_driver.simulation.light.moving import MovingLight, MovingResponses
-from transientcam_driver.simulation.light.paths import (
-    Lit,
-    camera_rays,
-    light_rays,
-    sparse,
-)
+from transientcam_driver.simulation.imperfections import PINHOLE, Lens
+from transientcam_driver.simulation.light.bundle import Region
+from transientcam_driver.simulation.light.facts import SceneFacts, cosine_to_axis
+from transientcam_driver.simulation.light.layers import MovingResponses
+from transientcam_driver.simulation.light.moving import MovingLight, still_scene
 from transientcam_driver.simulation.light.radiosity import Interreflection, WithInterreflection
+from transientcam_driver.simulation.light.rays import camera_rays
+from transientcam_driver.simulation.light.steps import Between, Steps
+from transientcam_driver.simulation.light.still import StillLight
+from transientcam_driver.simulation.light.variants import (
+    without_gloss,
+    without_mirrors,
+    without_scattering,
+)
 from transientcam_driver.simulation.responses import Responses
 from transientcam_driver.simulation.scene.scene import Scene
 
-_SUB_PIXELS = tuple((x / 3, y / 3) for x in (-1, 0, 1) for y in (-1, 0, 1))
-"""Rays of a pixel at an edge, right and down by these shares of a pixel."""
-_SUB_PIXELS_MOVING = ((-0.25, -0.25), (0.25, 0.25))
-"""The same where they are traced for every image, because the scene moves."""
+Values = NDArray[np.float64]
 
-ViewAt = Callable[[float], "View"]
-"""The view at a time of the device; the same object as long as nothing changes."""
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a sequence asks of the light: effects by name, and how exactly.
+
+    ``noise`` is that of a moment, ``highest_hz`` the highest frequency that is measured, ``lens``
+    the one before the sensor, and ``image_period_s`` the time from image to image.
+    """
+
+    effects: frozenset[str] = frozenset()
+    noise: Noise = field(default_factory=lambda: Noise(1e6, 0.0, 900.0, 1))
+    highest_hz: float = 0.0
+    lens: Lens = PINHOLE
+    image_period_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What the camera sees: impulse responses, and the reflectance of the pixels' surfaces."""
+    """What the camera sees: impulse responses, and the reflectance of the pixels' surfaces (H, W).
+
+    ``region``: rows and columns of the pixels that differ from the background; None: all may.
+    """
 
     responses: Responses
-    reflectance: NDArray[np.float32] | np.float32
+    reflectance: Callable[[], NDArray[np.float32] | np.float32]
+    region: Region | None = None
+
+    def moments(self, frequency_hz: float, region: Region | None) -> NDArray[np.complexfloating]:
+        """Moments of all pixels, or of a region that holds all that differs."""
+        if region is None:
+            return self.responses.moments(frequency_hz)
+        if isinstance(self.responses, MovingResponses | Between):
+            return self.responses.moments_in(region, frequency_hz)
+        return self.responses.moments(frequency_hz)[region]
+
+
+@dataclass(frozen=True, slots=True)
+class Views:
+    """The view at a time of the device; the same object as long as nothing changes.
+
+    ``exact`` takes no account of the time it takes. ``background`` is the view without what moves,
+    of which views are regions.
+    """
+
+    at: Callable[[float], View]
+    exact: Callable[[float], View]
+    background: View | None = None
+
+
+class Latest:
+    """A view as a function of time that remembers the last one."""
+
+    def __init__(self, of: Callable[[float], View]) -> None:
+        self._of = of
+        self._last: tuple[float, View] | None = None
+
+    def __call__(self, time_s: float) -> View:
+        """Return the view at a time."""
+        if self._last is None or self._last[0] != time_s:
+            self._last = time_s, self._of(time_s)
+        return self._last[1]
+
+
+def _view_of(now: MovingResponses | Between) -> View:
+    return View(now, lambda: now.reflectance, now.region)
 
 
 class Scenery(Protocol):
@@ -52,17 +111,27 @@ class Scenery(Protocol):
         ...
 
     @property
-    def preview(self) -> "View":
-        """The view at the start, without effects that take long to compute."""
+    def glimpses(self) -> tuple[Glimpse, ...]:
+        """What effects are judged by."""
         ...
 
     @property
     def facts(self) -> Facts | None:
-        """What effects are judged by; None if there is no geometry."""
+        """How effects of light change it; None if there is no geometry."""
         ...
 
-    def view(self, effects: frozenset[str]) -> ViewAt:
-        """Prepare its views with these effects of light."""
+    @property
+    def lens(self) -> Lens:
+        """What the light comes through."""
+        ...
+
+    @property
+    def cosine(self) -> Values:
+        """(H, W): of the angle between the pixels' rays and the lens's axis."""
+        ...
+
+    def view(self, wanted: Wanted) -> Views:
+        """Prepare its views."""
         ...
 
 
@@ -71,13 +140,27 @@ class GivenScenery:
 
     moves = False
     facts = None
+    lens = PINHOLE
 
     def __init__(self, responses: Responses) -> None:
-        self.preview = View(responses, np.float32(1))
+        self._view = View(responses, lambda: np.float32(1))
 
-    def view(self, effects: frozenset[str]) -> ViewAt:
-        """Return the given view; no effect changes it."""
-        return lambda _time_s: self.preview
+    @cached_property
+    def glimpses(self) -> tuple[Glimpse, ...]:
+        """All pixels, once."""
+        brightness = self._view.responses.moments(0.0).real
+        ones = np.ones(brightness.size)
+        shape = brightness.shape[0], brightness.shape[1]
+        return (Glimpse(brightness.ravel(), ones, ones, shape),)
+
+    @property
+    def cosine(self) -> Values:
+        """One, as nothing is known of angles."""
+        return np.ones(self.glimpses[0].shape)
+
+    def view(self, wanted: Wanted) -> Views:
+        """Return the given view."""
+        return Views(lambda _time_s: self._view, lambda _time_s: self._view)
 
 
 class SurfaceScenery:
@@ -86,9 +169,8 @@ class SurfaceScenery:
     def __init__(self, scene: Scene, *, width: int, height: int) -> None:
         assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
         self._scene = scene
-        self._width, self._height = width, height
-        self._rays = camera_rays(scene.camera, width=width, height=height)
-        self._start: Lit | None = None
+        self._camera = scene.camera
+        self._size = {"width": width, "height": height}
 
     @property
     def moves(self) -> bool:
@@ -96,83 +178,85 @@ class SurfaceScenery:
         return self._scene.moves
 
     @property
-    def preview(self) -> View:
-        """Direct light and mirrors."""
-        return self._preview
+    def lens(self) -> Lens:
+        """The camera's."""
+        return self._camera.lens
 
     @property
-    def facts(self) -> Facts:
-        """Figures of the scene, over several times if it moves."""
-        return self._facts
+    def glimpses(self) -> tuple[Glimpse, ...]:
+        """Pixels, over the scene's life."""
+        return self.facts.glimpses
 
     @cached_property
-    def _preview(self) -> View:
-        return self._view(self._scene.at(0.0), frozenset())
+    def facts(self) -> SceneFacts:
+        """How effects change the scene, over its life."""
+        return SceneFacts(self._scene, **self._size)
 
     @cached_property
-    def _facts(self) -> Facts:
-        if self.moves:
-            return facts_over_time(self._scene, width=self._width, height=self._height)
-        return facts_of(self._scene, self._lit(self._scene), width=self._width, height=self._height)
+    def cosine(self) -> Values:
+        """Of the pixels' rays to the lens's axis."""
+        shape = self._size["height"], self._size["width"]
+        return cosine_to_axis(self._camera, camera_rays(self._camera, **self._size)).reshape(shape)
 
-    def view(self, effects: frozenset[str]) -> ViewAt:
-        """Trace a still scene once, and a moving one for each time."""
-        scene = self._with(effects)
+    def view(self, wanted: Wanted) -> Views:
+        """Trace a still scene once; of a moving one what moves, for each time."""
+        scene = self._with(wanted)
+        effects = wanted.effects
+        still = StillLight(
+            still_scene(scene),
+            **self._size,
+            noise=wanted.noise if MixedPixels.name in effects else None,
+            highest_hz=wanted.highest_hz,
+        )
+        tolerance = CALLED_ABOVE * float(wanted.noise.deviation(0.0, 0.0))
+        further = DiffuseInterreflection.name in effects
         if not self.moves:
-            still = self._view(scene, effects)
-            return lambda _time_s: still
-        moving = MovingLight(scene, self._rays, width=self._width, height=self._height)
-        last: list[tuple[float, View]] = []
+            view = self._still_view(still, tolerance if further else None)
+            return Views(lambda _time_s: view, lambda _time_s: view)
+        moving = MovingLight(scene, still, soft=MixedPixels.name in effects)
+        if further:
+            at = Latest(lambda time_s: self._lit_view(moving.at(time_s), tolerance))
+            return Views(at, at)
+        exact = Latest(lambda time_s: _view_of(moving.at(time_s)))
+        steps = Steps(scene, moving.at, pixel_rad=still.pixel_rad, every_s=wanted.image_period_s)
+        between = Latest(lambda time_s: _view_of(steps.at(time_s)))
+        return Views(between, exact, self._still_view(still, None))
 
-        def view_at(time_s: float) -> View:
-            tick_s = moving.tick_s(time_s)
-            if not last or last[0][0] != tick_s:
-                last[:] = [(tick_s, self._moving_view(moving.at(tick_s), effects))]
-            return last[0][1]
+    def _lit_view(self, now: MovingResponses, tolerance: float) -> View:
+        """View of a moving scene with light over several surfaces, computed anew."""
+        width, height = self._size["width"], self._size["height"]
+        light = Interreflection(now.scene, now.lit, width=width, height=height, tolerance=tolerance)
+        return View(WithInterreflection(now, light), lambda: now.reflectance)
 
-        return view_at
+    def _still_view(self, still: StillLight, tolerance: float | None) -> View:
+        """View what stands still, with light over several surfaces up to a tolerance."""
+        shape = self._size["height"], self._size["width"]
+        responses: Responses = still.responses()
+        if tolerance is not None:
+            mixed = (still.mixed, still.fine) if still.mixed.size else None
+            light = Interreflection(
+                still.scene,
+                still.lit,
+                width=still.width,
+                height=still.height,
+                mixed=mixed,
+                tolerance=tolerance,
+            )
+            responses = WithInterreflection(responses, light)
+        return View(responses, lambda: still.reflectance.reshape(shape))
 
-    def _moving_view(self, now: MovingResponses, effects: frozenset[str]) -> View:
-        size = {"width": self._width, "height": self._height}
-        responses: Responses = now
-        if MixedPixels.name in effects:
-            responses = with_mixed_pixels(now.scene, now.distance_m, now, rays=_SUB_PIXELS_MOVING)
-        if DiffuseInterreflection.name in effects:
-            further = Interreflection(now.scene, now.lit, **size)
-            responses = WithInterreflection(responses, further)
-        return View(responses, now.reflectance.astype(np.float32))
-
-    def _with(self, effects: frozenset[str]) -> Scene:
-        scene = self._scene
-        mirrors = any(each.kind == "mirror" for each in scene.surfaces)
-        if mirrors and MirrorPaths.name not in effects:
-            transport = replace(scene.transport, mirror_bounces=0)
-            scene = replace(scene, transport=transport)
-        if Scattering.name not in effects and any(each.scatter for each in scene.surfaces):
-            surfaces = tuple(replace(each, scatter=None) for each in scene.surfaces)
-            scene = replace(scene, surfaces=surfaces)
-        forced = DiffuseInterreflection.name in effects and not scene.transport.diffuse_bounces
-        if forced:  # on, although the scene has none
+    def _with(self, wanted: Wanted) -> Scene:
+        """Return the scene with the effects of light that are wanted, and no others."""
+        effects, scene = wanted.effects, self._scene
+        lens = wanted.lens if Distortion.name in effects else PINHOLE
+        scene = replace(scene, camera=replace(self._camera, lens=lens))
+        if MirrorPaths.name not in effects:
+            scene = without_mirrors(scene)
+        if Gloss.name not in effects:
+            scene = without_gloss(scene)
+        if Scattering.name not in effects:
+            scene = without_scattering(scene)
+        if DiffuseInterreflection.name in effects and scene.transport.diffuse_bounces == 0:
+            # on, although the scene has none
             scene = replace(scene, transport=replace(scene.transport, diffuse_bounces=1))
         return scene
-
-    def _lit(self, scene: Scene) -> Lit:
-        """Trace, but the scene of the file only once."""
-        if scene is not self._scene:
-            return light_rays(scene, self._rays)
-        if self._start is None:
-            self._start = light_rays(scene, self._rays)
-        return self._start
-
-    def _view(self, scene: Scene, effects: frozenset[str]) -> View:
-        lit = self._lit(scene)
-        width, height = self._width, self._height
-        responses: Responses = sparse(scene, lit, width=width, height=height)
-        if MixedPixels.name in effects:
-            distance_m = lit.distance_m.reshape(height, width)
-            responses = with_mixed_pixels(scene, distance_m, responses, rays=_SUB_PIXELS)
-        if DiffuseInterreflection.name in effects:
-            further = Interreflection(scene, lit, width=width, height=height)
-            responses = WithInterreflection(responses, further)
-        reflectance = lit.reflectance.astype(np.float32).reshape(height, width)
-        return View(responses, reflectance)

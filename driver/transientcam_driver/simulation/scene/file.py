@@ -13,8 +13,10 @@ from transientcam_driver.sensor import Sensor
 from transientcam_driver.simulation.effects import CHOICES, EFFECTS
 from transientcam_driver.simulation.imperfections import (
     PROFILES,
+    DarkCurrent,
     DeviceProfile,
     Drift,
+    Lens,
     LensScatter,
     Outliers,
     Pattern,
@@ -129,12 +131,24 @@ def _viewpoint(table: Table) -> Viewpoint:
         position_m=table.vector("position_m", (0.0, 0.0, 0.0)),
         look_at_m=table.vector("look_at_m", (0.0, 1.0, 0.0)),
         field_of_view_deg=table.number("field_of_view_deg", 45.0, above=0, most=170),
+        lens=_lens(table.table("lens")),
     )
     if not np.any((view.look_at_m - view.position_m)[:2]):
         allowed = "away from position_m, and not straight above or below it"
         raise table.error("look_at_m", view.look_at_m.tolist(), allowed)
     table.done()
     return view
+
+
+def _lens(table: Table) -> Lens:
+    k1, k2, p1, p2 = (
+        table.number(name, 0.0, least=-most, most=most)
+        for name, most in (("k1", 1.0), ("k2", 1.0), ("p1", 0.1), ("p2", 0.1))
+    )
+    x, y = (table.number(name, 0.0, least=-0.5, most=0.5) for name in ("centre_x", "centre_y"))
+    lens = Lens((k1, k2, p1, p2), (x, y), table.number("vignetting", 0.0, least=0, most=16))
+    table.done()
+    return lens
 
 
 def _sensor(table: Table) -> Sensor:
@@ -164,6 +178,9 @@ def _device(table: Table, folder: Path) -> DeviceProfile:
         profile = replace(profile, drift=_drift(table.table("drift")))
     if "lens_scatter" in table:
         profile = replace(profile, lens_scatter=_lens_scatter(table.table("lens_scatter")))
+    if "dark_current_e_per_s" in table:
+        current = DarkCurrent(table.number("dark_current_e_per_s", least=0))
+        profile = replace(profile, dark_current=current)
     if "outlier_share" in table:
         share = table.number("outlier_share", least=0, most=1)
         profile = replace(profile, outliers=Outliers(share))
@@ -208,8 +225,10 @@ def _transport(table: Table) -> Transport:
         mirror_bounces=table.integer(
             "mirror_bounces", default.mirror_bounces, least=0, most=MOST_BOUNCES
         ),
-        diffuse_bounces=table.integer(
-            "diffuse_bounces", default.diffuse_bounces, least=0, most=MOST_BOUNCES
+        diffuse_bounces=(
+            table.integer("diffuse_bounces", least=0, most=MOST_BOUNCES)
+            if "diffuse_bounces" in table
+            else None
         ),
         patches=table.integer("patches", default.patches, least=2, most=64),
     )
@@ -263,6 +282,7 @@ def _surface(table: Table, motions: dict[str, Motion]) -> Surface:
     name = table.text("name", kind)
     shape = _shape(table, kind)
     share = "reflectivity" if kind == "mirror" else "albedo"
+    gloss, exponent = _gloss(table) if kind in ("diffuse", "translucent") else (0.0, 50.0)
     surface = Surface(
         name,
         kind,
@@ -271,7 +291,12 @@ def _surface(table: Table, motions: dict[str, Motion]) -> Surface:
         _mask(table) if kind == "stencil" else None,
         _scatter(table) if kind == "translucent" else None,
         _moves(table, kind, motions) if "motion" in table else (),
+        gloss,
+        exponent,
     )
+    if surface.reflectivity + gloss > 1 and surface.scatters:
+        limit = f"at most {1 - surface.reflectivity:g}, what albedo leaves of the light"
+        raise table.error("gloss", gloss, limit)
     table.done()
     return surface
 
@@ -291,6 +316,13 @@ def _shape(table: Table, kind: Kind) -> Shape:
     if not np.any(normal):
         raise table.error("normal", normal.tolist(), "other than zero")
     return Rectangle.facing(centre_m, normal, size=table.size("size_m"))
+
+
+def _gloss(table: Table) -> tuple[float, float]:
+    return (
+        table.number("gloss", 0.0, least=0, most=1),
+        table.number("gloss_exponent", 50.0, least=1, most=10_000),
+    )
 
 
 def _scatter(table: Table) -> Scatter:

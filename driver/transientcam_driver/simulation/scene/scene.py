@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.sensor import Sensor
-from transientcam_driver.simulation.imperfections import IDEAL, DeviceProfile
+from transientcam_driver.simulation.imperfections import IDEAL, PINHOLE, DeviceProfile, Lens
 from transientcam_driver.simulation.responses import Scatter
 from transientcam_driver.simulation.scene.geometry import Points, Rectangle, Shape
 from transientcam_driver.simulation.scene.motion import Motion
@@ -23,11 +23,12 @@ Kind = Literal["diffuse", "translucent", "mirror", "stencil"]
 
 @dataclass(frozen=True, slots=True)
 class Viewpoint:
-    """Where the camera stands and looks; ``field_of_view_deg`` is horizontal."""
+    """Where the camera stands and looks; ``field_of_view_deg`` is horizontal, of a pinhole."""
 
     position_m: Points
     look_at_m: Points
     field_of_view_deg: float
+    lens: Lens = PINHOLE
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +51,9 @@ class Surface:
     """Something that scatters, reflects or blocks light.
 
     ``reflectivity`` is the albedo of a diffuse or translucent surface. ``opaque`` is the mask of
-    a stencil, rows from top to bottom as seen from its front; the other kinds have none.
+    a stencil, rows from top to bottom as seen from its front; the other kinds have none. ``gloss``
+    is the share of light that a scattering surface reflects as a dull mirror, in a lobe of Blinn's
+    model with the exponent ``gloss_exponent``.
     """
 
     name: str
@@ -60,6 +63,8 @@ class Surface:
     opaque: NDArray[np.bool_] | None = None
     scatter: Scatter | None = None
     motions: tuple[Motion, ...] = ()
+    gloss: float = 0.0
+    gloss_exponent: float = 50.0
 
     @property
     def mirror(self) -> Rectangle:
@@ -89,13 +94,14 @@ class Transport:
     mirror_bounces
         Most mirrors on the way of light to a surface, and on a ray of the camera.
     diffuse_bounces
-        How often light goes from surface to surface before the camera sees it.
+        How often light goes from surface to surface before the camera sees it; None: until what is
+        left is below the noise.
     patches
         Into how many patches the longest side of a surface is cut to compute that.
     """
 
     mirror_bounces: int = 2
-    diffuse_bounces: int = 3
+    diffuse_bounces: int | None = None
     patches: int = 24
 
 

@@ -10,14 +10,18 @@ class EffectDocument(Document):
     """One effect's answer for the scene and the sequence."""
 
     effect: str
+    what: str
+    """The effect in a few words."""
     choice: Literal["auto", "on", "off", "always"]
     called_for: bool
     built: bool
     reason: str
     size_dn: float
-    """The error it causes in one moment of a typical pixel, as a root mean square."""
+    """The error it causes in one moment, as a root mean square over the lit pixels."""
     relative: float
-    """That over the noise floor."""
+    """The same of the errors over each pixel's own noise."""
+    worst: float
+    """The largest error over its noise of any pixel judged."""
     cost_s: float
     """Of one frame, by the order of magnitude."""
 
@@ -31,5 +35,7 @@ class ExplanationDocument(Document):
     noise_floor_dn: float
     """Of one moment of a typical pixel."""
     called_above: float
-    """Share of the noise floor above which an effect is called for."""
+    """An effect is called for above this share of the noise, as a root mean square."""
+    called_above_worst: float
+    """And above this share of its noise in any pixel."""
     effects: list[EffectDocument]

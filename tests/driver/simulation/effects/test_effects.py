@@ -21,8 +21,11 @@ from transientcam_driver.simulation.effects.pixel_pattern import read_offsets_ra
 from transientcam_driver.simulation.imperfections import (
     IDEAL,
     PROTOTYPE,
+    TYPICAL,
+    DarkCurrent,
     DeviceProfile,
     Drift,
+    Lens,
     LensScatter,
     Outliers,
     Pattern,
@@ -31,6 +34,7 @@ from transientcam_driver.simulation.imperfections import (
 )
 from transientcam_driver.simulation.light.transport import GivenScenery
 from transientcam_driver.simulation.responses import SparseResponses
+from transientcam_driver.simulation.scene.motion import Motion
 from transientcam_driver.simulation.world import World
 
 SHAPE = (12, 16)
@@ -49,12 +53,13 @@ def world(
     electrons: float = 20_000.0,
     ambient: float = 0.0,
     plane: NDArray[np.float64] | None = None,
+    sensor: Sensor | None = None,
 ) -> World:
     """One return, read without noise and with 16 bits."""
     weight = np.ones(SHAPE) if plane is None else plane
     return World(
         GivenScenery(SparseResponses(np.full_like(weight, DELAY_S)[None], weight[None])),
-        Sensor().ideal(),
+        sensor or Sensor().ideal(),
         electrons_per_s=electrons / EXPOSURE_S,
         effects=QUIET if effects is None else effects,
         seed=1,
@@ -153,26 +158,31 @@ def test_outliers_draw_from_a_stream_of_their_own() -> None:
 
 
 @pytest.mark.parametrize("effect", OPTIONAL)
-def test_each_effect_answers_for_an_ideal_device_and_a_prototype(effect: type[Effect]) -> None:
+def test_each_effect_answers_for_an_ideal_device_and_a_typical_one(effect: type[Effect]) -> None:
     sequence = Sequence(exposure_s=EXPOSURE_S)
-    for device in (IDEAL, PROTOTYPE):
+    for device in (IDEAL, TYPICAL):
         of = world(device, ambient=0.0 if device is IDEAL else 4000.0)
         call = effect.called_for(of.conditions(sequence))
         assert call.reason
         assert call.size_dn >= 0
         assert math.isfinite(call.size_dn)
     ideal = effect.called_for(world().conditions(sequence))
-    prototype = effect.called_for(world(PROTOTYPE).conditions(sequence))
+    typical_device = effect.called_for(world(TYPICAL).conditions(sequence))
     if effect.figures:
         assert not ideal.called
-        assert prototype.called
+        assert typical_device.called
 
 
 def test_an_effect_is_called_for_above_a_tenth_of_the_noise_floor() -> None:
     sequence = Sequence(exposure_s=EXPOSURE_S, sub_phases=SubPhases("none"))
     conditions = world().conditions(sequence)
     for factor, called in ((0.9, False), (1.1, True)):
-        third = factor * CALLED_ABOVE * conditions.floor_dn / conditions.brightness_dn
+        third = (
+            factor
+            * CALLED_ABOVE
+            * conditions.floor_dn
+            / (conditions.brightness_e / conditions.sensor.gain_e_per_dn)
+        )
         device = replace(IDEAL, waveform=Waveform(None, (1e6, 1e9), (third, third)))
         call = world(device).calls(sequence)["modulation-harmonics"]
         assert call.called == called
@@ -364,9 +374,12 @@ def test_ambient_light_adds_its_shot_noise() -> None:
     assert light / dark == pytest.approx(2, rel=6 * math.sqrt(2 * 2 / values))
 
 
-def test_saturation_is_called_for_where_a_pixel_may_be_full() -> None:
-    assert not world(electrons=39_000).calls(PLAIN)["saturation"].called
-    assert world(electrons=41_000).calls(PLAIN)["saturation"].called
+def test_saturation_is_called_for_where_a_pixel_may_be_full_before_the_converter_ends() -> None:
+    small = replace(Sensor(), full_well_e=20_000.0)
+
+    assert not world(sensor=small, electrons=15_000).calls(PLAIN)["saturation"].called
+    assert world(sensor=small, electrons=21_000).calls(PLAIN)["saturation"].called
+    assert not world(sensor=Sensor(), electrons=60_000).calls(PLAIN)["saturation"].called
     assert images(world(electrons=200_000)).max() == pytest.approx(
         min(40_000, (65_535 - 1024) * 9 / 16)
     )
@@ -399,7 +412,11 @@ def test_effects_of_the_prototype_spoil_nominal_moments_and_the_ideal_device_non
 
 
 def test_every_file_of_an_effect_has_its_entry_and_a_name_of_its_own() -> None:
-    files = {each.name for each in pkgutil.iter_modules(package.__path__)} - {"effect"}
+    files = {each.name for each in pkgutil.iter_modules(package.__path__)} - {
+        "conditions",
+        "effect",
+        "glimpses",
+    }
 
     assert {effect.__module__.rpartition(".")[2] for effect in EFFECTS} == files
     assert len({effect.name for effect in EFFECTS}) == len(EFFECTS)
@@ -440,3 +457,62 @@ def test_the_fano_factor_is_that_of_real_counts(data_dir: Path) -> None:
 def _fano(takes: NDArray[np.float64]) -> float:
     """Variance over mean, of all bins with counts."""
     return float(takes.var(axis=0, ddof=1).sum() / takes.mean(axis=0).sum())
+
+
+def test_vignetting_takes_light_by_the_cosine_to_the_axis() -> None:
+    scene = find_scene("wall")
+    assert scene.camera is not None
+    lens = Lens(vignetting=4.0)
+    dark = replace(scene, camera=replace(scene.camera, lens=lens))
+    sequence = Sequence(exposure_s=0.5e-3)
+    frames = []
+    for each in (scene, dark):
+        of = world_of(each, width=41, height=31, readout_s=4e-3)
+        of.configure(sequence, sequence.labels)
+        frames.append(of.mean_image_e(sequence.labels[0], number=0, device_time_s=0.0))
+    x = math.tan(math.radians(20)) * (2 * (np.arange(41) + 0.5) / 41 - 1)
+    y = math.tan(math.radians(20)) * (31 / 41) * (2 * (np.arange(31) + 0.5) / 31 - 1)
+
+    expected = (1 + x[None, :] ** 2 + y[:, None] ** 2) ** -2
+
+    assert frames[1] / frames[0] == pytest.approx(expected, rel=1e-5)
+
+
+def test_dark_current_is_there_without_light_and_cancels_in_the_moments() -> None:
+    device = replace(IDEAL, dark_current=DarkCurrent(2e5))
+    of = world(device, effects=QUIET | {"dark-current": "on"})
+
+    _on, off, *_ = images(of, electrons_images())
+
+    assert off.mean() == pytest.approx(2e5 * EXPOSURE_S, abs=1)
+    assert moment(of).mean() == pytest.approx(IDEAL_MOMENT, abs=2)
+
+
+def test_what_is_dark_at_the_start_is_judged_by_what_comes_later() -> None:
+    """A ball before nothing that comes into view after some seconds."""
+    scene = find_scene("visitor")
+    ball = replace(scene.surfaces[3], motions=(Motion(np.array([[-3.0, 0, 0], [0.2, 0, 0]]), 20),))
+    void = replace(scene, surfaces=(ball,))
+    of = world_of(void, width=41, height=30, readout_s=4e-3)
+    sequence = Sequence(exposure_s=0.5e-3)
+
+    calls = of.calls(sequence)
+    of.configure(sequence, sequence.labels)
+
+    assert not of.mean_image_e(sequence.labels[0], number=0, device_time_s=0.0).any()
+    assert all(calls[name].called for name in ("shot-noise", "motion", "mixed-pixels"))
+
+
+def test_motion_counts_from_the_first_image_of_a_sequence_to_the_last() -> None:
+    scene = find_scene("visitor")
+    slow = Motion(np.array([[-0.2, 0, 0], [0.2, 0, 0]]), 2e4, "back")
+    ball = replace(scene.surfaces[3], motions=(slow,))
+    of = world_of(
+        replace(scene, surfaces=(scene.surfaces[0], ball)), width=41, height=30, readout_s=4e-3
+    )
+
+    short, long = (of.calls(Sequence(takes=takes))["motion"] for takes in (1, 256))
+
+    # 256 takes: 16 times less noise, and 256 times as far
+    assert long.relative > 16 * short.relative
+    assert long.called

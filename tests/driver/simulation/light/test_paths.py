@@ -9,13 +9,21 @@ from numpy.typing import NDArray
 
 from transientcam_driver.sensor import Sensor
 from transientcam_driver.simulation.build import find_scene
-from transientcam_driver.simulation.light.paths import trace
+from transientcam_driver.simulation.imperfections import Lens
+from transientcam_driver.simulation.light.paths import light_rays
+from transientcam_driver.simulation.light.rays import rays_through
+from transientcam_driver.simulation.light.still import StillLight
+from transientcam_driver.simulation.responses import SparseResponses
 from transientcam_driver.simulation.scene.geometry import Rectangle
 from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Transport, Viewpoint
 
 C = 299_792_458.0
 WIDTH, HEIGHT = 33, 25
 CENTRE = (HEIGHT // 2, WIDTH // 2)
+
+
+def trace(of: Scene, *, width: int, height: int) -> SparseResponses:
+    return StillLight(of, width=width, height=height).responses()
 
 
 def v(*values: float) -> NDArray[np.float64]:
@@ -258,3 +266,46 @@ class TestMirrors:
                 (np.arange(mask.shape[1]) + 0.5) * box.shape[1] / mask.shape[1]
             ).astype(int)
             assert ((box[np.ix_(centre_row, centre_column)] > 0) == mask).all(), path
+
+
+def test_a_lens_shows_points_where_browns_model_says() -> None:
+    """Rays through places on the sensor, projected again by the model itself."""
+    lens = Lens((-0.12, 0.03, 0.002, -0.001), (0.02, -0.01))
+    view = Viewpoint(np.zeros(3), np.array([0.0, 1.0, 0.0]), 70.0, lens)
+    rows, columns = np.divmod(np.arange(41 * 31), 41)
+
+    rays = rays_through(view, columns, rows, width=41, height=31)
+
+    x, y = rays[:, 0] / rays[:, 1], rays[:, 2] / rays[:, 1]
+    k1, k2, p1, p2 = lens.distortion
+    squared = x * x + y * y
+    radial = 1 + k1 * squared + k2 * squared**2
+    half = math.tan(math.radians(35))
+    seen_x = x * radial + 2 * p1 * x * y + p2 * (squared + 2 * x * x) + 2 * half * 0.02
+    seen_y = y * radial + p1 * (squared + 2 * y * y) + 2 * p2 * x * y + 2 * half * 0.01
+    assert seen_x == pytest.approx(half * (2 * (columns + 0.5) / 41 - 1), abs=1e-6)
+    assert seen_y == pytest.approx(half * 31 / 41 * (1 - 2 * (rows + 0.5) / 31), abs=1e-6)
+
+
+def test_gloss_is_a_lobe_around_the_direction_of_reflection() -> None:
+    """On a wall seen from the lamp's own place, the highlight is straight ahead."""
+    wall = Rectangle.facing(np.array([0.0, 2.0, 0.0]), np.array([0.0, -1.0, 0.0]), size=(3, 3))
+    eye = np.zeros(3)
+    directions = np.array([[0.0, 1.0, 0.0], [0.3, 1.0, 0.0]])
+    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+    weights = []
+    for gloss in (0.0, 0.2):
+        surface = Surface("wall", "diffuse", wall, 0.5, gloss=gloss, gloss_exponent=40.0)
+        of = Scene(
+            name="test",
+            description="",
+            file=None,
+            light=Light(1.0, eye, np.array([0.0, 1.0, 0.0]), 0.0),
+            camera=Viewpoint(eye, np.array([0.0, 1.0, 0.0]), 40.0),
+            surfaces=(surface,),
+        )
+        weights.append(light_rays(of, directions).weight[0])
+
+    cosine = directions[:, 1]
+    expected = 0.2 * (40 + 8) / 8 * cosine**40 * cosine / (2 / cosine) ** 2
+    assert weights[1] - weights[0] == pytest.approx(expected, rel=1e-9)

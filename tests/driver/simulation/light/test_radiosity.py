@@ -8,9 +8,11 @@ import pytest
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.build import find_scene
+from transientcam_driver.simulation.light.exchange import Exchange
 from transientcam_driver.simulation.light.patches import Patches, form_factors
-from transientcam_driver.simulation.light.paths import camera_rays, light_rays
+from transientcam_driver.simulation.light.paths import light_rays
 from transientcam_driver.simulation.light.radiosity import Interreflection
+from transientcam_driver.simulation.light.rays import camera_rays
 from transientcam_driver.simulation.responses import BIN_S
 from transientcam_driver.simulation.scene.geometry import Ellipsoid, Rectangle
 from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Transport, Viewpoint
@@ -114,12 +116,27 @@ def test_energy_is_conserved_over_many_bounces_in_a_closed_room() -> None:
     exchange = further(box(albedo, bounces=bounces))._exchange
     direct = exchange.radiosity.sum(axis=(0, 2)) / albedo * exchange.patches.area
 
-    indirect = exchange.irradiance(0.0).real * exchange.patches.area
+    indirect = exchange.irradiance(0.0, bounces).real * exchange.patches.area
 
     # a geometric series, cut off after some bounces
     expected = albedo * (1 - albedo**bounces) / (1 - albedo)
     assert direct.sum() == pytest.approx(4 * math.pi, rel=0.01)
     assert indirect.sum() / direct.sum() == pytest.approx(expected, rel=5e-3)
+
+
+def test_bounces_are_followed_until_what_is_left_is_negligible_and_no_further() -> None:
+    room = replace(box(0.7, bounces=1), transport=Transport(diffuse_bounces=None, patches=6))
+    exchange = Exchange.of(room, 6)
+    tolerance = 1e-3 * float(exchange.radiosity.sum(axis=(0, 2)).max())
+
+    bounces = exchange.bounces(tolerance)
+
+    all_light = exchange.irradiance(0.0, 80).real
+
+    def left(after: int) -> float:
+        return float((0.7 * (all_light - exchange.irradiance(0.0, after).real)).max())
+
+    assert left(bounces) < tolerance < left(bounces - 3)
 
 
 def right_angle(*, bounces: int = 1, patches: int = 24) -> Scene:

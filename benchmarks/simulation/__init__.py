@@ -1,0 +1,1 @@
+"""What the simulated camera costs, and how true it is: ``docs/simulation.md``."""

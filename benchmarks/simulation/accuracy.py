@@ -1,0 +1,234 @@
+"""What the automatic choice leaves out: against everything, and against 16 rays a pixel.
+
+Moments are compared before noise, in units of the noise of one moment of the pixel concerned. The
+reference follows 16 rays in each pixel of every image at the image's own time, with all effects
+that the scene has anything for; light over several surfaces is followed over 60 bounces.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.simulation.scenes import scene_named
+from transientcam_driver import Sequence
+from transientcam_driver.sequence import ImageLabel
+from transientcam_driver.simulation.build import world_of
+from transientcam_driver.simulation.light.paths import Lit, light_rays
+from transientcam_driver.simulation.light.radiosity import Interreflection
+from transientcam_driver.simulation.light.rays import camera_rays, rays_through
+from transientcam_driver.simulation.scene.scene import Scene
+from transientcam_driver.simulation.world import World
+
+READOUT_S = 3.98e-3
+START_S = 9.0  # a visitor is there
+SIDE = 4  # rays of the reference, a side of a pixel
+BOUNCES = 60
+SEQUENCES = {
+    "video": Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005),
+    "m = 4 x 20": Sequence(harmonics=4, takes=20),
+    "m = 6 x 8": Sequence(harmonics=6, takes=8),
+}
+OF_LIGHT = ("distortion", "mirror-paths", "gloss", "interreflection", "scattering", "mixed-pixels")
+OF_IMAGES = (*OF_LIGHT, "motion")
+
+Moments = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """Of moments from others, over the lit pixels, in units of the noise."""
+
+    rms: float
+    largest: float
+    beyond_half: float
+
+
+@dataclass(frozen=True, slots=True)
+class Accuracy:
+    """What a scene's automatic choice leaves out at a sequence."""
+
+    scene: str
+    sequence: str
+    called: tuple[str, ...]
+    everything: Difference
+    nothing: Difference
+    rays: Difference | None
+
+
+def measure(name: str, sequence_name: str) -> Accuracy:
+    """Compare moments of the automatic choice with those of everything, nothing, and 16 rays."""
+    scene, sequence = scene_named(name), SEQUENCES[sequence_name]
+    # 16 rays in every pixel of every image take long where something moves
+    width, height = (82, 60) if scene.moves else (163, 120)
+    automatic = _world(scene, scene.effects, sequence, (width, height))
+    there = tuple(
+        effect
+        for effect in OF_IMAGES
+        if effect != "interreflection" or scene.transport.diffuse_bounces != 0
+        if effect != "distortion" or (scene.camera is not None and scene.camera.lens.bends)
+    )
+    everything, nothing = (
+        _world(scene, scene.effects | dict.fromkeys(there, choice), sequence, (width, height))
+        for choice in ("on", "off")
+    )
+    found = _moments(automatic, sequence)
+    reference = _reference(scene, automatic, sequence, (width, height))
+    brightness = automatic.truth(device_time_s=START_S).brightness.ravel()
+    gain_e = sequence.exposure_s * scene.light.electrons_per_s / automatic.sensor.gain_e_per_dn
+    conditions = automatic.conditions(sequence)
+    noise = replace(conditions.noise, white_e=conditions.white_e)
+    deviation_e = noise.deviation(brightness / gain_e, 1.0) * noise.scale_e
+    lit = brightness > 0
+    explained = automatic.explain(name, sequence)
+    return Accuracy(
+        name,
+        sequence_name,
+        tuple(each.effect for each in explained.effects if each.built and each.choice == "auto"),
+        _difference(found - _moments(everything, sequence), deviation_e, lit),
+        _difference(found - _moments(nothing, sequence), deviation_e, lit),
+        None if reference is None else _difference(found - reference, deviation_e, lit),
+    )
+
+
+def _world(
+    scene: Scene, effects: dict[str, str], sequence: Sequence, size: tuple[int, int]
+) -> World:
+    changed = replace(scene, effects=effects)
+    world = world_of(changed, width=size[0], height=size[1], readout_s=READOUT_S)
+    world.configure(sequence, sequence.labels)
+    return world
+
+
+def _moments(world: World, sequence: Sequence) -> Moments:
+    """Moments (m, P) in electrons of the first, the middle and the last take."""
+    period_s = sequence.exposure_s + READOUT_S
+
+    def image(label: ImageLabel) -> NDArray[np.float64]:
+        time_s = START_S + label.index * period_s
+        mean_e = world.mean_image_e(label, number=label.index, device_time_s=time_s)
+        return mean_e.ravel().astype(np.float64)
+
+    return _four_buckets(sequence, image)
+
+
+def _four_buckets(
+    sequence: Sequence, image: Callable[[ImageLabel], NDArray[np.float64]]
+) -> Moments:
+    takes = sorted({0, sequence.takes // 2, sequence.takes - 1})
+    moments: list[Moments] = []
+    for j in range(1, sequence.harmonics + 1):
+        total = np.zeros(0, dtype=np.complex128)
+        for take in takes:
+            of = [each for each in sequence.labels if each.take == take and each.harmonic == j]
+            i_0, i_90, i_180, i_270 = map(image, of)
+            moment = (i_0 - i_180) + 1j * (i_90 - i_270)
+            total = total + moment if total.size else moment
+        moments.append(total / len(takes))
+    return np.array(moments)
+
+
+def _difference(
+    apart_e: Moments, deviation_e: NDArray[np.float64], lit: NDArray[np.bool_]
+) -> Difference:
+    relative = (np.abs(apart_e) / deviation_e)[:, lit]
+    worst = relative.max(axis=0)
+    return Difference(
+        float(np.sqrt(np.mean(relative**2))), float(worst.max()), float(np.mean(worst > 0.5))
+    )
+
+
+def _reference(
+    scene: Scene, world: World, sequence: Sequence, size: tuple[int, int]
+) -> Moments | None:
+    """Moments by 16 rays in each pixel of each image; None for scenes without geometry."""
+    if scene.camera is None or scene.device.name != "ideal":
+        return None
+    cosine = world.conditions(sequence).cosine.ravel() ** scene.camera.lens.vignetting
+    scale_e = 0.5 * scene.light.electrons_per_s * sequence.exposure_s
+    conditions = world.conditions(sequence)
+    period_s = sequence.exposure_s + READOUT_S
+    kept: dict[tuple[float, float], tuple[Moments, Moments]] = {}
+
+    def image(label: ImageLabel) -> NDArray[np.float64]:
+        time_s = START_S + label.index * period_s if scene.moves else 0.0
+        key = time_s, label.frequency_hz
+        if key not in kept:
+            kept.clear()
+            zeroth, modulated = _of_rays(scene.at(time_s), size, (0.0, label.frequency_hz))
+            kept[key] = zeroth, modulated
+        zeroth, modulated = kept[key]
+        turned = modulated * conditions.sub_phase_gain(1) * np.exp(-1j * label.phase_rad)
+        electrons: NDArray[np.float64] = scale_e * cosine * (zeroth + turned).real
+        return electrons  # but for other light, which cancels
+
+    return _four_buckets(sequence, image)
+
+
+def _of_rays(
+    scene: Scene, size: tuple[int, int], frequencies_hz: tuple[float, ...]
+) -> list[Moments]:
+    """Mean moments (P) over the rays of each pixel, at each frequency."""
+    assert scene.camera is not None
+    width, height = size
+    rows, columns = np.divmod(np.arange(width * height), width)
+    offsets = (2 * np.arange(SIDE) + 1) / (2 * SIDE) - 0.5
+    lits: list[Lit] = []
+    for x in offsets:
+        for y in offsets:
+            rays = rays_through(scene.camera, columns + x, rows + y, width=width, height=height)
+            lits.append(light_rays(scene, rays))
+    moments = [
+        np.mean([lit.moments(frequency_hz, lit.scatter(scene)) for lit in lits], axis=0)
+        for frequency_hz in frequencies_hz
+    ]
+    if scene.transport.diffuse_bounces != 0 and sum(each.scatters for each in scene.surfaces) > 1:
+        every = replace(scene, transport=replace(scene.transport, diffuse_bounces=BOUNCES))
+        centres = light_rays(every, camera_rays(scene.camera, width=width, height=height))
+        fine = Lit(
+            *(
+                np.concatenate([getattr(lit, name) for lit in lits], axis=axis)
+                for name, axis in zip(Lit.__slots__, (0, 0, 0, 0, 1, 1), strict=True)
+            )
+        )
+        light = Interreflection(
+            every, centres, width=width, height=height, mixed=(np.arange(width * height), fine)
+        )
+        further = [light.moments(frequency_hz).ravel() for frequency_hz in frequencies_hz]
+        moments = [one + more for one, more in zip(moments, further, strict=True)]
+    return moments
+
+
+def accuracy_lines(results: list[Accuracy]) -> list[str]:
+    """Return the section of the page."""
+    return [
+        "## What is left out",
+        "",
+        "Automatic against everything that the scene has anything for, against none of it, and",
+        "against 16 rays in each pixel of every image: differences of the moments of 163 x 120",
+        "pixels (82 x 60 where something moves) in units of the noise, as root mean square,",
+        "largest, and share of the lit pixels beyond half the noise. Of many takes the first, the",
+        "middle and the last are compared, with the noise of all.",
+        "",
+        "| scene | sequence | called for | automatic - everything | automatic - nothing "
+        "| automatic - 16 rays |",
+        "|---|---|---|---|---|---|",
+        *(
+            f"| {each.scene} | {each.sequence} | {', '.join(_of_scene(each.called))} "
+            f"| {_words(each.everything)} | {_words(each.nothing)} | {_words(each.rays)} |"
+            for each in results
+        ),
+        "",
+    ]
+
+
+def _of_scene(called: tuple[str, ...]) -> list[str]:
+    always = ("shot-noise", "read-noise", "quantisation")
+    return [each for each in called if each not in always] or ["-"]
+
+
+def _words(each: Difference | None) -> str:
+    if each is None:
+        return "-"
+    return f"{each.rms:.2f}, {each.largest:.1f}, {each.beyond_half:.2%}"

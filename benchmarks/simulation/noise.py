@@ -1,0 +1,63 @@
+"""Statistics of the noise: the mean-variance line, independence, kurtosis."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver import Sequence
+from transientcam_driver.sensor import Sensor
+from transientcam_driver.simulation.light import GivenScenery
+from transientcam_driver.simulation.responses import SparseResponses
+from transientcam_driver.simulation.world import World
+
+SHAPE = (120, 163)
+IMAGES = 60
+EXPOSURE_S = 1e-3
+LEVELS_E = (200.0, 1_000.0, 4_000.0, 12_000.0, 30_000.0)
+
+
+def _series(mean_e: float) -> NDArray[np.float64]:
+    """Images of an even brightness."""
+    ones = np.ones((1, *SHAPE))
+    world = World(
+        GivenScenery(SparseResponses(0 * ones, ones)),
+        Sensor(),
+        electrons_per_s=2 * mean_e / EXPOSURE_S,
+        effects={},
+        seed=5,
+    )
+    sequence = Sequence(harmonics=1, zeroth="on-off", exposure_s=EXPOSURE_S)
+    world.configure(sequence, sequence.labels)
+    on = sequence.labels[0]
+    images = [world.image(on, number=n, device_time_s=0.0) for n in range(IMAGES)]
+    return np.array(images, dtype=np.float64)
+
+
+def noise_lines() -> list[str]:
+    """Measure, and return the section of the page."""
+    sensor = Sensor()
+    series = [_series(mean_e) for mean_e in LEVELS_E]
+    means = [float(each.mean()) - sensor.dark_dn for each in series]
+    variances = [float(each.var()) for each in series]
+    slope, offset = np.polyfit(means, variances, 1)
+    bright = series[-2] - series[-2].mean()
+    sideways = np.corrcoef(bright[:, :, 1:].ravel(), bright[:, :, :-1].ravel())[0, 1]
+    downwards = np.corrcoef(bright[:, 1:].ravel(), bright[:, :-1].ravel())[0, 1]
+    onwards = np.corrcoef(bright[1:].ravel(), bright[:-1].ravel())[0, 1]
+    kurtosis = float(np.mean(bright**4) / np.mean(bright**2) ** 2)
+    gain = sensor.gain_e_per_dn
+    return [
+        "## Noise",
+        "",
+        f"Of {IMAGES} images of {len(LEVELS_E)} even levels of light, {bright.size} values each.",
+        "",
+        "| what | measured | expected |",
+        "|---|---|---|",
+        f"| slope of variance over mean | {slope:.4f} DN | {1 / gain:.4f} DN |",
+        f"| variance at no light | {offset:.2f} DN² "
+        f"| {(sensor.read_noise_e / gain) ** 2 + 1 / 12:.2f} DN² |",
+        f"| kurtosis | {kurtosis:.3f} | 3, ± {2 * np.sqrt(24 / bright.size):.3f} |",
+        f"| correlation of neighbours, right and down | {sideways:.4f}, {downwards:.4f} "
+        f"| 0 ± {2 / np.sqrt(bright.size):.4f} |",
+        f"| correlation of successive images | {onwards:.4f} | the same |",
+        "",
+    ]

@@ -1,0 +1,89 @@
+"""What effects are judged by: the light of pixels over the scene's life, and its noise."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise of one complex moment of a pixel, in units of brightness.
+
+    A moment is made of four images, (I0 - I180) + i (I90 - I270), and has twice their noise.
+
+    Attributes
+    ----------
+    scale_e
+        Electrons of an exposure at a brightness of 1.
+    white_e
+        Electrons of unmodulated light in an image of a white surface.
+    dark_e2
+        Variance of an image without light: of the read-out, the rounding and the dark current.
+    takes
+        Over which moments are averaged.
+    """
+
+    scale_e: float
+    white_e: float
+    dark_e2: float
+    takes: int
+
+    def deviation(self, brightness: Values | float, reflectance: Values | float) -> Values:
+        """Return the root mean square error of a moment, real and imaginary part together."""
+        variance_e2 = self.scale_e * np.maximum(brightness, 0) / 2 + self.dark_e2
+        variance_e2 = variance_e2 + self.white_e * np.asarray(reflectance)
+        result: Values = 2 * np.sqrt(variance_e2 / self.takes) / self.scale_e
+        return result
+
+
+@dataclass(frozen=True)
+class Glimpse:
+    """Pixels at one time of the scene's life, flat.
+
+    Attributes
+    ----------
+    brightness, reflectance
+        (P) zeroth moments, and the share of light that falls on a surface that reaches the camera.
+    cosine
+        (P) of the angle between pixels' rays and the lens's axis.
+    shape
+        Rows and columns of these pixels.
+    """
+
+    brightness: Values
+    reflectance: Values
+    cosine: Values
+    shape: tuple[int, int]
+
+    @cached_property
+    def lit(self) -> NDArray[np.bool_]:
+        """Which pixels any light reaches."""
+        return np.asarray(self.brightness > 0)
+
+
+class Facts(Protocol):
+    """The light of a scene of surfaces, with and without one effect."""
+
+    @property
+    def glimpses(self) -> tuple[Glimpse, ...]:
+        """The pixels judged, at several times of the scene's life; once where it stands still."""
+        ...
+
+    def changes(
+        self, effect: str, frequencies_hz: tuple[float, ...], *, during_s: float = 0.0
+    ) -> tuple[Values, ...]:
+        """Return how far an effect moves each pixel's moments, at most, by glimpse.
+
+        ``during_s`` is the time from the first image of a sequence to the last. Empty where the
+        scene has nothing that the effect is about.
+        """
+        ...
+
+    def further_bounces(self, tolerance: float) -> int:
+        """Return how often light goes from surface to surface until less than this is left."""
+        ...

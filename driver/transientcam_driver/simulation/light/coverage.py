@@ -1,0 +1,155 @@
+"""Which share of each pixel a shape covers, seen from one point, without further rays.
+
+Lines through one apex are tested against a shape. What is computed of each line changes its sign at
+the silhouette and is smooth across it, so that its differences between neighbouring pixels say how
+far the silhouette is from the pixel's centre.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver.simulation.scene.geometry import Ellipsoid, Points, Rectangle, Shape
+
+Plane = NDArray[np.float32]
+_TOUCHING = np.float32(1e-4)  # of the way from the apex
+_TINY = np.float32(1e-12)
+
+
+@dataclass(frozen=True, slots=True)
+class Crossing:
+    """Lines ``apex + t way`` and a shape.
+
+    Attributes
+    ----------
+    inside
+        Functions of the line that are above 0 where it meets the shape, all of them.
+    at
+        The t at which it meets a rectangle's plane, or is closest to an ellipsoid's centre.
+    """
+
+    inside: tuple[Plane, ...]
+    at: Plane
+    _length: Plane | None = None
+
+    def between(self, near: Plane | np.float32, far: Plane | np.float32) -> NDArray[np.bool_]:
+        """Whether lines meet the shape between two of their points, and not just at one."""
+        between: NDArray[np.bool_] = self.at > near + _TOUCHING
+        between &= self.at < far * (1 - _TOUCHING)
+        return between
+
+    def entered(self, root: Plane) -> Plane:
+        """Return the t at which lines enter, given the square root of ``inside`` for ellipsoids."""
+        return self.at if self._length is None else self.at - root / self._length
+
+
+def crossing(shape: Shape, apex: Points, way: tuple[Plane, ...]) -> Crossing:
+    """Cross lines, given by three planes of their components, with a shape."""
+    if isinstance(shape, Ellipsoid):
+        return _ellipsoid(shape, apex, way)
+    return _rectangle(shape, apex, way)
+
+
+def _ellipsoid(shape: Ellipsoid, apex: Points, way: tuple[Plane, ...]) -> Crossing:
+    origin = (apex - shape.centre) / shape.radii
+    x, y, z = (w * np.float32(1 / r) for w, r in zip(way, shape.radii, strict=True))
+    squared: Plane = x * x
+    squared += y * y
+    squared += z * z
+    squared += _TINY
+    along: Plane = x * np.float32(origin[0])
+    along += y * np.float32(origin[1])
+    along += z * np.float32(origin[2])
+    closest: Plane = along / squared
+    # 1 minus the squared distance of the line from the centre, where the ellipsoid is a unit sphere
+    inside: Plane = along * closest
+    inside += np.float32(1 - origin @ origin)
+    np.negative(closest, out=closest)
+    return Crossing((inside,), closest, np.sqrt(squared))
+
+
+def _rectangle(shape: Rectangle, apex: Points, way: tuple[Plane, ...]) -> Crossing:
+    origin = apex - shape.centre
+
+    def part(axis: Points) -> Plane:
+        x, y, z = (w * np.float32(a) for w, a in zip(way, axis, strict=True))
+        total: Plane = x + y + z + _TINY
+        return total
+
+    at: Plane = np.float32(-(origin @ shape.normal)) / part(shape.normal)
+    inside: list[Plane] = []
+    for axis, length in ((shape.right, shape.width), (shape.up, shape.height)):
+        place = at * part(axis)
+        place += np.float32(origin @ axis)
+        inside.append(1 - np.abs(place) * np.float32(2 / length))
+    return Crossing(tuple(inside), at)
+
+
+def covered(inside: Plane, *, rooted: bool = True) -> tuple[Plane, Plane]:
+    """Share of each pixel (H, W) where a function is above 0, and its mean square root there.
+
+    The function is taken as linear within a pixel; the share is then exact. NaN is nowhere. Without
+    ``rooted`` the second plane is the first.
+    """
+    positive = inside > 0
+    share = positive.astype(np.float32)
+    root = np.sqrt(np.maximum(inside, np.float32(0))) if rooted else share
+    near = np.flatnonzero(_at_border(positive))
+    if near.size:
+        value = inside.ravel()[near]
+        down, right = _slopes(inside, near, value)
+        if rooted:
+            width = np.sqrt(down * down + right * right)
+            high = np.maximum(value + width / 2, np.float32(1e-9))
+            low = np.maximum(value - width / 2, np.float32(0))
+            cubes = high * np.sqrt(high) - low * np.sqrt(low)
+            root.ravel()[near] = cubes / np.maximum(1.5 * (high - low), np.float32(1e-9))
+        share.ravel()[near] = _half_plane(value, np.maximum(down, right), np.minimum(down, right))
+    return share, root
+
+
+def _at_border(positive: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Pixels with a neighbour on the other side: a border crosses no others."""
+    border = np.zeros_like(positive)
+    step = positive[1:] != positive[:-1]
+    border[1:] |= step
+    border[:-1] |= step
+    step = positive[:, 1:] != positive[:, :-1]
+    border[:, 1:] |= step
+    border[:, :-1] |= step
+    return border
+
+
+def _slopes(plane: Plane, at: NDArray[np.intp], value: Plane) -> tuple[Plane, Plane]:
+    """Sizes of the differences to the nearer neighbours down and right, 0 where there are none."""
+    height, width = plane.shape
+    flat = plane.ravel()
+    row, column = np.divmod(at, width)
+    # beyond the edge, the neighbour on the other side stands for the one that is not there
+    up = np.where(row > 0, at - width, at + width * (height > 1))
+    down = np.where(row < height - 1, at + width, at - width * (height > 1))
+    left = np.where(column > 0, at - 1, at + (width > 1))
+    right = np.where(column < width - 1, at + 1, at - (width > 1))
+    slopes = [
+        np.fmin(np.abs(value - flat[one]), np.abs(value - flat[other]))
+        for one, other in ((up, down), (left, right))
+    ]
+    for slope in slopes:
+        slope[np.isnan(slope)] = 0
+    return slopes[0], slopes[1]
+
+
+def _half_plane(value: Plane, steep: Plane, gentle: Plane) -> Plane:
+    """Area of a unit square where ``value + steep x + gentle y`` is above 0, about its centre."""
+    steep = np.maximum(steep, np.float32(1e-9))
+    gentle = np.maximum(gentle, np.float32(1e-2) * steep)
+    area = np.zeros_like(value)
+    half, rest = (steep + gentle) / 2, (steep - gentle) / 2
+    # the integral of the step over the square: second differences of a parabola
+    for sign, offset in ((1, half), (-1, rest), (-1, -rest), (1, -half)):
+        part = np.maximum(value + offset, np.float32(0))
+        area += sign * part * part
+    share: Plane = np.clip(area / (2 * steep * gentle), 0, 1)
+    share[np.isnan(share)] = 0
+    return share

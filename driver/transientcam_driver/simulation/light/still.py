@@ -1,0 +1,199 @@
+"""The light of what stands still: a ray a pixel, and more where light differs within it."""
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver.simulation.effects.glimpses import Noise
+from transientcam_driver.simulation.light.bundle import Bundle
+from transientcam_driver.simulation.light.paths import (
+    FAR_M,
+    Lit,
+    hit,
+    light_rays,
+    scatter_of,
+    sparse_image,
+)
+from transientcam_driver.simulation.light.rays import camera_rays, rays_through
+from transientcam_driver.simulation.responses import Scatter, SparseResponses
+from transientcam_driver.simulation.scene.geometry import Points
+from transientcam_driver.simulation.scene.scene import Scene
+
+_SIDE = 4
+"""Rays a side of a pixel that light differs in."""
+_DIFFERS_ABOVE = 0.25  # of the noise
+
+
+class StillLight:
+    """What the pixels of a camera see of a scene that stands still.
+
+    Parameters
+    ----------
+    scene
+        With a camera.
+    noise, highest_hz
+        Which differences of light between pixels matter: None if none do, and at which frequency.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        width: int,
+        height: int,
+        noise: Noise | None = None,
+        highest_hz: float = 0.0,
+    ) -> None:
+        assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
+        self.scene = scene
+        self.width, self.height = width, height
+        self._camera = scene.camera
+        self.rays = camera_rays(self._camera, width=width, height=height)
+        self.lit = light_rays(scene, self.rays)
+        self.mixed = np.zeros(0, dtype=np.intp)
+        """Pixels, by index, that are the mean over several rays."""
+        if noise is not None:
+            self.mixed = np.flatnonzero(self._differs(noise, highest_hz))
+        self._phasors: dict[float, tuple[NDArray[np.complex64], NDArray[np.complex64]]] = {}
+
+    @property
+    def pixel_rad(self) -> float:
+        """Angle of a pixel in the middle of the image."""
+        middle = self.height // 2 * self.width + self.width // 2
+        return float(np.arccos(np.clip(self.rays[middle] @ self.rays[middle - 1], -1, 1)))
+
+    def rays_in(self, pixel: NDArray[np.intp], side: int = _SIDE) -> Points:
+        """Return rays, so many a side, in some pixels: for each place in a pixel, all pixels."""
+        rows, columns = np.divmod(pixel, self.width)
+        offsets = (2 * np.arange(side) + 1) / (2 * side) - 0.5
+        down, right = (grid.reshape(-1, 1) for grid in np.meshgrid(offsets, offsets))
+        size = {"width": self.width, "height": self.height}
+        return rays_through(self._camera, (columns + right).ravel(), (rows + down).ravel(), **size)
+
+    @cached_property
+    def reflectance(self) -> NDArray[np.float32]:
+        """(H W) of what the pixels see."""
+        reflectance = self.lit.reflectance.astype(np.float32)
+        if self.mixed.size:
+            of_rays = self.fine.reflectance.reshape(-1, len(self.mixed))
+            reflectance[self.mixed] = of_rays.mean(axis=0)
+        return reflectance
+
+    @cached_property
+    def fine(self) -> Lit:
+        """Light of several rays in each of the pixels ``mixed``."""
+        return light_rays(self.scene, self.rays_in(self.mixed))
+
+    def phasors(self, frequency_hz: float) -> tuple[NDArray[np.complex64], NDArray[np.complex64]]:
+        """Moments (K, H, W) by chain of mirrors, and (H, W) in all."""
+        if frequency_hz not in self._phasors:
+            each = self.lit.phasors(frequency_hz, self.lit.scatter(self.scene))
+            if self.mixed.size:
+                fine = self.fine.phasors(frequency_hz, self.fine.scatter(self.scene))
+                each[:, self.mixed] = fine.reshape(len(each), -1, len(self.mixed)).mean(axis=1)
+            each = each.reshape(-1, self.height, self.width)
+            total = each.sum(axis=0)
+            self._phasors[frequency_hz] = each.astype(np.complex64), total.astype(np.complex64)
+        return self._phasors[frequency_hz]
+
+    @cached_property
+    def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64], Scatter | None]:
+        """Delays and weights (K, H W) by chain, and the spread of each.
+
+        Of a pixel that is the mean over several rays, each surface in it has planes of its own.
+        """
+        lit, scene = self.lit, self.scene
+        delay_s, weight = [lit.delay_s], [lit.weight.copy()]
+        surfaces = [np.broadcast_to(lit.surface, lit.weight.shape)]
+        if self.mixed.size:
+            weight[0][:, self.mixed] = 0
+            shape = (len(lit.weight), -1, len(self.mixed))
+            fine_s, fine = self.fine.delay_s.reshape(shape), self.fine.weight.reshape(shape)
+            of = self.fine.surface.reshape(shape[1:])
+            for surface in np.unique(of[of >= 0]):
+                mine = np.where(of == surface, fine, 0)
+                total = mine.sum(axis=1)
+                mean_s = (mine * fine_s).sum(axis=1) / np.where(total > 0, total, 1)
+                delay_s.append(np.zeros_like(lit.delay_s))
+                weight.append(np.zeros_like(lit.weight))
+                surfaces.append(np.full(lit.weight.shape, surface))
+                delay_s[-1][:, self.mixed] = mean_s
+                weight[-1][:, self.mixed] = total / fine.shape[1]
+        spread = scatter_of(scene, np.concatenate(surfaces))
+        return np.concatenate(delay_s), np.concatenate(weight), spread
+
+    def responses(self) -> SparseResponses:
+        """Return all returns as an image."""
+        delay_s, weight, scatter = self.returns
+        return sparse_image(delay_s, weight, scatter, (self.height, self.width))
+
+    def lines_of_sight(self) -> list[Bundle]:
+        """Rays of the camera up to what stands still: before any mirror, then behind mirrors."""
+        shape = self.height, self.width
+        surfaces = self.scene.surfaces
+        bundles: list[Bundle] = []
+        eye = self._camera.position_m
+        start = np.broadcast_to(eye, self.rays.shape)
+        follow = [(0, np.arange(len(self.rays)), eye, start, self.rays)]
+        while follow:
+            bounces, index, apex, start, direction = follow.pop(0)
+            hits = np.stack([hit(each, start, start + FAR_M * direction) for each in surfaces])
+            nearest, which = hits.min(axis=0), hits.argmin(axis=0)
+            reach_m = np.minimum(nearest, 1.0) * FAR_M
+            way, near, far = np.zeros((len(self.rays), 3)), *np.zeros((2, len(self.rays)))
+            way[index], near[index] = direction, np.linalg.norm(start - apex, axis=-1)
+            far[index] = near[index] + reach_m
+            counts = np.zeros(len(self.rays), dtype=bool)
+            counts[index] = True
+            bundles.append(
+                Bundle.of(
+                    apex,
+                    way.reshape(*shape, 3),
+                    counts.reshape(shape),
+                    near=near.reshape(shape),
+                    far=far.reshape(shape),
+                )
+            )
+            for k in np.unique(which[np.isfinite(nearest)]):
+                if surfaces[k].kind == "mirror" and bounces < self.scene.mirror_bounces:
+                    on = np.isfinite(nearest) & (which == k)
+                    mirror = surfaces[k].mirror
+                    on[on] = direction[on] @ mirror.normal < 0
+                    end = start[on] + reach_m[on, None] * direction[on]
+                    turned = mirror.mirrored_direction(direction[on])
+                    follow.append((bounces + 1, index[on], mirror.mirrored(apex), end, turned))
+        return bundles
+
+    def _differs(self, noise: Noise, highest_hz: float) -> NDArray[np.bool_]:
+        """Pixels in which light may differ, (H W): where it does between neighbours.
+
+        By the second difference over three pixels, which even a steep but smooth change hardly
+        has; or where the surface changes, since light over further surfaces changes there too.
+        """
+        shape = self.height, self.width
+        deviation = noise.deviation(self.lit.weight.sum(axis=0), self.lit.reflectance)
+        limit = _DIFFERS_ABOVE * deviation.reshape(shape)
+        scatter = self.lit.scatter(self.scene)
+        planes = [self.lit.moments(f, scatter).reshape(shape) for f in (0.0, highest_hz)]
+        surface = self.lit.surface.reshape(shape)
+        differs = np.zeros(shape, dtype=bool)
+        for axis in (0, 1):
+            of, other = np.moveaxis(differs, axis, 0), np.moveaxis(surface, axis, 0)
+            step = other[1:] != other[:-1]
+            of[1:] |= step
+            of[:-1] |= step
+            for plane in planes:
+                bend = np.abs(np.diff(np.moveaxis(plane, axis, 0), 2, axis=0))
+                of[1:-1] |= bend > np.moveaxis(limit, axis, 0)[1:-1]
+        return _grown(differs).ravel()
+
+
+def _grown(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Mark the neighbours too, whose corners an edge may cut."""
+    grown = marked.copy()
+    grown[1:] |= marked[:-1]
+    grown[:-1] |= marked[1:]
+    grown[:, 1:] |= marked[:, :-1]
+    grown[:, :-1] |= marked[:, 1:]
+    return grown
