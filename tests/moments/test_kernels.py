@@ -227,8 +227,7 @@ def test_several_threads_compile_each_lane_once(monkeypatch: pytest.MonkeyPatch)
         thread.join()
 
     assert len(made) == len(set(made))
-    # that of the likelihood takes long to compile, and is prepared when it is first used
-    in_background = set(compiler.LANES) - {"likelihood"}
+    in_background = set(compiler.LANES) - {"likelihood"}  # that one when it is first used
     assert {(name, m) for name, m, _ in made} == {(n, m) for n in in_background for m in (3, 5)}
 
 
