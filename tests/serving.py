@@ -9,8 +9,8 @@ from typing import Any
 
 from fastapi import FastAPI
 
+from transientcam_driver import Camera, open_camera
 from transientcam_server.api.app import build_app
-from transientcam_server.camera import Camera, open_camera
 from transientcam_server.daemon.server import Server, address, listen
 from transientcam_server.service import Service
 from transientcam_server.settings import Settings

@@ -71,6 +71,7 @@ class FrameMeta(TypedDict):
     unrepaired_images: int | None
     """Images of pairs that contradict the others and could not be rebuilt; None until computed."""
     filled_images: list[int] | None
+    corrected_pixels: int | None
     """Which images are those of the frame before, by their index in it; None until computed."""
     pixels: PixelCounts | None
     predicted_range_std_m: PredictedStd | None

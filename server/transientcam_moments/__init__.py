@@ -31,6 +31,13 @@ from transientcam_moments.errors import (
 )
 from transientcam_moments.flags import INVALID, Flags, flags
 from transientcam_moments.four_bucket import four_bucket, measure, saturated
+from transientcam_moments.harmonics import (
+    Corrected,
+    HarmonicCorrection,
+    checked_waveform,
+    sweep_offsets_rad,
+    waveform_of,
+)
 from transientcam_moments.labels import Labels
 from transientcam_moments.levinson import (
     Coefficients,
@@ -57,7 +64,9 @@ __all__ = [
     "Average",
     "Biased",
     "Coefficients",
+    "Corrected",
     "Flags",
+    "HarmonicCorrection",
     "Labels",
     "Likelihood",
     "MomentsError",
@@ -76,6 +85,7 @@ __all__ = [
     "bounds",
     "calibrate",
     "calibration_of",
+    "checked_waveform",
     "comparisons",
     "cumulative",
     "density",
@@ -104,4 +114,6 @@ __all__ = [
     "smallest_eigenvalue",
     "smooth",
     "smoothed_density",
+    "sweep_offsets_rad",
+    "waveform_of",
 ]

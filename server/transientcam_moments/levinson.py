@@ -184,7 +184,7 @@ def extend(coefficients: Coefficients, n: int) -> Array:
         raise ParameterError("n", n, f"above the order m = {m}")
     b = _moments(coefficients)
     for k in range(m + 1, n + 1):
-        b.append(_predicted(a, b, k))
+        b.append(predicted(a, b, k))
     return namespace(a).stack(b[m + 1 :])
 
 
@@ -206,7 +206,8 @@ def _moments(coefficients: Coefficients) -> list[Array]:
     return b
 
 
-def _predicted(a: Array, b: list[Array], k: int) -> Array:
+def predicted(a: Array, b: list[Array], k: int) -> Array:
+    """Return b_k from b_{k-m} .. b_{k-1} and the polynomial a of order m, see `extend`."""
     total = a[1] * b[k - 1]
     for j in range(2, a.shape[0]):
         total = total + a[j] * b[k - j]

@@ -16,6 +16,7 @@ from transientcam_moments.cumulative import cumulative
 from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.flags import INVALID, Flags, flags
 from transientcam_moments.four_bucket import ZEROTH_IMAGES
+from transientcam_moments.harmonics import HarmonicCorrection
 from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.likelihood import Likelihood, likelihood
 from transientcam_moments.maximum_entropy import density
@@ -152,6 +153,8 @@ class Reconstruction:
         What was done to the images before.
     calibration : array, shape (m + 1,) or (m + 1, ...), optional
         Gains that the moments were divided by, for their noise; 1, when left out.
+    correction : HarmonicCorrection, optional
+        What is taken out of the moments once they are smoothed.
     """
 
     def __init__(
@@ -164,8 +167,10 @@ class Reconstruction:
         kept: Array | None = None,
         repaired: Repair | None = None,
         calibration: Array | None = None,
+        correction: HarmonicCorrection | None = None,
     ) -> None:
         self.settings = settings
+        self._correction = correction
         self._measured = moments
         self._saturated = saturated_pixels
         self._bad = bad_pixels
@@ -201,11 +206,26 @@ class Reconstruction:
         return tuple((int(t), int(i)) for t, i in np.argwhere(self._repaired.filled))
 
     @cached_property
-    def smoothed(self) -> Array:
-        """Moments (m + 1, ...) smoothed over pixels, b_0 estimated where it wasn't measured."""
+    def _corrected(self) -> tuple[Array, Array | None]:
+        """Smoothed moments without the known harmonics, and where these were taken out."""
         moments = self.measured
         if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
             moments = smooth(moments, self.settings.smoothing_sigma_px)
+        return (moments, None) if self._correction is None else self._correction(moments)
+
+    @property
+    def corrected_pixels(self) -> int | None:
+        """Of how many pixels known harmonics were taken out; None where none are known."""
+        corrected = self._corrected[1]
+        return None if corrected is None else int(corrected.sum())
+
+    @cached_property
+    def smoothed(self) -> Array:
+        """Moments (m + 1, ...) smoothed over pixels, b_0 estimated where it wasn't measured.
+
+        Known harmonics of the modulation are taken out.
+        """
+        moments = self._corrected[0]
         if self.settings.zeroth == "estimated":
             moments = estimate_zeroth(moments, self.settings.epsilon)
         return moments
@@ -473,6 +493,8 @@ class PassedReconstruction(Reconstruction):
         What was done to the images before.
     calibration : array, optional
         As of `Reconstruction`.
+    corrected : boolean array, shape (...), optional
+        Where known harmonics were taken out; none are known, when left out.
     """
 
     def __init__(
@@ -483,10 +505,12 @@ class PassedReconstruction(Reconstruction):
         kept: Array | None = None,
         repaired: Repair | None = None,
         calibration: Array | None = None,
+        corrected: Array | None = None,
     ) -> None:
         super().__init__(None, settings, kept=kept, repaired=repaired, calibration=calibration)
         self._measure = measure
         self.smoothed = planes.smoothed
+        self._corrected = planes.smoothed, corrected
         self.validity = planes.validity
         self.flags = planes.flags
         self.returns = Returns(planes.phase_rad, planes.weight, planes.uniform, planes.count)

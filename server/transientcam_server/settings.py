@@ -66,6 +66,9 @@ class ReconstructionSettings(_Group):
     spoilt_images: SpoiltImages = "repair"
     """Images that lost their synchronisation: rebuilt from the frame's other images, and (`fill`)
     taken from the frame before where that is impossible; or kept."""
+    modulation_harmonics: Literal["take-out", "keep"] = "take-out"
+    """Odd harmonics of the modulation, where the calibration has measured them: taken out of the
+    moments, or kept in them."""
 
     @property
     def least_harmonics(self) -> int:
@@ -207,8 +210,8 @@ class Settings(_Group):
     """Everything that can be set."""
 
     camera: str = Field(default="sim:mirrors", min_length=1)
-    """Which camera: ``usb``, ``usb:SERIAL``, ``sim:SCENE``, ``sim:measured:FILE`` or
-    ``recording:FILE``."""
+    """Which camera, as NAME:ADDRESS: ``usb:SERIAL``, ``sim:SCENE``, ``tofcam660:ADDRESS``,
+    ``recording:FILE``, or one of another package; `transientcam devices` lists them."""
     host: str = Field(default="127.0.0.1", min_length=1)
     """Address to listen on."""
     port: int = Field(default=8000, ge=0, le=65535)

@@ -9,9 +9,10 @@ import transientcam_moments as tm
 from transientcam_moments._kernels.registry import REGISTRY
 
 CACHE = Path(__file__).resolve().parents[2] / ".pytest_cache" / "kernels"
-FEW = tuple(name for name in tm.kernels.LANES if name not in ("likelihood", "covariance"))
-"""All but that of the likelihood, which takes as long to compile as the others together, and that
-of the noise, which few tests need."""
+FEW = tuple(
+    name for name in tm.kernels.LANES if name not in (*tm.kernels.WHEN_NEEDED, "covariance")
+)
+"""All but those that few tests need, of which some take as long to compile as the others together."""
 
 
 @contextmanager

@@ -31,6 +31,9 @@ isn't finite
 ``likelihood(b (m+1, P), variance (m+1, P), returns, tail_shape) -> attributes of Likelihood``,
 or None for other than the usual models
 
+``harmonics(given, current, polynomial (m+1, P), mixed (K m, P), inverse (m, P), orders) ->
+following (m+1, P), misfit (P)``, or None for orders above 31
+
 ``reconstruct(shape, constants) -> OnePass``, found by `lookup`
 
 All others take ``spread=`` to do parts of the pixels on other threads (see ``parallel``).

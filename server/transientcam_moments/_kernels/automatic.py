@@ -11,7 +11,7 @@ THREAD: Final = "transientcam-compile"
 """Name of every thread that compiles."""
 MOST_ROOTS: Final = 8
 """The largest m with lanes for eigenvalues and returns."""
-_SINGLE_ONLY: Final = ("smooth", "measure", "separate", "reconstruct", "likelihood")
+_SINGLE_ONLY: Final = ("smooth", "measure", "separate", "reconstruct", "likelihood", "harmonics")
 _DOUBLE_ONLY: Final = ("covariance",)
 _FEW_ROOTS: Final = (
     "pisarenko",

@@ -18,7 +18,7 @@ def serve(
     camera: Annotated[
         str | None,
         typer.Option(
-            help="usb[:SERIAL], sim:SCENE or recording:FILE  [default: sim:mirrors]",
+            help="NAME:ADDRESS, as `transientcam devices` lists them.  [default: sim:mirrors]",
             autocompletion=lambda: _camera_names(),
         ),
     ] = None,
@@ -78,8 +78,8 @@ def serve(
     settings = load_settings(command_line, file=config, environment=os.environ)
 
     import transientcam_moments as tm
+    from transientcam_driver import open_camera
     from transientcam_server.api.app import build_app
-    from transientcam_server.camera import open_camera
     from transientcam_server.camera.source import start_with
     from transientcam_server.daemon import server
 
@@ -107,8 +107,9 @@ def serve(
 
 def _camera_names() -> list[str]:
     from transientcam_driver import list_scenes
+    from transientcam_driver.opening import kinds
 
-    return ["usb", *(f"sim:{scene.name}" for scene in list_scenes())]
+    return [*kinds(), *(f"sim:{scene.name}" for scene in list_scenes())]
 
 
 def _check(command_line: dict[str, Any], config: Path | None, *, as_json: bool) -> None:
