@@ -12,7 +12,7 @@ CACHE = Path(__file__).resolve().parents[2] / ".pytest_cache" / "kernels"
 FEW = tuple(
     name for name in tm.kernels.LANES if name not in (*tm.kernels.WHEN_NEEDED, "covariance")
 )
-"""All but those that few tests need, of which some take as long to compile as the others together."""
+"""All but those that few tests need; some of these take as long to compile as all others."""
 
 
 @contextmanager
