@@ -1,22 +1,22 @@
 """Plans sequences for the scene that a camera sees. Runs on workers."""
 
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 import transientcam_moments as tm
-from transientcam_driver import Capabilities, Truth
+from transientcam_driver import Capabilities, Sequence, Truth
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.noise import moment_noise
-from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.planning.candidates import candidates
-from transientcam_server.planning.choice import Choice, choices_on_front
+from transientcam_server.planning.families import families
 from transientcam_server.planning.goal import Goal
+from transientcam_server.planning.look import LookedThrough, look_at
 from transientcam_server.planning.plan import Plan, plan
 from transientcam_server.planning.prediction import Predictor
-from transientcam_server.planning.scene import SceneStatistics, scene_of_frame
+from transientcam_server.planning.scene import SceneStatistics
+from transientcam_server.planning.search import Search
 from transientcam_server.planning.timing import ReconstructionTimer
 from transientcam_server.settings import ReconstructionSettings
 
@@ -47,52 +47,37 @@ class Planner:
         self._settings = settings
         self._computing = ReconstructionTimer(self._capabilities, settings)
 
-    def scene_statistics(
-        self, recipe: Recipe, found: tm.Reconstruction, ambient_dn_per_s: float
+    def look(
+        self, camera: LookedThrough, base: Sequence, go_on: Callable[[str], None] = lambda _: None
     ) -> SceneStatistics:
-        """Describe the scene of a frame.
+        """Look at the scene before a camera; see `look_at`."""
 
-        Raises
-        ------
-        Problem
-            ``target-unreachable`` where the frame shows no light.
-        """
-        statistics = scene_of_frame(
-            found,
-            moment_noise(recipe, found),
-            exposure_s=recipe.applied.sequence.exposure_s,
-            base_frequency_hz=recipe.base_frequency_hz,
-            ambient_dn_per_s=ambient_dn_per_s,
+        def checked(stage: str) -> None:
+            self._go_on()
+            go_on(stage)
+
+        return look_at(camera, self._sensor, self._settings, base=base, go_on=checked)
+
+    def plan(
+        self, goal: Goal, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
+    ) -> Plan:
+        """Recommend a sequence; see `planning.plan`. What ``go_on`` raises ends it."""
+        return plan(
+            goal, self._predictor(scene, go_on), self._capabilities, timed=self._computing
         )
-        if statistics is None:
-            raise Problem(
-                kinds.TARGET_UNREACHABLE,
-                "The current frame shows no pixel with light that does not saturate; give a scene.",
-                field="scene",
-                value=None,
-                best=None,
-            )
-        return statistics
 
-    def plan(self, goal: Goal, scene: SceneStatistics) -> Plan:
-        """Recommend a sequence; see `planning.plan`."""
-        return plan(goal, self._predictor(scene), self._capabilities, reconstruct_s=self._computing)
-
-    def plan_document(self, goal: Goal, scene: SceneStatistics) -> dict[str, Any]:
-        """Return `plan` as JSON, with intervals by a bootstrap."""
-        return self.plan(goal, scene).to_document()
-
-    def front(self, goal: Goal, scene: SceneStatistics) -> list[Choice]:
-        """Return all sequences that no other beats, by rising time."""
-        choices = candidates(
-            goal, self._predictor(scene), self._capabilities, reconstruct_s=self._computing
-        )
-        return choices_on_front(choices, goal.leading)
+    def plan_document(
+        self, goal: Goal, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
+    ) -> dict[str, Any]:
+        """Return `plan` as JSON."""
+        return self.plan(goal, scene, go_on).to_document()
 
     def front_documents(self, goal: Goal, scene: SceneStatistics) -> list[dict[str, Any]]:
-        """Return `front` as JSON, with intervals by a bootstrap: seconds of computing."""
+        """Return all that no other beats, by rising time, as JSON: seconds of computing."""
+        found = families(goal, self._predictor(scene), self._capabilities)
+        search = Search(goal, found, self._predictor(scene), self._computing)
         documents = []
-        for choice in self.front(goal, scene):
+        for choice in search.front(goal.leading):
             self._go_on()
             documents.append(choice.to_document())
         return documents
@@ -101,8 +86,14 @@ class Planner:
         """End what is being computed: it raises Problem ``shutting-down``. From any thread."""
         self._closing.set()
 
-    def _predictor(self, scene: SceneStatistics) -> Predictor:
-        return Predictor(scene, self._sensor, self._settings, go_on=self._go_on)
+    def _predictor(
+        self, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
+    ) -> Predictor:
+        def checked() -> None:
+            self._go_on()
+            go_on()
+
+        return Predictor(scene, self._sensor, self._settings, go_on=checked)
 
     def _go_on(self) -> None:
         if self._closing.is_set():

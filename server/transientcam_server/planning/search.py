@@ -1,0 +1,241 @@
+"""The search: which member of which family is quickest, or finest, and what is stated of it."""
+
+import bisect
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from transientcam_driver import Sequence
+from transientcam_server.planning.choice import Choice
+from transientcam_server.planning.families import Family, Member
+from transientcam_server.planning.goal import Goal
+from transientcam_server.planning.pareto import front
+from transientcam_server.planning.prediction import Predictor
+
+Timed = Callable[[Sequence, str], float]
+"""Computing time in s of a frame of a sequence with an estimator."""
+QUICK_MARGIN: Final = 1.02
+"""About what the margin of the intervals comes to, less the bias that few draws make."""
+CONTENDERS: Final = 3
+"""Families of which more draws decide."""
+NEAR: Final = 1.3
+"""A family stays a contender as long as it takes no longer than so many times the quickest."""
+ON_FRONT: Final = 16
+"""Members of a family that the front is made of."""
+_STEPS: Final = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A member of a family and the error that few draws predict of it."""
+
+    family: Family
+    place: int
+    error: float
+
+    @property
+    def member(self) -> Member:
+        """The sequence."""
+        return self.family.members[self.place]
+
+
+class Search:
+    """Finds choices for a goal among families.
+
+    Parameters
+    ----------
+    goal
+        Targets and budgets.
+    families
+        Those of shorter captures first.
+    predictor
+        Of the scene.
+    timed
+        Of the machine.
+    """
+
+    def __init__(
+        self, goal: Goal, families: list[Family], predictor: Predictor, timed: Timed
+    ) -> None:
+        self.families = families
+        self._goal = goal
+        self.predictor = predictor
+        self.timed = timed
+        self._choices: dict[tuple[str, Sequence], Choice] = {}
+
+    def choice(self, family: Family, member: Member) -> Choice:
+        """Predict a member with many draws."""
+        key = (family.estimator, member.sequence)
+        if key not in self._choices:
+            applied = family.applied(member)
+            sequence, goal, predictor = applied.sequence, self._goal, self.predictor
+            distance_m = goal.separation_m
+            self._choices[key] = Choice(
+                applied,
+                family.estimator,
+                predictor.predict(family.estimator, sequence),
+                predictor.beyond_scene(sequence),
+                lambda: self.timed(sequence, family.estimator),
+                predictor.bound_width(sequence) if goal.bound_width is not None else None,
+                None if distance_m is None else predictor.separation(sequence, distance_m),
+            )
+        return self._choices[key]
+
+    def quickest(
+        self, targets: dict[str, float], *, contenders: int = CONTENDERS
+    ) -> Choice | None:
+        """Return the choice within the budgets that reaches targets soonest; None without any.
+
+        The families are searched with few draws, the best of them again with many; where those
+        do not bear the target out, the next longer member is taken.
+        """
+        found: list[Found] = []
+        best_s = math.inf
+        for family, place in self._hopeful(targets):
+            if family.members[place].capture_s > NEAR * best_s:
+                break
+            soonest = self._soonest(family, place, targets, NEAR * best_s)
+            if soonest is not None:
+                found.append(Found(family, soonest, 0.0))
+                best_s = min(best_s, found[-1].member.capture_s)
+        best: Choice | None = None
+        for each in sorted(found, key=lambda each: each.member.capture_s)[:contenders]:
+            limit_s = math.inf if best is None else best.applied.capture_s
+            borne_out = self._borne_out(each, targets, limit_s)
+            best = borne_out or best
+        return best
+
+    def finest(
+        self, leading: str, within_s: float = math.inf, *, contenders: int = CONTENDERS
+    ) -> Choice | None:
+        """Return the choice within the budgets, and a time, with the least error."""
+        bounded = []
+        for family in self.families:
+            place = self._longest(family, within_s)
+            if place is not None:
+                bounded.append((self._least(family, place, leading), family, place))
+        found: list[Found] = []
+        for least, family, place in sorted(bounded, key=lambda each: each[0]):
+            errors = sorted(each.error for each in found)
+            if errors and least > NEAR * errors[0]:
+                break
+            found.append(Found(family, place, self._quick(family, place, leading)))
+        found.sort(key=lambda each: (each.error, each.member.capture_s))
+        choices = [self.choice(each.family, each.member) for each in found[:contenders]]
+        return min(choices, key=lambda choice: choice.error(leading), default=None)
+
+    def front(self, leading: str) -> list[Choice]:
+        """Return choices of every family along its time, without those that others beat."""
+        found = [
+            Found(family, place, self._quick(family, place, leading))
+            for family in self.families
+            for place in _spread(len(family.members))
+            if self._affords(family, family.members[place])
+        ]
+        best = front(found, cost=lambda each: each.member.capture_s, error=lambda each: each.error)
+        choices = [self.choice(each.family, each.member) for each in best]
+        return front(
+            choices,
+            cost=lambda choice: choice.applied.capture_s,
+            error=lambda choice: choice.error(leading),
+        )
+
+    def _longest(self, family: Family, within_s: float = math.inf) -> int | None:
+        """Return the place of the longest capture that the budgets and a time allow."""
+        end = bisect.bisect_right(family.members, within_s, key=lambda each: each.capture_s)
+        for place in range(end - 1, -1, -1):
+            if self._affords(family, family.members[place]):
+                return place
+        return None
+
+    def _affords(self, family: Family, member: Member) -> bool:
+        goal = self._goal
+        if not goal.affords_time(member.capture_s):
+            return False
+        if goal.computing_share is None:
+            return True
+        share = self.timed(member.sequence, family.estimator) / member.capture_s
+        return share <= goal.computing_share
+
+    def _hopeful(self, targets: dict[str, float]) -> list[tuple[Family, int]]:
+        """Return families and the first member that may reach the targets, by its time."""
+        hopeful = []
+        for family in self.families:
+            last = self._longest(family)
+            if last is None:
+                continue
+            first = bisect.bisect_left(
+                range(last + 1),
+                x=True,
+                key=lambda place, family=family: all(
+                    self._least(family, place, name) <= limit for name, limit in targets.items()
+                ),
+            )
+            if first <= last:
+                hopeful.append((family, first))
+        return sorted(hopeful, key=lambda each: each[0].members[each[1]].capture_s)
+
+    def _soonest(
+        self, family: Family, first: int, targets: dict[str, float], within_s: float
+    ) -> int | None:
+        last = self._longest(family, within_s)
+        if last is None or last < first or not self._reaches(family, last, targets):
+            return None
+        while first < last:  # the longer a capture, the less its noise
+            middle = (first + last) // 2
+            if self._reaches(family, middle, targets) and self._affords(
+                family, family.members[middle]
+            ):
+                last = middle
+            else:
+                first = middle + 1
+        return last
+
+    def _reaches(self, family: Family, place: int, targets: dict[str, float]) -> bool:
+        return all(
+            self._quick(family, place, name) <= limit / self._margin(name)
+            for name, limit in targets.items()
+        )
+
+    @staticmethod
+    def _margin(target: str) -> float:
+        return QUICK_MARGIN if target.startswith("range") else 1.0
+
+    def _least(self, family: Family, place: int, target: str) -> float:
+        """Return what the error of a member is at least; 0 where no bound is known."""
+        if target != "range_error_m":
+            return 0.0
+        member = family.members[place]
+        return self.predictor.least_error_m(family.estimator, member.sequence, member.scale)
+
+    def _quick(self, family: Family, place: int, target: str) -> float:
+        member, predictor = family.members[place], self.predictor
+        if target == "bound_width":
+            return predictor.bound_width(member.sequence)
+        if target == "separation_m":
+            assert self._goal.separation_m is not None  # noqa: S101 - it is a target
+            return 1.0 - predictor.separation(member.sequence, self._goal.separation_m)
+        std_m, _, error_m = predictor.quick(family.estimator, member.sequence, member.scale)
+        return std_m if target == "range_std_m" else error_m
+
+    def _borne_out(
+        self, found: Found, targets: dict[str, float], limit_s: float
+    ) -> Choice | None:
+        """Return the first member from one on that many draws find to reach the targets."""
+        members = found.family.members
+        for place in range(found.place, min(found.place + _STEPS, len(members))):
+            member = members[place]
+            if member.capture_s >= limit_s or not self._affords(found.family, member):
+                return None
+            choice = self.choice(found.family, member)
+            if all(choice.error_with_margin(name) <= limit for name, limit in targets.items()):
+                return choice
+        return None
+
+
+def _spread(count: int) -> list[int]:
+    """Return at most `ON_FRONT` places, evenly from the first to the last."""
+    if count <= ON_FRONT:
+        return list(range(count))
+    return [round(k * (count - 1) / (ON_FRONT - 1)) for k in range(ON_FRONT)]
