@@ -66,7 +66,9 @@ class Kept:
     @property
     def ratios(self) -> dict[str, float]:
         """Measured over predicted noise, bias and error."""
-        return {name: self.measured[name] / self.predicted[name] for name in ("std", "bias", "error")}
+        return {
+            name: self.measured[name] / self.predicted[name] for name in ("std", "bias", "error")
+        }
 
     @property
     def covered(self) -> bool:

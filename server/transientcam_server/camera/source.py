@@ -1,5 +1,6 @@
 """What the service serves: a camera on USB, a simulated one, or a recording."""
 
+import contextlib
 import logging
 from typing import Protocol, Self
 
@@ -7,6 +8,7 @@ import transientcam_driver
 import transientcam_moments as tm
 from transientcam_driver import (
     AppliedSequence,
+    CameraError,
     Capabilities,
     Counters,
     RawFrame,
@@ -14,6 +16,7 @@ from transientcam_driver import (
     Simulation,
     Status,
 )
+from transientcam_driver.clock import VirtualClock
 from transientcam_server.recording.replay import PREFIX, ReplayCamera, parse_replay
 from transientcam_server.settings import SensorSettings, SequenceSettings
 
@@ -105,6 +108,35 @@ def start_with(camera: Camera, settings: SequenceSettings) -> None:
     if nearest != wanted:
         _log.warning("the camera cannot do %s; it starts with %s", wanted, nearest)
     camera.configure(nearest)
+
+
+def twin_of(camera: Camera, spec: str) -> transientcam_driver.Camera:
+    """Open another simulated camera before the same scene, as old as the first, in virtual time.
+
+    Parameters
+    ----------
+    camera
+        A simulated one.
+    spec
+        What it was opened with.
+
+    Raises
+    ------
+    SpecError, SceneError, CameraError
+        As `transientcam_driver.open_camera`.
+    """
+    own = camera.simulation
+    assert own is not None  # noqa: S101 - callers look
+    clock = VirtualClock()
+    twin = transientcam_driver.open_camera(spec, clock=clock)
+    with contextlib.suppress(CameraError):  # an unplugged one is as new as the twin
+        clock.sleep(camera.status().device_time_s)
+    there = twin.simulation
+    assert there is not None  # noqa: S101 - of the same spec
+    same = (there.scene, there.effects, there.diffusor) == (own.scene, own.effects, own.diffusor)
+    if not same:
+        there.change(scene=own.scene, effects=own.effects, diffusor=own.diffusor)
+    return twin
 
 
 def open_camera(spec: str) -> Camera:

@@ -9,6 +9,7 @@ from transientcam_server.planning.choice import Choice
 from transientcam_server.planning.front import FrontCache
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.look import look_at
+from transientcam_server.planning.looks import Looks
 from transientcam_server.planning.plan import Plan
 from transientcam_server.planning.planner import Planner
 from transientcam_server.planning.prediction import Predictor
@@ -18,6 +19,7 @@ __all__ = [
     "Choice",
     "FrontCache",
     "Goal",
+    "Looks",
     "Plan",
     "Planner",
     "Predictor",

@@ -32,6 +32,8 @@ class Seen:
         How they were captured.
     moments
         (F, m + 1, H, W) smoothed moments of each frame.
+    single
+        (m + 1, H, W) moments that are not smoothed, averaged over the frames.
     mean_dn
         (H, W) mean of all four-bucket images above the dark level.
     brightest_dn
@@ -43,6 +45,7 @@ class Seen:
     recipe: Recipe
     sensor: tm.noise.Sensor
     moments: _Array
+    single: _Array
     mean_dn: _Array
     brightest_dn: float
     usable: _Array
@@ -104,7 +107,7 @@ def describe(
     """
     lit = lit_pixels(seen)
     if coarse is not None:
-        lit &= lit_pixels(coarse)  # what neighbours leak into an unlit pixel is not enough
+        lit &= lit_pixels(coarse)
     if not lit.any():
         return None
     there = np.flatnonzero(lit)
@@ -123,7 +126,7 @@ def describe(
         ambient = np.maximum(mean_dn - light_dn / 2, 0.0) / seen.exposure_s
     else:
         ambient = np.full(pixels.size, ambient_dn_per_s)
-    relative = b / light_dn
+    relative = (b / light_dn).astype(np.complex64)
     relative[0] = 1.0
     returns = tm.pisarenko(relative)
     weight = np.asarray(returns.weight, dtype=float)
@@ -149,11 +152,13 @@ def lit_pixels(seen: Seen) -> _Array:
     """Return which pixels (H, W) have modulated light that noise alone does not explain.
 
     The sum of squares of 2 m independent parts over their variance is chi-square; it must be above
-    its mean by `LIT_DEVIATIONS` of its standard deviations, 2 sqrt(m) each.
+    its mean by `LIT_DEVIATIONS` of its standard deviations, 2 sqrt(m) each. Smoothing would leak
+    the light of neighbours into unlit pixels.
     """
-    b = seen.moments.mean(axis=0)[1:]
+    b = seen.single[1:]
     m = len(b)
-    variance = seen.variance(seen.mean_dn)[1:] / len(seen.moments)
+    left = tm.noise.smoothing_factor(seen.recipe.settings.smoothing_px)
+    variance = seen.variance(seen.mean_dn)[1:] / (left * len(seen.moments))
     with np.errstate(invalid="ignore"):  # of pixels that are not finite
         power = (np.abs(b) ** 2 / variance).sum(axis=0)
         lit: _Array = seen.usable & (power > 2 * m + LIT_DEVIATIONS * 2 * np.sqrt(m))
@@ -166,9 +171,7 @@ def _brightness(low: _Array, b: _Array) -> _Array:
     return np.maximum(size, 1e-9)
 
 
-def _unwrapped(
-    direct_m: _Array, b: _Array, coarse: Seen, pixels: _Array, base_hz: float
-) -> _Array:
+def _unwrapped(direct_m: _Array, b: _Array, coarse: Seen, pixels: _Array, base_hz: float) -> _Array:
     """Add the periods that the mean of all light lies beyond, by the coarse frequency."""
     coarse_b, _ = coarse.at(pixels)
     coarse_hz = coarse.recipe.base_frequency_hz

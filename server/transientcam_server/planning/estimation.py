@@ -11,8 +11,10 @@ import transientcam_moments as tm
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
-ESTIMATORS: Final = ("single-frequency", "maximum-entropy", "likelihood", "pisarenko")
-"""Estimators that are planned with, the quickest to compute first."""
+SEARCHED: Final = ("single-frequency", "maximum-entropy", "likelihood")
+"""Estimators that are planned with where none is named. On no scene was Pisarenko's the best."""
+ESTIMATORS: Final = (*SEARCHED, "pisarenko")
+"""All that can be predicted."""
 MOST_HARMONICS: Final[Mapping[str, int]] = MappingProxyType({"single-frequency": 1})
 """More harmonics than these do nothing for an estimator."""
 

@@ -9,7 +9,7 @@ from transientcam_driver import AppliedSequence, Capabilities, Sequence, Sequenc
 from transientcam_moments.comparisons import TECHNIQUES
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.planning.estimation import ESTIMATORS, MOST_HARMONICS
+from transientcam_server.planning.estimation import MOST_HARMONICS, SEARCHED
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.pareto import front
 from transientcam_server.planning.prediction import Predictor
@@ -32,13 +32,16 @@ class Member:
 
     Attributes
     ----------
+    exposure_s, takes
+        In what it differs from the others of its family.
     capture_s
         Time of one capture.
     scale
         Its noise over that of the predictor's nominal sequence.
     """
 
-    sequence: Sequence
+    exposure_s: float
+    takes: int
     capture_s: float
     scale: float
 
@@ -48,12 +51,15 @@ class Family:
     """Sequences of the same frequencies, by rising time, and the estimator of their range."""
 
     estimator: str
+    first: Sequence
     members: tuple[Member, ...]
     capabilities: Capabilities
 
     def applied(self, member: Member) -> AppliedSequence:
         """Return a member as the camera would set it."""
-        return self.capabilities.apply(member.sequence)
+        return self.capabilities.apply(
+            replace(self.first, exposure_s=member.exposure_s, takes=member.takes)
+        )
 
 
 def families(goal: Goal, predictor: Predictor, capabilities: Capabilities) -> list[Family]:
@@ -90,7 +96,7 @@ def families(goal: Goal, predictor: Predictor, capabilities: Capabilities) -> li
             continue
         members = tuple(_members(goal, sequence, scales, capabilities))
         if members:
-            found.append(Family(estimator, members, capabilities))
+            found.append(Family(estimator, sequence, members, capabilities))
     if not found:
         reason = "the fixed fields exclude all"
         if ambiguous_m:
@@ -129,7 +135,7 @@ def _frequencies(goal: Goal) -> Iterator[tuple[Sequence, str]]:
     if "base_frequency_hz" in fixed:
         frequencies_hz = [base.base_frequency_hz]
     harmonics = (base.harmonics,) if "harmonics" in fixed else HARMONICS
-    estimators = ESTIMATORS if goal.estimator is None else (goal.estimator,)
+    estimators = SEARCHED if goal.estimator is None else (goal.estimator,)
     for estimator, m, frequency_hz, zeroth in itertools.product(
         estimators, harmonics, frequencies_hz, _zeroths(goal)
     ):
@@ -157,11 +163,7 @@ def _members(
             continue
         image_s = exposure_s + capabilities.streaming_readout_s
         members += [
-            Member(
-                replace(sequence, exposure_s=exposure_s, takes=each),
-                each * images * image_s,
-                scale / each**0.5,
-            )
+            Member(exposure_s, each, each * images * image_s, scale / each**0.5)
             for each in takes
             if each <= most_takes
         ]

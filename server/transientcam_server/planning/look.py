@@ -72,6 +72,7 @@ def look_at(
     settings: ReconstructionSettings,
     *,
     base: Sequence | None = None,
+    ambient_dn_per_s: float | None = None,
     go_on: Callable[[str], None] = lambda stage: None,
 ) -> SceneStatistics:
     """Look at the scene before a camera.
@@ -89,7 +90,9 @@ def look_at(
     settings
         Smoothing, biasing and threshold.
     base
-        Whose base frequency, and half of it, are planned with, and its sub-phases.
+        Whose base frequency, its multiples and half of it are planned with, and its sub-phases.
+    ambient_dn_per_s
+        Light that is not the camera's; None takes it from the mean of the images.
     go_on
         Called with the name of each stage; whatever it raises ends the look.
 
@@ -153,7 +156,12 @@ def look_at(
     )
     fine = captured(fine_sequence, FRAMES, "all frequencies")
     go_on("direct range")
-    scene = describe(_seen(fine, sensor), settings, coarse=_seen(coarse, sensor))
+    scene = describe(
+        _seen(fine, sensor),
+        settings,
+        coarse=_seen(coarse, sensor),
+        ambient_dn_per_s=ambient_dn_per_s,
+    )
     if scene is None:
         raise no_light()
     return scene
@@ -221,6 +229,7 @@ def _seen(
         recipe=recipe,
         sensor=sensor,
         moments=np.stack([tm.smooth(b, smoothing_px) if smoothing_px else b for b in measured]),
+        single=np.mean(measured, axis=0),
         mean_dn=images.mean(axis=0) - sensor.dark_dn,
         brightest_dn=brightest(images, sensor),
         usable=images.max(axis=0) < sensor.highest_dn,
@@ -231,4 +240,3 @@ def _modulated(frame: RawFrame) -> _Array:
     """Return the images of whole periods of the light: four-bucket images of all harmonics."""
     lit = [label.index for label in frame.labels if label.harmonic > 0]
     return np.asarray(frame.images[lit])
-

@@ -41,7 +41,9 @@ class PixelErrors:
         return np.hypot(self.std_m, self.bias_m)
 
 
-def pixel_errors(range_m: _Array, true_m: _Array, uncertainty_m: _Array | float = 0.0) -> PixelErrors:
+def pixel_errors(
+    range_m: _Array, true_m: _Array, uncertainty_m: _Array | float = 0.0
+) -> PixelErrors:
     """Measure the errors of captured or drawn ranges.
 
     Parameters

@@ -77,9 +77,7 @@ class Plan:
         }
 
 
-def plan(
-    goal: Goal, predictor: Predictor, capabilities: Capabilities, *, timed: Timed
-) -> Plan:
+def plan(goal: Goal, predictor: Predictor, capabilities: Capabilities, *, timed: Timed) -> Plan:
     """Recommend a sequence and an estimator.
 
     Parameters
@@ -105,11 +103,36 @@ def plan(
     leading = goal.leading
     best = search.quickest(targets) if targets else search.finest(leading)
     if best is None:
-        finest = search.finest(leading)
-        raise too_small(goal, search) if finest is None else unreachable(goal, search, finest)
+        best = search.finest(leading)
+        if best is None:
+            raise too_small(goal, search)
+        if not goal.reached_by(best):
+            raise unreachable(goal, search, best)
     half_time = search.finest(leading, best.applied.capture_s / 2, contenders=1)
     twice = search.quickest({leading: best.error(leading) / 2}, contenders=1)
     return Plan(best, half_time, twice, leading, _summary(best, twice))
+
+
+def in_a_sentence(front: list[Choice]) -> str:
+    """State from where on bias rules, of choices by rising time."""
+    ruled = [each for each in front if each.predicted.range_bias.median > _noise_m(each)]
+    if not front:
+        return "Nothing reaches any accuracy on this scene."
+    finest = front[-1]
+    best = (
+        f"the best is {finest.predicted.range_error.median * 1e3:.3g} mm in "
+        f"{finest.applied.capture_s * 1e3:.3g} ms ({finest.in_words()})"
+    )
+    if not ruled:
+        return f"Noise rules everywhere: more time buys accuracy; {best}."
+    return (
+        f"From {ruled[0].applied.capture_s * 1e3:.3g} ms on bias rules and more time buys little; "
+        f"{best}."
+    )
+
+
+def _noise_m(choice: Choice) -> float:
+    return choice.predicted.range_std.median
 
 
 def _summary(best: Choice, twice: Choice | None) -> str:

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from transientcam_server.errors.exceptions import Problem
 from transientcam_server.planning.families import families
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.look import LookedThrough, look_at
-from transientcam_server.planning.plan import Plan, plan
+from transientcam_server.planning.plan import Plan, in_a_sentence, plan
 from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.scene import SceneStatistics
 from transientcam_server.planning.search import Search
@@ -48,7 +49,12 @@ class Planner:
         self._computing = ReconstructionTimer(self._capabilities, settings)
 
     def look(
-        self, camera: LookedThrough, base: Sequence, go_on: Callable[[str], None] = lambda _: None
+        self,
+        camera: LookedThrough,
+        base: Sequence,
+        *,
+        ambient_dn_per_s: float | None = None,
+        go_on: Callable[[str], None] = lambda stage: None,
     ) -> SceneStatistics:
         """Look at the scene before a camera; see `look_at`."""
 
@@ -56,15 +62,20 @@ class Planner:
             self._go_on()
             go_on(stage)
 
-        return look_at(camera, self._sensor, self._settings, base=base, go_on=checked)
+        return look_at(
+            camera,
+            self._sensor,
+            self._settings,
+            base=base,
+            ambient_dn_per_s=ambient_dn_per_s,
+            go_on=checked,
+        )
 
     def plan(
         self, goal: Goal, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
     ) -> Plan:
         """Recommend a sequence; see `planning.plan`. What ``go_on`` raises ends it."""
-        return plan(
-            goal, self._predictor(scene, go_on), self._capabilities, timed=self._computing
-        )
+        return plan(goal, self._predictor(scene, go_on), self._capabilities, timed=self._computing)
 
     def plan_document(
         self, goal: Goal, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
@@ -72,15 +83,25 @@ class Planner:
         """Return `plan` as JSON."""
         return self.plan(goal, scene, go_on).to_document()
 
-    def front_documents(self, goal: Goal, scene: SceneStatistics) -> list[dict[str, Any]]:
-        """Return all that no other beats, by rising time, as JSON: seconds of computing."""
-        found = families(goal, self._predictor(scene), self._capabilities)
-        search = Search(goal, found, self._predictor(scene), self._computing)
-        documents = []
-        for choice in search.front(goal.leading):
-            self._go_on()
-            documents.append(choice.to_document())
-        return documents
+    def tradeoff_document(self, goal: Goal, scene: SceneStatistics) -> dict[str, Any]:
+        """Return all that no other beats, and the lines they lie on, as JSON: seconds of work."""
+        predictor = self._predictor(scene)
+        found = families(goal, predictor, self._capabilities)
+        search = Search(goal, found, predictor, self._computing)
+        choices = search.front(goal.leading)
+        return {
+            "front": [choice.to_document() for choice in choices],
+            "lines": [
+                {
+                    "estimator": line.estimator,
+                    "harmonics": line.sequence.harmonics,
+                    "base_frequency_hz": line.sequence.base_frequency_hz,
+                    "points": [asdict(point) for point in line.points],
+                }
+                for line in search.lines(choices)
+            ],
+            "summary": in_a_sentence(choices),
+        }
 
     def close(self) -> None:
         """End what is being computed: it raises Problem ``shutting-down``. From any thread."""

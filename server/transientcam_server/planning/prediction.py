@@ -153,17 +153,20 @@ class Predictor:
         )
         return _typical(std), float(np.median(bias)), float(np.median(np.hypot(std, bias)))
 
-    def least_error_m(self, estimator: str, sequence: Sequence, scale: float) -> float:
-        """Return a bound in m that the error of the median pixel hardly falls below: no draws.
+    def least_noise_m(self, estimator: str, sequence: Sequence, scale: float) -> float:
+        """Return a bound in m on the noise of the median pixel: that of Cramer and Rao.
 
-        The bias without noise, and the Cramer-Rao bound of one return with all the light.
+        Of one return with all the light; the sum of squares of 1 to m is in it.
         """
-        harmonics = self._harmonics(estimator, sequence)
-        frequency_hz = sequence.base_frequency_hz
-        squares = harmonics * (harmonics + 1) * (2 * harmonics + 1) / 6
+        m = self._harmonics(estimator, sequence)
         noise = float(np.median(self._nominal)) * scale
-        std_m = float(tm.range_m(noise / math.sqrt(squares), frequency_hz))
-        return math.hypot(std_m, self._exact(estimator, harmonics, frequency_hz))
+        std_rad = noise / math.sqrt(m * (m + 1) * (2 * m + 1) / 6)
+        return float(tm.range_m(std_rad, sequence.base_frequency_hz))
+
+    def least_bias_m(self, estimator: str, sequence: Sequence) -> float:
+        """Return what the bias of the median pixel hardly falls below: that without noise."""
+        m = self._harmonics(estimator, sequence)
+        return self._exact(estimator, m, sequence.base_frequency_hz)
 
     def _bias_without_noise(
         self, estimator: str, harmonics: int, base_frequency_hz: float
@@ -172,7 +175,7 @@ class Predictor:
         self._go_on()
         scene = self.scene
         b = scene.relative_moments(harmonics, base_frequency_hz)[:, FEW]
-        variance = np.broadcast_to((self._nominal[FEW] * STEP**-4) ** 2, b.shape).copy()
+        variance = np.broadcast_to((self._nominal[FEW] * STEP**-4) ** 2, b.shape).astype(np.float32)
         variance[0] = 0
         range_m = ranges_m(b, variance, estimator, base_frequency_hz, self.settings)
         bias_m = np.hypot(range_m - scene.direct_m[FEW], scene.uncertainty_m[FEW])
@@ -186,9 +189,7 @@ class Predictor:
         errors = self._errors(
             estimator, harmonics, sequence.base_frequency_hz, noise, FINE_DRAWS, sequence.zeroth
         )
-        picks = np.random.default_rng(self._seed).integers(
-            0, noise.size, (_RESAMPLED, noise.size)
-        )
+        picks = np.random.default_rng(self._seed).integers(0, noise.size, (_RESAMPLED, noise.size))
 
         def figure(each: _Array, median: Callable[[_Array], float]) -> Figure:
             value = median(each)
@@ -264,7 +265,7 @@ class Predictor:
     ) -> PixelErrors:
         self._go_on()
         b = self.scene.relative_moments(harmonics, base_frequency_hz)[:, pixels]
-        variance = np.broadcast_to(noise[pixels] ** 2, b.shape).copy()
+        variance = np.broadcast_to(noise[pixels] ** 2, b.shape).astype(np.float32)
         if zeroth == "estimated":
             variance[0] = 0
         random = np.random.default_rng((self._seed, harmonics, draws))

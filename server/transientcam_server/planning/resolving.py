@@ -59,9 +59,7 @@ class Resolving:
             variance[0] = 0
         return tm.noise.draw(b, tm.noise.MomentNoise(variance), random, draws=draws)
 
-    def _reconstructed(
-        self, b: _Array, base_frequency_hz: float, zeroth: str
-    ) -> tm.Reconstruction:
+    def _reconstructed(self, b: _Array, base_frequency_hz: float, zeroth: str) -> tm.Reconstruction:
         plain = self._settings.model_copy(
             update={"smoothing_px": 0.0, "minimum_brightness_dn": 0.0}
         )

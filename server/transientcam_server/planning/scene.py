@@ -80,9 +80,9 @@ class SceneStatistics:
             return np.array(self.measured[: step * harmonics + 1 : step])
         j = np.arange(harmonics + 1)[:, None, None]
         phase = 2 * np.pi * base_frequency_hz * np.nan_to_num(self.delay_s)
-        moments: _Array = (self.share * np.exp(1j * j * phase)).sum(axis=1)
+        moments = (self.share * np.exp(1j * j * phase)).sum(axis=1)
         moments[0] = 1.0
-        return moments
+        return moments.astype(np.complex64)
 
     def ambiguous(self, unambiguous_range_m: float) -> bool:
         """Whether ranges beyond this one are too frequent, of the direct or of later returns.

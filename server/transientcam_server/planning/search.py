@@ -15,14 +15,18 @@ from transientcam_server.planning.prediction import Predictor
 
 Timed = Callable[[Sequence, str], float]
 """Computing time in s of a frame of a sequence with an estimator."""
-QUICK_MARGIN: Final = 1.02
-"""About what the margin of the intervals comes to, less the bias that few draws make."""
+HOPE: Final = 1.1
+"""A family is looked at closely where few draws predict up to so many times a target."""
 CONTENDERS: Final = 3
 """Families of which more draws decide."""
 NEAR: Final = 1.3
 """A family stays a contender as long as it takes no longer than so many times the quickest."""
-ON_FRONT: Final = 16
-"""Members of a family that the front is made of."""
+ON_FRONT: Final = 12
+"""Times that the front is made of."""
+LONGEST_S: Final = 5.0
+"""The longest of them."""
+POINTS: Final = 8
+"""At most twice as many make a line."""
 _STEPS: Final = 4
 
 
@@ -38,6 +42,28 @@ class Found:
     def member(self) -> Member:
         """The sequence."""
         return self.family.members[self.place]
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """Predicted errors in m of the median pixel, of a capture of this length."""
+
+    capture_s: float
+    range_std_m: float
+    range_bias_m: float
+    range_error_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """How the error of the same frequencies falls with time: noise falls onto the bias.
+
+    ``sequence`` is the shortest one.
+    """
+
+    estimator: str
+    sequence: Sequence
+    points: tuple[Point, ...]
 
 
 class Search:
@@ -66,9 +92,9 @@ class Search:
 
     def choice(self, family: Family, member: Member) -> Choice:
         """Predict a member with many draws."""
-        key = (family.estimator, member.sequence)
+        applied = family.applied(member)
+        key = (family.estimator, applied.sequence)
         if key not in self._choices:
-            applied = family.applied(member)
             sequence, goal, predictor = applied.sequence, self._goal, self.predictor
             distance_m = goal.separation_m
             self._choices[key] = Choice(
@@ -82,9 +108,7 @@ class Search:
             )
         return self._choices[key]
 
-    def quickest(
-        self, targets: dict[str, float], *, contenders: int = CONTENDERS
-    ) -> Choice | None:
+    def quickest(self, targets: dict[str, float], *, contenders: int = CONTENDERS) -> Choice | None:
         """Return the choice within the budgets that reaches targets soonest; None without any.
 
         The families are searched with few draws, the best of them again with many; where those
@@ -95,6 +119,8 @@ class Search:
         for family, place in self._hopeful(targets):
             if family.members[place].capture_s > NEAR * best_s:
                 break
+            if self._least_bias(family) > targets.get("range_error_m", math.inf):
+                continue
             soonest = self._soonest(family, place, targets, NEAR * best_s)
             if soonest is not None:
                 found.append(Found(family, soonest, 0.0))
@@ -116,30 +142,50 @@ class Search:
             if place is not None:
                 bounded.append((self._least(family, place, leading), family, place))
         found: list[Found] = []
+        worst = math.inf
         for least, family, place in sorted(bounded, key=lambda each: each[0]):
-            errors = sorted(each.error for each in found)
-            if errors and least > NEAR * errors[0]:
+            if least > worst:
                 break
+            if leading == "range_error_m" and self._least_bias(family) > worst:
+                continue
             found.append(Found(family, place, self._quick(family, place, leading)))
+            worst = min(worst, NEAR * found[-1].error)
         found.sort(key=lambda each: (each.error, each.member.capture_s))
         choices = [self.choice(each.family, each.member) for each in found[:contenders]]
         return min(choices, key=lambda choice: choice.error(leading), default=None)
 
     def front(self, leading: str) -> list[Choice]:
-        """Return choices of every family along its time, without those that others beat."""
-        found = [
-            Found(family, place, self._quick(family, place, leading))
-            for family in self.families
-            for place in _spread(len(family.members))
-            if self._affords(family, family.members[place])
-        ]
-        best = front(found, cost=lambda each: each.member.capture_s, error=lambda each: each.error)
-        choices = [self.choice(each.family, each.member) for each in best]
+        """Return the finest choices within rising times, without those that others beat."""
+        shortest_s = self.families[0].members[0].capture_s
+        longest_s = max(family.members[-1].capture_s for family in self.families)
+        longest_s = min(max(LONGEST_S, shortest_s), longest_s)
+        ratio = (longest_s / shortest_s) ** (1 / (ON_FRONT - 1))
+        times_s = [shortest_s * ratio**k * (1 + 1e-9) for k in range(ON_FRONT)]
+        choices = [self.finest(leading, within_s, contenders=1) for within_s in times_s]
         return front(
-            choices,
+            [choice for choice in choices if choice is not None],
             cost=lambda choice: choice.applied.capture_s,
             error=lambda choice: choice.error(leading),
         )
+
+    def lines(self, choices: list[Choice]) -> list[Line]:
+        """Return noise and bias over time of every family that choices come from."""
+        wanted = {_frequencies_of(choice.estimator, choice.applied.sequence) for choice in choices}
+        lines = []
+        for family in self.families:
+            sequence = family.applied(family.members[0]).sequence
+            if _frequencies_of(family.estimator, sequence) not in wanted:
+                continue
+            members = [each for each in family.members if each.capture_s <= LONGEST_S]
+            points = [
+                Point(
+                    each.capture_s,
+                    *self.predictor.quick(family.estimator, family.first, each.scale),
+                )
+                for each in members[:: max(1, len(members) // POINTS)]
+            ]
+            lines.append(Line(family.estimator, sequence, tuple(points)))
+        return lines
 
     def _longest(self, family: Family, within_s: float = math.inf) -> int | None:
         """Return the place of the longest capture that the budgets and a time allow."""
@@ -155,7 +201,8 @@ class Search:
             return False
         if goal.computing_share is None:
             return True
-        share = self.timed(member.sequence, family.estimator) / member.capture_s
+        sequence = family.applied(member).sequence
+        share = self.timed(sequence, family.estimator) / member.capture_s
         return share <= goal.computing_share
 
     def _hopeful(self, targets: dict[str, float]) -> list[tuple[Family, int]]:
@@ -194,48 +241,64 @@ class Search:
 
     def _reaches(self, family: Family, place: int, targets: dict[str, float]) -> bool:
         return all(
-            self._quick(family, place, name) <= limit / self._margin(name)
+            self._quick(family, place, name) <= limit * self._hope(name)
             for name, limit in targets.items()
         )
 
     @staticmethod
-    def _margin(target: str) -> float:
-        return QUICK_MARGIN if target.startswith("range") else 1.0
+    def _hope(target: str) -> float:
+        return HOPE if target.startswith("range") else 1.0
 
     def _least(self, family: Family, place: int, target: str) -> float:
-        """Return what the error of a member is at least; 0 where no bound is known."""
-        if target != "range_error_m":
+        """Return what the noise of a member is at least; 0 where no bound is known."""
+        if not target.startswith("range"):
             return 0.0
-        member = family.members[place]
-        return self.predictor.least_error_m(family.estimator, member.sequence, member.scale)
+        scale = family.members[place].scale
+        return self.predictor.least_noise_m(family.estimator, family.first, scale)
+
+    def _least_bias(self, family: Family) -> float:
+        return self.predictor.least_bias_m(family.estimator, family.first)
 
     def _quick(self, family: Family, place: int, target: str) -> float:
         member, predictor = family.members[place], self.predictor
         if target == "bound_width":
-            return predictor.bound_width(member.sequence)
+            return predictor.bound_width(family.applied(member).sequence)
         if target == "separation_m":
             assert self._goal.separation_m is not None  # noqa: S101 - it is a target
-            return 1.0 - predictor.separation(member.sequence, self._goal.separation_m)
-        std_m, _, error_m = predictor.quick(family.estimator, member.sequence, member.scale)
+            sequence = family.applied(member).sequence
+            return 1.0 - predictor.separation(sequence, self._goal.separation_m)
+        std_m, _, error_m = predictor.quick(family.estimator, family.first, member.scale)
         return std_m if target == "range_std_m" else error_m
 
-    def _borne_out(
-        self, found: Found, targets: dict[str, float], limit_s: float
-    ) -> Choice | None:
+    def _borne_out(self, found: Found, targets: dict[str, float], limit_s: float) -> Choice | None:
         """Return the first member from one on that many draws find to reach the targets."""
-        members = found.family.members
-        for place in range(found.place, min(found.place + _STEPS, len(members))):
-            member = members[place]
-            if member.capture_s >= limit_s or not self._affords(found.family, member):
+        family, place = found.family, found.place
+        for _ in range(_STEPS):
+            member = family.members[place]
+            if member.capture_s >= limit_s or not self._affords(family, member):
                 return None
-            choice = self.choice(found.family, member)
-            if all(choice.error_with_margin(name) <= limit for name, limit in targets.items()):
+            choice = self.choice(family, member)
+            over = max(choice.error_with_margin(name) / limit for name, limit in targets.items())
+            if over <= 1:
                 return choice
+            # few draws were wrong by that factor: on to where they predict as much less
+            wanted = {name: self._quick(family, place, name) / over for name in targets}
+            later = range(place + 1, len(family.members))
+            place = (
+                bisect.bisect_left(
+                    later,
+                    x=True,
+                    key=lambda each: all(
+                        self._quick(family, each, name) <= limit for name, limit in wanted.items()
+                    ),
+                )
+                + place
+                + 1
+            )
+            if place >= len(family.members):
+                return None
         return None
 
 
-def _spread(count: int) -> list[int]:
-    """Return at most `ON_FRONT` places, evenly from the first to the last."""
-    if count <= ON_FRONT:
-        return list(range(count))
-    return [round(k * (count - 1) / (ON_FRONT - 1)) for k in range(ON_FRONT)]
+def _frequencies_of(estimator: str, sequence: Sequence) -> tuple[str, int, float, str]:
+    return estimator, sequence.harmonics, sequence.base_frequency_hz, sequence.zeroth
