@@ -109,7 +109,8 @@ def plan(goal: Goal, predictor: Predictor, capabilities: Capabilities, *, timed:
         if not goal.reached_by(best):
             raise unreachable(goal, search, best)
     half_time = search.finest(leading, best.applied.capture_s / 2, contenders=1)
-    twice = search.quickest({leading: best.error(leading) / 2}, contenders=1)
+    half = {leading: best.error(leading) / 2}
+    twice = search.without_budgets().quickest(half, contenders=1)
     return Plan(best, half_time, twice, leading, _summary(best, twice))
 
 

@@ -1,6 +1,5 @@
 """Why a goal is out of reach: the best there is, and what limits it, in words."""
 
-from dataclasses import replace
 from typing import Any
 
 from transientcam_server.errors import kinds
@@ -24,9 +23,7 @@ def unreachable(goal: Goal, search: Search, finest: Choice) -> Problem:
 
 def too_small(goal: Goal, search: Search) -> Problem:
     """Return the problem of the budget that is too small, with the least that is possible."""
-    unlimited = Search(
-        replace(goal, **dict.fromkeys(BUDGETS)), search.families, search.predictor, search.timed
-    )
+    unlimited = search.without_budgets()
     quickest_of = min(search.families, key=lambda family: family.members[0].capture_s)
     quickest = unlimited.choice(quickest_of, quickest_of.members[0])
     given = [name for name in BUDGETS if getattr(goal, name) is not None]
@@ -59,9 +56,7 @@ def _limits(goal: Goal, search: Search, best: Choice, target: str) -> tuple[str,
         kind = "noise"
     given = [name for name in BUDGETS if getattr(goal, name) is not None]
     if given:
-        unlimited = Search(
-            replace(goal, **dict.fromkeys(BUDGETS)), search.families, search.predictor, search.timed
-        )
+        unlimited = search.without_budgets()
         other = unlimited.quickest({target: goal.limit(target)}) or unlimited.finest(target)
         if other is not None and other.error(target) < 0.8 * best.error(target):
             factor = other.applied.capture_s / best.applied.capture_s

@@ -3,13 +3,13 @@
 import bisect
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from transientcam_driver import Sequence
 from transientcam_server.planning.choice import Choice
 from transientcam_server.planning.families import Family, Member
-from transientcam_server.planning.goal import Goal
+from transientcam_server.planning.goal import BUDGETS, Goal
 from transientcam_server.planning.pareto import front
 from transientcam_server.planning.prediction import Predictor
 
@@ -89,6 +89,11 @@ class Search:
         self.predictor = predictor
         self.timed = timed
         self._choices: dict[tuple[str, Sequence], Choice] = {}
+
+    def without_budgets(self) -> "Search":
+        """Return the search for the same targets, whatever they cost."""
+        goal = replace(self._goal, **dict.fromkeys(BUDGETS))
+        return Search(goal, self.families, self.predictor, self.timed)
 
     def choice(self, family: Family, member: Member) -> Choice:
         """Predict a member with many draws."""
