@@ -1,4 +1,4 @@
-"""Draw what accuracy costs in time on scenes: ``python -m benchmarks.accuracy.pictures [SCENE ...]``.
+"""Draw what accuracy costs in time: ``python -m benchmarks.accuracy.pictures [SCENE ...]``.
 
 With ``--write`` the pictures go to docs/figures; else to the folder of ``-o``.
 """

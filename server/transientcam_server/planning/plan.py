@@ -5,6 +5,7 @@ is recommended, or, without a target, the most accurate. Beside it stand what ha
 and what twice the accuracy costs.
 """
 
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -116,7 +117,6 @@ def plan(goal: Goal, predictor: Predictor, capabilities: Capabilities, *, timed:
 
 def in_a_sentence(front: list[Choice]) -> str:
     """State from where on bias rules, of choices by rising time."""
-    ruled = [each for each in front if each.predicted.range_bias.median > _noise_m(each)]
     if not front:
         return "Nothing reaches any accuracy on this scene."
     finest = front[-1]
@@ -124,16 +124,18 @@ def in_a_sentence(front: list[Choice]) -> str:
         f"the best is {finest.predicted.range_error.median * 1e3:.3g} mm in "
         f"{finest.applied.capture_s * 1e3:.3g} ms ({finest.in_words()})"
     )
+    ruled = list(
+        itertools.takewhile(
+            lambda each: each.predicted.range_bias.median > each.predicted.range_std.median,
+            reversed(front),
+        )
+    )
     if not ruled:
         return f"Noise rules everywhere: more time buys accuracy; {best}."
     return (
-        f"From {ruled[0].applied.capture_s * 1e3:.3g} ms on bias rules and more time buys little; "
+        f"From {ruled[-1].applied.capture_s * 1e3:.3g} ms on bias rules and more time buys little; "
         f"{best}."
     )
-
-
-def _noise_m(choice: Choice) -> float:
-    return choice.predicted.range_std.median
 
 
 def _summary(best: Choice, twice: Choice | None) -> str:
