@@ -4,7 +4,7 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 """
 
 import json
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 from rich.console import Console
@@ -14,6 +14,9 @@ from transientcam.cli.options import JsonOption
 if TYPE_CHECKING:
     from transientcam_driver import Camera, Sequence
     from transientcam_server.planning import Planner, SceneStatistics
+
+MOVING: Final = 0.02
+"""Share of moving pixels from which on it is said."""
 
 
 def plan(
@@ -206,6 +209,15 @@ def _print_plan(document: dict[str, Any], *, computing: bool) -> None:
         f"{predicted['outlier_share']:.1%} of the ranges are outliers"
     )
     typer.echo(document["summary"])
+    scene = document["scene"]
+    typer.echo(
+        f"seen: {scene['lit_share']:.0%} of the pixels lit, at {scene['range_m']:.2f} m; "
+        f"{scene['ambient_dn_per_s']:.3g} DN/s of ambient light"
+    )
+    if scene["moving_share"] > MOVING:
+        typer.echo(f"{scene['moving_share']:.0%} of them move: what that costs is not predicted")
+    if not scene["ambiguity_checked"]:
+        typer.echo("whether ranges are short by a period was not checked")
     if document["predicted"]["beyond_scene"]:
         typer.echo("at best: this resolves more of the scene than the capture it is predicted from")
     if document["predicted"]["separation_share"] is not None:

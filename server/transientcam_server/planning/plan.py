@@ -16,6 +16,7 @@ from transientcam_server.planning.families import families
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.refusal import too_small, unreachable
+from transientcam_server.planning.scene import SceneStatistics
 from transientcam_server.planning.search import Search, Timed
 
 
@@ -32,7 +33,9 @@ class Plan:
     leading
         The target by which they are compared.
     summary
-        One sentence about noise, bias and what more of either costs.
+        One sentence about noise, bias and what half the error costs.
+    scene
+        What it was planned for.
     """
 
     recommended: Choice
@@ -40,6 +43,7 @@ class Plan:
     twice_accuracy: Choice | None
     leading: str
     summary: str
+    scene: SceneStatistics
 
     def to_document(self) -> dict[str, Any]:
         """Return the plan as JSON has it."""
@@ -47,6 +51,7 @@ class Plan:
             **self.recommended.to_document(),
             "compared_by": self.leading,
             "summary": self.summary,
+            "scene": self.scene.to_document(),
             "half_time": self._neighbour(self.half_time),
             "twice_accuracy": self._neighbour(self.twice_accuracy),
         }
@@ -112,7 +117,7 @@ def plan(goal: Goal, predictor: Predictor, capabilities: Capabilities, *, timed:
     half_time = search.finest(leading, best.applied.capture_s / 2, contenders=1)
     half = {leading: best.error(leading) / 2}
     twice = search.without_budgets().quickest(half, contenders=1)
-    return Plan(best, half_time, twice, leading, _summary(best, twice))
+    return Plan(best, half_time, twice, leading, _summary(best, twice), predictor.scene)
 
 
 def in_a_sentence(front: list[Choice]) -> str:

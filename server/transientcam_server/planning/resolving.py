@@ -57,7 +57,7 @@ class Resolving:
         variance = np.full(b.shape, level**2)
         if zeroth == "estimated":
             variance[0] = 0
-        return tm.noise.draw(b, tm.noise.MomentNoise(variance), random, draws=draws)
+        return np.asarray(tm.noise.draw(b, tm.noise.MomentNoise(variance), random, draws=draws))
 
     def _reconstructed(self, b: _Array, base_frequency_hz: float, zeroth: str) -> tm.Reconstruction:
         plain = self._settings.model_copy(

@@ -66,6 +66,17 @@ class SceneStatistics:
     moving_share: float = 0.0
     ambiguity_checked: bool = True
 
+    def to_document(self) -> dict[str, Any]:
+        """Return what was seen, as JSON."""
+        return {
+            "range_m": float(np.median(self.direct_m)),
+            "brightness_dn_per_s": float(np.median(self.brightness_dn_per_s)),
+            "ambient_dn_per_s": float(np.median(self.ambient_dn_per_s)),
+            "lit_share": self.lit_share,
+            "moving_share": self.moving_share,
+            "ambiguity_checked": self.ambiguity_checked,
+        }
+
     def covers(self, harmonics: int, base_frequency_hz: float) -> bool:
         """Whether moments at these frequencies are known without a model of the returns."""
         if self.measured is None:
@@ -82,7 +93,7 @@ class SceneStatistics:
         phase = 2 * np.pi * base_frequency_hz * np.nan_to_num(self.delay_s)
         moments = (self.share * np.exp(1j * j * phase)).sum(axis=1)
         moments[0] = 1.0
-        return moments.astype(np.complex64)
+        return np.asarray(moments, np.complex64)
 
     def ambiguous(self, unambiguous_range_m: float) -> bool:
         """Whether ranges beyond this one are too frequent, of the direct or of later returns.

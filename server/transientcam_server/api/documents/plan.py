@@ -144,6 +144,22 @@ class NeighbourDocument(ChoiceDocument):
     """Its error over the recommended one's."""
 
 
+class SeenDocument(Document):
+    """The scene that was planned for, by its median lit pixel."""
+
+    range_m: float
+    brightness_dn_per_s: float
+    """Zeroth moment for each second of exposure."""
+    ambient_dn_per_s: float
+    """Light that is not the camera's, in DN an image for each second of exposure."""
+    lit_share: float
+    """Share of all pixels whose light stands clear of the noise; no others count."""
+    moving_share: float
+    """Share of those that changed while the scene was looked at: what moves is not predicted."""
+    ambiguity_checked: bool
+    """Whether a second base frequency showed that no range is short by a period."""
+
+
 class PlanDocument(ChoiceDocument):
     """A recommendation and its neighbours."""
 
@@ -151,6 +167,7 @@ class PlanDocument(ChoiceDocument):
     """The target that neighbours are compared by."""
     summary: str
     """Noise and bias in a sentence, and what half the error costs."""
+    scene: SeenDocument
     half_time: NeighbourDocument | None = None
     """What half the time gives; null where nothing is that quick."""
     twice_accuracy: NeighbourDocument | None = None

@@ -42,6 +42,8 @@ def test_a_plan_for_the_scene_before_the_camera_is_a_sequence_it_takes(noisy: ht
     assert predicted["range_bias_m"] < predicted["range_error_m"]["p90"]
     assert 0 <= predicted["outlier_share"] < 0.2
     assert "mm noise, " in answer["summary"]
+    assert answer["scene"]["ambiguity_checked"] is True
+    assert answer["scene"]["lit_share"] > 0.9
     assert answer["sequence"]["harmonics"] == 3
     checked = noisy.post("/api/v1/sequence/validate", json=answer["sequence"]).json()
     assert checked["capture_s"] == pytest.approx(answer["capture_s"])
