@@ -11,7 +11,7 @@ import transientcam_moments as tm
 from transientcam_driver import Capabilities, Sequence, Truth
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.planning.families import families
+from transientcam_server.planning.families import Family, families
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.look import LookedThrough, look_at
 from transientcam_server.planning.plan import Plan, in_a_sentence, plan
@@ -82,6 +82,10 @@ class Planner:
     ) -> dict[str, Any]:
         """Return `plan` as JSON."""
         return self.plan(goal, scene, go_on).to_document()
+
+    def families(self, goal: Goal, scene: SceneStatistics) -> list[Family]:
+        """Return all that is searched for a goal; see `planning.families`."""
+        return families(goal, self._predictor(scene), self._capabilities)
 
     def tradeoff_document(self, goal: Goal, scene: SceneStatistics) -> dict[str, Any]:
         """Return all that no other beats, and the lines they lie on, as JSON: seconds of work."""

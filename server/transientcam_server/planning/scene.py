@@ -100,7 +100,7 @@ class SceneStatistics:
 
         Returns too weak to be taken for the direct one do not count.
         """
-        counts = self.share >= DIRECT_THRESHOLD * self.share.max(axis=0)
+        counts = (self.share >= DIRECT_THRESHOLD * self.share.max(axis=0)) & (self.share > 0)
         late_m = np.where(counts, tm.SPEED_OF_LIGHT_M_S / 2 * np.nan_to_num(self.delay_s), 0.0)
         late = (late_m >= unambiguous_range_m).any(axis=0)
         direct = self.direct_m >= unambiguous_range_m
