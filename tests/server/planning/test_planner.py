@@ -165,7 +165,7 @@ def test_a_plan_shows_what_it_recommends(capabilities: Capabilities) -> None:
 
 
 def test_neighbours_take_half_the_time_and_have_half_the_error(capabilities: Capabilities) -> None:
-    document = planned(Goal(capture_s=0.04), capabilities).to_document()
+    document = planned(Goal(range_error_m=0.0035), capabilities).to_document()
 
     assert document["half_time"]["time_factor"] <= 0.5
     assert document["half_time"]["error_factor"] > 1.0

@@ -13,7 +13,7 @@ from transientcam_server.api.auth.permissions import needs
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.plan import PlanDocument, PlanRequest, TradeoffDocument
 from transientcam_server.api.problems import documented
-from transientcam_server.errors import kinds
+from transientcam_server.errors import Problem, kinds
 from transientcam_server.planning import Goal, SceneStatistics, uniform_scene
 from transientcam_server.service import Service
 
@@ -58,20 +58,23 @@ async def make_plan(service: ServiceOf, request: PlanRequest, http: Request) -> 
 
     def go_on() -> None:
         if left.is_set():
-            raise asyncio.CancelledError
+            raise _left()
 
     task = asyncio.ensure_future(_planned(service, request, goal, go_on))
     try:
         while not task.done():
             await asyncio.wait({task}, timeout=_ASK_EVERY_S)
             if await http.is_disconnected():
-                break
-        else:
-            return PlanDocument.model_validate(task.result())
-        raise asyncio.CancelledError
+                raise _left()
+        return PlanDocument.model_validate(task.result())
     finally:
         left.set()
         task.cancel()
+
+
+def _left() -> Problem:
+    """Return what ends the work for a client that has gone, and reads no answer."""
+    return Problem(kinds.SHUTTING_DOWN, "The client left before the plan was made.")
 
 
 async def _planned(
