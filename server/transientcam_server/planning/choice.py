@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from transientcam_driver import AppliedSequence
-from transientcam_server.planning.prediction import Prediction, with_margin
+from transientcam_server.planning.prediction import Prediction
 
 TARGETS: Final = ("range_error_m", "range_std_m", "separation_m", "bound_width")
 """Accuracies that a goal may limit; choices are compared by the first by default."""
@@ -58,9 +58,9 @@ class Choice:
     def error_with_margin(self, target: str) -> float:
         """Return what 80 % of the captures stay below."""
         if target == "range_error_m":
-            return with_margin(self.predicted.range_error)
+            return self.predicted.range_error.with_margin
         if target == "range_std_m":
-            return with_margin(self.predicted.range_std)
+            return self.predicted.range_std.with_margin
         return self.error(target)
 
     def to_document(self) -> dict[str, Any]:

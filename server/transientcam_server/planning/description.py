@@ -117,6 +117,11 @@ def describe(
     variance = seen.variance(mean_dn) / len(seen.moments)
     base_hz = seen.recipe.base_frequency_hz
     direct_m, uncertainty_m = direct_range(b, variance, base_hz, settings)
+    # by how hard they are: every other pixel is then as good a sample of the scene as all of them
+    order = np.argsort(uncertainty_m, kind="stable")
+    pixels, b, mean_dn, variance, direct_m, uncertainty_m = (
+        each[..., order] for each in (pixels, b, mean_dn, variance, direct_m, uncertainty_m)
+    )
     light_dn = _brightness(b if coarse is None else coarse.at(pixels)[0], b)
     checked = coarse is not None
     if coarse is not None:

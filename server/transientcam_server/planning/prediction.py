@@ -43,8 +43,9 @@ MODEL_SPREAD: Final = 0.08
 of pixels explains (docs/accuracy.md)."""
 _RESAMPLED: Final = 100
 _HARDLY: Final = 0.8
-_SIDE: Final = NormalDist().inv_cdf(0.5 + COVERAGE / 2)
-_MARGIN: Final = NormalDist().inv_cdf(0.8)
+LIKELY: Final = 0.8
+"""Share of the captures that are to meet a target."""
+_LEAST_M: Final = 1e-9
 _NORMAL: Final = np.array([NormalDist().inv_cdf(0.5 + (k + 0.5) / 64) for k in range(32)])
 """Absolute values of a standard normal variable, each as likely."""
 
@@ -61,12 +62,15 @@ class Figure:
         `COVERAGE` of the captures measure a value between them.
     p90
         90 % of the pixels are better.
+    with_margin
+        What 80 % of the captures measure less than: what a target is held against.
     """
 
     median: float
     low: float
     high: float
     p90: float
+    with_margin: float
 
     def to_document(self) -> dict[str, float]:
         """Return it as JSON."""
@@ -192,12 +196,13 @@ class Predictor:
         picks = np.random.default_rng(self._seed).integers(0, noise.size, (_RESAMPLED, noise.size))
 
         def figure(each: _Array, median: Callable[[_Array], float]) -> Figure:
-            value = median(each)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                logs = np.log([median(each[pick]) for pick in picks])
-            sampled = float(np.std(logs)) if np.isfinite(logs).all() else 0.0
-            factor = math.exp(_SIDE * math.hypot(sampled, MODEL_SPREAD))
-            return Figure(value, value / factor, value * factor, float(np.quantile(each, 0.9)))
+            value = max(median(each), _LEAST_M)
+            sampled = np.maximum([median(each[pick]) for pick in picks], _LEAST_M)
+            low, high, likely = (
+                _widened(value, float(np.quantile(sampled, part)), NormalDist().inv_cdf(part))
+                for part in (0.5 - COVERAGE / 2, 0.5 + COVERAGE / 2, LIKELY)
+            )
+            return Figure(value, low, high, float(np.quantile(each, 0.9)), likely)
 
         return Prediction(
             figure(errors.std_m, _typical),
@@ -280,12 +285,16 @@ class Predictor:
         )
 
 
-def with_margin(figure: Figure) -> float:
-    """Return what 80 % of the captures stay below, by the figure's interval."""
-    if not 0 < figure.median < math.inf:
-        return figure.median
-    spread = math.log(figure.high / figure.median) / _SIDE
-    return figure.median * math.exp(_MARGIN * spread)
+def _widened(value: float, sampled: float, deviations: float) -> float:
+    """Add what the model may be wrong by to a quantile of the median of sampled pixels.
+
+    Both as logarithms, as independent: ``deviations`` is the quantile of a normal variable.
+    """
+    if not 0 < sampled < math.inf:
+        return sampled
+    by_sampling, by_model = math.log(sampled / value), deviations * MODEL_SPREAD
+    outwards = max(by_sampling, 0.0) if deviations > 0 else min(by_sampling, 0.0)
+    return value * math.exp(math.copysign(math.hypot(outwards, by_model), deviations))
 
 
 def _typical(deviations: _Array) -> float:

@@ -30,7 +30,7 @@ from transientcam_server.planning import (
 from transientcam_server.planning.families import EXPOSURES, HARMONICS, TAKES, families
 from transientcam_server.planning.measures import pixel_errors
 from transientcam_server.planning.plan import plan
-from transientcam_server.planning.prediction import Figure, Prediction, with_margin
+from transientcam_server.planning.prediction import Figure, Prediction
 from transientcam_server.planning.resolving import both_found
 from transientcam_server.planning.search import Search
 from transientcam_server.planning.timing import ReconstructionTimer
@@ -50,6 +50,7 @@ def capabilities() -> Iterator[Capabilities]:
 # -- the search ---------------------------------------------------------------------------------
 
 SPREAD = 1.1
+MARGIN = 1.05
 
 
 class ClosedForm:
@@ -80,7 +81,10 @@ class ClosedForm:
 
     def predict(self, estimator: str, sequence: Sequence) -> Prediction:
         each = self.quick(estimator, sequence, self.noise_scale(sequence))
-        figures = [Figure(value, value / SPREAD, value * SPREAD, 2 * value) for value in each]
+        figures = [
+            Figure(value, value / SPREAD, value * SPREAD, 2 * value, value * MARGIN)
+            for value in each
+        ]
         return Prediction(*figures, 0.0)
 
     def beyond_scene(self, sequence: Sequence) -> bool:
@@ -118,7 +122,7 @@ def everything(capabilities: Capabilities) -> list[tuple[float, float]]:
                         except SequenceError:
                             continue
                         figure = model.predict(estimator, applied.sequence).range_error
-                        found.append((applied.capture_s, with_margin(figure)))
+                        found.append((applied.capture_s, figure.with_margin))
     return found
 
 
