@@ -12,7 +12,8 @@ DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f 
 DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test check bench paper docs clean dashboard debian-packages
+.PHONY: help serve test check bench paper docs clean dashboard debian-packages \
+	check-pyright check-mypy check-style check-dashboard
 
 help:  ## Say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 16
@@ -21,16 +22,10 @@ serve: .venv/serve.stamp dashboard  ## Run the daemon and its dashboard (PORT=80
 	$(BIN)/transientcam serve --host $(HOST) --port $(PORT) --camera '$(CAMERA)'
 
 test: check debian-packages dashboard  ## Run every check and every test
-	npm --prefix client/dashboard test
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 check: .venv/test.stamp client/dashboard/node_modules/.package-lock.json  ## Lint, types, import laws
-	$(BIN)/ruff format --check .
-	$(BIN)/ruff check .
-	$(BIN)/mypy
-	$(BIN)/pyright
-	$(BIN)/lint-imports
-	npm --prefix client/dashboard run check
+	@$(MAKE) --no-print-directory --jobs 2 check-pyright check-mypy check-style check-dashboard
 
 bench: .venv/test.stamp  ## Measure speed, everything in one run on the same data
 	$(BIN)/python -m benchmarks
@@ -82,6 +77,22 @@ clean:  ## Remove everything that was built or installed here
 client/dashboard/node_modules/.package-lock.json: client/dashboard/package-lock.json
 	npm --prefix client/dashboard ci --no-audit --no-fund
 	@touch $@
+
+# Side by side, the slowest first.
+check-pyright:
+	$(BIN)/pyright
+
+check-mypy:
+	$(BIN)/mypy
+
+check-style:
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/lint-imports
+
+check-dashboard:
+	npm --prefix client/dashboard run check
+	npm --prefix client/dashboard test
 
 # The daemon runs without its page where there is no Node; a test run does not.
 dashboard:
