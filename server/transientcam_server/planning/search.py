@@ -119,23 +119,38 @@ class Search:
         The families are searched with few draws, the best of them again with many; where those
         do not bear the target out, the next longer member is taken.
         """
+        wrong: set[tuple[str, Sequence]] = set()
+        while True:
+            contending = self._contending(targets, wrong)[:contenders]
+            if not contending:
+                return None
+            best: Choice | None = None
+            for each in contending:
+                limit_s = math.inf if best is None else best.applied.capture_s
+                best = self._borne_out(each, targets, limit_s) or best
+            if best is not None:
+                return best
+            # few draws were wrong about these: the next ones may be slower than they promised
+            wrong |= {(each.family.estimator, each.family.first) for each in contending}
+
+    def _contending(
+        self, targets: dict[str, float], wrong: set[tuple[str, Sequence]]
+    ) -> list[Found]:
+        """Return the quickest member of each family by few draws, those near the quickest."""
         found: list[Found] = []
         best_s = math.inf
         for family, place in self._hopeful(targets):
             if family.members[place].capture_s > NEAR * best_s:
                 break
+            if (family.estimator, family.first) in wrong:
+                continue
             if self._least_bias(family) > targets.get("range_error_m", math.inf):
                 continue
             soonest = self._soonest(family, place, targets, NEAR * best_s)
             if soonest is not None:
                 found.append(Found(family, soonest, 0.0))
                 best_s = min(best_s, found[-1].member.capture_s)
-        best: Choice | None = None
-        for each in sorted(found, key=lambda each: each.member.capture_s)[:contenders]:
-            limit_s = math.inf if best is None else best.applied.capture_s
-            borne_out = self._borne_out(each, targets, limit_s)
-            best = borne_out or best
-        return best
+        return sorted(found, key=lambda each: each.member.capture_s)
 
     def finest(
         self, leading: str, within_s: float = math.inf, *, contenders: int = CONTENDERS
