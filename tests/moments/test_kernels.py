@@ -227,7 +227,7 @@ def test_several_threads_compile_each_lane_once(monkeypatch: pytest.MonkeyPatch)
         thread.join()
 
     assert len(made) == len(set(made))
-    in_background = set(compiler.LANES) - {"likelihood"}  # long to compile: prepared when first used
+    in_background = set(compiler.LANES) - {"likelihood"}  # that one when it is first used
     assert {(name, m) for name, m, _ in made} == {(n, m) for n in in_background for m in (3, 5)}
 
 
