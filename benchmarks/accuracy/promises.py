@@ -267,7 +267,7 @@ def main() -> None:
                 print(f"{each.scene}, {each.goal}: {each.why}", flush=True)
     print(table(rows), summary(rows), sep="\n\n")
     if arguments.json:
-        arguments.json.write_text(json.dumps([asdict(row) for row in (*rows, *refused)]))
+        arguments.json.write_text(json.dumps([*map(asdict, rows), *map(asdict, refused)]))
 
 
 if __name__ == "__main__":

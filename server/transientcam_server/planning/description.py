@@ -188,7 +188,7 @@ def _unwrapped(direct_m: _Array, b: _Array, coarse: Seen, pixels: _Array, base_h
     mean_m = mean_m + periods * period_m
     before_m = np.remainder(mean_m - direct_m, period_m)
     before_m = np.where(before_m > _EARLY * period_m, before_m - period_m, before_m)
-    return np.maximum(mean_m - before_m, 0.0)
+    return np.asarray(np.maximum(mean_m - before_m, 0.0))
 
 
 def _moving_share(seen: Seen, lit: _Array) -> float:

@@ -74,10 +74,12 @@ class FrontCache:
             frequency_hz = base.base_frequency_hz
             base = Sequence(base_frequency_hz=frequency_hz, sub_phases=base.sub_phases)
             scene = await self._looks.of_twin(base, None, lambda: None)
-        targets = {} if by == "range_error_m" else {by: _WIDE}
-        document, _ = await self._workers.run_long(
-            self._planner.tradeoff_document, Goal(base=base, **targets), scene
+        goal = Goal(
+            base=base,
+            range_std_m=_WIDE if by == "range_std_m" else None,
+            bound_width=_WIDE if by == "bound_width" else None,
         )
+        document, _ = await self._workers.run_long(self._planner.tradeoff_document, goal, scene)
         return document
 
     async def _current(self, frame: Frame) -> dict[str, Any]:

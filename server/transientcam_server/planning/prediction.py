@@ -276,8 +276,14 @@ class Predictor:
         random = np.random.default_rng((self._seed, harmonics, draws))
         drawn = tm.noise.draw(b, tm.noise.MomentNoise(variance), random, draws=draws)
         spread = np.broadcast_to(variance[:, None], drawn.shape)
-        flat = (planes.reshape((len(b), -1)) for planes in (drawn, spread))
-        range_m = ranges_m(*flat, estimator, base_frequency_hz, self.settings, zeroth=zeroth)
+        range_m = ranges_m(
+            drawn.reshape((len(b), -1)),
+            spread.reshape((len(b), -1)),
+            estimator,
+            base_frequency_hz,
+            self.settings,
+            zeroth=zeroth,
+        )
         return pixel_errors(
             range_m.reshape((draws, -1)),
             self.scene.direct_m[pixels],

@@ -4,12 +4,13 @@ import bisect
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 from transientcam_driver import Sequence
 from transientcam_server.planning.choice import Choice
 from transientcam_server.planning.families import Family, Member
-from transientcam_server.planning.goal import BUDGETS, Goal
+from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.pareto import front
 from transientcam_server.planning.prediction import Predictor
 
@@ -92,7 +93,7 @@ class Search:
 
     def without_budgets(self) -> "Search":
         """Return the search for the same targets, whatever they cost."""
-        goal = replace(self._goal, **dict.fromkeys(BUDGETS))
+        goal = replace(self._goal, capture_s=None, frame_rate_hz=None, computing_share=None)
         return Search(goal, self.families, self.predictor, self.timed)
 
     def choice(self, family: Family, member: Member) -> Choice:
@@ -235,13 +236,14 @@ class Search:
             first = bisect.bisect_left(
                 range(last + 1),
                 x=True,
-                key=lambda place, family=family: all(
-                    self._least(family, place, name) <= limit for name, limit in targets.items()
-                ),
+                key=partial(self._may_reach, family, targets),
             )
             if first <= last:
                 hopeful.append((family, first))
         return sorted(hopeful, key=lambda each: each[0].members[each[1]].capture_s)
+
+    def _may_reach(self, family: Family, targets: dict[str, float], place: int) -> bool:
+        return all(self._least(family, place, name) <= limit for name, limit in targets.items())
 
     def _soonest(
         self, family: Family, first: int, targets: dict[str, float], within_s: float

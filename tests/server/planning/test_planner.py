@@ -67,7 +67,7 @@ class ClosedForm:
 
     def least_noise_m(self, estimator: str, sequence: Sequence, scale: float) -> float:
         m = 1 if estimator == "single-frequency" else sequence.harmonics
-        return 1e-2 * scale / m**1.5 / (sequence.base_frequency_hz / 23e6)
+        return float(1e-2 * scale / m**1.5 / (sequence.base_frequency_hz / 23e6))
 
     def least_bias_m(self, estimator: str, sequence: Sequence) -> float:
         m = 1 if estimator == "single-frequency" else sequence.harmonics
@@ -81,11 +81,11 @@ class ClosedForm:
 
     def predict(self, estimator: str, sequence: Sequence) -> Prediction:
         each = self.quick(estimator, sequence, self.noise_scale(sequence))
-        figures = [
+        std, bias, error = (
             Figure(value, value / SPREAD, value * SPREAD, 2 * value, value * MARGIN)
             for value in each
-        ]
-        return Prediction(*figures, 0.0)
+        )
+        return Prediction(std, bias, error, 0.0)
 
     def beyond_scene(self, sequence: Sequence) -> bool:
         return False
