@@ -1,14 +1,12 @@
 """Which sequence and estimator to take: for a target accuracy, or for a budget of time.
 
-A look at the scene (`look_at`) gives `SceneStatistics`; a `Predictor` draws noise, bias and
+A look at the scene (`Planner.look`) gives `SceneStatistics`; a `Predictor` draws noise, bias and
 outliers of any sequence from those; a `Planner` recommends the best for a `Goal` (`Plan`), or
 returns all that no other beats.
 """
 
-from transientcam_server.planning.choice import Choice
 from transientcam_server.planning.front import FrontCache
 from transientcam_server.planning.goal import Goal
-from transientcam_server.planning.look import look_at
 from transientcam_server.planning.looks import Looks
 from transientcam_server.planning.plan import Plan
 from transientcam_server.planning.planner import Planner
@@ -16,7 +14,6 @@ from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.scene import SceneStatistics, uniform_scene
 
 __all__ = [
-    "Choice",
     "FrontCache",
     "Goal",
     "Looks",
@@ -24,6 +21,5 @@ __all__ = [
     "Planner",
     "Predictor",
     "SceneStatistics",
-    "look_at",
     "uniform_scene",
 ]
