@@ -44,6 +44,7 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 	$(BIN)/python -m benchmarks.simulation --write
 	$(BIN)/python -m benchmarks.recording --write
 	$(BIN)/python -m benchmarks.by_hand --write
+	$(BIN)/python -m benchmarks.cameras --write
 	$(BIN)/python -m benchmarks.first_light --write
 	$(BIN)/python -m benchmarks.stream_load --write
 	$(BIN)/python -m benchmarks.robustness --write
@@ -70,8 +71,11 @@ clean:  ## Remove everything that was built or installed here
 	$(BIN)/python -m pip install --quiet --editable '.[server,plot]'
 	@touch $@
 
+# The client of the TOFcam660's vendor, which drives our emulation of it. What the tests use of it needs NumPy
+# alone; its own requirements (OpenCV, Bluetooth, serial ports) are for its other cameras.
 .venv/test.stamp: pyproject.toml | .venv/bin/python
 	$(BIN)/python -m pip install --quiet --editable '.[test]'
+	$(BIN)/python -m pip install --quiet --no-deps 'epc-tofcam-toolkit==0.13.0'
 	@touch $@ .venv/serve.stamp
 
 client/dashboard/node_modules/.package-lock.json: client/dashboard/package-lock.json

@@ -27,6 +27,7 @@ from typing import Any
 import uvicorn
 
 from benchmarks.machine import machine
+from transientcam_server.daemon.acceptor import Acceptor
 from transientcam_server.daemon.connections import BoundedConnection
 from transientcam_server.daemon.streams import BoundedStream
 from transientcam_server.settings import LimitSettings, StreamSettings
@@ -55,6 +56,27 @@ async def echo(scope: Any, receive: Any, send: Any) -> None:
         await send({**message, "type": "websocket.send"})
 
 
+class Echo(uvicorn.Server):
+    """uvicorn behind the service's own acceptor, through which it reads in portions."""
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Accept connections of the first socket."""
+        await super().startup([])
+        assert sockets
+        make: Any = self.config.http_protocol_class  # the one given, by keywords
+        protocol = partial(make, config=self.config, server_state=self.server_state, app_state={})
+        limits = LimitSettings()
+        self._acceptor = Acceptor(
+            sockets[0], protocol=protocol, limits=limits, watched=lambda: False
+        )
+        self._acceptor.open()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Accept no more."""
+        await self._acceptor.close()
+        await super().shutdown(sockets)
+
+
 @contextmanager
 def echoing() -> Iterator[int]:
     """Serve the echo; yields its port."""
@@ -69,8 +91,9 @@ def echoing() -> Iterator[int]:
         ws_max_size=MESSAGE_BYTES,
         log_config=None,
     )
-    server = uvicorn.Server(config)
+    server = Echo(config)
     with socket.create_server(("127.0.0.1", 0)) as listener:
+        listener.setblocking(False)
         serving = partial(asyncio.run, server.serve(sockets=[listener]))
         thread = threading.Thread(target=serving, daemon=True)
         thread.start()

@@ -17,7 +17,7 @@ from benchmarks.machine import machine
 from transientcam_experiments import tradeoff
 from transientcam_experiments.tradeoff.estimating import SAMPLE_PIXELS
 from transientcam_moments.comparisons import TECHNIQUES, Technique
-from transientcam_server.settings import Estimator
+from transientcam_server.settings import Estimator, ReconstructionSettings
 
 PAGE = Path(__file__).parents[1] / "docs" / "estimators.md"
 SCENES = ("mirrors", "corner")
@@ -90,9 +90,12 @@ def report(records: Iterable[tradeoff.Record]) -> str:
 _INTRODUCTION = (
     "The range of a frame is that of its first return. Which method finds it is the setting "
     "`reconstruction.estimator` of the daemon, `PUT /api/v1/reconstruction` while it runs, and "
-    "`tm.Settings(estimator=...)` in Python. The paper's own are `pisarenko`, which is the "
-    "default, and `maximum-entropy`; all others are there to be compared with. With them direct "
-    "and indirect light are theirs, too, and uniform light is what they leave of the brightness.",
+    "`tm.Settings(estimator=...)` in Python. The daemon's default is `likelihood`, which errs "
+    "least over the scenes of [likelihood.md](likelihood.md) together. The paper's own "
+    "are `pisarenko`, as printed and the default of `tm.Settings`, and `maximum-entropy`; "
+    "`pisarenko-merged` merges returns that noise split. All others are there to be compared with. "
+    "Direct and indirect light are those of the estimator, too, and uniform light is what they "
+    "leave of the brightness.",
     "",
     "`transientcam_moments.comparisons.TECHNIQUES` holds all of them in one form: "
     "`technique.estimate(moments)` gives an impulse response with `cumulative(phase_rad)`, "
@@ -168,13 +171,14 @@ def _best(records: list[tradeoff.Record], quantity: str) -> str:
 
 
 def _fewer_outliers(records: list[tradeoff.Record]) -> str:
-    """Say who does better there than the default."""
+    """Say which have fewer outliers there than the default."""
+    default = ReconstructionSettings().estimator
     share = {str(each.point["estimator"]): each.values["range_outliers"] for each in records}
-    ours = share["pisarenko"] or 0.0
+    ours = share[default] or 0.0
     fewer = [f"`{name}`" for name, value in share.items() if value is not None and value < ours]
     if not fewer:
-        return "None has fewer pixels off by more than 0.1 m than `pisarenko`."
-    return f"Fewer pixels off by more than 0.1 m than `pisarenko`: {', '.join(fewer)}."
+        return f"None has fewer pixels off by more than 0.1 m than `{default}`."
+    return f"Fewer pixels off by more than 0.1 m than `{default}`: {', '.join(fewer)}."
 
 
 def _seconds(record: tradeoff.Record) -> str:

@@ -1,8 +1,9 @@
 """Damaged and forged recordings in a service's directory: what becomes of it.
 
-Run it with ``python -m benchmarks.fuzz_recordings [--cases 100000] [--jobs 2] [--write]``. Cases
-follow from their numbers, so that one can be tried again alone. They run in processes of their
-own: one that crashes or hangs is noted, and the next process goes on after it.
+Run it with ``python -m benchmarks.fuzz_recordings [--cases 100000] [--jobs 2] [--write]``; with
+``--keep FILE`` it goes on where it was ended. Cases follow from their numbers, so that one can be
+tried again alone. They run in processes of their own: one that crashes or hangs is noted, and the
+next process goes on after it.
 """
 
 import argparse
@@ -108,21 +109,46 @@ def _lines(directory: Path, first: int, last: int) -> Iterator[dict[str, Any]]:
     yield {"ended": process.returncode}
 
 
-def measure(*, cases: int, jobs: int) -> Findings:
-    """Try so many cases, some at the same time."""
+def measure(*, cases: int, jobs: int, kept: Path | None = None) -> Findings:
+    """Try so many cases, some at the same time; what a file keeps is not tried again.
+
+    Outcomes are appended to the file, a line for each, when a batch of them is there.
+    """
     findings = Findings()
+    known = _known(kept)
     batches = [(begin, min(begin + BATCH, cases)) for begin in range(0, cases, BATCH)]
+
+    def outcomes_of(batch: tuple[int, int]) -> list[dict[str, Any]]:
+        numbers = range(*batch)
+        if all(number in known for number in numbers):
+            return [known[number] for number in numbers]
+        return list(attempt(*batch))
+
     with ThreadPoolExecutor(jobs) as threads:
-        for outcomes in threads.map(lambda batch: list(attempt(*batch)), batches):
+        for outcomes in threads.map(outcomes_of, batches):
+            new = [each for each in outcomes if each["number"] not in known]
+            if kept is not None and new:
+                with kept.open("a", encoding="utf-8") as file:
+                    file.writelines(json.dumps(each) + "\n" for each in new)
             for outcome in outcomes:
                 findings.take(outcome)
     return findings
 
 
-def report(findings: Findings, *, elapsed_s: float) -> str:
+def _known(kept: Path | None) -> dict[int, dict[str, Any]]:
+    if kept is None or not kept.exists():
+        return {}
+    lines = kept.read_text(encoding="utf-8").splitlines()
+    return {outcome["number"]: outcome for outcome in map(json.loads, lines)}
+
+
+def report(findings: Findings, *, elapsed_s: float | None) -> str:
     """Return the page."""
     states = ("complete", "interrupted", "damaged")
     cases = len(findings.grown_bytes)
+    took = ""
+    if elapsed_s is not None:
+        took = f": in {elapsed_s / 60:.0f} min, {1e3 * elapsed_s / cases:.0f} ms each"
     beyond = [each for each in findings.grown_bytes if each > BEYOND_BYTES]
     page = [
         "# What damaged and forged recordings do to a service",
@@ -131,8 +157,8 @@ def report(findings: Findings, *, elapsed_s: float) -> str:
         f"{machine()},",
         f"h5py {h5py.version.version} (HDF5 {h5py.version.hdf5_version}).",
         "",
-        f"{cases} files were put into the directory of a service, beside a good recording: "
-        f"in {elapsed_s / 60:.0f} min. Each was listed, described, read frame by frame, replayed, "
+        f"{cases} files were put into the directory of a service, beside a good recording"
+        f"{took}. Each was listed, described, read frame by frame, replayed, "
         "recovered if unfinished, and deleted; every tenth over HTTP. A file is bytes damaged "
         "(`flipped`, `cut`, `overwritten`, `resummed`: changed with HDF5's checksum made right), "
         "or rewritten by h5py with wrong types, shapes, places and values.",
@@ -173,11 +199,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=100_000, help="how many files")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="how many at a time")
+    parser.add_argument("--keep", type=Path, help="file of outcomes, to go on where it was ended")
     parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
     arguments = parser.parse_args()
     begin_s = time.perf_counter()
-    findings = measure(cases=arguments.cases, jobs=arguments.jobs)
-    page = report(findings, elapsed_s=time.perf_counter() - begin_s)
+    findings = measure(cases=arguments.cases, jobs=arguments.jobs, kept=arguments.keep)
+    elapsed_s = time.perf_counter() - begin_s
+    page = report(findings, elapsed_s=elapsed_s if arguments.keep is None else None)
     print(page)
     if arguments.write:
         PAGE.write_text(page, encoding="utf-8")

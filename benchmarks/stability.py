@@ -148,6 +148,28 @@ def fates() -> Table:
     return table
 
 
+def _many_returns(m: int) -> Iterator[tuple[str, str, str]]:
+    """Yield how well 1 to m returns at random places explain their moments, by precision."""
+    pixels = 20_000
+    random = np.random.default_rng(m)
+    there = np.arange(m)[:, None] <= np.arange(pixels) % m
+    weight = random.uniform(0.05, 1, (m, pixels)) * there
+    b = oracles.moments_of_returns(random.uniform(0, 2 * np.pi, (m, pixels)), weight, m)
+    for precision, dtype in PRECISIONS.items():
+        given: Complex = b.astype(dtype)
+        found = tm.pisarenko(given)
+        phase = np.where(found.weight > 0, found.phase_rad, 0).astype(float)
+        again = oracles.moments_of_returns(phase, found.weight.astype(float), m)
+        error = np.abs(again - given)[1:].max(axis=0) / b[0].real
+        limit = 64 * (m + 1) * float(np.finfo(dtype).eps)
+        yield (
+            f"m = {m}, 1 to {m} random returns, {precision}: worst residual over b_0; "
+            f"share above 64 (m + 1) eps",
+            "-",
+            f"{error.max():.1e}; {np.mean(error > limit):.2%}",
+        )
+
+
 def targets() -> Table:
     """Compare what was asked for with what came out."""
     table = Table("Targets", ("target", "asked for", "measured"))
@@ -175,6 +197,7 @@ def targets() -> Table:
             f"{crowded[0]:.1e}; {crowded[1]:.1e}",
         ),
     ]
+    rows += list(_many_returns(8))
     for precision, margin, bar in (("float64", 1e-6, "1e-12"), ("float32", 4e-3, "2e-5")):
         worst: Worst = {}
         for m in ORDERS:

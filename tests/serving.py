@@ -9,8 +9,8 @@ from typing import Any
 
 from fastapi import FastAPI
 
+from transientcam_driver import Camera, open_camera
 from transientcam_server.api.app import build_app
-from transientcam_server.camera import Camera, open_camera
 from transientcam_server.daemon.server import Server, address, listen
 from transientcam_server.service import Service
 from transientcam_server.settings import Settings
@@ -61,6 +61,8 @@ def serving(
     """
     with open_camera(camera) as opened, TemporaryDirectory() as state:
         usual = {"port": 0, "log_level": "warning", "calibrations": {"directory": state}}
+        # without compiled lanes the likelihood takes a fraction of a second a frame
+        usual |= {"reconstruction": {"estimator": "pisarenko"}}
         chosen = Settings(camera=camera, **{**usual, **settings})
         app = build_app(opened, chosen)
         prepare(app)

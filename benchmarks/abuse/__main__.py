@@ -2,9 +2,9 @@
 
 Each attack goes on at full speed from 1 and from 16 connections against a daemon of its own, with
 the simulated camera at the paper's video setting (Sec. 6.3: 18.6 Hz). Meanwhile a viewer streams
-range, /livez is asked, a lease lapses, the light is switched off, and SIGTERM ends it.
-``--against CHECKOUT`` attacks the daemon of another checkout too, for comparison; ``--quick`` is
-short and from 16 connections only; ``--minutes 10`` mixes all attacks for so long instead.
+range, /livez is asked, a lease lapses, the light is switched off, and SIGTERM ends it: half a
+minute each. ``--against CHECKOUT`` attacks the daemon of another checkout too, for comparison;
+``--minutes 10`` mixes all attacks for so long instead.
 """
 
 import argparse
@@ -16,8 +16,7 @@ from benchmarks.abuse.page import PAGE, mixed_page, page, row
 from benchmarks.abuse.soaking import soak
 
 CONNECTIONS = (1, 16)
-DURATION_S = 10.0
-QUICK_S = 3.0
+DURATION_S = 5.0
 
 
 def main() -> None:
@@ -25,7 +24,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.abuse", description=__doc__)
     parser.add_argument("attacks", nargs="*", metavar="ATTACK", help=f"of {', '.join(ATTACKS)}")
     parser.add_argument("--against", type=Path, help="another checkout, measured first")
-    parser.add_argument("--quick", action="store_true", help="short, from 16 connections only")
+    parser.add_argument(
+        "--connections", type=int, nargs="+", default=CONNECTIONS, help="from how many"
+    )
+    parser.add_argument("--seconds", type=float, default=DURATION_S, help="of each attack")
     parser.add_argument("--minutes", type=float, help="a mix of all attacks for so long instead")
     parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
     arguments = parser.parse_args()
@@ -38,10 +40,10 @@ def main() -> None:
         if arguments.write:
             PAGE.with_name("abuse-soak.md").write_text(text, encoding="utf-8")
         return
-    duration_s = QUICK_S if arguments.quick else DURATION_S
+    duration_s = arguments.seconds
     found = []
     for name in arguments.attacks or ATTACKS:
-        for connections in CONNECTIONS[-1:] if arguments.quick else CONNECTIONS:
+        for connections in arguments.connections:
             before = None
             if arguments.against is not None:
                 before = measure(
@@ -50,11 +52,22 @@ def main() -> None:
             now = measure(name, connections, duration_s=duration_s)
             found.append((name, connections, before, now))
             print(row(*found[-1]), flush=True)
-    options = " --quick" if arguments.quick else ""
-    text = page(found, duration_s=duration_s, options=options)
+    text = page(found, duration_s=duration_s, command=_command(arguments))
     print(text)
     if arguments.write:
         PAGE.write_text(text, encoding="utf-8")
+
+
+def _command(arguments: argparse.Namespace) -> str:
+    """Return what was asked for, as far as it differs from the defaults."""
+    parts = ["python -m benchmarks.abuse"]
+    if tuple(arguments.connections) != CONNECTIONS:
+        parts += ["--connections", *map(str, arguments.connections)]
+    if arguments.seconds != DURATION_S:
+        parts.append(f"--seconds {arguments.seconds:g}")
+    if arguments.against is not None:
+        parts.append(f"--against {arguments.against.name}")
+    return " ".join([*parts, "--write"])
 
 
 if __name__ == "__main__":

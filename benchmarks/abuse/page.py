@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from benchmarks.abuse.attacks import NICE, SOURCE
-from benchmarks.abuse.measuring import GIVE_UP_S, Seen
+from benchmarks.abuse.attacks import HEALTHY, NICE, SOURCE
+from benchmarks.abuse.measuring import COMES_BACK_S, GIVE_UP_S, Seen
 from benchmarks.abuse.soaking import Soak
 from benchmarks.machine import machine
 
@@ -72,23 +72,23 @@ def _seconds(value: float | None) -> str:
     return "never" if value is None else f"{value:.2f} s"
 
 
-def page(found: Sequence[Found], *, duration_s: float, options: str = "") -> str:
+def page(found: Sequence[Found], *, duration_s: float, command: str) -> str:
     """Return the page."""
     compared = any(before is not None for _, _, before, _ in found)
     return "\n".join(
         [
             "# Attacks by clients",
             "",
-            f"Written by `python -m benchmarks.abuse{options} --write` on {machine()}.",
+            f"Written by `{command}` on {machine()}.",
             "",
             f"Each attack goes on at full speed for {duration_s:g} s and longer, from one process "
             f"at nice {NICE},",
             f"so that its own need of the processor does not starve the daemon, and from {SOURCE}: "
             "the daemon counts by",
-            "address, and who shares an attacker's address shares its limits. No attack has a "
-            "token; the daemon",
-            "asks for none, so that nothing else refuses them. Healthy clients come from 127.0.0.1."
-            + (" In parentheses: before." if compared else ""),
+            "address, and who shares an attacker's address shares its limits (one line shows "
+            "that). No attack has a token;",
+            f"the daemon asks for none, so that nothing else refuses them. Healthy clients come "
+            f"from {HEALTHY}." + (" In parentheses: before." if compared else ""),
             "",
             f"| {' | '.join(_COLUMNS)} |",
             "|---|" + "---:|" * (len(_COLUMNS) - 2) + "---|",
@@ -101,7 +101,7 @@ def page(found: Sequence[Found], *, duration_s: float, options: str = "") -> str
             f"{LIVEZ_CPU_BAR_S:g} s.",
             "- lapse, safe-off: from when the light should have gone off to the last capture; bar "
             f"{LIGHT_BAR_S:g} s.",
-            "- memory: growth at most, and 5 s after the attack; bar "
+            f"- memory: growth at most, and {COMES_BACK_S:g} s after the attack; bar "
             f"{GROWN_BAR_BYTES // _MIB} MiB.",
             f"- SIGTERM: until the daemon has ended, under attack; bar {END_BAR_S:g} s.",
             f"- never: not within {GIVE_UP_S:g} s.",

@@ -5,7 +5,6 @@ keeps the page and its figures in docs/. The measured composite needs TRANSIENTC
 """
 
 import argparse
-import os
 import tempfile
 from dataclasses import replace
 from functools import partial
@@ -19,36 +18,13 @@ from benchmarks.accuracy.noise import draw_noise, predicted_and_observed
 from benchmarks.accuracy.page import report
 from benchmarks.accuracy.pictures import drawn
 from benchmarks.accuracy.promises import BUILT_IN, GOALS, Kept, kept
+from benchmarks.measured_scenes import composite_scene
 from transientcam_experiments import tradeoff
 from transientcam_experiments.tradeoff.report import file_name
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 SCENES = ("wall", "corner", "mirrors", "visitor")
-COMPOSITE = """
-name = "composite"
-description = "One photon-counting measurement and two through foam, one after the other"
-[light]
-electrons_per_s = 1.0e7
-[[response]]
-file = "{data}/measured/capture_direct.npz"
-background = "median"
-time_zero_file = "{data}/measured/capture_direct.npz"
-weight = 0.55
-delay_s = 3e-9
-[[response]]
-file = "{data}/measured/capture_1_0_inch.npz"
-background = "median"
-time_zero_file = "{data}/measured/capture_direct.npz"
-weight = 0.30
-delay_s = 9e-9
-[[response]]
-file = "{data}/measured/capture_3_0_inch.npz"
-background = "median"
-time_zero_file = "{data}/measured/capture_direct.npz"
-weight = 0.5
-delay_s = 20e-9
-"""
 
 
 def main() -> None:
@@ -85,17 +61,6 @@ def main() -> None:
                     if source.exists():
                         target = DOCS / "figures" / f"accuracy-{file_name(spec)}-{name}.png"
                         target.write_bytes(source.read_bytes())
-
-
-def composite_scene(folder: Path) -> str | None:
-    """Write the measured composite as a scene, if the data are there."""
-    default = ROOT.parent / "shared" / "data"
-    data = Path(os.environ.get("TRANSIENTCAM_TEST_DATA", default)).resolve()
-    if not (data / "measured" / "capture_direct.npz").is_file():
-        return None
-    path = folder / "composite.toml"
-    path.write_text(COMPOSITE.format(data=data), encoding="utf-8")
-    return str(path)
 
 
 def _advance(progress: Progress, task: TaskID, kind: str) -> None:

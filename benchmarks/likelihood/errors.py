@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from transientcam_moments.likelihood import MODEL_ERROR
 
 Array = NDArray[Any]
 ESTIMATORS: Final[Mapping[str, str]] = {
     "single-frequency": "single frequency",
     "pisarenko": "Pisarenko",
+    "pisarenko-merged": "Pisarenko, merged",
     "maximum-entropy": "maximum entropy",
     "likelihood": "likelihood",
 }
@@ -65,12 +67,17 @@ def ranges(
     noise: tm.noise.MomentNoise | None = None,
     calibration: Array | None = None,
 ) -> dict[str, Array]:
-    """Return the range (...) by each estimator; that of the likelihood by `noise` where given."""
+    """Return the range (...) by each estimator; `noise`, where given, stands for the sensor's."""
     found = {}
     for name in ESTIMATORS:
-        if name == "likelihood" and noise is not None:
+        if noise is not None and name in ("likelihood", "pisarenko-merged"):
             assert settings.base_frequency_hz is not None
-            phase = tm.likelihood(moments, noise).separate(settings.threshold).phase_rad
+            if name == "likelihood":
+                model = tm.likelihood(moments, noise, model_error=MODEL_ERROR)
+                phase = model.separate(settings.threshold).phase_rad
+            else:
+                merged = tm.merge_returns(tm.pisarenko(moments), noise)
+                phase = tm.separate(merged, settings.threshold).phase_rad
             found[name] = np.asarray(tm.range_m(phase, settings.base_frequency_hz))
             continue
         chosen = replace(settings, estimator=name)

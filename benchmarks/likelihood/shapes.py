@@ -10,6 +10,7 @@ import numpy as np
 import transientcam_moments as tm
 from benchmarks.likelihood.errors import Array, errors_of, ranges, turn_m
 from benchmarks.tables import Table
+from transientcam_moments.likelihood import MODEL_ERROR
 from transientcam_moments.likelihood.choice import TAIL_SHAPE
 
 BASE_HZ: Final = 23e6
@@ -82,7 +83,7 @@ def _row(responses: Responses, m: int) -> tuple[str, ...]:
         phase = tm.likelihood(noisy, noise, returns=1, tail_shape=shape).separate().phase_rad
         columns.append(np.asarray(tm.range_m(phase, BASE_HZ)))
     columns.append(found["likelihood"])
-    explained = tm.likelihood(noisy, noise).explained().mean()
+    explained = tm.likelihood(noisy, noise, model_error=MODEL_ERROR).explained().mean()
     cells = (str(errors_of(each, truth, turn_m(BASE_HZ))) for each in columns)
     return (responses.name, *cells, f"{explained:.0%}")
 

@@ -26,6 +26,8 @@ class PixelCounts(TypedDict):
     replaced: int
     contradictory: NotRequired[int]
     """More than noise explains; absent from daemons that do not look for it."""
+    unexplained: NotRequired[int]
+    """The returns do not explain the moments; absent from daemons that do not look for it."""
 
 
 class PredictedStd(TypedDict):
@@ -71,6 +73,7 @@ class FrameMeta(TypedDict):
     unrepaired_images: int | None
     """Images of pairs that contradict the others and could not be rebuilt; None until computed."""
     filled_images: list[int] | None
+    corrected_pixels: int | None
     """Which images are those of the frame before, by their index in it; None until computed."""
     pixels: PixelCounts | None
     predicted_range_std_m: PredictedStd | None

@@ -1,4 +1,4 @@
-"""A camera in this process: an AMCW lidar on USB, or its simulation behind the same cable.
+"""A camera in this process: an AMCW lidar, or its simulation behind the same cable.
 
 >>> from transientcam_driver import Sequence, open_camera
 >>> with open_camera("sim:mirrors") as camera:
@@ -26,14 +26,17 @@ from transientcam_driver.errors import (
     CameraFault,
     CameraLost,
     CameraNotFound,
+    CameraUnreachable,
     DeviceRefused,
     DriverError,
     EffectError,
     FirmwareTooOld,
     FrameTimeout,
+    ImagesLost,
     LibusbMissing,
     NotStreaming,
     PermissionDenied,
+    PluginError,
     ProtocolError,
     SceneError,
     SequenceError,
@@ -41,10 +44,12 @@ from transientcam_driver.errors import (
 )
 from transientcam_driver.handle import Simulation, Truth
 from transientcam_driver.opening import open_camera
+from transientcam_driver.plugin import CameraName, CameraPlugin, FoundCamera
 from transientcam_driver.protocol import Status
 from transientcam_driver.receiving import Counters, RawFrame
 from transientcam_driver.sequence import ImageLabel, Sequence, SubPhases
 from transientcam_driver.simulation import SceneInfo, list_scenes
+from transientcam_driver.triggered import TriggeredCamera, TriggeredDevice
 
 __all__ = [
     "AppliedSequence",
@@ -59,19 +64,25 @@ __all__ = [
     "CameraError",
     "CameraFault",
     "CameraLost",
+    "CameraName",
     "CameraNotFound",
+    "CameraPlugin",
     "CameraState",
+    "CameraUnreachable",
     "Capabilities",
     "Counters",
     "DeviceRefused",
     "DriverError",
     "EffectError",
     "FirmwareTooOld",
+    "FoundCamera",
     "FrameTimeout",
     "ImageLabel",
+    "ImagesLost",
     "LibusbMissing",
     "NotStreaming",
     "PermissionDenied",
+    "PluginError",
     "ProtocolError",
     "RawFrame",
     "SceneError",
@@ -82,6 +93,8 @@ __all__ = [
     "SpecError",
     "Status",
     "SubPhases",
+    "TriggeredCamera",
+    "TriggeredDevice",
     "Truth",
     "capture_calibration",
     "list_scenes",

@@ -1,6 +1,7 @@
 """What a camera can do, and a sequence as it applies it."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from transientcam_driver.errors import SequenceError
@@ -23,7 +24,7 @@ class AppliedSequence:
     """What was really set, after rounding to the grid of the camera's synthesiser and timer.
 
     ``epoch`` is the number the camera gave this configuration; every image carries it. It is 0
-    when a sequence was only checked.
+    when a sequence was only checked. ``delay_s`` is that of the capabilities.
     """
 
     sequence: Sequence
@@ -34,6 +35,7 @@ class AppliedSequence:
     unambiguous_range_m: float
     data_rate_bytes_s: float
     low_frequency_hz: float
+    delay_s: float = 0.0
 
     @property
     def labels(self) -> tuple[ImageLabel, ...]:
@@ -46,12 +48,41 @@ class AppliedSequence:
         return self.sequence.to_document() | {"sequence_id": self.epoch} | derived
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Capabilities:
-    """What a camera can do, by its answer to GET_CAPS.
+    """What a camera can do.
 
-    Frequencies are multiples of ``tuning_step_hz``, exposures of 1 ns. A single capture reads an
-    image out in ``readout_s``; back-to-back frames take ``streaming_readout_s`` an image.
+    Attributes
+    ----------
+    model, serial, firmware, protocol_version
+        Which camera it is. Calibrations belong to a serial number.
+    width, height, bits
+        Of an image; the highest code of ``bits`` means that the pixel is saturated.
+    readout_s, streaming_readout_s
+        From the end of an exposure to the begin of the next one, in a single capture and back to
+        back.
+    settle_s
+        What each change of the modulation frequency takes beside that.
+    tuning_step_hz, min_frequency_hz, max_frequency_hz
+        Modulation frequencies: multiples of the step.
+    low_frequency_hz
+        Where the zeroth moment is measured, with ``low-frequency``.
+    min_exposure_s, max_exposure_s, exposure_step_s
+        Exposures of one image: multiples of the step.
+    max_harmonics, max_takes, max_sub_phases, max_images
+        Of a sequence.
+    schemes, zeroths, take_orders
+        What a sequence can ask for.
+    phase_offsets
+        Whether the phases of a sequence can be shifted together.
+    delay_s
+        What the light takes on its way inside of the camera, so that a moment at the frequency f
+        comes with a phase of 2 pi f delay_s more; nominal gains take it away.
+    fifo_bytes
+        Room for images in the camera; 0 where that is not known.
+    heartbeat_s
+        The camera switches its light off by itself when it was not asked for anything for so long;
+        0 where it does not.
     """
 
     model: str
@@ -63,21 +94,25 @@ class Capabilities:
     bits: int
     readout_s: float
     streaming_readout_s: float
+    settle_s: float = 0.0
     tuning_step_hz: float
     min_frequency_hz: float
     max_frequency_hz: float
-    low_frequency_hz: float
+    low_frequency_hz: float = 0.0
     max_harmonics: int
     min_exposure_s: float
     max_exposure_s: float
-    max_takes: int
-    max_sub_phases: int
-    max_images: int
-    schemes: tuple[Scheme, ...]
-    zeroths: tuple[Zeroth, ...]
-    take_orders: tuple[TakeOrder, ...]
-    fifo_bytes: int
-    heartbeat_s: float
+    exposure_step_s: float = 1e-9
+    max_takes: int = 256
+    max_sub_phases: int = 1
+    max_images: int = 2048
+    schemes: tuple[Scheme, ...] = ("none",)
+    zeroths: tuple[Zeroth, ...] = ("estimated",)
+    take_orders: tuple[TakeOrder, ...] = ("sequential",)
+    phase_offsets: bool = False
+    delay_s: float = 0.0
+    fifo_bytes: int = 0
+    heartbeat_s: float = 0.0
 
     @property
     def image_bytes(self) -> int:
@@ -118,6 +153,8 @@ class Capabilities:
         if sequence.take_order not in self.take_orders:
             limit = f"one of {', '.join(self.take_orders)} on this camera"
             raise SequenceError("take_order", sequence.take_order, limit)
+        if sequence.phase_offset_rad and not self.phase_offsets:
+            raise SequenceError("phase_offset_rad", sequence.phase_offset_rad, "0 on this camera")
         most_takes = min(self.max_takes, self.max_images // sequence.images_per_take)
         if sequence.takes > most_takes:
             limit = f"at most {most_takes} with {sequence.images_per_take} images a take"
@@ -144,6 +181,23 @@ class Capabilities:
         most_takes = min(self.max_takes, self.max_images // nearest.images_per_take)
         return replace(nearest, takes=min(sequence.takes, most_takes))
 
+    def sequence_of(self, document: Mapping[str, Any]) -> Sequence:
+        """Build a sequence from a JSON document, as `Sequence.from_document` does.
+
+        What is absent takes its default, or where this camera cannot do that what is nearest.
+
+        Raises
+        ------
+        SequenceError
+            Naming the field, its value and the limit.
+        """
+        wanted = Sequence.from_document(document)
+        possible = self.nearest(wanted)
+        absent = {each.name for each in fields(Sequence)} - document.keys()
+        if "scheme" not in document.get("sub_phases", {}):
+            absent.add("sub_phases")
+        return replace(wanted, **{name: getattr(possible, name) for name in absent})
+
     def apply(self, sequence: Sequence, *, epoch: int = 0) -> AppliedSequence:
         """Return a sequence as this camera would apply it, without a request to it."""
         self.validate(sequence)
@@ -151,14 +205,15 @@ class Capabilities:
             replace(
                 sequence,
                 base_frequency_hz=self.frequency_hz(self.tuning_word(sequence.base_frequency_hz)),
-                exposure_s=round(sequence.exposure_s * 1e9) / 1e9,
+                exposure_s=self.exposure_grid_s(sequence.exposure_s),
             ),
             epoch=epoch,
         )
 
     def describe(self, sequence: Sequence, *, epoch: int) -> AppliedSequence:
         """Return a sequence that is set already, with its derived fields."""
-        streaming_s = sequence.capture_s(self.streaming_readout_s)
+        settling_s = self.settle_s * sequence.frequency_changes
+        streaming_s = sequence.capture_s(self.streaming_readout_s) + settling_s
         frame_bytes = sequence.images * (IMAGE_HEADER_BYTES + self.image_bytes)
         return AppliedSequence(
             sequence=sequence,
@@ -169,6 +224,7 @@ class Capabilities:
             unambiguous_range_m=sequence.unambiguous_range_m,
             data_rate_bytes_s=frame_bytes / streaming_s,
             low_frequency_hz=self.low_frequency_hz,
+            delay_s=self.delay_s,
         )
 
     def frequency_hz(self, tuning_word: int) -> float:
@@ -178,6 +234,12 @@ class Capabilities:
     def tuning_word(self, frequency_hz: float) -> int:
         """Nearest tuning word of a frequency; harmonics use multiples of the base's word."""
         return round(frequency_hz / self.tuning_step_hz)
+
+    def exposure_grid_s(self, exposure_s: float) -> float:
+        """Nearest exposure that the timer makes."""
+        # by division, so that 25 us are 25e-6 and not 25.000000000000004e-6
+        steps_per_s = round(1 / self.exposure_step_s)
+        return round(exposure_s * steps_per_s) / steps_per_s
 
 
 def _clamped(value: float, least: float, most: float) -> float:

@@ -8,11 +8,13 @@
     │   └── EffectError        there is no such effect, or no such choice of one
     ├── SceneError             a scene file is not valid
     ├── SpecError              open_camera() was given a name that is not valid
+    ├── PluginError            the package of a camera cannot be used
     ├── CalibrationError
     │   ├── CalibrationMismatch   a calibration belongs to something else
     │   └── CalibrationFileError  a file holds no calibration
     └── CameraError
         ├── CameraNotFound     no such camera is plugged in
+        │   └── CameraUnreachable  no camera answers at an address of the network
         ├── PermissionDenied   it is there, and this user may not open it
         ├── CameraBusy         another program holds it
         ├── LibusbMissing      the USB library of the system is missing
@@ -22,13 +24,14 @@
         ├── FrameTimeout       no complete frame within the time given
         ├── CameraFault        the device switched itself off
         ├── DeviceRefused      the device refused a request, with its reason
+        ├── ImagesLost         images that were asked for will not come, or not whole
         ├── TransferStalled    an endpoint answered with a stall
         ├── TransferOverflow   the device sent more than was requested
         └── ProtocolError      it sent something the protocol does not allow
             └── FirmwareTooOld
 
-``TransferStalled`` and ``TransferOverflow`` go from the transport to the camera, which recovers
-from both or raises one of the others.
+``ImagesLost``, ``TransferStalled`` and ``TransferOverflow`` go from the transport to the camera,
+which recovers from them or raises one of the others.
 """
 
 import reprlib
@@ -98,10 +101,16 @@ class SpecError(DriverError):
 
     spec: str
     reason: str
-    _sentence = (
-        "camera {spec!r}: {reason} "
-        "(usb, usb:SERIAL, sim:SCENE or sim:SCENE?width=320&height=240&noise=off&seed=3)"
-    )
+    _sentence = "camera {spec!r}: {reason}"
+
+
+@dataclass(eq=False, repr=False)
+class PluginError(DriverError):
+    """The plug-in of a kind of camera cannot be used."""
+
+    kind: str
+    reason: str
+    _sentence = "the camera {kind!r} cannot be used: {reason}"
 
 
 class CalibrationError(DriverError):
@@ -147,6 +156,14 @@ class CameraNotFound(CameraError):
         if self.serial is None:
             return "no camera is plugged in"
         return f"no camera with serial number {self.serial!r} is plugged in"
+
+
+@dataclass(eq=False, repr=False)
+class CameraUnreachable(CameraNotFound):
+    """No camera answers at an address of the network."""
+
+    def __str__(self) -> str:
+        return f"no camera answers at {self.serial}"
 
 
 @dataclass(eq=False, repr=False)
@@ -225,6 +242,14 @@ class DeviceRefused(CameraError):
 
     def __str__(self) -> str:
         return f"the camera refused {self.request}: {self.detail or self.code}"
+
+
+@dataclass(eq=False, repr=False)
+class ImagesLost(CameraError):
+    """Images that were asked for will not come, or not whole."""
+
+    reason: str
+    _sentence = "images were lost: {reason}"
 
 
 class TransferStalled(CameraError):

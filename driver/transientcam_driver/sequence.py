@@ -28,6 +28,8 @@ DERIVED_FIELDS = (
     "data_rate_bytes_s",
 )
 """What follows from a sequence on one camera: fields of an applied one and of its document."""
+DRIVER_FIELDS = frozenset({"phase_offset_rad"})
+"""What documents of a sequence do not have: only calibrations are measured with it."""
 READ_ONLY_FIELDS = frozenset({"sequence_id", *DERIVED_FIELDS})
 """What a client may send back unchanged with a sequence's document; it is ignored."""
 
@@ -127,6 +129,9 @@ class Sequence:
         often as there are takes, then the next one.
     sub_phases
         Division of each exposure.
+    phase_offset_rad
+        Added to the phase of each modulated image, from 0 to a turn: one step of a phase sweep. Not
+        part of documents.
     """
 
     base_frequency_hz: float = 23e6
@@ -136,6 +141,7 @@ class Sequence:
     takes: int = 1
     sub_phases: SubPhases = field(default_factory=SubPhases)
     take_order: TakeOrder = "sequential"
+    phase_offset_rad: float = 0.0
 
     def __post_init__(self) -> None:
         _positive("base_frequency_hz", self.base_frequency_hz, "a number of hertz above 0")
@@ -150,6 +156,8 @@ class Sequence:
         _positive("exposure_s", self.exposure_s, "a number of seconds above 0")
         _integer("takes", self.takes, "an integer of at least 1", least=1, most=None)
         _one_of("take_order", self.take_order, get_args(TakeOrder))
+        if not 0 <= self.phase_offset_rad < 2 * math.pi:
+            raise SequenceError("phase_offset_rad", self.phase_offset_rad, "from 0 to a turn")
         if not isinstance(self.sub_phases, SubPhases):
             raise SequenceError("sub_phases", self.sub_phases, "an object {scheme, n}")
         object.__setattr__(self, "base_frequency_hz", float(self.base_frequency_hz))
@@ -178,13 +186,14 @@ class Sequence:
         whether takes follow one another as a whole or image by image.
         """
         of_a_take: list[tuple[int, float, float, bool]] = []
+        phases_rad = [self.phase_offset_rad + phase_rad for phase_rad in PHASE_STEPS_RAD]
         if self.zeroth == "on-off":
             of_a_take += [(0, 0.0, 0.0, True), (0, 0.0, 0.0, False)]
         elif self.zeroth == "low-frequency":
-            of_a_take += [(0, low_frequency_hz, phase_rad, True) for phase_rad in PHASE_STEPS_RAD]
+            of_a_take += [(0, low_frequency_hz, phase_rad, True) for phase_rad in phases_rad]
         for j in range(1, self.harmonics + 1):
             frequency_hz = j * self.base_frequency_hz
-            of_a_take += [(j, frequency_hz, phase_rad, True) for phase_rad in PHASE_STEPS_RAD]
+            of_a_take += [(j, frequency_hz, phase_rad, True) for phase_rad in phases_rad]
         order = [(take, image) for take in range(self.takes) for image in of_a_take]
         if self.take_order == "interleaved":
             order = [(take, image) for image in of_a_take for take in range(self.takes)]
@@ -200,6 +209,14 @@ class Sequence:
             )
             for index, (take, (harmonic, frequency_hz, phase_rad, illumination)) in enumerate(order)
         )
+
+    @property
+    def frequency_changes(self) -> int:
+        """How often the modulation changes in a frame that others of its kind follow."""
+        groups = self.harmonics + (self.zeroth != "estimated")
+        if groups == 1:
+            return 0
+        return groups * (self.takes if self.take_order == "sequential" else 1)
 
     def capture_s(self, readout_s: float) -> float:
         """Time from the first exposure to the last read-out."""
@@ -234,7 +251,7 @@ class Sequence:
         SequenceError
             Naming the field, its value and the limit.
         """
-        known = {each.name for each in fields(cls)}
+        known = {each.name for each in fields(cls)} - DRIVER_FIELDS
         _known_keys("", document, known | READ_ONLY_FIELDS)
         given = {name: value for name, value in document.items() if name in known}
         if "sub_phases" in given:

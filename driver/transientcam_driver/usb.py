@@ -7,7 +7,6 @@ import array
 import errno
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 import usb.backend.libusb1
@@ -24,6 +23,7 @@ from transientcam_driver.errors import (
     TransferOverflow,
     TransferStalled,
 )
+from transientcam_driver.plugin import FoundCamera
 from transientcam_driver.protocol import Request
 from transientcam_driver.protocol.requests import IMAGE_ENDPOINT, PRODUCT_ID, VENDOR_ID
 
@@ -182,30 +182,12 @@ def open_transport(serial: str | None = None, *, backend: Any = None) -> UsbTran
     raise trouble
 
 
-@dataclass(frozen=True, slots=True)
-class UsbCamera:
-    """A camera that is plugged in.
-
-    ``serial`` and ``product`` are None, and ``problem`` says why, where they cannot be read.
-    """
-
-    node: str
-    serial: str | None = None
-    product: str | None = None
-    problem: str | None = None
-
-    @property
-    def spec(self) -> str:
-        """The name by which `open_camera` opens it."""
-        return "usb" if self.serial is None else f"usb:{self.serial}"
-
-
 def system_libusb() -> Any:
     """Return pyusb's backend for the libusb of this system; None where there is none."""
     return usb.backend.libusb1.get_backend()
 
 
-def list_cameras(*, backend: Any = None) -> tuple[UsbCamera, ...]:
+def list_cameras(*, backend: Any = None) -> tuple[FoundCamera, ...]:
     """List the cameras that are plugged in; none is claimed, so that none is disturbed.
 
     Raises
@@ -215,7 +197,7 @@ def list_cameras(*, backend: Any = None) -> tuple[UsbCamera, ...]:
     return tuple(map(_described, _cameras(backend)))
 
 
-def _described(device: Any) -> UsbCamera:
+def _described(device: Any) -> FoundCamera:
     node = _node(device)
     try:
         with _translated("reading its strings", node):
@@ -223,11 +205,16 @@ def _described(device: Any) -> UsbCamera:
                 usb.util.get_string(device, index, _US_ENGLISH)
                 for index in (device.iSerialNumber, device.iProduct)
             )
-            return UsbCamera(node, serial, product)
+            return FoundCamera(_spec(serial), serial, product, node)
     except CameraError as error:
-        return UsbCamera(node, problem=str(error))
+        return FoundCamera(_spec(None), node=node, problem=str(error))
     finally:
         usb.util.dispose_resources(device)
+
+
+def _spec(serial: str | None) -> str:
+    """Return the name by which `open_camera` opens it."""
+    return "usb" if serial is None else f"usb:{serial}"
 
 
 def _cameras(backend: Any) -> list[Any]:

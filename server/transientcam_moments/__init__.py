@@ -31,6 +31,13 @@ from transientcam_moments.errors import (
 )
 from transientcam_moments.flags import INVALID, Flags, flags
 from transientcam_moments.four_bucket import four_bucket, measure, saturated
+from transientcam_moments.harmonics import (
+    Corrected,
+    HarmonicCorrection,
+    checked_waveform,
+    sweep_offsets_rad,
+    waveform_of,
+)
 from transientcam_moments.labels import Labels
 from transientcam_moments.levinson import (
     Coefficients,
@@ -41,6 +48,7 @@ from transientcam_moments.levinson import (
 )
 from transientcam_moments.likelihood import Likelihood, likelihood
 from transientcam_moments.maximum_entropy import density
+from transientcam_moments.merging import merge_returns
 from transientcam_moments.modulation import modulation_gain
 from transientcam_moments.peaks import Peaks, peaks
 from transientcam_moments.pisarenko import Returns, Separation, pisarenko, separate
@@ -57,7 +65,9 @@ __all__ = [
     "Average",
     "Biased",
     "Coefficients",
+    "Corrected",
     "Flags",
+    "HarmonicCorrection",
     "Labels",
     "Likelihood",
     "MomentsError",
@@ -76,6 +86,7 @@ __all__ = [
     "bounds",
     "calibrate",
     "calibration_of",
+    "checked_waveform",
     "comparisons",
     "cumulative",
     "density",
@@ -90,6 +101,7 @@ __all__ = [
     "levinson",
     "likelihood",
     "measure",
+    "merge_returns",
     "modulation_gain",
     "moments_of",
     "noise",
@@ -104,4 +116,6 @@ __all__ = [
     "smallest_eigenvalue",
     "smooth",
     "smoothed_density",
+    "sweep_offsets_rad",
+    "waveform_of",
 ]

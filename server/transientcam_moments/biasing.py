@@ -22,6 +22,7 @@ from transientcam_moments._arrays import (
 )
 from transientcam_moments._kernels import accelerated
 from transientcam_moments._loops import repeat
+from transientcam_moments._shown import summary
 from transientcam_moments.levinson import normalised
 
 EPSILON = 4e-3
@@ -46,6 +47,10 @@ class Biased(NamedTuple):
 
     moments: Array
     biased: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
 
 def smallest_eigenvalue(b: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Flags of pixels: biased, dark, saturated, not finite, replaced, contradictory."""
+"""Flags of pixels: biased, dark, saturated, not finite, replaced, contradictory, unexplained."""
 
 from enum import IntFlag
 
@@ -33,6 +33,13 @@ class Flags(IntFlag):
     Gains that drifted or are of another camera, light that moved while it was captured, images that
     lost their synchronisation. Only who knows the noise can set it; never where b_0 is
     estimated, as that makes any moments agree.
+    """
+    UNEXPLAINED = 128
+    """The returns found do not explain the moments: chi-square is above what noise exceeds in one
+    pixel of a thousand.
+
+    Light comes back in another way than the estimate assumes, and its range may be biased. Only the
+    estimator "likelihood" says so, and where the noise of the sensor is known.
     """
 
 

@@ -27,6 +27,7 @@ from transientcam_moments._arrays import (
 )
 from transientcam_moments._kernels import accelerated
 from transientcam_moments._kernels.parallel import on_threads
+from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 
 
@@ -46,6 +47,10 @@ class Coefficients(NamedTuple):
     error: Array
     polynomial: Array
     reflection: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
     @property
     def brightness(self) -> Array:
@@ -179,7 +184,7 @@ def extend(coefficients: Coefficients, n: int) -> Array:
         raise ParameterError("n", n, f"above the order m = {m}")
     b = _moments(coefficients)
     for k in range(m + 1, n + 1):
-        b.append(_predicted(a, b, k))
+        b.append(predicted(a, b, k))
     return namespace(a).stack(b[m + 1 :])
 
 
@@ -201,7 +206,8 @@ def _moments(coefficients: Coefficients) -> list[Array]:
     return b
 
 
-def _predicted(a: Array, b: list[Array], k: int) -> Array:
+def predicted(a: Array, b: list[Array], k: int) -> Array:
+    """Return b_k from b_{k-m} .. b_{k-1} and the polynomial a of order m, see `extend`."""
     total = a[1] * b[k - 1]
     for j in range(2, a.shape[0]):
         total = total + a[j] * b[k - j]

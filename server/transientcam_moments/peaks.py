@@ -16,6 +16,7 @@ from transientcam_moments._arrays import (
     to_complex,
 )
 from transientcam_moments._loops import repeat
+from transientcam_moments._shown import summary
 from transientcam_moments.levinson import Coefficients
 from transientcam_moments.maximum_entropy import modulus_floor
 from transientcam_moments.roots import disc_roots
@@ -45,6 +46,10 @@ class Peaks(NamedTuple):
     strongest_rad: Array
     phase_rad: Array
     density: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
 
 def peaks(coefficients: Coefficients, *, threshold: float = PEAK_THRESHOLD) -> Peaks:

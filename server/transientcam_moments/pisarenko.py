@@ -15,6 +15,7 @@ from transientcam_moments._arrays import (
 )
 from transientcam_moments._kernels import accelerated
 from transientcam_moments._kernels.parallel import on_threads
+from transientcam_moments._shown import summary
 from transientcam_moments.biasing import search
 from transientcam_moments.levinson import Recursion, normalised, onto_circle, recursion
 from transientcam_moments.polishing import polish, residual, size
@@ -73,6 +74,10 @@ class Separation(NamedTuple):
     direct: Array
     indirect: Array
     phase_rad: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
 
 def pisarenko(b: Array, *, eigenvalue: Array | None = None, threads: int | None = None) -> Returns:

@@ -3,20 +3,26 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
+from html import escape
 
 import numpy as np
 
 from transientcam_moments._arrays import Array, chosen, in_range, in_turn, namespace
 from transientcam_moments._kernels.one_pass import Planes
+from transientcam_moments._kernels.parallel import Spread, at_once
+from transientcam_moments._shown import map_html
 from transientcam_moments.biasing import EPSILON, bias, estimate_zeroth, smallest_eigenvalue
 from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
 from transientcam_moments.cumulative import cumulative
 from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.flags import INVALID, Flags, flags
 from transientcam_moments.four_bucket import ZEROTH_IMAGES
+from transientcam_moments.harmonics import HarmonicCorrection
 from transientcam_moments.levinson import Coefficients, levinson
-from transientcam_moments.likelihood import Likelihood, likelihood
+from transientcam_moments.likelihood import MODEL_ERROR, Likelihood
+from transientcam_moments.likelihood.estimate import assumed_noise, fitted
 from transientcam_moments.maximum_entropy import density
+from transientcam_moments.merging import merge_returns
 from transientcam_moments.noise.moments import MomentNoise, moment_noise, smoothed_of
 from transientcam_moments.noise.sensor import Sensor
 from transientcam_moments.peaks import Peaks, peaks
@@ -34,7 +40,7 @@ from transientcam_moments.smoothing import SIGMA_PX, smooth
 SPOILT_IMAGES = ("keep", "repair", "fill")
 """What becomes of images that lost their synchronisation; see `Settings`."""
 
-_OWN = ("pisarenko", "maximum-entropy", "likelihood", "single-frequency")
+_OWN = ("pisarenko", "maximum-entropy", "likelihood", "single-frequency", "pisarenko-merged")
 ESTIMATORS = (
     *_OWN,
     *(
@@ -69,8 +75,9 @@ class Settings:
         The range is that of the first return, or peak, with this share of the strongest one's
         weight, or density.
     estimator : str
-        What the range is taken from: "pisarenko", "maximum-entropy", "likelihood",
-        "single-frequency", which is the usual arg b_1, or another of the `comparisons` of moments.
+        What the range is taken from: "pisarenko" as the paper has it, "pisarenko-merged" (see
+        `merge_returns`), "maximum-entropy", "likelihood", "single-frequency", which is the usual
+        arg b_1, or another of the `comparisons` of moments.
     minimum_brightness : float
         Pixels with b_0 at or below it have no signal, in the unit of the moments.
     full_scale : float
@@ -80,8 +87,8 @@ class Settings:
         opposite images find them (`repair`), and where those don't tell also filled in from the
         frame before, or kept as they are.
     sensor : noise.Sensor, optional
-        Whose noise the images have; "likelihood" weighs the moments by it, and without one takes
-        the noise that `likelihood` assumes.
+        Whose noise the images have; "likelihood" weighs the moments by it, and
+        "pisarenko-merged" merges by it; both assume some without one, see `likelihood`.
     """
 
     base_frequency_hz: float | None = None
@@ -150,6 +157,10 @@ class Reconstruction:
         What was done to the images before.
     calibration : array, shape (m + 1,) or (m + 1, ...), optional
         Gains that the moments were divided by, for their noise; 1, when left out.
+    correction : HarmonicCorrection, optional
+        What is taken out of the moments once they are smoothed.
+    spread : callable, optional
+        How the likelihood uses several threads, as `kernels.over` returns it.
     """
 
     def __init__(
@@ -162,8 +173,12 @@ class Reconstruction:
         kept: Array | None = None,
         repaired: Repair | None = None,
         calibration: Array | None = None,
+        correction: HarmonicCorrection | None = None,
+        spread: Spread = at_once,
     ) -> None:
         self.settings = settings
+        self._correction = correction
+        self._spread = spread
         self._measured = moments
         self._saturated = saturated_pixels
         self._bad = bad_pixels
@@ -199,11 +214,26 @@ class Reconstruction:
         return tuple((int(t), int(i)) for t, i in np.argwhere(self._repaired.filled))
 
     @cached_property
-    def smoothed(self) -> Array:
-        """Moments (m + 1, ...) smoothed over pixels, b_0 estimated where it wasn't measured."""
+    def _corrected(self) -> tuple[Array, Array | None]:
+        """Smoothed moments without the known harmonics, and where these were taken out."""
         moments = self.measured
         if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
             moments = smooth(moments, self.settings.smoothing_sigma_px)
+        return (moments, None) if self._correction is None else self._correction(moments)
+
+    @property
+    def corrected_pixels(self) -> int | None:
+        """Of how many pixels known harmonics were taken out; None where none are known."""
+        corrected = self._corrected[1]
+        return None if corrected is None else int(corrected.sum())
+
+    @cached_property
+    def smoothed(self) -> Array:
+        """Moments (m + 1, ...) smoothed over pixels, b_0 estimated where it wasn't measured.
+
+        Known harmonics of the modulation are taken out.
+        """
+        moments = self._corrected[0]
         if self.settings.zeroth == "estimated":
             moments = estimate_zeroth(moments, self.settings.epsilon)
         return moments
@@ -242,6 +272,16 @@ class Reconstruction:
     @cached_property
     def flags(self) -> Array:
         """Flags of every pixel, uint8 of `Flags`."""
+        if self.settings.estimator != "likelihood" or self.noise is None:
+            return self._flags_of_moments
+        xp = namespace(self.smoothed)
+        unexplained = self.has_range & ~self.likelihood.explained()
+        found = self._flags_of_moments | xp.where(unexplained, int(Flags.UNEXPLAINED), 0)
+        return found.astype(xp.uint8)
+
+    @cached_property
+    def _flags_of_moments(self) -> Array:
+        """Those that follow from moments and images alone."""
         xp = namespace(self.smoothed)
         found = flags(
             self.smoothed,
@@ -267,13 +307,12 @@ class Reconstruction:
         where : boolean array, shape (...)
         """
         xp = namespace(self.flags)
-        added = xp.where(xp.asarray(where), int(flag), 0)
-        self.flags = (self.flags | added).astype(xp.uint8)
+        self.flags = self.flags | xp.asarray(where).astype(xp.uint8) * xp.uint8(flag)
 
     @property
     def has_range(self) -> Array:
         """Where there is light and all moments are finite."""
-        return (self.flags & int(INVALID)) == 0
+        return (self._flags_of_moments & int(INVALID)) == 0
 
     @cached_property
     def coefficients(self) -> Coefficients:
@@ -323,7 +362,8 @@ class Reconstruction:
     @cached_property
     def likelihood(self) -> Likelihood:
         """Few returns, or one with a tail, with what they are worth; of moments as measured."""
-        return likelihood(self.smoothed, self.noise)
+        error = 0.0 if self.noise is None else MODEL_ERROR  # which assumed noise is large beside
+        return fitted(self.smoothed, self.noise, self._spread, model_error=error)
 
     @cached_property
     def reduced_chi_square(self) -> Array:
@@ -345,6 +385,10 @@ class Reconstruction:
         technique = self._technique
         if self.settings.estimator == "likelihood":
             return self.likelihood.separate(self.settings.threshold)
+        if self.settings.estimator == "pisarenko-merged":
+            noise = assumed_noise(self.smoothed) if self.noise is None else self.noise
+            merged = merge_returns(self.returns, noise)
+            return separate(merged, self.settings.threshold)
         if technique is None:
             return separate(self.returns, self.settings.threshold)
         xp = namespace(self.smoothed)
@@ -371,7 +415,7 @@ class Reconstruction:
 
         That is negative where noise, or a contradiction, makes the returns brighter than b_0.
         """
-        if self._technique is not None or self.settings.estimator == "likelihood":
+        if self.settings.estimator not in ("pisarenko", "maximum-entropy", "single-frequency"):
             return self.brightness - self.direct - self.indirect
         return self.returns.uniform
 
@@ -434,9 +478,19 @@ class Reconstruction:
         parts = [f"m = {order}{at}", f"pixels {' x '.join(map(str, shape)) or '1'}"]
         parts += [f"estimator {self.settings.estimator}"]
         if "range_m" in known:
-            parts.append(_spread(self.range_m))
+            parts.append(_in_metres(self.range_m))
         computed = [name for name in _SHOWN if name in known]
         return f"<Reconstruction {', '.join(parts)}; computed: {', '.join(computed) or 'nothing'}>"
+
+    def _repr_html_(self) -> str:
+        """Return its range as a map, for notebooks; the brightness without a base frequency."""
+        shown = ""
+        if len(self._shape[1]) == 2:
+            if self.settings.base_frequency_hz is None:
+                shown = map_html(self.brightness, title="brightness", unit="(as the moments)")
+            else:
+                shown = map_html(self.range_m, title="range", unit="m")
+        return f"<p>{escape(repr(self))}</p>{shown}"
 
     @property
     def _shape(self) -> tuple[int, tuple[int, ...]]:
@@ -462,6 +516,10 @@ class PassedReconstruction(Reconstruction):
         What was done to the images before.
     calibration : array, optional
         As of `Reconstruction`.
+    corrected : boolean array, shape (...), optional
+        Where known harmonics were taken out; none are known, when left out.
+    spread : callable, optional
+        As of `Reconstruction`.
     """
 
     def __init__(
@@ -472,20 +530,25 @@ class PassedReconstruction(Reconstruction):
         kept: Array | None = None,
         repaired: Repair | None = None,
         calibration: Array | None = None,
+        corrected: Array | None = None,
+        spread: Spread = at_once,
     ) -> None:
-        super().__init__(None, settings, kept=kept, repaired=repaired, calibration=calibration)
+        super().__init__(
+            None, settings, kept=kept, repaired=repaired, calibration=calibration, spread=spread
+        )
         self._measure = measure
         self.smoothed = planes.smoothed
+        self._corrected = planes.smoothed, corrected
         self.validity = planes.validity
-        self.flags = planes.flags
+        self._flags_of_moments = planes.flags
         self.returns = Returns(planes.phase_rad, planes.weight, planes.uniform, planes.count)
         self.brightness = planes.brightness
         if settings.estimator == "pisarenko":  # else they follow from another estimate
             self.uniform = planes.uniform
             self.direct = planes.direct
             self.indirect = planes.indirect
-        if settings.base_frequency_hz is not None:
-            self.range_m = planes.range_m
+            if settings.base_frequency_hz is not None:
+                self.range_m = planes.range_m
 
     @cached_property
     def measured(self) -> Array:
@@ -498,7 +561,7 @@ class PassedReconstruction(Reconstruction):
 
     @cached_property
     def _biased(self) -> tuple[Array, Array]:
-        biased = (self.flags & int(Flags.BIASED)) > 0
+        biased = (self._flags_of_moments & int(Flags.BIASED)) > 0
         if self.settings.zeroth == "estimated":
             return self.smoothed, biased
         moments = self.smoothed.copy()
@@ -506,7 +569,7 @@ class PassedReconstruction(Reconstruction):
         return moments, biased
 
 
-def _spread(range_m: Array) -> str:
+def _in_metres(range_m: Array) -> str:
     """Return the least, middle and greatest range in words."""
     values = np.asarray(range_m)
     there = values[np.isfinite(values)]

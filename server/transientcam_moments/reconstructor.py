@@ -14,8 +14,9 @@ from transientcam_moments._kernels.padding import LEAST_WIDTH
 from transientcam_moments._kernels.parallel import Spread, at_once, on_threads
 from transientcam_moments.bad_pixels import Replacement, checked_mask, fill_bad_pixels
 from transientcam_moments.calibration import calibrate, inverse_gains
-from transientcam_moments.errors import UnlabelledImages
+from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.four_bucket import harmonics_of, measure, saturated, takes_first
+from transientcam_moments.harmonics import HarmonicCorrection, checked_waveform, matters
 from transientcam_moments.labels import Labels
 from transientcam_moments.ranging import range_m
 from transientcam_moments.reconstruction import PassedReconstruction, Reconstruction, Settings
@@ -23,6 +24,8 @@ from transientcam_moments.repair import Repair, repair
 from transientcam_moments.smoothing import gaussian_taps, smooth
 from transientcam_moments.takes import average_takes
 
+_BY_THE_PASS = ("pisarenko", "pisarenko-merged", "likelihood")
+"""Estimators that follow from the pass's returns or moments."""
 _SHAPES = 4  # of images that a reconstructor keeps prepared
 
 
@@ -42,6 +45,9 @@ class Reconstructor:
         taken to be calibrated.
     bad_pixels : boolean array, shape (H, W), optional
         Pixels that show the mean of their neighbours instead, and are flagged.
+    waveform : array, shape (m, K), optional
+        Odd harmonics of the modulation, from `waveform_of`, that are taken out of the moments; none
+        are known, when left out. Needs the calibration.
     """
 
     def __init__(
@@ -50,12 +56,19 @@ class Reconstructor:
         *,
         calibration: Array | None = None,
         bad_pixels: Array | None = None,
+        waveform: Array | None = None,
     ) -> None:
         self.settings = Settings() if settings is None else settings
         self._calibration = calibration
         self._bad = bad_pixels
+        if waveform is not None:
+            waveform = checked_waveform(waveform)
+            if calibration is None:
+                raise ParameterError("calibration", None, "given, for the phases of the waveform")
+        self._waveform = waveform if waveform is not None and matters(waveform) else None
         self._lock = threading.Lock()
         self._prepared: dict[tuple[Any, ...], OnePass] = {}
+        self._corrections: dict[tuple[int, ...], HarmonicCorrection] = {}
 
     def __call__(
         self,
@@ -77,7 +90,8 @@ class Reconstructor:
         previous : array, optional
             Images of the frame before, like `data`, for ``spoilt_images="fill"``.
         spread : callable
-            How the compiled pass uses several threads, as `kernels.over` returns it.
+            How the compiled pass, and the likelihood, use several threads, as `kernels.over`
+            returns it.
 
         Returns
         -------
@@ -102,7 +116,8 @@ class Reconstructor:
         repaired = self._repaired(takes, previous)
         if repaired is not None:
             takes = repaired.images
-        one_pass = self._pass_of_images(takes, zeroth)
+        # behind the smoothing, where a waveform is known: harmonics are taken out there
+        one_pass = None if self._waveform is not None else self._pass_of_images(takes, zeroth)
         if one_pass is not None:
             planes = one_pass.images(takes[0], saturated_pixels, spread)
             return PassedReconstruction(
@@ -111,6 +126,7 @@ class Reconstructor:
                 lambda: self._measured(takes)[0],
                 repaired=repaired,
                 calibration=self._calibration,
+                spread=spread,
             )
         moments, kept = self._measured(takes, None if repaired is None else repaired.left_out)
         if saturated_pixels is None:
@@ -138,6 +154,7 @@ class Reconstructor:
     ) -> Reconstruction:
         """Go on from calibrated moments."""
         one_pass = self._pass_of_moments(moments)
+        correction = self._correction(moments)
         if one_pass is None:
             return Reconstruction(
                 moments,
@@ -147,14 +164,44 @@ class Reconstructor:
                 kept=kept,
                 repaired=repaired,
                 calibration=self._calibration,
+                correction=correction,
+                spread=spread,
             )
         smoothed = moments
         if moments.ndim == 3:
             smoothed = smooth(moments, self.settings.smoothing_sigma_px)
+        corrected = None
+        if correction is not None:
+            smoothed, corrected = correction(smoothed, spread=spread)
         planes = one_pass.moments(smoothed, saturated_pixels, spread)
         return PassedReconstruction(
-            planes, self.settings, lambda: moments, kept, repaired, self._calibration
+            planes,
+            self.settings,
+            lambda: moments,
+            kept=kept,
+            repaired=repaired,
+            calibration=self._calibration,
+            corrected=corrected,
+            spread=spread,
         )
+
+    def _correction(self, moments: Array) -> HarmonicCorrection | None:
+        """Return what takes the harmonics of the waveform out of these moments, if any is known."""
+        if self._waveform is None:
+            return None
+        shape = tuple(moments.shape[1:])
+        with self._lock:
+            if shape not in self._corrections:
+                self._corrections[shape] = HarmonicCorrection(
+                    self._waveform,
+                    self._calibration,
+                    shape,
+                    smoothing_sigma_px=self.settings.smoothing_sigma_px,
+                    estimated=self.settings.zeroth == "estimated",
+                )
+                while len(self._corrections) > _SHAPES:
+                    self._corrections.pop(next(iter(self._corrections)))
+            return self._corrections[shape]
 
     def _repaired(self, takes: Array, previous: Array | None) -> Repair | None:
         """Return the images after repair; None for other arrays than NumPy's, or by the settings.
@@ -208,7 +255,7 @@ class Reconstructor:
 
     def _pass(self, m: int, shape: tuple[int, ...]) -> OnePass | None:
         usual = self.settings.keep == "harmonics"
-        usual = usual and self.settings.estimator in ("pisarenko", "likelihood")
+        usual = usual and self.settings.estimator in _BY_THE_PASS
         prepare = _kernels.lookup("reconstruct", m, math.prod(shape))
         masked = self._bad is None or np.shape(self._bad) == shape
         if not usual or prepare is None or not masked:
@@ -270,6 +317,7 @@ def reconstruct(
     saturated_pixels: Array | None = None,
     bad_pixels: Array | None = None,
     previous: Array | None = None,
+    waveform: Array | None = None,
     threads: int | None = None,
 ) -> Reconstruction:
     """Reconstruct one frame of labelled raw images, or of moments.
@@ -303,6 +351,8 @@ def reconstruct(
         Pixels that show the mean of their neighbours instead, and are flagged.
     previous : array, optional
         Images of the frame before, like `data`, for ``spoilt_images="fill"``.
+    waveform : array, shape (m, K), optional
+        Odd harmonics that are taken out of the moments, as `Reconstructor` takes them.
     threads : int, optional
         How many the compiled pass uses; all cores, when left out.
 
@@ -311,7 +361,8 @@ def reconstruct(
     UnlabelledImages
         When raw images do not say what they show: nothing is assumed for it.
     ParameterError
-        When the labels are of no capture there is, or contradict the settings.
+        When the labels are of no capture there is, or contradict the settings; for a waveform
+        without a calibration.
     ShapeError
         When shapes do not fit each other.
     """
@@ -330,7 +381,9 @@ def reconstruct(
     if raw and (chosen.base_frequency_hz is None or calibration is None):
         needed = {"frequency_hz": chosen.base_frequency_hz, "calibration": calibration}
         raise UnlabelledImages(tuple(name for name, value in needed.items() if value is None))
-    reconstructor = Reconstructor(chosen, calibration=calibration, bad_pixels=bad_pixels)
+    reconstructor = Reconstructor(
+        chosen, calibration=calibration, bad_pixels=bad_pixels, waveform=waveform
+    )
     spread = on_threads(threads)
     return reconstructor(data, saturated_pixels=saturated_pixels, previous=previous, spread=spread)
 

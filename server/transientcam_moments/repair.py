@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_moments._arrays import Array
+from transientcam_moments._shown import summary
 from transientcam_moments.biasing import smallest_eigenvalue
 from transientcam_moments.calibration import calibrate
 from transientcam_moments.errors import ShapeError
@@ -69,6 +70,10 @@ class Repair(NamedTuple):
     filled: Array
     left_out: Array
     unrepaired: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
 
 def repair(

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from transientcam_moments._arrays import Array, as_array, namespace
+from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 
 _CLIP = 32  # a pixel counts at most as this many times the typical difference
@@ -23,6 +24,10 @@ class Average(NamedTuple):
 
     images: Array
     kept: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
 
 def average_takes(

@@ -12,7 +12,7 @@ from typing import Any, Final, Protocol
 
 import transientcam_moments as tm
 from transientcam import wire
-from transientcam_driver import AppliedSequence, CalibrationError
+from transientcam_driver import AppliedSequence, CalibrationError, Camera
 from transientcam_driver.calibration.file import DEVICE_FIELDS
 from transientcam_server.broadcast.channel import Channel
 from transientcam_server.broadcast.hub import Hub
@@ -20,7 +20,6 @@ from transientcam_server.camera import (
     Acquisition,
     CalibrationStore,
     Calibrator,
-    Camera,
     Jobs,
     LeaseManager,
 )
@@ -181,6 +180,12 @@ class Service:
         return tuple(each.describe(self.camera.capabilities, self.applied) for each in channels)
 
     @property
+    def watched(self) -> bool:
+        """Whether frames are sent to anybody or recorded."""
+        recorded = self.recordings.active_id is not None
+        return recorded or bool(self.hub.clients or self.mjpeg_clients)
+
+    @property
     def intrinsics(self) -> Intrinsics:
         """Where the pixels look; another simulated scene may have another lens."""
         camera, simulation = self.camera, self.camera.simulation
@@ -258,6 +263,7 @@ class Service:
             calibration={"id": calibration_id(gains)},
             calibration_planes=None if gains is None else gains.planes,
             calibration_bad=None if gains is None else gains.bad,
+            calibration_waveform=None if gains is None else gains.waveform,
             reconstruction=self.pipeline.reconstruction.settings.model_dump(),
         )
 

@@ -59,13 +59,18 @@ class ReconstructionSettings(_Group):
     """Smallest eigenvalue every pixel's moments are raised to, over its brightness (Sec. 4.3)."""
     return_threshold: _Finite = Field(default=_DEFAULTS.threshold, ge=0.0, le=1.0)
     """Weight from which a return counts as the first, over the pixel's strongest return."""
-    estimator: Estimator = "pisarenko"
-    """What the range is taken from; all but the first three are there for comparison."""
+    estimator: Estimator = "likelihood"
+    """What range, direct and indirect light are taken from. `likelihood` errs least over the
+    scenes of docs/likelihood.md together; the paper's are `pisarenko` and `maximum-entropy`, the
+    others are there for comparison."""
     minimum_brightness_dn: _Finite = Field(default=0.0, ge=0.0)
     """Pixels with no more light than this have no range."""
     spoilt_images: SpoiltImages = "repair"
     """Images that lost their synchronisation: rebuilt from the frame's other images, and (`fill`)
     taken from the frame before where that is impossible; or kept."""
+    modulation_harmonics: Literal["take-out", "keep"] = "take-out"
+    """Odd harmonics of the modulation, where the calibration has measured them: taken out of the
+    moments, or kept in them."""
 
     @property
     def least_harmonics(self) -> int:
@@ -207,8 +212,8 @@ class Settings(_Group):
     """Everything that can be set."""
 
     camera: str = Field(default="sim:mirrors", min_length=1)
-    """Which camera: ``usb``, ``usb:SERIAL``, ``sim:SCENE``, ``sim:measured:FILE`` or
-    ``recording:FILE``."""
+    """Which camera, as NAME:ADDRESS: ``usb:SERIAL``, ``sim:SCENE``, ``tofcam660:ADDRESS``,
+    ``recording:FILE``, or one of another package; `transientcam devices` lists them."""
     host: str = Field(default="127.0.0.1", min_length=1)
     """Address to listen on."""
     port: int = Field(default=8000, ge=0, le=65535)

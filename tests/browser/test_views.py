@@ -22,12 +22,13 @@ FLAG_COLOURS = {
     2: "1b2a6b",
     4: "e69f00",
     64: "d55e00",
+    128: "56b4e9",
     32: "f0e442",
     16: "009e73",
     1: "7f93a3",
 }
 NAMES = {1: "biased", 2: "no_signal", 4: "saturated", 8: "non_finite", 16: "degenerate"}
-NAMES |= {64: "contradictory"}
+NAMES |= {64: "contradictory", 128: "unexplained"}
 
 
 def show(page: Page, served: Served, title: str, canvas: str) -> None:

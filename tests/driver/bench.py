@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver import Camera, Capabilities, ImageLabel, RawFrame, Sequence
+from transientcam_driver import Capabilities, ImageLabel, RawFrame, Sequence
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.protocol import Request, Status
 from transientcam_driver.protocol.capabilities import pack_capabilities
@@ -15,6 +15,7 @@ from transientcam_driver.simulation.device.firmware import Firmware
 from transientcam_driver.simulation.device.prototype import prototype
 from transientcam_driver.simulation.device.usb_device import EmulatedDevice
 from transientcam_driver.usb import open_transport
+from transientcam_driver.usb_camera import UsbCamera
 
 WIDTH, HEIGHT = 12, 5
 CAPABILITIES = replace(
@@ -81,8 +82,8 @@ class Bench:
         self.device = EmulatedDevice(capabilities, power_on, clock=self.clock)
         self.bus = SimulatedBus([self.device])
 
-    def open(self, sequence: Sequence | None = None) -> Camera:
-        return Camera(
+    def open(self, sequence: Sequence | None = None) -> UsbCamera:
+        return UsbCamera(
             lambda serial: open_transport(serial, backend=self.bus),
             clock=self.clock,
             sequence=sequence,

@@ -15,6 +15,7 @@ from transientcam_driver.simulation.build import build, find_scene, without_nois
 from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.simulation.device.faults import Fault
 from transientcam_driver.usb import open_transport
+from transientcam_driver.usb_camera import UsbCamera
 
 
 class Mount(Protocol):
@@ -67,7 +68,7 @@ class PyusbMount:
 
     def open(self, spec: str = "usb", sequence: Sequence | None = None) -> Camera:
         of_spec = spec.partition(":")[2] or None
-        camera = Camera(
+        camera = UsbCamera(
             lambda serial: open_transport(serial or of_spec, backend=self._bus),
             clock=self._clock,
             sequence=sequence,

@@ -29,6 +29,7 @@ from transientcam_driver.simulation.build import build, find_scene
 from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.simulation.device.usb_device import EmulatedDevice
 from transientcam_driver.usb import open_transport
+from transientcam_driver.usb_camera import UsbCamera
 
 from .conftest import OpenCamera
 
@@ -42,6 +43,7 @@ def state_of(camera: Camera) -> CameraState:
 
 def device_of(simulation: Simulation) -> EmulatedDevice:
     assert isinstance(simulation, SimulationHandle)
+    assert isinstance(simulation._device, EmulatedDevice)
     return simulation._device
 
 
@@ -234,7 +236,7 @@ def test_opening_switches_off_what_the_last_owner_left_on(clock: VirtualClock) -
     crashed.close()
     assert light_of(simulation)
 
-    with Camera(lambda serial: open_transport(serial, backend=bus), clock=clock):
+    with UsbCamera(lambda serial: open_transport(serial, backend=bus), clock=clock):
         assert not light_of(simulation)
 
 
@@ -429,6 +431,7 @@ def test_an_opened_interlock_is_a_fault_that_start_clears(
 def test_an_answer_that_cannot_be_is_a_protocol_error(
     camera: Camera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    assert isinstance(camera, UsbCamera)
     transport: Any = camera._transport
     control_in = transport.control_in
 

@@ -135,3 +135,28 @@ def test_the_nearest_sequence_is_one_that_the_camera_can_do(
 
 def test_a_sequence_that_the_camera_can_do_is_its_own_nearest() -> None:
     assert CAPABILITIES.nearest(Sequence(takes=3)) == Sequence(takes=3)
+
+
+def test_what_a_document_leaves_out_is_nearest_to_its_default() -> None:
+    camera = replace(
+        CAPABILITIES,
+        schemes=("none",),
+        zeroths=("estimated",),
+        max_frequency_hz=28e6,
+        max_exposure_s=1e-3,
+    )
+
+    sequence = camera.sequence_of({"harmonics": 4})
+
+    assert (sequence.harmonics, sequence.zeroth) == (4, "estimated")
+    assert (sequence.sub_phases, sequence.exposure_s) == (SubPhases("none"), 1e-3)
+    assert sequence.base_frequency_hz == pytest.approx(7e6, abs=1.0)
+    assert camera.sequence_of({"sub_phases": {"n": 3}}).sub_phases == SubPhases("none")
+
+
+def test_what_a_document_says_is_not_bent() -> None:
+    camera = replace(CAPABILITIES, schemes=("none",), zeroths=("estimated",))
+
+    sequence = camera.sequence_of({"zeroth": "on-off", "sub_phases": {"scheme": "arccos"}})
+
+    assert (sequence.zeroth, sequence.sub_phases.scheme) == ("on-off", "arccos")

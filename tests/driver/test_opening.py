@@ -1,11 +1,21 @@
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.driver.conftest import OpenCamera
-from transientcam_driver import CameraNotFound, SceneError, SpecError
-from transientcam_driver.opening import CameraSpec, open_camera, parse_spec
+from transientcam_driver import (
+    CameraName,
+    CameraNotFound,
+    PluginError,
+    SceneError,
+    SpecError,
+    opening,
+)
+from transientcam_driver.entries.sim import SimulatedScene, scene_of
+from transientcam_driver.opening import check_camera, open_camera
+from transientcam_driver.plugin import GROUP
 from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.usb import open_transport
 
@@ -13,31 +23,44 @@ from transientcam_driver.usb import open_transport
 @pytest.mark.parametrize(
     ("spec", "expected"),
     [
-        ("usb", CameraSpec()),
-        ("usb:A-17", CameraSpec(serial="A-17")),
-        ("sim:mirrors", CameraSpec(scene="mirrors")),
+        ("usb", CameraName("usb", "usb")),
+        ("usb:A-17", CameraName("usb:A-17", "usb", "A-17")),
+        ("lidar:10.0.0.7:5000", CameraName("lidar:10.0.0.7:5000", "lidar", "10.0.0.7:5000")),
         (
-            "sim:mirrors?width=320&height=240&noise=off&seed=3",
-            CameraSpec(scene="mirrors", width=320, height=240, noise=False, seed=3),
-        ),
-        ("sim:wall?device=prototype", CameraSpec(scene="wall", device="prototype")),
-        ("sim:a/b.toml?noise=on", CameraSpec(scene="a/b.toml")),
-        (
-            "sim:measured:x.npz?background=median&time_zero=peak",
-            CameraSpec(scene="measured:x.npz", background="median", time_zero="peak"),
+            "sim:a/b.toml?noise=on&seed=",
+            CameraName(
+                "sim:a/b.toml?noise=on&seed=", "sim", "a/b.toml", {"noise": "on", "seed": ""}
+            ),
         ),
     ],
 )
-def test_a_name_is_taken_apart(spec: str, expected: CameraSpec) -> None:
-    assert parse_spec(spec) == expected
+def test_a_name_is_taken_apart(spec: str, expected: CameraName) -> None:
+    assert CameraName.parse(spec) == expected
+
+
+@pytest.mark.parametrize(
+    ("spec", "expected"),
+    [
+        ("sim:mirrors", SimulatedScene("mirrors")),
+        ("sim:mirrors?noise=off&seed=3", SimulatedScene("mirrors", noise=False, seed=3)),
+        ("sim:wall?device=prototype", SimulatedScene("wall", device="prototype")),
+        (
+            "sim:measured:x.npz?background=median&time_zero=peak",
+            SimulatedScene("measured:x.npz", background="median", time_zero="peak"),
+        ),
+    ],
+)
+def test_a_simulated_cameras_name_says_its_scene(spec: str, expected: SimulatedScene) -> None:
+    assert scene_of(CameraName.parse(spec)) == expected
 
 
 @pytest.mark.parametrize(
     ("spec", "reason"),
     [
-        ("", "neither a USB camera nor a simulated one"),
-        ("webcam", "neither a USB camera nor a simulated one"),
-        ("sim:", "neither a USB camera nor a simulated one"),
+        ("", "no camera is called ''"),
+        ("webcam", "no camera is called 'webcam'; known are recording, sim"),
+        ("usb:A-17?speed=3", "unknown option 'speed'; there are none"),
+        ("sim:", "it names no scene"),
         ("sim:mirrors?depth=3", "unknown option 'depth'"),
         ("sim:mirrors?width=320", "width and height come together"),
         (
@@ -48,6 +71,7 @@ def test_a_name_is_taken_apart(spec: str, expected: CameraSpec) -> None:
         ("sim:mirrors?noise=no", "noise = 'no': must be one of on, off"),
         ("sim:mirrors?seed=-1", "seed = '-1'"),
         ("sim:mirrors?device=mine", "device = 'mine': must be one of ideal, prototype"),
+        ("sim:mirrors?seed=99999999999999999999", "seed"),
         ("sim:mirrors?background=median", "belong to sim:measured:PATH.npz"),
         ("sim:measured:x.npz?background=mean", "one of none, median"),
     ],
@@ -77,7 +101,7 @@ def test_an_absent_file_is_named(tmp_path: Path) -> None:
 
 def test_without_a_camera_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "transientcam_driver.opening.open_transport",
+        "transientcam_driver.entries.usb.open_transport",
         lambda serial: open_transport(serial, backend=SimulatedBus([])),
     )
 
@@ -174,3 +198,45 @@ def test_the_snr_of_the_papers_single_take_is_good_but_visibly_noisy(
     snr = np.median(truth.direct / sigma)
 
     assert 50 < snr < 100
+
+
+def offer(monkeypatch: pytest.MonkeyPatch, *values: str) -> None:
+    """Let packages offer a camera called `odd`."""
+    points = [EntryPoint("odd", value, GROUP) for value in values]
+    monkeypatch.setattr(opening, "entry_points", lambda **_: points)
+
+
+@pytest.mark.parametrize(
+    ("values", "reason"),
+    [
+        (["package_that_is_not_there:PLUGIN"], "package_that_is_not_there is not installed"),
+        (["math:pi"], "math:pi is a float, not a CameraPlugin"),
+        (["math:tau_and_more"], "cannot be imported: AttributeError"),
+        (["a:PLUGIN", "b:PLUGIN"], "several packages offer it: a:PLUGIN, b:PLUGIN"),
+    ],
+)
+def test_a_plug_in_that_cannot_be_used_says_why(
+    monkeypatch: pytest.MonkeyPatch, values: list[str], reason: str
+) -> None:
+    offer(monkeypatch, *values)
+
+    with pytest.raises(PluginError, match=reason):
+        open_camera("odd:1")
+
+
+def test_a_camera_is_checked_without_being_opened() -> None:
+    check_camera("usb:not-there")
+    check_camera("sim:wall")
+    with pytest.raises(SceneError):
+        check_camera("sim:hall-of-mirrors")
+    with pytest.raises(SpecError):
+        check_camera("sim:wall?height=3")
+
+
+@pytest.mark.parametrize("text", ["", "x", "nan", "inf", "-1", "1e9"])
+def test_a_number_in_a_name_is_one_within_its_limits(text: str) -> None:
+    name = CameraName("a:?wait=" + text, "a", options={"wait": text})
+
+    with pytest.raises(SpecError, match=r"wait = .* a number from 0 to 10"):
+        name.number("wait", 1.0, least=0.0, most=10.0)
+    assert CameraName("a", "a").number("wait", 1.0, least=0.0, most=10.0) == 1.0

@@ -6,11 +6,11 @@ import pytest
 
 import transientcam_driver
 
-ENTRY_POINTS = "transientcam_driver.cli"
+ENTRY_POINTS = {"transientcam_driver.cli", "transientcam_driver.entries"}
 PACKAGES = [
     each.name
     for each in pkgutil.walk_packages(transientcam_driver.__path__, "transientcam_driver.")
-    if each.ispkg and each.name != ENTRY_POINTS
+    if each.ispkg and each.name not in ENTRY_POINTS
 ]
 
 

@@ -17,11 +17,12 @@ from transientcam_driver import (
 )
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.errors import UDEV_RULES_FILE, TransferOverflow, TransferStalled
+from transientcam_driver.plugin import FoundCamera
 from transientcam_driver.protocol import Request
 from transientcam_driver.simulation.build import build, find_scene
 from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.simulation.device.usb_device import EmulatedDevice
-from transientcam_driver.usb import UDEV_RULE, UsbCamera, list_cameras, open_transport
+from transientcam_driver.usb import UDEV_RULE, list_cameras, open_transport
 
 
 def plug(scene: str = "mirrors") -> EmulatedDevice:
@@ -211,10 +212,9 @@ def test_cameras_are_listed_without_being_claimed(bus: SimulatedBus) -> None:
 
     (found,) = list_cameras(backend=bus)
 
-    assert found == UsbCamera(
-        "/dev/bus/usb/001/001", "SIM-ideal-0", "AMCW lidar (simulated)", problem=None
+    assert found == FoundCamera(
+        "usb:SIM-ideal-0", "SIM-ideal-0", "AMCW lidar (simulated)", "/dev/bus/usb/001/001"
     )
-    assert found.spec == "usb:SIM-ideal-0"
     owned.close()
 
 

@@ -9,8 +9,10 @@ import transientcam_moments as tm
 from transientcam_moments._kernels.registry import REGISTRY
 
 CACHE = Path(__file__).resolve().parents[2] / ".pytest_cache" / "kernels"
-FEW = tuple(name for name in tm.kernels.LANES if name != "likelihood")
-"""All but that of the likelihood, which takes as long to compile as the others together."""
+FEW = tuple(
+    name for name in tm.kernels.LANES if name not in (*tm.kernels.WHEN_NEEDED, "covariance")
+)
+"""All but those that few tests need, some of which take longer to compile than all others."""
 
 
 @contextmanager

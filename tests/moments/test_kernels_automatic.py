@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import CACHE, lanes, without_lanes
 from transientcam_moments._kernels import automatic
-from transientcam_moments._kernels.parallel import on_threads
+from transientcam_moments._kernels.parallel import _cores, on_threads
 from transientcam_moments._kernels.registry import HEAVY_PIXELS, REGISTRY, Key
 
 
@@ -117,9 +117,10 @@ def in_fresh_process(setting: str) -> str:
         "b = np.ones((2, 4096), np.complex64); b[0] = 3\n"
         "before = tm.levinson(b)\n"
         "[each.join() for each in threading.enumerate() if each.name == 'transientcam-compile']\n"
+        "shared = sum(e.name.startswith('transientcam-lane') for e in threading.enumerate())\n"
         "after = tm.levinson(b)\n"
         "assert np.allclose(before.polynomial, after.polynomial, rtol=1e-6)\n"
-        "print(tm.kernels.state()['compiled'], 'numba' in sys.modules)\n"
+        "print(tm.kernels.state()['compiled'], 'numba' in sys.modules, shared)\n"
     )
     result = subprocess.run(
         [sys.executable, "-W", "error", "-c", code],
@@ -132,13 +133,15 @@ def in_fresh_process(setting: str) -> str:
     return result.stdout.strip()
 
 
-def test_a_fresh_process_changes_over_by_itself() -> None:
-    assert in_fresh_process("on") == "['levinson m=1 float32'] True"
+def test_a_fresh_process_changes_over_by_itself_with_its_threads_running() -> None:
+    lanes, loaded, shared = in_fresh_process("on").rsplit(" ", 2)
+    assert (lanes, loaded) == ("['levinson m=1 float32']", "True")
+    assert (int(shared) > 0) == (_cores() > 1)
 
 
 @pytest.mark.parametrize("setting", ["off", "manual"])
 def test_where_it_is_not_wanted_nothing_is_compiled(setting: str) -> None:
-    assert in_fresh_process(setting) == "[] False"
+    assert in_fresh_process(setting) == "[] False 0"
 
 
 def test_orders_and_precisions_are_given_by_position(monkeypatch: pytest.MonkeyPatch) -> None:

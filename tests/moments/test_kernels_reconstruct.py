@@ -367,6 +367,22 @@ def test_saturated_pixels_can_be_given() -> None:
     assert np.array_equal(saturated, given_saturation())
 
 
+@pytest.mark.parametrize("estimator", ["likelihood", "pisarenko-merged"])
+def test_another_estimator_s_range_and_light_are_its_own_in_a_pass(estimator: str) -> None:
+    settings = settings_of(estimator=estimator, sensor=tm.noise.Sensor())
+    images = raw_images(settings)
+
+    found = in_one_pass(images, settings)
+
+    with stage_by_stage():
+        expected = reconstructed(images, settings, calibration=np.ones(M + 1))
+    for name in ("range_m", "direct", "indirect"):
+        mine, theirs = getattr(found, name), getattr(expected, name)
+        assert np.isclose(mine, theirs, rtol=1e-3, equal_nan=True).mean() > 0.99, name
+    pisarenko = in_one_pass(images, settings_of())
+    assert np.mean(np.abs(found.range_m - pisarenko.range_m) > 0.001) > 0.01
+
+
 def test_light_is_complete() -> None:
     found = in_one_pass(raw_images(settings_of()), settings_of())
 

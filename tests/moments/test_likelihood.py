@@ -12,7 +12,7 @@ from scipy.stats import chi2, gamma
 
 import transientcam_moments as tm
 from tests.moments.oracles import moments_of_returns
-from transientcam_moments.likelihood import choice, estimate, sharp, tail
+from transientcam_moments.likelihood import chi_square, choice, estimate, sharp, tail
 
 NOISE_SHARE = 1 / 100
 
@@ -103,7 +103,7 @@ def test_deviations_of_returns_are_the_cramer_rao_bound() -> None:
 @pytest.mark.parametrize("free", [1, 2, 3, 6, 9, 64])
 @pytest.mark.parametrize("significance", [0.3, 1e-3, 1e-9])
 def test_quantiles_of_chi_square_are_scipys(free: int, significance: float) -> None:
-    found = estimate.chi_square_quantile(free, significance)
+    found = chi_square.chi_square_quantile(free, significance)
 
     assert found == pytest.approx(chi2.isf(significance, free), rel=1e-9)
 
@@ -540,6 +540,33 @@ def test_noise_and_harmonics_have_to_fit_the_moments() -> None:
         tm.likelihood(b, tm.noise.MomentNoise(np.ones((2, 2))))
     with pytest.raises(tm.ShapeError, match="harmonics"):
         tm.likelihood(b, harmonics=(0, 1))
+
+
+def test_a_model_error_counts_as_noise_of_the_largest_moment() -> None:
+    random = np.random.default_rng(8)
+    b = 700 * moments_of_returns(random.uniform(1, 5, (2, 50)), np.full((2, 50), 0.5), 4)
+    noise = tm.noise.MomentNoise(np.full(b.shape, 3.0**2))
+    drawn = tm.noise.draw(b, noise, random, draws=1)[:, 0]
+
+    found = tm.likelihood(drawn, noise, model_error=0.01)
+
+    largest = np.maximum(abs(drawn.real), abs(drawn.imag)).max(axis=0)
+    both = tm.noise.MomentNoise(noise.variance + (0.01 * largest) ** 2)
+    for mine, theirs in zip(found[:-1], tm.likelihood(drawn, both)[:-1], strict=True):
+        assert np.allclose(mine, theirs, rtol=1e-6, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"model_error": -0.1}, "model_error"),
+        ({"model_error": 1.5}, "model_error"),
+        ({"threads": 0}, "threads"),
+    ],
+)
+def test_model_error_and_threads_are_checked(options: dict[str, Any], field: str) -> None:
+    with pytest.raises(tm.ParameterError, match=field):
+        tm.likelihood(np.ones((4, 5), complex), **options)
 
 
 @pytest.mark.parametrize("significance", [0.0, 1.0, -1.0, np.nan])

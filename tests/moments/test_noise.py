@@ -5,9 +5,11 @@ deviations, which the worst of thousands of seeded pixels stays in. Within 15 % 
 therefore leaves 8 % to first order itself.
 """
 
+import itertools
 from collections.abc import Sequence as Many
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import given
@@ -15,6 +17,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from tests.moments.kernel_lanes import lanes
 from transientcam_driver import RawFrame, Sequence, SubPhases, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_moments import noise
@@ -359,6 +362,52 @@ def test_bound_of_two_returns_is_the_inverse_of_differentiated_moments() -> None
 
     np.testing.assert_allclose(bound.weight_std[:, 0], expected[:2], rtol=1e-7)
     np.testing.assert_allclose(bound.phase_std_rad[:, 0], expected[2:], rtol=1e-7)
+
+
+@pytest.mark.parametrize("m", [1, 3, 8])
+def test_bound_of_as_many_returns_as_harmonics_is_exact_however_close_they_are(m: int) -> None:
+    """The Jacobian inverted with 60 digits: Fisher's information squares its condition."""
+    random = np.random.default_rng(m)
+    phase = np.sort(random.uniform(0, 2 * np.pi, (m, 64)), axis=0)
+    if m > 1:
+        phase[1, 0] = phase[0, 0] + 1e-4
+    weight, variance = random.uniform(0.1, 1, (m, 64)), random.uniform(1, 3, (m + 1, 64))
+
+    planar = noise.cramer_rao(phase, weight, noise.MomentNoise(variance)).covariance
+    with lanes(m, precisions=("float64",), names=("covariance",)):
+        compiled = noise.cramer_rao(phase, weight, noise.MomentNoise(variance)).covariance
+
+    for pixel in range(0, 64, 21):
+        expected = exact_covariance(phase[:, pixel], variance[1:, pixel])
+        size = np.sqrt(np.diag(expected))
+        for found in (planar, compiled):
+            error = (found[:, :, pixel] - expected) / np.outer(size, size)
+            assert abs(error).max() < 1e-10
+
+
+def exact_covariance(phase_rad: Array, variance: Array) -> Array:
+    m = len(phase_rad)
+    with mpmath.workdps(60):
+        jacobian = mpmath.matrix(2 * m, 2 * m)
+        for k, j in itertools.product(range(m), range(m)):
+            slope = mpmath.expj((j + 1) * mpmath.mpf(float(phase_rad[k])))
+            slope /= mpmath.sqrt(mpmath.mpf(float(variance[j])))
+            turning = 1j * (j + 1) * slope
+            jacobian[j, k], jacobian[m + j, k] = slope.real, slope.imag
+            jacobian[j, m + k], jacobian[m + j, m + k] = turning.real, turning.imag
+        inverse = jacobian**-1
+        return np.array((inverse * inverse.T).tolist(), dtype=float)
+
+
+def test_one_unused_return_leaves_other_pixels_as_they_are() -> None:
+    phase, weight = np.array([[1.0, 1.0], [2.0, 2.0]]), np.array([[1.0, 1.0], [0.5, 0.0]])
+    of_moments = noise.MomentNoise(np.full((3, 2), 0.1))
+
+    both = noise.cramer_rao(phase, weight, of_moments)
+    alone = noise.cramer_rao(phase[:, :1], weight[:, :1], noise.MomentNoise(np.full((3, 1), 0.1)))
+
+    np.testing.assert_allclose(both.phase_std_rad[:, 0], alone.phase_std_rad[:, 0], rtol=1e-12)
+    assert both.phase_std_rad[0, 1] == pytest.approx(np.sqrt(0.1 / 5))
 
 
 def test_coinciding_returns_have_an_infinite_bound_and_unused_slots_none() -> None:

@@ -9,6 +9,7 @@ import transientcam_moments as tm
 from tests.moments import oracles
 from transientcam_driver import SubPhases
 from transientcam_moments.comparisons import sra_table
+from transientcam_moments.likelihood import MODEL_ERROR
 from transientcam_moments.reconstruction import ESTIMATORS
 
 SHAPE = (6, 7)
@@ -256,7 +257,7 @@ def test_the_likelihood_weighs_the_moments_by_the_noise_of_the_sensor() -> None:
     noise = tm.noise.moment_noise(
         b[0].real, tm.noise.Sensor(), calibration=np.ones(5), zeroth="low-frequency", takes=4
     )
-    expected = tm.likelihood(b, noise)
+    expected = tm.likelihood(b, noise, model_error=MODEL_ERROR)
     direct, indirect, phase = expected.separate()
     assert np.array_equal(found.direct, direct)
     assert np.array_equal(found.indirect, indirect)
@@ -285,6 +286,48 @@ def test_gains_and_smoothing_are_in_the_noise_of_a_reconstruction() -> None:
     )
     expected = tm.noise.smoothed(raw, settings.smoothing_sigma_px)
     assert np.allclose(noise.variance, expected.variance)
+
+
+@pytest.mark.parametrize("estimator", ["likelihood", "pisarenko"])
+def test_returns_that_do_not_explain_the_moments_are_flagged(estimator: str) -> None:
+    b, _ = _noisy_pair()
+    b[0, :4] *= 2  # half of the light is uniform, which no model of the likelihood has
+    b[:, 0, 0] = 0
+    known = tm.Settings(
+        FREQUENCY_HZ,
+        zeroth="low-frequency",
+        takes=4,
+        estimator=estimator,
+        sensor=tm.noise.Sensor(),
+        smoothing_sigma_px=0.0,
+    )
+
+    flagged = (tm.Reconstruction(b, known).flags & int(tm.Flags.UNEXPLAINED)) > 0
+    unknown = tm.Reconstruction(b, replace(known, sensor=None)).flags & int(tm.Flags.UNEXPLAINED)
+
+    expected = np.zeros((8, 9), bool)
+    expected[:4] = estimator == "likelihood"
+    expected[0, 0] = False  # without light there is nothing to explain
+    assert np.array_equal(flagged, expected)
+    assert not unknown.any()
+
+
+def test_merged_returns_are_those_that_the_noise_of_the_sensor_allows() -> None:
+    b, noise = _noisy_pair()
+    settings = tm.Settings(
+        FREQUENCY_HZ,
+        zeroth="low-frequency",
+        takes=4,
+        estimator="pisarenko-merged",
+        sensor=tm.noise.Sensor(),
+        smoothing_sigma_px=0.0,
+    )
+
+    found = tm.Reconstruction(b, settings)
+
+    expected = tm.separate(tm.merge_returns(found.returns, found.noise or noise))
+    assert np.array_equal(found.phase_rad, expected.phase_rad)
+    assert np.allclose(found.direct + found.indirect + found.uniform, found.brightness)
 
 
 def test_without_a_sensor_the_likelihood_assumes_the_noise() -> None:

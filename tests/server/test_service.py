@@ -2,7 +2,8 @@ from typing import Any
 
 import pytest
 
-from tests.serving import Served
+from tests.server.streaming import streaming
+from tests.serving import Served, serving
 from transientcam_server.broadcast.channel import Channel
 from transientcam_server.camera import AcquisitionStatus
 
@@ -62,3 +63,14 @@ def test_channels_are_described_with_the_present_sequence(steady_daemon: Served)
     assert described.channel == 3
     assert described.shape == (service.applied.images, 120, 163)
     assert described.dtype == "<u2"
+
+
+def test_the_loop_is_left_to_requests_where_nobody_watches() -> None:
+    with serving("sim:wall?noise=off") as daemon:
+        before = daemon.service.watched
+        with streaming(daemon.stream_url) as client:
+            client.subscribe("flags")
+            client.frame()
+            during = daemon.service.watched
+
+    assert (before, during) == (False, True)

@@ -1,12 +1,12 @@
-"""``transientcam devices``: cameras on USB and on the network, and what opens each.
+"""``transientcam devices``: the cameras here and on the network, and what opens each.
 
-The list of USB cameras comes from the driver, through the entry point ``usb`` of the group
-``transientcam.devices``.
+Each kind of camera lists its own, through its entry point of the group ``transientcam.cameras``.
 """
 
 import json
 from dataclasses import asdict
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
+from itertools import chain
 from typing import Annotated, Any, Final
 
 import typer
@@ -15,10 +15,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from transientcam.cli.options import JsonOption
+from transientcam.cli.verbs import extra_of
 from transientcam.discovery import FoundCamera, discover
 from transientcam.errors import CommandUnavailable, ServerUnreachable
 
-GROUP: Final = "transientcam.devices"
+GROUP: Final = "transientcam.cameras"
 _VERB: Final = "devices"
 
 
@@ -33,8 +34,8 @@ def devices(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """List the cameras on USB and on the network, and how to open each."""
-    document = {**_plugged_in(), "network": [], "network_problem": None}
+    """List the cameras that each plug-in finds, those on the network, and how to open each."""
+    document = {**_found(network=network), "network": [], "network_problem": None}
     console = Console(stderr=True)
     if network:
         with console.status("listening on the network"):
@@ -46,17 +47,41 @@ def devices(
         _print(document, network=network)
 
 
-def _plugged_in() -> dict[str, Any]:
-    """Return the cameras that the driver finds, or how to install the driver."""
-    try:
-        for point in entry_points(group=GROUP, name="usb"):
-            found: dict[str, Any] = point.load()()
-            return found
-        missing = "transientcam_driver"
-    except ModuleNotFoundError as error:
-        missing = error.name or ""
-    problem = str(CommandUnavailable(_VERB, missing, "driver"))
-    return {"cameras": [], "problem": problem, "simulated": []}
+def _found(*, network: bool) -> dict[str, Any]:
+    """Return the kinds of cameras, what each finds, and why one could not look."""
+    document: dict[str, Any] = {"kinds": [], "cameras": [], "problems": {}, "simulated": []}
+    for point in sorted(entry_points(group=GROUP), key=lambda each: each.name):
+        try:
+            _look(point, document, network=network)
+        except ModuleNotFoundError as error:
+            extra = extra_of(error.name or "", _VERB) or extra_of(point.module, _VERB)
+            missing = CommandUnavailable(_VERB, error.name or "", extra)
+            document["problems"][point.name] = str(missing)
+        except Exception as error:  # one plug-in, of any package, must not hide the others
+            # an error that was raised on purpose is a sentence; any other needs its name
+            ours = type(error).__module__.startswith("transientcam")
+            text = str(error) if ours else f"{type(error).__name__}: {error}"
+            document["problems"][point.name] = text
+    return document
+
+
+def _look(point: EntryPoint, document: dict[str, Any], *, network: bool) -> None:
+    plugin = point.load()
+    document["kinds"].append(
+        {
+            "name": point.name,
+            "usage": plugin.usage,
+            "summary": plugin.summary,
+            "options": dict(plugin.options),
+        }
+    )
+    elsewhere = plugin.find_on_network() if network else ()
+    for camera in chain(plugin.find(), elsewhere):
+        found = asdict(camera)
+        if found.pop("simulated"):
+            document["simulated"].append(camera.spec)
+        else:
+            document["cameras"].append({"kind": point.name, **found})
 
 
 def _announced(
@@ -72,14 +97,20 @@ def _announced(
 
 def _print(document: dict[str, Any], *, network: bool) -> None:
     console = Console()
-    plugged, announced = document["cameras"], document["network"]
-    if plugged:
-        console.print(_usb_table(plugged))
+    cameras, announced = document["cameras"], document["network"]
+    if document["kinds"]:
+        console.print(_kinds_table(document["kinds"]))
+        console.print()
+    if cameras:
+        console.print(_camera_table(cameras))
     else:
-        console.print(escape(document["problem"] or "No camera is plugged in."), soft_wrap=True)
-    for camera in plugged:
+        console.print("No camera was found.")
+    for camera in cameras:
         if camera["problem"] is not None:
-            console.print(f"{camera['node']}: {escape(camera['problem'])}", soft_wrap=True)
+            where = camera["node"] or camera["spec"]
+            console.print(escape(f"{where}: {camera['problem']}"), soft_wrap=True)
+    for kind, problem in document["problems"].items():
+        console.print(escape(f"{kind}: {problem}"), soft_wrap=True)
     if announced:
         console.print(_network_table(announced))
     elif network:
@@ -90,10 +121,17 @@ def _print(document: dict[str, Any], *, network: bool) -> None:
         console.print(f"Simulated ones: {simulated} (transientcam scenes)", soft_wrap=True)
 
 
-def _usb_table(cameras: list[dict[str, Any]]) -> Table:
-    table = Table("camera", "serial number", "product", "node", box=None)
+def _kinds_table(kinds: list[dict[str, Any]]) -> Table:
+    table = Table("name of a camera", "what it opens", box=None)
+    for kind in kinds:
+        table.add_row(escape(kind["usage"]), escape(kind["summary"]))
+    return table
+
+
+def _camera_table(cameras: list[dict[str, Any]]) -> Table:
+    table = Table("camera", "serial number", "product", "at", box=None)
     for camera in cameras:
-        fields = (camera["spec"], camera["serial"] or "?", camera["product"] or "?", camera["node"])
+        fields = (camera[name] or "?" for name in ("spec", "serial", "product", "node"))
         table.add_row(*map(escape, fields))
     return table
 

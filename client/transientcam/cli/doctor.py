@@ -25,6 +25,12 @@ def doctor(
         str | None,
         typer.Argument(metavar="[URL]", help="A daemon to check; without it, this machine."),
     ] = None,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            help="A camera to open and to hold to the contract of all cameras; its light goes on."
+        ),
+    ] = None,
     config: Annotated[
         Path | None, typer.Option(help="Settings in TOML.  [default: as `transientcam serve`]")
     ] = None,
@@ -37,11 +43,15 @@ def doctor(
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Check this machine, or a daemon, and print a remedy for each fault.
+    """Check this machine, a daemon or a camera, and print a remedy for each fault.
 
     Exits with 0 if there is no fault (warnings are allowed), with 1 otherwise.
     """
-    if url is None:
+    if url is not None and camera is not None:
+        raise typer.BadParameter("is for a camera without a daemon", param_hint="--camera")
+    if camera is not None:
+        found = chain(_of_client(), findings.of_camera(camera))
+    elif url is None:
         found = chain(_of_client(), findings.of_this_machine(config))
     else:
         found = chain(

@@ -2,21 +2,24 @@
 
 Each package offers its own checks as an entry point of the group ``transientcam.checks``: a
 function that takes ``config`` (the file of settings, or None) and yields tuples ``(level, check,
-message, remedy)``. Only installed packages have any.
+message, remedy)``. One of the group ``transientcam.camera-checks`` takes a camera's name instead.
+Only installed packages have any.
 """
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
+from functools import partial
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Final, Literal
 
 GROUP: Final = "transientcam.checks"
+CAMERA_GROUP: Final = "transientcam.camera-checks"
 
 Level = Literal["ok", "warning", "fault"]
 Reported = tuple[str, str, str, str | None]
 """A finding as a plain tuple, which other packages yield without importing this one."""
-Checks = Callable[[Path | None], Iterable[Reported]]
+Checks = Callable[[], Iterable[Reported]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,20 +50,29 @@ class Finding:
 
 def of_this_machine(config: Path | None) -> Iterator[Finding]:
     """Run the checks of every installed package."""
-    for point in sorted(entry_points(group=GROUP), key=lambda each: each.name):
+    yield from _installed(GROUP, config)
+
+
+def of_camera(spec: str) -> Iterator[Finding]:
+    """Run the checks of one camera, of every package that has any."""
+    yield from _installed(CAMERA_GROUP, spec)
+
+
+def _installed(group: str, argument: object) -> Iterator[Finding]:
+    for point in sorted(entry_points(group=group), key=lambda each: each.name):
         try:
-            checks: Checks = point.load()
+            checks = point.load()
         except ModuleNotFoundError as error:
             message = f"not installed ({error.name} is missing)"
             yield Finding("ok", point.name, message, f"pip install 'transientcam[{point.name}]'")
             continue
-        yield from guarded(point.name, checks, config)
+        yield from guarded(point.name, partial(checks, argument))
 
 
-def guarded(name: str, checks: Checks, config: Path | None) -> Iterator[Finding]:
+def guarded(name: str, checks: Checks) -> Iterator[Finding]:
     """Run some checks; one that fails is a finding itself and ends only these."""
     try:
-        for level, check, message, remedy in checks(config):
+        for level, check, message, remedy in checks():
             yield Finding(_level(level), check, message, remedy)
     except Exception as error:
         message = f"could not be checked: {type(error).__name__}: {error}"

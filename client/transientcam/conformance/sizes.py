@@ -78,7 +78,7 @@ def _large(device: Device, size_bytes: int) -> Iterator[Conversation]:
 def _sequence(capabilities: dict[str, Any], size_bytes: int) -> dict[str, Any]:
     images = math.ceil(size_bytes / (2 * capabilities["width"] * capabilities["height"])) + 1
     harmonics = min(capabilities["max_harmonics"], 8)
-    takes = math.ceil(images / (4 * (harmonics + 1)))
+    takes = math.ceil(images / (4 * harmonics))
     skip_unless(
         takes <= capabilities["max_takes"],
         f"this camera makes no frame of {size_bytes // MIB} MiB",
@@ -86,7 +86,7 @@ def _sequence(capabilities: dict[str, Any], size_bytes: int) -> dict[str, Any]:
     return {
         "harmonics": harmonics,
         "takes": takes,
-        "zeroth": "low-frequency",
+        "zeroth": "estimated",
         "exposure_s": capabilities["min_exposure_s"],
         "base_frequency_hz": capabilities["max_frequency_hz"] / harmonics / 2.0,
     }

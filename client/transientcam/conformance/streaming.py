@@ -114,7 +114,7 @@ def a_change_of_the_sequence_is_told(device: Device) -> None:
     with device.control(), device.capturing(), device.stream("moments") as stream:
         present = device.sequence
         other = 2 if present["harmonics"] != 2 else 3
-        changed = device.accepted(present | {"harmonics": other, "zeroth": "on-off"})
+        changed = device.accepted(present | {"harmonics": other, "zeroth": "estimated"})
         applied = device.document(device.send("PUT", f"{API}/sequence", json=changed))
         stream.notice("sequence-changed")
         equal(stream.channels[0].shape[0], other + 1, "the moments in the notice")

@@ -42,15 +42,24 @@ class Calibrations(Generic[_Document, _Bytes]):
         return self._ask(document(_path(calibration_id)))
 
     def measure(
-        self, *, name: str = "", frames: int = 40, activate: bool = False, force: bool = False
+        self,
+        *,
+        name: str = "",
+        frames: int = 40,
+        activate: bool = False,
+        force: bool = False,
+        harmonics: bool = True,
     ) -> _Document:
         """Start measuring one with the present sequence; returns the job.
 
         Put filter and diffusor before the lens first, so that the light shines at the sensor. The
         job's result says in ``verdict`` whether the images look so; what was measured on a scene
-        is not used, and ``activated`` false, unless with ``force``.
+        is not used, and ``activated`` false, unless with ``force``. ``harmonics`` sweeps the phase
+        as well, with 30 frames or more and a camera that can.
         """
         body = {"name": name, "frames": frames, "activate": activate, "force": force}
+        if not harmonics:  # true by itself; a daemon of an earlier version knows no such field
+            body["harmonics"] = harmonics
         return self._ask(document("calibrations", method="POST", body=body))
 
     def active(self) -> _Document:

@@ -10,10 +10,13 @@ from transientcam_driver.calibration.file import (
     CalibrationCapture,
     CalibrationSubject,
 )
+from transientcam_driver.calibration.sweep import LEAST_TAKES, SWEEP_STEPS
 
 __all__ = [
     "DEFAULT_TAKES",
     "DEVICE_FIELDS",
+    "LEAST_TAKES",
+    "SWEEP_STEPS",
     "CalibrationCapture",
     "CalibrationSubject",
     "capture_calibration",

@@ -5,7 +5,7 @@ every pixel should measure the same at every frequency (Peters et al. 2015, Sec.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.calibration.file import CalibrationCapture
+from transientcam_driver.calibration.sweep import PhaseSweep, Waveform
 from transientcam_driver.capabilities import AppliedSequence, Capabilities
 from transientcam_driver.errors import CameraError, FrameTimeout, SequenceError
 from transientcam_driver.receiving import RawFrame
@@ -74,6 +75,7 @@ def capture_calibration(
     *,
     takes: int = DEFAULT_TAKES,
     average: Averaging = mean_of_takes,
+    waveform: Waveform | None = None,
     progress: Progress | None = None,
 ) -> CalibrationCapture:
     """Measure with the camera's present sequence while its light shines at the sensor (Sec. 4.2).
@@ -89,6 +91,9 @@ def capture_calibration(
         How often each image is captured, at least 2.
     average
         From the takes of an image to one; their mean by default.
+    waveform
+        Evaluates a phase sweep, which follows; none is captured, when left out, with fewer than
+        30 takes, and with a camera that cannot shift its phases.
     progress
         Called after each frame, and while waiting for one.
 
@@ -105,7 +110,9 @@ def capture_calibration(
     single = replace(before, takes=1, take_order="sequential")
     in_the_dark = replace(single, harmonics=1, zeroth="on-off")
     with_dark = "on-off" in camera.capabilities.zeroths
-    total = takes * (1 + with_dark)
+    sweep = PhaseSweep.beside(takes) if camera.capabilities.phase_offsets else None
+    before_sweep = takes * (1 + with_dark)
+    total = before_sweep + (sweep.frames if sweep and waveform else 0)
 
     def report(done: int) -> None:
         if progress is not None:
@@ -113,8 +120,11 @@ def capture_calibration(
 
     try:
         dark = _dark(_frames(camera, in_the_dark, takes, report)) if with_dark else None
-        frames = _frames(camera, single, takes, lambda done: report(total - takes + done))
+        frames = _frames(camera, single, takes, lambda done: report(before_sweep - takes + done))
         applied = camera.applied
+        harmonics = None
+        if sweep is not None and waveform is not None:
+            harmonics = waveform(_steps(camera, sweep, single, report, before_sweep))
     finally:
         with suppress(CameraError):  # a lost camera switches its light off by its watchdog
             camera.stop()
@@ -137,7 +147,25 @@ def capture_calibration(
         captured_unix_s=frames[-1].host_time_s,
         dark=None if dark is None else dark.mean(axis=0),
         dark_deviation=None if dark is None else dark.std(axis=0, ddof=1),
+        waveform=harmonics,
     )
+
+
+def _steps(
+    camera: CalibratedCamera,
+    sweep: PhaseSweep,
+    single: Sequence,
+    report: Callable[[int], None],
+    done_before: int,
+) -> Iterator[NDArray[np.uint16]]:
+    """Capture the takes (takes, N, H, W) of one step of a sweep after the other."""
+    for step, sequence in enumerate(sweep.sequences(single)):
+
+        def done(frames: int, before: int = done_before + step * sweep.takes) -> None:
+            report(before + frames)
+
+        frames = _frames(camera, sequence, sweep.takes, done)
+        yield np.stack([frame.images for frame in frames])
 
 
 def _frames(

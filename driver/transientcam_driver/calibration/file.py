@@ -29,7 +29,10 @@ from transientcam_driver.sequence import Sequence
 
 DEVICE_FIELDS = ("serial", "width", "height")
 """Fields of a mismatch that another sequence cannot resolve."""
-FORMAT = 1
+FORMATS = (1, 2)
+"""Of files: without and with the harmonics of the modulation."""
+MAX_WAVEFORM = 64
+"""Harmonics in a file."""
 MAX_BYTES = 1024**3
 """Of the content of a file, unpacked."""
 MAX_DN = 65535
@@ -100,6 +103,9 @@ class CalibrationCapture:
         exposure; None where the camera cannot take any.
     notes
         Further entries of the file, as JSON; its id does not depend on them.
+    waveform
+        complex128 (m, K): odd harmonics 3, 5, ... of the modulation at each frequency relative to
+        the fundamental, from a phase sweep; None where there was none, or it told nothing.
     """
 
     images: NDArray[np.float32]
@@ -114,6 +120,7 @@ class CalibrationCapture:
     dark: NDArray[np.float32] | None = None
     dark_deviation: NDArray[np.float32] | None = None
     notes: Mapping[str, Any] = field(default_factory=dict)
+    waveform: NDArray[np.complex128] | None = None
 
     @property
     def id(self) -> str:
@@ -155,7 +162,11 @@ class CalibrationCapture:
 
     def save(self, path: Path) -> None:
         """Write an .npz: arrays, and a JSON document beside them."""
-        content = {"format": FORMAT} | self._document() | {"notes": dict(self.notes)}
+        content = (
+            {"format": FORMATS[self.waveform is not None]}
+            | self._document()
+            | {"notes": dict(self.notes)}
+        )
         document = np.array(json.dumps(content))
         with path.open("wb") as file:  # a path without .npz would be given one
             np.savez_compressed(file, document=document, **self._arrays())  # type: ignore[arg-type]  # numpy types its keywords as flags
@@ -189,6 +200,8 @@ class CalibrationCapture:
         arrays: dict[str, NDArray[Any]] = {"images": self.images, "kept": self.kept}
         if self.dark is not None and self.dark_deviation is not None:
             arrays |= {"dark": self.dark, "dark_deviation": self.dark_deviation}
+        if self.waveform is not None:
+            arrays["waveform"] = self.waveform
         return arrays
 
     def _document(self) -> dict[str, Any]:
@@ -279,6 +292,7 @@ def _checked(path: Path, content: Mapping[str, NDArray[Any]]) -> CalibrationCapt
         **fields,
         dark=dark,
         dark_deviation=deviation,
+        waveform=_waveform(path, content, sequence.harmonics),
     )
 
 
@@ -290,10 +304,24 @@ def _document_in(path: Path, content: Mapping[str, NDArray[Any]]) -> dict[str, A
         document = json.loads(str(content["document"]))
     except (ValueError, RecursionError) as error:
         raise CalibrationFileError(path, "document", str(error), "JSON") from error
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
+    if not isinstance(document, dict) or document.get("format") not in FORMATS:
         found = document.get("format") if isinstance(document, dict) else type(document).__name__
-        raise CalibrationFileError(path, "format", found, FORMAT)
+        raise CalibrationFileError(path, "format", found, " or ".join(map(str, FORMATS)))
     return document
+
+
+def _waveform(
+    path: Path, content: Mapping[str, NDArray[Any]], harmonics: int
+) -> NDArray[np.complex128] | None:
+    if "waveform" not in content:
+        return None
+    array = content["waveform"]
+    fits = array.ndim == 2 and len(array) == harmonics and array.shape[1] <= MAX_WAVEFORM
+    if array.dtype != np.complex128 or not fits or not np.isfinite(array).all():
+        found = f"{array.dtype} of shape {array.shape}"
+        expected = f"finite complex128 of shape ({harmonics}, at most {MAX_WAVEFORM})"
+        raise CalibrationFileError(path, "waveform", found, expected)
+    return array
 
 
 def _array(

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from transientcam_driver.errors import UDEV_RULES_FILE, LibusbMissing
+from transientcam_driver.plugin import FoundCamera
 from transientcam_driver.protocol.requests import PRODUCT_ID, VENDOR_ID
-from transientcam_driver.usb import UDEV_RULE, UsbCamera, list_cameras, system_libusb
+from transientcam_driver.usb import UDEV_RULE, list_cameras, system_libusb
 
 Reported = tuple[str, str, str, str | None]
 
@@ -97,11 +98,11 @@ def _is_ours(line: str) -> bool:
     return is_rule and bool(_VENDOR.search(line)) and bool(_PRODUCT.search(line))
 
 
-def _plugged_in(backend: Any) -> tuple[UsbCamera | None, ...]:
+def _plugged_in(backend: Any) -> tuple[FoundCamera | None, ...]:
     return list_cameras(backend=backend) or (None,)
 
 
-def _camera(camera: UsbCamera | None) -> Reported:
+def _camera(camera: FoundCamera | None) -> Reported:
     if camera is None:
         return "ok", "camera", "none is plugged in", None
     if camera.problem is not None:

@@ -11,9 +11,10 @@ from rich.markup import escape
 from rich.table import Table
 
 from transientcam_driver.cli.options import JsonOption
+from transientcam_driver.entries.sim import resolution, scene_of
 from transientcam_driver.errors import DriverError, SpecError
 from transientcam_driver.handle import ExplainedEffect, Explanation
-from transientcam_driver.opening import parse_spec, scene_of
+from transientcam_driver.plugin import CameraName
 from transientcam_driver.sequence import Sequence
 from transientcam_driver.simulation import world_of
 from transientcam_driver.simulation.device import prototype
@@ -79,20 +80,14 @@ def _document(path: Path) -> Any:
 
 
 def _explained(name: str, sequence: Sequence) -> Explanation:
-    parsed = parse_spec(name if name.startswith(("sim:", "usb")) else f"sim:{name}")
-    if parsed.scene is None:
+    parsed = CameraName.parse(name if name.startswith(("sim:", "usb")) else f"sim:{name}")
+    if parsed.kind != "sim":
         raise SpecError(name, "a real camera has no scene to explain")
-    scene = scene_of(parsed)
-    capabilities = prototype(
-        serial="", width=parsed.width, height=parsed.height, bits=scene.sensor.bits
-    )
+    scene = scene_of(parsed).load()
+    width, height = resolution(parsed)
+    capabilities = prototype(serial="", width=width, height=height, bits=scene.sensor.bits)
     capabilities.validate(sequence)
-    world = world_of(
-        scene,
-        width=parsed.width,
-        height=parsed.height,
-        readout_s=capabilities.streaming_readout_s,
-    )
+    world = world_of(scene, width=width, height=height, readout_s=capabilities.streaming_readout_s)
     return world.explain(scene.name, sequence)
 
 

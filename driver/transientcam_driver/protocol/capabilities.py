@@ -14,7 +14,8 @@ from transientcam_driver.protocol.units import nanoseconds
 
 _Word = TypeVar("_Word", bound=str)
 _CAPS_MAGIC = b"TCCP"
-_CAPS = struct.Struct("<4sHH32s32s16sHHBBBBBBHHxxIIIIIIIIIII")
+_PHASE_OFFSETS = 1
+_CAPS = struct.Struct("<4sHH32s32s16sHHBBBBBBHHBxIIIIIIIIIII")
 CAPS_BYTES = _CAPS.size + 4
 CAPS_ROOM_BYTES = 512
 """Length that a host requests, so that later fields fit (usb-protocol 3)."""
@@ -40,6 +41,7 @@ def pack_capabilities(capabilities: Capabilities) -> bytes:
         _bits(c.take_orders[1:], TAKE_ORDERS[1:]),
         c.max_takes,
         c.max_images,
+        _PHASE_OFFSETS * c.phase_offsets,
         round(c.tuning_step_hz * 1e6),
         c.tuning_word(c.min_frequency_hz),
         c.tuning_word(c.max_frequency_hz),
@@ -90,6 +92,7 @@ def unpack_capabilities(data: bytes) -> Capabilities:
         take_orders,
         max_takes,
         max_images,
+        options,
         step_uhz,
         min_word,
         max_word,
@@ -128,6 +131,7 @@ def unpack_capabilities(data: bytes) -> Capabilities:
         take_orders=(TAKE_ORDERS[0], *_named(take_orders, TAKE_ORDERS[1:])),
         fifo_bytes=fifo_bytes,
         heartbeat_s=heartbeat_ms / 1e3,
+        phase_offsets=bool(options & _PHASE_OFFSETS),
     )
     _check_capabilities(capabilities)
     return capabilities

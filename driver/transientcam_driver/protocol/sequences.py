@@ -7,7 +7,7 @@ from transientcam_driver.capabilities import Capabilities
 from transientcam_driver.errors import ProtocolError
 from transientcam_driver.protocol.codes import SCHEMES, TAKE_ORDERS, ZEROTHS
 from transientcam_driver.protocol.requests import VERSION
-from transientcam_driver.protocol.units import nanoseconds
+from transientcam_driver.protocol.units import nanoseconds, phase_rad, phase_word
 from transientcam_driver.sequence import Sequence, SubPhases
 
 
@@ -15,7 +15,8 @@ from transientcam_driver.sequence import Sequence, SubPhases
 class SequenceWords:
     """A sequence in the integers of the hardware: payload of SET_SEQUENCE, part of COMMIT's answer.
 
-    Frequency j is ``j * base_word`` steps of the synthesiser, so that ratios are exact.
+    Frequency j is ``j * base_word`` steps of the synthesiser, so that ratios are exact. The phase
+    offset, in 1/65536 of a turn, is appended only where there is one.
     """
 
     harmonics: int
@@ -27,9 +28,12 @@ class SequenceWords:
     exposure_ns: int
     takes: int
     take_order: int = 0
+    phase_offset: int = 0
 
     _LAYOUT = struct.Struct("<BBBBBBHIII")
+    _OFFSET = struct.Struct("<Hxx")
     BYTES = _LAYOUT.size
+    MOST_BYTES = _LAYOUT.size + _OFFSET.size
 
     @classmethod
     def of(cls, sequence: Sequence, capabilities: Capabilities) -> "SequenceWords":
@@ -45,6 +49,7 @@ class SequenceWords:
             exposure_ns=nanoseconds(sequence.exposure_s),
             takes=sequence.takes,
             take_order=TAKE_ORDERS.index(sequence.take_order),
+            phase_offset=phase_word(sequence.phase_offset_rad),
         )
 
     def sequence(self, capabilities: Capabilities) -> Sequence:
@@ -73,6 +78,7 @@ class SequenceWords:
             takes=self.takes,
             sub_phases=SubPhases(SCHEMES[self.scheme], self.sub_phases),
             take_order=TAKE_ORDERS[self.take_order],
+            phase_offset_rad=phase_rad(self.phase_offset),
         )
 
     def word(self, harmonic: int) -> int:
@@ -81,7 +87,7 @@ class SequenceWords:
 
     def pack(self) -> bytes:
         """Payload of SET_SEQUENCE."""
-        return self._LAYOUT.pack(
+        words = self._LAYOUT.pack(
             VERSION,
             self.harmonics,
             self.zeroth,
@@ -93,16 +99,18 @@ class SequenceWords:
             self.low_word,
             self.exposure_ns,
         )
+        return words + self._OFFSET.pack(self.phase_offset) if self.phase_offset else words
 
     @classmethod
     def unpack(cls, data: bytes) -> "SequenceWords":
         """Read the payload of SET_SEQUENCE."""
-        if len(data) != cls.BYTES or data[0] != VERSION:
+        if len(data) not in (cls.BYTES, cls.MOST_BYTES) or data[0] != VERSION:
             raise ProtocolError(f"{len(data)} bytes for a sequence of {cls.BYTES}")
         _, harmonics, zeroth, scheme, sub_phases, order, takes, base, low, exposure = (
-            cls._LAYOUT.unpack(data)
+            cls._LAYOUT.unpack_from(data)
         )
-        return cls(harmonics, zeroth, scheme, sub_phases, base, low, exposure, takes, order)
+        offset = cls._OFFSET.unpack_from(data, cls.BYTES)[0] if len(data) > cls.BYTES else 0
+        return cls(harmonics, zeroth, scheme, sub_phases, base, low, exposure, takes, order, offset)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +125,7 @@ class Commitment:
 
     _LAYOUT = struct.Struct("<IIQI")
     BYTES = _LAYOUT.size + SequenceWords.BYTES
+    MOST_BYTES = _LAYOUT.size + SequenceWords.MOST_BYTES
 
     def pack(self) -> bytes:
         """Bytes of the answer."""
@@ -126,7 +135,7 @@ class Commitment:
     @classmethod
     def unpack(cls, data: bytes) -> "Commitment":
         """Read the answer."""
-        if len(data) != cls.BYTES:
+        if len(data) not in (cls.BYTES, cls.MOST_BYTES):
             raise ProtocolError(f"answer of {len(data)} bytes to COMMIT, {cls.BYTES} needed")
         epoch, images, first_image, period_ns = cls._LAYOUT.unpack_from(data)
         words = SequenceWords.unpack(data[cls._LAYOUT.size :])

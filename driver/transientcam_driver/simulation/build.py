@@ -12,7 +12,7 @@ from transientcam_driver.simulation.device import EmulatedDevice, Firmware, prot
 from transientcam_driver.simulation.effects import CHOICES, EFFECTS, NOISE
 from transientcam_driver.simulation.effects.modulation_harmonics import measured_harmonics
 from transientcam_driver.simulation.effects.pixel_pattern import read_offsets_rad
-from transientcam_driver.simulation.handle import SimulationHandle
+from transientcam_driver.simulation.handle import PrepareScene, SimulationHandle
 from transientcam_driver.simulation.imperfections import DeviceProfile
 from transientcam_driver.simulation.light import (
     GivenScenery,
@@ -135,17 +135,32 @@ def build(
         bits=scene.sensor.bits,
     )
 
-    def world_of_scene(scene: Scene) -> World:
-        return world_of(
-            scene, width=width, height=height, seed=seed, readout_s=capabilities.streaming_readout_s
-        )
-
-    world = SwitchableWorld(world_of_scene(scene))
+    world, prepare = world_before(
+        scene, width=width, height=height, seed=seed, readout_s=capabilities.streaming_readout_s
+    )
 
     def power_on(now_s: float) -> Firmware:
         return Firmware(capabilities, world, power_on_s=now_s)
 
     device = EmulatedDevice(capabilities, power_on, clock=clock)
+    return device, SimulationHandle(scene, world, device, prepare=prepare)
+
+
+def world_before(
+    scene: Scene, *, width: int, height: int, seed: int | None, readout_s: float
+) -> tuple[SwitchableWorld, PrepareScene]:
+    """Build the world in front of a specimen of a camera, and what prepares another one for it.
+
+    Sensor, imperfections and what is off of its noise stay those of the scene given.
+
+    Raises
+    ------
+    SceneError
+        A file that the scene names cannot be read, or has other content.
+    """
+
+    def world_of_scene(scene: Scene) -> World:
+        return world_of(scene, width=width, height=height, seed=seed, readout_s=readout_s)
 
     quiet = {each.name: "off" for each in NOISE if scene.effects.get(each.name) == "off"}
 
@@ -158,7 +173,7 @@ def build(
         behind = seen(find_scene(CALIBRATION), effects) if diffusor else found
         return found, world_of_scene(behind)
 
-    return device, SimulationHandle(scene, world, device, prepare=prepare)
+    return SwitchableWorld(world_of_scene(scene)), prepare
 
 
 def checked_effects(effects: Mapping[str, str]) -> dict[str, str]:

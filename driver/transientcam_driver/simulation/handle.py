@@ -2,12 +2,13 @@
 
 import threading
 from collections.abc import Callable, Mapping
+from typing import Protocol
 
 from transientcam_driver.errors import CameraError
 from transientcam_driver.handle import Explanation, Truth
 from transientcam_driver.sensor import Sensor
 from transientcam_driver.sequence import Sequence
-from transientcam_driver.simulation.device import EmulatedDevice, Fault
+from transientcam_driver.simulation.device import Fault
 from transientcam_driver.simulation.scene import Scene
 from transientcam_driver.simulation.switchable_world import SwitchableWorld
 from transientcam_driver.simulation.world import World
@@ -15,6 +16,31 @@ from transientcam_driver.simulation.world import World
 PrepareScene = Callable[[str, Mapping[str, str], bool], tuple[Scene, World]]
 """Prepares a scene by its name, with choices of effects, and with or without a diffusor before the
 lens."""
+
+
+class FaultyDevice(Protocol):
+    """The emulated device behind the handle, whose cable can be pulled."""
+
+    @property
+    def plugged(self) -> bool:
+        """Whether the cable is in."""
+        ...
+
+    def unplug(self) -> None:
+        """Pull the cable."""
+        ...
+
+    def replug(self) -> None:
+        """Plug the cable in again."""
+        ...
+
+    def inject(self, fault: Fault, images: int = 1) -> None:
+        """Inject a fault into the next images."""
+        ...
+
+    def set_interlock(self, *, closed: bool) -> None:
+        """Open or close the safety interlock."""
+        ...
 
 
 class SimulationHandle:
@@ -31,7 +57,7 @@ class SimulationHandle:
     """
 
     def __init__(
-        self, scene: Scene, world: SwitchableWorld, device: EmulatedDevice, *, prepare: PrepareScene
+        self, scene: Scene, world: SwitchableWorld, device: FaultyDevice, *, prepare: PrepareScene
     ) -> None:
         self._scene = scene
         self._world = world

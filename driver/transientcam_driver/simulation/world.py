@@ -1,7 +1,7 @@
 """A scene in front of the simulated sensor: from impulse responses to images."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,6 +123,7 @@ class World:
 
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
         """Build the effects that the sequence calls for."""
+        sequence = replace(sequence, phase_offset_rad=0.0)  # which the labels have in them
         if self._plan is not None and self._plan.sequence == sequence:
             return
         conditions = self.conditions(sequence)

@@ -17,6 +17,8 @@ The lanes and their signatures, each that of the planar statement it stands besi
 
 ``pisarenko(b, eigenvalue (...) or None) -> phase_rad, weight (m, ...), uniform, count (...)``
 
+``covariance(phase (m, P), variance (m, P)) -> (2m, 2m, P)``, of returns, in double precision
+
 For whole frames in single precision:
 
 ``measure(images (N, ...) uint16, zeroth) -> moments (m+1, ...)``
@@ -28,6 +30,9 @@ isn't finite
 
 ``likelihood(b (m+1, P), variance (m+1, P), returns, tail_shape) -> attributes of Likelihood``,
 or None for other than the usual models
+
+``harmonics(given, current, polynomial (m+1, P), mixed (K m, P), inverse (m, P), orders) ->
+following (m+1, P), misfit (P)``, or None for orders above 31
 
 ``reconstruct(shape, constants) -> OnePass``, found by `lookup`
 

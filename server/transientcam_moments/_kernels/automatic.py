@@ -4,14 +4,22 @@ import logging
 import threading
 from typing import Final
 
+from transientcam_moments._kernels.parallel import start_threads
 from transientcam_moments._kernels.registry import REGISTRY, Key
 
 THREAD: Final = "transientcam-compile"
 """Name of every thread that compiles."""
 MOST_ROOTS: Final = 8
 """The largest m with lanes for eigenvalues and returns."""
-_SINGLE_ONLY: Final = ("smooth", "measure", "separate", "reconstruct", "likelihood")
-_FEW_ROOTS: Final = ("pisarenko", "smallest_eigenvalue", "reconstruct", "likelihood")
+_SINGLE_ONLY: Final = ("smooth", "measure", "separate", "reconstruct", "likelihood", "harmonics")
+_DOUBLE_ONLY: Final = ("covariance",)
+_FEW_ROOTS: Final = (
+    "pisarenko",
+    "smallest_eigenvalue",
+    "reconstruct",
+    "likelihood",
+    "covariance",
+)
 _log = logging.getLogger("transientcam_moments")
 
 
@@ -63,6 +71,8 @@ def is_offered(key: Key) -> bool:
     """Say whether there is such a lane; the planar statement does all orders."""
     if key.name in _SINGLE_ONLY and key.precision != "f":
         return False
+    if key.name in _DOUBLE_ONLY and key.precision != "d":
+        return False
     # a characteristic polynomial with more roots underflows where they cluster
     return key.harmonics <= MOST_ROOTS or key.name not in _FEW_ROOTS
 
@@ -75,6 +85,7 @@ def _is_long(key: Key) -> bool:
 def _work() -> None:
     """Compile what is wanted until nothing is, or the process ends."""
     main = threading.main_thread()
+    start_threads()
     while True:
         with _WANTED.lock:
             if not _WANTED.waiting or not main.is_alive():

@@ -3,9 +3,11 @@
 from collections.abc import Callable
 from typing import Any
 
+from transientcam_moments._kernels.covariance import covariance_lane
 from transientcam_moments._kernels.density import density_lane
 from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue_lane
 from transientcam_moments._kernels.frames import measure_lane, separate_lane, smooth_lane
+from transientcam_moments._kernels.harmonics import harmonics_lane
 from transientcam_moments._kernels.levinson import levinson_lane
 from transientcam_moments._kernels.likelihood import likelihood_lane
 from transientcam_moments._kernels.pisarenko import pisarenko_lane
@@ -22,6 +24,8 @@ LANES: dict[str, Callable[[int, str], Callable[..., Any]]] = {
     "separate": separate_lane,
     "reconstruct": reconstruct_lane,
     "likelihood": likelihood_lane,
+    "harmonics": harmonics_lane,
+    "covariance": covariance_lane,
 }
 
 

@@ -19,6 +19,7 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.parallel import Spread, at_once
+from transientcam_moments._kernels.registry import LEAST_PIXELS
 
 _BANK = 240  # pairs of registers of coefficients, which stay in the first cache for all phases
 _PAST_CACHES_BYTES = 1 << 24
@@ -258,4 +259,7 @@ def density_lane(m: int, precision: str) -> Callable[..., Any]:
             spread(part, pixels)
         return out
 
+    # the first call reads machine code and NumPy's tables, which takes as long as a whole film
+    nothing = np.zeros((m + 1, LEAST_PIXELS), f"c{2 * np.dtype(precision).itemsize}")
+    lane(nothing, nothing[1:], nothing[0].real, np.arange(_LEAST_MIRRORED))
     return lane

@@ -50,8 +50,9 @@ _INTERLEAVE = 2
 
 @njit(forceinline=True, error_model="numpy")
 def _prepare(
-    order: Any, b: Any, variance: Any, p: int, one: Any, data_r: Any, data_i: Any, weight: Any
-) -> Any:
+    order: Any, b: Any, variance: Any, error: float, p: int, one: Any, data_r: Any, data_i: Any,
+    weight: Any,
+) -> Any:  # fmt: skip
     """Load pixels, their largest moment made 1; return that, how many numbers, and their use."""
     m = len(order)
     zero = 0.0 * one
@@ -79,34 +80,40 @@ def _prepare(
         seen = weight[j] > 0.0
         std = simd.sqrt(simd.select(seen, weight[j], one)) * inverse
         std = simd.minimum(simd.maximum(std, rounding), 1.0 / rounding)
-        weight[j] = simd.select(usable, simd.select(seen, 1.0 / (std * std), 0.0), one)
+        each = 1.0 / (std * std + error * error)
+        weight[j] = simd.select(usable, simd.select(seen, each, 0.0), one)
     return scale, simd.select(usable, numbers, one), usable
 
 
 @njit(error_model="numpy")
 def _fit(
     order: Any, returns: Any, unknowns: Any, steps: int, cosine: float, sine: float, data_r: Any,
-    data_i: Any, weight: Any, x: Any, y: Any, w: Any, rr: Any, ri: Any,
+    data_i: Any, weight: Any, x: Any, y: Any, w: Any, rr: Any, ri: Any, active: Any, bar: Any,
 ) -> Any:  # fmt: skip
-    """Add a return and fit all of them; return chi-square."""
+    """Add a return and fit all of them, until `active` pixels have settled; return chi-square."""
     m, last = len(order), len(returns) - 1
     like = data_r[0]
     re, im = simd.registers(like, order, 1), simd.registers(like, order, 1)
     total = sharp.weigh_what_is_left(order, weight, rr, ri, re, im)
+    kr, ki = simd.matrix(like, order, 1), simd.matrix(like, order, 1)  # (m + 1)^2 are enough
+    sharp.overlaps(order, returns, weight, total, x, y, kr, ki)
+    flat = weight[0] / total
     best, bx, by, bw = total * 0.0 - 1.0, total * 0.0, total * 0.0, total * 0.0
     c, s = 1.0, 0.0
     for _ in range(choice.phases_of(m)):
         best, bx, by, bw = sharp.try_phase(
-            order, returns, weight, re, im, total, x, y, c, s, best, bx, by, bw
+            order, returns, flat, re, im, total, kr, ki, c, s, best, bx, by, bw
         )
         c, s = c * cosine - s * sine, c * sine + s * cosine
     x[last], y[last], w[last] = bx, by, bw
     sharp.take_away(order, bx, by, bw, rr, ri)
     cost = sharp.chi_square(order, weight, rr, ri)
-    damping = sharp.FIRST_DAMPING + 0.0 * cost
+    damping = simd.select(active, sharp.FIRST_DAMPING + 0.0 * cost, sharp.SETTLED)
     for _ in range(steps):
+        if not simd.some(damping < sharp.SETTLED):
+            break
         cost, damping = sharp.step(
-            order, returns, unknowns, data_r, data_i, weight, x, y, w, rr, ri, cost, damping
+            order, returns, unknowns, data_r, data_i, weight, x, y, w, rr, ri, cost, damping, bar
         )
     return cost
 
@@ -125,11 +132,14 @@ def _fit_tail(
     tail.shape(order, powers, d, qr, qi)
     tail.remains(order, data_r, data_i, x, y, w, v, qr, qi, rr, ri)
     cost = sharp.chi_square(order, weight, rr, ri) + PRIOR * t * t
-    damping = sharp.FIRST_DAMPING + 0.0 * cost
+    damping = simd.select(allowed, sharp.FIRST_DAMPING + 0.0 * cost, sharp.SETTLED)
+    bar = found[SCORE] - 4.0 * penalty
     for _ in range(TAIL_STEPS):
+        if not simd.some(damping < sharp.SETTLED):
+            break
         x, y, w, v, d, t, cost, damping = tail.step(
             order, powers, unknowns, data_r, data_i, weight, PRIOR, x, y, w, v, d, t, qr, qi, rr,
-            ri, cost, damping,
+            ri, cost, damping, bar,
         )  # fmt: skip
     choice.offer_tail(
         order, powers, unknowns, weight, PRIOR, x, y, w, v, d, t, qr, qi, rr, ri, cost, penalty,
@@ -199,33 +209,34 @@ def _write(
 
 @njit(nogil=True, error_model="numpy")
 def fit_returns(
-    order: Any, slots: Any, cosine: float, sine: float, b: Any, variance: Any, planes: Any,
-    free: Any, count: Any, start: int, stop: int,
+    order: Any, slots: Any, cosine: float, sine: float, b: Any, variance: Any, error: float,
+    planes: Any, free: Any, count: Any, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; each model where simpler ones leave enough."""
     m = len(order)
     one = simd.ones(variance, _INTERLEAVE)
-    step = simd.width(one)
+    step, far = simd.width(one), simd.infinity(one)
     data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
     rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
     weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
     x, y, w = simd.registers(one, (), 3), simd.registers(one, (), 3), simd.registers(one, (), 3)
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        scale, numbers, usable = _prepare(order, b, variance, p, one, data_r, data_i, weight)
+        scale, numbers, usable = _prepare(order, b, variance, error, p, one, data_r, data_i, weight)
         penalty = logarithm(numbers) + MARGIN
-        choice.nothing(one, simd.infinity(one), found)
+        choice.nothing(one, far, found)
         for j in range(m + 1):
             rr[j], ri[j] = data_r[j], data_i[j]
         cost = _fit(
-            order, (0,), (0, 0), STEPS[0], cosine, sine, data_r, data_i, weight, x, y, w, rr, ri
-        )
+            order, (0,), (0, 0), STEPS[0], cosine, sine, data_r, data_i, weight, x, y, w, rr, ri,
+            usable, far,
+        )  # fmt: skip
         choice.offer_returns(order, (0,), (0, 0), weight, x, y, w, cost, penalty, one > 0.0, found)
         more = found[SCORE] > 4.0 * penalty
         if m >= 2 and simd.some(more):
             cost = _fit(
                 order, (0, 0), (0, 0, 0, 0), STEPS[1], cosine, sine, data_r, data_i, weight, x, y,
-                w, rr, ri,
+                w, rr, ri, more, far,
             )  # fmt: skip
             allowed = more & (numbers >= 4.0)
             choice.offer_returns(
@@ -239,7 +250,7 @@ def fit_returns(
             if m >= 3 and simd.some(more):
                 cost = _fit(
                     order, (0, 0, 0), (0, 0, 0, 0, 0, 0), STEPS[2], cosine, sine, data_r, data_i,
-                    weight, x, y, w, rr, ri,
+                    weight, x, y, w, rr, ri, more, found[SCORE] - 6.0 * penalty,
                 )  # fmt: skip
                 choice.offer_returns(
                     order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, x, y, w, cost, penalty, more,
@@ -254,14 +265,20 @@ def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:
     real, cplx = real_arrays(precision), complex_arrays(precision)
     run = entry(
         fit_returns,
-        order_type(m), order_type(len(slots)), REAL, REAL, cplx[2], real[2], real[2], COUNTS,
-        COUNTS, PIXELS, PIXELS,
+        order_type(m), order_type(len(slots)), REAL, REAL, cplx[2], real[2], REAL, real[2],
+        COUNTS, COUNTS, PIXELS, PIXELS,
     )  # fmt: skip
     turn = 2 * np.pi / choice.phases_of(m)
     cosine, sine = float(np.cos(turn)), float(np.sin(turn))
 
     def lane(
-        b: Any, variance: Any, returns: int, tail_shape: int, *, spread: Spread = at_once
+        b: Any,
+        variance: Any,
+        returns: int,
+        tail_shape: int,
+        error: float,
+        *,
+        spread: Spread = at_once,
     ) -> tuple[Any, ...] | None:
         if (returns, tail_shape) != (MOST_RETURNS, TAIL_SHAPE):
             return None
@@ -271,7 +288,7 @@ def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:
         free, count = np.empty(pixels, np.int32), np.empty(pixels, np.int32)
 
         def part(start: int, stop: int) -> None:
-            run(order, slots, cosine, sine, moments, noise, planes, free, count, start, stop)
+            run(order, slots, cosine, sine, moments, noise, error, planes, free, count, start, stop)
 
         spread(part, pixels)
         four = (planes[k * size : (k + 1) * size] for k in range(4))

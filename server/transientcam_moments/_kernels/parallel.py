@@ -97,6 +97,11 @@ def on_threads(threads: int | None) -> Spread:
     return at_once if threads == 1 else over(_SHARED.get(), threads)
 
 
+def start_threads() -> None:
+    """Start the threads that all calls share, so that no call waits until they run."""
+    on_threads(None)(lambda start, stop: None, 1024 * _cores())
+
+
 def _cores() -> int:
     """Return how many cores this process may use; not every system can say."""
     affinity = getattr(os, "sched_getaffinity", None)

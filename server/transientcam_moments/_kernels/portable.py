@@ -94,6 +94,8 @@ for _function in (
     sharp.chi_square,
     sharp.take_away,
     sharp.weigh_what_is_left,
+    sharp.judge,
+    sharp.overlaps,
     sharp.try_phase,
     sharp.information,
     sharp.weigh,

@@ -47,6 +47,7 @@ TECHNIQUES: dict[str, Technique] = {
         own.MAXIMUM_ENTROPY,
         own.PISARENKO,
         own.LIKELIHOOD,
+        own.MERGED,
         single_frequency.TECHNIQUE,
         inverse_fourier.TECHNIQUE,
         godbaz.TECHNIQUE,

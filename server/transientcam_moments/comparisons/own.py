@@ -9,6 +9,8 @@ from transientcam_moments.comparisons.estimate import (
 from transientcam_moments.comparisons.technique import Technique, from_first, from_zeroth
 from transientcam_moments.levinson import levinson
 from transientcam_moments.likelihood import likelihood
+from transientcam_moments.likelihood.estimate import assumed_noise
+from transientcam_moments.merging import merge_returns
 from transientcam_moments.pisarenko import pisarenko
 
 
@@ -27,6 +29,16 @@ def pisarenko_estimate(b: Array) -> SparseEstimate:
     """
     found = pisarenko(b)
     return SparseEstimate(found.phase_rad, found.weight, found.uniform)
+
+
+def merged_estimate(b: Array) -> SparseEstimate:
+    """Estimate as `pisarenko_estimate`, and merge returns that noise split.
+
+    Their noise is not known here: it is what `transientcam_moments.likelihood` assumes.
+    """
+    found = pisarenko(b)
+    merged = merge_returns(found, assumed_noise(b))
+    return SparseEstimate(merged.phase_rad, merged.weight, merged.uniform)
 
 
 def likelihood_estimate(b: Array) -> LikelihoodEstimate:
@@ -62,6 +74,20 @@ PISARENKO = Technique(
     cost="Closed form: a smallest eigenvalue and the roots of a polynomial of degree m.",
     failure="A continuous response is made sparse: outliers in range under diffuse light.",
     estimate=pisarenko_estimate,
+)
+
+MERGED = Technique(
+    name="pisarenko-merged",
+    label="Pisarenko, returns that noise split merged",
+    returns="m",
+    frequencies="f .. m f; 0 for the uniform part",
+    harmonics=from_first,
+    least_harmonics=1,
+    assumptions="At most m sharp returns and a uniform part; the noise of the moments.",
+    cost="That of Pisarenko's, and up to m - 1 rounds over m pairs of returns.",
+    failure="Returns that are closer than noise can tell become one; a continuous response is made "
+    "sparse.",
+    estimate=merged_estimate,
 )
 
 LIKELIHOOD = Technique(

@@ -1,5 +1,5 @@
 """Few-parameter likelihood estimates of returns, from moments whose noise is known."""
 
-from transientcam_moments.likelihood.estimate import Likelihood, likelihood
+from transientcam_moments.likelihood.estimate import MODEL_ERROR, Likelihood, likelihood
 
-__all__ = ["Likelihood", "likelihood"]
+__all__ = ["MODEL_ERROR", "Likelihood", "likelihood"]

@@ -1,8 +1,6 @@
 """The likelihood estimate of every pixel, with what it is worth."""
 
-import math
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -12,14 +10,18 @@ from transientcam_moments._arrays import (
     Array,
     as_array,
     by_blocks,
+    in_range,
     in_turn,
     moment_planes,
     namespace,
 )
 from transientcam_moments._kernels import accelerated
+from transientcam_moments._kernels.parallel import Spread, on_threads
+from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.likelihood import choice
 from transientcam_moments.likelihood.arithmetic import logarithm
+from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, chi_square_quantile
 from transientcam_moments.likelihood.choice import MARGIN, MOST_RETURNS, TAIL_SHAPE
 from transientcam_moments.likelihood.planar import Data, fit
 from transientcam_moments.noise.moments import MomentNoise
@@ -27,7 +29,9 @@ from transientcam_moments.pisarenko import DIRECT_THRESHOLD, Returns, Separation
 
 ASSUMED_NOISE: Final = 0.01
 """Standard deviation over the largest moment, where none is given."""
-SIGNIFICANCE: Final = 1e-3
+MODEL_ERROR: Final = 4e-3
+"""What calibration, and light of no model, leave in the moments of a camera, over the largest: as
+large as the bias of Sec. 4.3. docs/likelihood.md has the evidence."""
 
 
 class Likelihood(NamedTuple):
@@ -71,6 +75,10 @@ class Likelihood(NamedTuple):
     degrees_of_freedom: Array
     count: Array
     tail_shape: int
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
     @property
     def has_tail(self) -> Array:
@@ -150,6 +158,8 @@ def likelihood(
     harmonics: Sequence[int] | None = None,
     returns: int = MOST_RETURNS,
     tail_shape: int = TAIL_SHAPE,
+    model_error: float = 0.0,
+    threads: int | None = None,
 ) -> Likelihood:
     """Estimate the returns of every pixel from moments whose noise is known.
 
@@ -169,6 +179,12 @@ def likelihood(
         Most sharp returns, 1 to 3.
     tail_shape : int
         Shape p of the tail's gamma distribution, 1 (exponential) to 6; 0 for no tail.
+    model_error : float
+        What is wrong with every part of a moment beside its noise, as calibration and the models
+        leave it: a standard deviation over the pixel's largest moment, 0 to 1. It is part of all
+        that is said of deviations and chi-square. `MODEL_ERROR` is a camera's.
+    threads : int, optional
+        How many the compiled lane uses; all cores, when left out.
 
     Returns
     -------
@@ -181,7 +197,8 @@ def likelihood(
     ShapeError
         When `b` is not 2 to 33 planes of numbers, or noise or harmonics don't fit it.
     ParameterError
-        For other numbers of returns, shapes of tails or harmonics.
+        For other numbers of returns, shapes of tails, harmonics or model errors, and for less
+        than one thread.
 
     Notes
     -----
@@ -193,17 +210,32 @@ def likelihood(
     the Bayesian information criterion with a margin (see `MARGIN`).
 
     A fit begins with the returns of the one before and the best of 4 m + 6 phases for one more,
-    the tail with two returns; it takes a fixed number of Levenberg and Marquardt's steps, none of
-    which raises chi^2, with the weights eliminated (Golub and Pereyra 1973, Kaufman 1975). Noise
+    the tail with two returns; it takes at most 4, 8, 10 and 10 of Levenberg and Marquardt's steps,
+    none of which raises chi^2, with the weights eliminated (Golub and Pereyra 1973, Kaufman 1975),
+    and no more where one changes chi^2 by too little to matter (`sharp.judge`). Noise
     smaller than the rounding of the moments' precision counts as that large.
 
     With b_0 measured, all light comes from returns and tail: a uniform part is not in the model.
     """
+    return fitted(b, noise, on_threads(threads), harmonics, returns, tail_shape, model_error)
+
+
+def fitted(
+    b: Array,
+    noise: MomentNoise | None,
+    spread: Spread,
+    harmonics: Sequence[int] | None = None,
+    returns: int = MOST_RETURNS,
+    tail_shape: int = TAIL_SHAPE,
+    model_error: float = 0.0,
+) -> Likelihood:
+    """Do what `likelihood` does, with the threads of a caller."""
     planes, trailing = moment_planes(b)
     if not 1 <= returns <= MOST_RETURNS:
         raise ParameterError("returns", returns, f"1 to {MOST_RETURNS}")
     if not 0 <= tail_shape <= 6:
         raise ParameterError("tail_shape", tail_shape, "0 to 6")
+    in_range("model_error", model_error, 0.0, 1.0, "0 to 1")
     places = _places(harmonics, planes.shape[0])
     variance = _variance(noise, planes, trailing)
     xp = namespace(planes)
@@ -214,7 +246,7 @@ def likelihood(
         dense = [by_place.get(j) for j in range(order + 1)]
         planes = xp.stack([empty if at is None else planes[at] for at in dense])
         variance = xp.stack([0 * variance[0] if at is None else variance[at] for at in dense])
-    found = _estimated(planes, variance, returns, tail_shape)
+    found = _estimated(planes, variance, returns, tail_shape, float(model_error), spread=spread)
     shaped = (part.reshape((*part.shape[:-1], *trailing)) for part in found)
     return Likelihood._make([*shaped, tail_shape])
 
@@ -233,8 +265,7 @@ def _variance(noise: MomentNoise | None, planes: Array, trailing: tuple[int, ...
     xp = namespace(planes)
     real = planes.real.dtype
     if noise is None:
-        size = xp.maximum(abs(planes.real), abs(planes.imag)).max(axis=0)
-        return xp.broadcast_to((ASSUMED_NOISE * size) ** 2, planes.shape).astype(real)
+        return as_array(assumed_noise(planes).variance)
     variance = as_array(noise.variance)
     shape = tuple(variance.shape)
     if shape not in ((planes.shape[0],), (planes.shape[0], *trailing)):
@@ -244,23 +275,34 @@ def _variance(noise: MomentNoise | None, planes: Array, trailing: tuple[int, ...
     return xp.broadcast_to(xp.asarray(flat).astype(real), planes.shape)
 
 
+def assumed_noise(b: Array) -> MomentNoise:
+    """Return the noise of moments (m + 1, ...) where none is known: `ASSUMED_NOISE`."""
+    xp = namespace(b)
+    size = xp.maximum(abs(b.real), abs(b.imag)).max(axis=0)
+    return MomentNoise(xp.broadcast_to((ASSUMED_NOISE * size) ** 2, b.shape).astype(b.real.dtype))
+
+
 @accelerated("likelihood")
-def _estimated(planes: Array, variance: Array, returns: int, tail_shape: int) -> tuple[Array, ...]:
+def _estimated(
+    planes: Array, variance: Array, returns: int, tail_shape: int, error: float
+) -> tuple[Array, ...]:
     """Return the attributes of `Likelihood` of flat planes."""
     return by_blocks(
-        lambda b, variance: _estimate(b, variance, returns, tail_shape), planes, variance
+        lambda b, variance: _estimate(b, variance, returns, tail_shape, error), planes, variance
     )
 
 
-def _estimate(b: Array, variance: Array, returns: int, tail_shape: int) -> tuple[Array, ...]:
+def _estimate(
+    b: Array, variance: Array, returns: int, tail_shape: int, error: float
+) -> tuple[Array, ...]:
     """Planar statement of `likelihood`: all harmonics from 0 on, (m + 1, P)."""
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
-        data, scale, usable = _prepared(b, variance)
+        data, scale, usable = _prepared(b, variance, error)
         found = fit(data, returns, tail_shape)
         return _results(found, data, scale, usable, min(returns, b.shape[0] - 1), tail_shape)
 
 
-def _prepared(b: Array, variance: Array) -> tuple[Data, Array, Array]:
+def _prepared(b: Array, variance: Array, error: float) -> tuple[Data, Array, Array]:
     """Return data with the largest moment 1, what they were divided by, and where there is light.
 
     A pixel that cannot be used is fitted to one return, which comes to nothing.
@@ -287,7 +329,7 @@ def _prepared(b: Array, variance: Array) -> tuple[Data, Array, Array]:
     std = xp.sqrt(xp.where(seen, variance, 1)) * inverse
     rounding = 4 * float(limits.eps)
     std = xp.minimum(xp.maximum(std, rounding), 1 / rounding)
-    weight = xp.where(usable, xp.where(seen, 1 / (std * std), 0), 1)
+    weight = xp.where(usable, xp.where(seen, 1 / (std * std + error**2), 0), 1)
     numbers = xp.where(usable, (2 * seen).sum(axis=0) - seen[0], 1).astype(size.dtype)
     penalty = (logarithm(numbers) + MARGIN).astype(size.dtype)
     re, im, weight = (part.astype(size.dtype) for part in (re, im, weight))
@@ -339,30 +381,3 @@ def _results(
         free.astype(np.int32),
         used.sum(axis=0).astype(np.int32),
     )
-
-
-@lru_cache(maxsize=256)
-def chi_square_quantile(free: int, significance: float) -> float:
-    """Return what chi-square of so many degrees of freedom exceeds with a given probability.
-
-    By bisection on the distribution's closed form for whole numbers of degrees of freedom.
-    """
-    if free < 1:
-        return 0.0
-    low, high = 0.0, free + 10.0
-    while _exceeding(free, high) > significance:
-        high *= 2
-    for _ in range(80):
-        middle = (low + high) / 2
-        low, high = (middle, high) if _exceeding(free, middle) > significance else (low, middle)
-    return high
-
-
-def _exceeding(free: int, value: float) -> float:
-    """Return the probability that chi-square exceeds a value (Abramowitz and Stegun, 26.4.4-5)."""
-    half, odd = value / 2, free % 2
-    total = math.erfc(math.sqrt(half)) if odd else 0.0
-    for k in range(free // 2):
-        power = k + odd / 2
-        total += math.exp(power * math.log(half) - half - math.lgamma(power + 1))
-    return total

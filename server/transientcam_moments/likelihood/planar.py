@@ -53,8 +53,9 @@ def fit(data: Data, most: int, shape: int) -> Array:
     xp = namespace(data.re)
     m = data.re.shape[0] - 1
     found = [data.re[0]] * PLANES
-    nothing(data.penalty, np.inf + 0 * data.penalty, found)
-    one = _Returns.start(data, 1, None)
+    far = np.inf + 0 * data.penalty
+    nothing(data.penalty, far, found)
+    one = _Returns.start(data, 1, None, far)
     one.offer(found, data.numbers >= 0)
     planes = xp.stack(found)
     further = min(most, m) >= 2
@@ -63,7 +64,7 @@ def fit(data: Data, most: int, shape: int) -> Array:
 
     def more(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
         found = list(planes)
-        two = _Returns.start(data, 2, before)
+        two = _Returns.start(data, 2, before, np.inf + 0 * data.penalty)
         if further:
             two.offer(found, data.numbers >= 4)
         if shape:
@@ -74,7 +75,8 @@ def fit(data: Data, most: int, shape: int) -> Array:
 
         def most_of_all(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
             found = list(planes)
-            _Returns.start(data, 3, before).offer(found, data.numbers >= 6)
+            bar = found[SCORE] - 6 * data.penalty
+            _Returns.start(data, 3, before, bar).offer(found, data.numbers >= 6)
             return namespace(planes).stack(found)
 
         still = done[SCORE] > 6 * data.penalty
@@ -120,8 +122,10 @@ class _Returns:
         self.x, self.y, self.w = ([*part, data.re[0]] for part in points or ((), (), ()))
 
     @classmethod
-    def start(cls, data: Data, count: int, before: tuple[Array, ...] | None) -> "_Returns":
-        """Add a return to those of another fit, and fit all of them."""
+    def start(
+        cls, data: Data, count: int, before: tuple[Array, ...] | None, bar: Array
+    ) -> "_Returns":
+        """Add a return to those of another fit, and fit all of them; `bar` as in `sharp.judge`."""
         fit = cls(data, count, before)
         fit.cost = fit._add()
         damping = sharp.FIRST_DAMPING + 0 * fit.cost
@@ -130,12 +134,12 @@ class _Returns:
             x, y, w, rr, ri = (list(part) for part in state[:5])
             cost, damping = sharp.step(
                 fit.order, fit.returns, fit.unknowns, data.re, data.im, data.weight,
-                x, y, w, rr, ri, state[5], state[6],
+                x, y, w, rr, ri, state[5], state[6], bar,
             )  # fmt: skip
             return tuple(x), tuple(y), tuple(w), tuple(rr), tuple(ri), cost, damping
 
         banks = (tuple(part) for part in (fit.x, fit.y, fit.w, fit.rr, fit.ri))
-        state = _times(STEPS[count - 1], step, (*banks, fit.cost, damping))
+        state = _times(STEPS[count - 1], step, (*banks, fit.cost, damping), _moving)
         fit.x, fit.y, fit.w, fit.rr, fit.ri = (list(part) for part in state[:5])
         fit.cost = state[5]
         return fit
@@ -147,11 +151,14 @@ class _Returns:
         total = sharp.weigh_what_is_left(order, data.weight, self.rr, self.ri, re, im)
         phases = phases_of(len(order))
         cosine, sine = np.cos(2 * np.pi / phases), np.sin(2 * np.pi / phases)
+        kr, ki = [total] * len(order) * 2, [total] * len(order) * 2
+        sharp.overlaps(order, self.returns, data.weight, total, self.x, self.y, kr, ki)
+        flat = data.weight[0] / total
 
         def attempt(state: tuple[Array, ...]) -> tuple[Array, ...]:
             c, s = state[:2]
             best = sharp.try_phase(
-                order, self.returns, data.weight, re, im, total, self.x, self.y, c, s, *state[2:]
+                order, self.returns, flat, re, im, total, kr, ki, c, s, *state[2:]
             )
             return c * cosine - s * sine, c * sine + s * cosine, *best
 
@@ -193,13 +200,14 @@ def _offer_tail(data: Data, two: _Returns, shape: int, found: list[Array]) -> No
         qr, qi, rr, ri = (list(part) for part in state[:4])
         new = tail.step(
             order, powers, unknowns, data.re, data.im, data.weight, PRIOR,
-            x, y, w, v, d, t, qr, qi, rr, ri, cost, damping,
+            x, y, w, v, d, t, qr, qi, rr, ri, cost, damping, bar,
         )  # fmt: skip
         return tuple(qr), tuple(qi), tuple(rr), tuple(ri), *new
 
     banks = (tuple(part) for part in (qr, qi, rr, ri))
     damping = sharp.FIRST_DAMPING + 0 * cost
-    state = _times(TAIL_STEPS, step, (*banks, x, y, w, v, d, t, cost, damping))
+    bar = found[SCORE] - 4 * data.penalty
+    state = _times(TAIL_STEPS, step, (*banks, x, y, w, v, d, t, cost, damping), _moving)
     qr, qi, rr, ri = (list(part) for part in state[:4])
     x, y, w, v, d, t, cost, _ = state[4:]
     offer_tail(
@@ -208,12 +216,24 @@ def _offer_tail(data: Data, two: _Returns, shape: int, found: list[Array]) -> No
     )  # fmt: skip
 
 
-def _times(times: int, step: Callable[[Any], Any], state: Any) -> Any:
-    """Apply a step so many times; JAX compiles it once."""
+def _moving(state: Any) -> bool:
+    """Say whether any pixel takes a further step."""
+    return bool((state[-1] < sharp.SETTLED).any())
+
+
+def _times(
+    times: int,
+    step: Callable[[Any], Any],
+    state: Any,
+    going_on: Callable[[Any], bool] = lambda state: True,
+) -> Any:
+    """Apply a step so many times, or until nothing goes on; JAX compiles all of them once."""
     if namespace(state[-1]).__name__ == "jax.numpy":
         from jax import lax
 
         return lax.fori_loop(0, times, lambda _, inner: step(inner), state)
     for _ in range(times):
+        if not going_on(state):
+            break
         state = step(state)
     return state

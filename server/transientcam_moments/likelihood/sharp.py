@@ -29,6 +29,13 @@ from transientcam_moments.likelihood.linear import decompose, solve, variances
 FIRST_DAMPING = 1e-2
 LESS_DAMPING, MORE_DAMPING = 0.15, 6.0
 LEAST_DAMPING, MOST_DAMPING = 1e-7, 1e7
+SETTLED = 1e9
+"""The damping of pixels that take no further step; above `MOST_DAMPING`."""
+ENOUGH, ENOUGH_SHARE = 0.1, 3e-3
+"""A step that changes chi-square by less, or by less of it, is the last one: noise moves the
+unknowns by ten times as much."""
+HOPELESS = 0.1
+"""So is one that takes less than this share of what a model would still have to gain."""
 LEAST_APART = 0.02
 """Of the square of a new return's moments, the least that counts as its own."""
 REACH = 1.5
@@ -41,6 +48,23 @@ def chi_square(order: Length, weight: Bank, rr: Bank, ri: Bank) -> Array:
     for j in range(1, len(order) + 1):
         total = total + weight[j] * (rr[j] * rr[j] + ri[j] * ri[j])
     return total
+
+
+def judge(cost: Array, tried: Array, damping: Array, bar: Array) -> tuple[Any, Array]:
+    """Return where a step is taken, and the damping of the next one.
+
+    `bar` is the chi-square from which on the model is not the best; infinite where that is open.
+    """
+    moving = damping < SETTLED
+    lower = tried < cost
+    change = select(lower, cost - tried, tried - cost)
+    missing = larger(tried - bar, 0.0 * cost)
+    little = (change < ENOUGH + ENOUGH_SHARE * tried + HOPELESS * missing) & (damping < 1.0)
+    factor = select(lower, LESS_DAMPING + 0.0 * cost, MORE_DAMPING + 0.0 * cost)
+    damping = smaller(
+        larger(damping * factor, LEAST_DAMPING + 0.0 * cost), MOST_DAMPING + 0.0 * cost
+    )
+    return lower & moving, select(moving & ~little, damping, SETTLED + 0.0 * cost)
 
 
 def take_away(order: Length, x: Array, y: Array, w: Array, rr: Bank, ri: Bank) -> None:
@@ -64,15 +88,33 @@ def weigh_what_is_left(
     return larger(total, least(total))
 
 
+def overlaps(
+    order: Length, returns: Length, weight: Bank, total: Array, x: Bank, y: Bank, kr: Bank, ki: Bank
+) -> None:
+    """Put the coefficients of what a return at any phase shares with all but the last in banks.
+
+    Of return k they are the Fourier coefficients of sum_j weight_j cos(j (phi - phi_k)) over the
+    sum of the weights, j = 1 to m.
+    """
+    m = len(order)
+    inverse = 1.0 / total
+    for k in range(len(returns) - 1):
+        p, q = x[k], y[k]
+        for j in range(1, m + 1):
+            share = weight[j] * inverse
+            kr[k * m + j - 1], ki[k * m + j - 1] = share * p, share * q
+            p, q = p * x[k] - q * y[k], p * y[k] + q * x[k]
+
+
 def try_phase(
     order: Length,
     returns: Length,
-    weight: Bank,
+    flat: Array,
     re: Bank,
     im: Bank,
     total: Array,
-    x: Bank,
-    y: Bank,
+    kr: Bank,
+    ki: Bank,
     c: Any,
     s: Any,
     best: Array,
@@ -82,7 +124,8 @@ def try_phase(
 ) -> tuple[Array, ...]:
     """Return best gain, point and weight of a return more, after trying the point c + i s.
 
-    What such a return explains of the space that one of the others spans is not counted.
+    What such a return explains of the space that one of the others spans is not counted; `kr` and
+    `ki` are from `overlaps`, and `flat` is the weight of b_0 over all weights.
     """
     m = len(order)
     found = re[0]
@@ -92,13 +135,11 @@ def try_phase(
         a, b = a * c - b * s, a * s + b * c
     apart = 0.0 * total
     for k in range(len(returns) - 1):
-        dx, dy = c * x[k] + s * y[k], s * x[k] - c * y[k]
-        p, q = dx, dy
-        same = weight[0]
-        for j in range(1, m + 1):
-            same = same + weight[j] * p
-            p, q = p * dx - q * dy, p * dy + q * dx
-        same = same / total
+        same = flat
+        a, b = c, s
+        for j in range(m):
+            same = same + (kr[k * m + j] * a + ki[k * m + j] * b)
+            a, b = a * c - b * s, a * s + b * c
         apart = larger(apart, same * same)
     apart = larger(1.0 - apart, LEAST_APART + 0.0 * apart)
     gain = select(found > 0.0, found * found / apart, 0.0 * found)
@@ -189,8 +230,9 @@ def step(
     ri: Bank,
     cost: Array,
     damping: Array,
+    bar: Array,
 ) -> tuple[Array, Array]:
-    """Go one step of Levenberg and Marquardt wherever that lowers chi-square.
+    """Go one step of Levenberg and Marquardt wherever that lowers chi-square; see `judge`.
 
     Returns chi-square and damping; ``unknowns`` is a tuple of length 2 K.
     """
@@ -216,25 +258,22 @@ def step(
         tr[j], ti[j] = data_r[j], data_i[j]
     reach = 0.5 * REACH / m
     for k in range(count):
-        half = 0.5 * g[count + k] / larger(w[k], least(cost))
-        half = larger(smaller(half, reach + 0.0 * half), -reach + 0.0 * half)
-        scale = 1.0 / (1.0 + half * half)
-        c, s = (1.0 - half * half) * scale, 2.0 * half * scale
+        # the turn by 2 arctan(half / size), with one quotient
+        size = larger(w[k], least(cost))
+        half = larger(smaller(0.5 * g[count + k], reach * size), -reach * size)
+        inverse = 1.0 / (size * size + half * half)
+        c, s = (size * size - half * half) * inverse, 2.0 * size * half * inverse
         tx[k], ty[k] = x[k] * c - y[k] * s, x[k] * s + y[k] * c
     weigh(order, returns, data_r, data_i, weight, tx, ty, tw)
     for k in range(count):
         take_away(order, tx[k], ty[k], tw[k], tr, ti)
     tried = chi_square(order, weight, tr, ti)
-    lower = tried < cost
+    lower, damping = judge(cost, tried, damping, bar)
     for k in range(count):
         x[k], y[k] = select(lower, tx[k], x[k]), select(lower, ty[k], y[k])
         w[k] = select(lower, tw[k], w[k])
     for j in range(m + 1):
         rr[j], ri[j] = select(lower, tr[j], rr[j]), select(lower, ti[j], ri[j])
-    factor = select(lower, LESS_DAMPING + 0.0 * cost, MORE_DAMPING + 0.0 * cost)
-    damping = smaller(
-        larger(damping * factor, LEAST_DAMPING + 0.0 * cost), MOST_DAMPING + 0.0 * cost
-    )
     return select(lower, tried, cost), damping
 
 

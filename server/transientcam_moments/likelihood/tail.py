@@ -20,14 +20,7 @@ from transientcam_moments.likelihood.arithmetic import (
     square_bank,
 )
 from transientcam_moments.likelihood.linear import decompose, solve, variances
-from transientcam_moments.likelihood.sharp import (
-    LEAST_DAMPING,
-    LESS_DAMPING,
-    MORE_DAMPING,
-    MOST_DAMPING,
-    REACH,
-    chi_square,
-)
+from transientcam_moments.likelihood.sharp import REACH, chi_square, judge
 
 LONGER = 0.7
 """The most that log d changes in a step."""
@@ -167,6 +160,7 @@ def step(
     ri: Bank,
     cost: Array,
     damping: Array,
+    bar: Array,
 ) -> tuple[Array, ...]:
     """Go one step of Levenberg and Marquardt wherever that lowers chi-square with the prior.
 
@@ -198,14 +192,10 @@ def step(
     tw, tv = weigh(order, data_r, data_i, weight, tx, ty, sr, si)
     remains(order, data_r, data_i, tx, ty, tw, tv, sr, si, tr, ti)
     tried = chi_square(order, weight, tr, ti) + prior * tt * tt
-    lower = tried < cost
+    lower, damping = judge(cost, tried, damping, bar)
     for j in range(m + 1):
         qr[j], qi[j] = select(lower, sr[j], qr[j]), select(lower, si[j], qi[j])
         rr[j], ri[j] = select(lower, tr[j], rr[j]), select(lower, ti[j], ri[j])
-    factor = select(lower, LESS_DAMPING + 0.0 * cost, MORE_DAMPING + 0.0 * cost)
-    damping = smaller(
-        larger(damping * factor, LEAST_DAMPING + 0.0 * cost), MOST_DAMPING + 0.0 * cost
-    )
     return (
         select(lower, tx, x),
         select(lower, ty, y),

@@ -18,6 +18,7 @@ from transientcam_moments.noise.draws import draw
 from transientcam_moments.noise.moments import (
     MomentNoise,
     moment_noise,
+    own_share,
     smoothed,
     smoothed_at,
     smoothed_of,
@@ -37,6 +38,7 @@ __all__ = [
     "density_std",
     "draw",
     "moment_noise",
+    "own_share",
     "return_noise",
     "smoothed",
     "smoothed_at",

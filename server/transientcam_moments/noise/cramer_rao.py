@@ -5,7 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from transientcam_moments._arrays import Array, as_array, namespace
+from transientcam_moments._shown import summary
 from transientcam_moments.errors import ShapeError
+from transientcam_moments.noise.interpolation import determined_covariance
 from transientcam_moments.noise.moments import MomentNoise
 
 _COINCIDE_RAD = 1e-5
@@ -28,6 +30,10 @@ class CramerRao(NamedTuple):
     phase_std_rad: Array
     weight_std: Array
     covariance: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
 
 def cramer_rao(phase_rad: Array, weight: Array, noise: MomentNoise) -> CramerRao:
@@ -70,9 +76,7 @@ def cramer_rao(phase_rad: Array, weight: Array, noise: MomentNoise) -> CramerRao
     clear = _apart(xp.where(used, phase, np.nan)) > _COINCIDE_RAD
     usable = used & clear
     with np.errstate(all="ignore"):
-        information = _information(xp.where(usable, phase, 0), usable, variance)
-        covariance = xp.linalg.inv(information)
-        covariance = xp.moveaxis(covariance, 0, -1)
+        covariance = _covariance(xp.where(usable, phase, 0), usable, variance)
         each = xp.sqrt(xp.stack([covariance[k, k] for k in range(2 * count)]))
         lost = xp.where(used, np.inf, np.nan)
         weight_std = xp.where(usable, each[:count], lost)
@@ -82,6 +86,23 @@ def cramer_rao(phase_rad: Array, weight: Array, noise: MomentNoise) -> CramerRao
         weight_std.reshape((count, *pixels)),
         covariance.reshape((2 * count, 2 * count, *pixels)),
     )
+
+
+def _covariance(phase: Array, used: Array, variance: Array) -> Array:
+    """Return the covariance (2K, 2K, P), in closed form where there are as many returns as b_j."""
+    xp = namespace(phase)
+    if len(phase) < len(variance) or xp is not np:
+        return xp.moveaxis(xp.linalg.inv(_information(phase, used, variance)), 0, -1)
+    determined = used.all(axis=0)
+    if determined.all():
+        return determined_covariance(phase, variance)
+    covariance = np.empty((2 * len(phase), 2 * len(phase), phase.shape[1]))
+    covariance[..., determined] = determined_covariance(
+        phase[:, determined], variance[:, determined]
+    )
+    others = phase[:, ~determined], used[:, ~determined], variance[:, ~determined]
+    covariance[..., ~determined] = np.moveaxis(np.linalg.inv(_information(*others)), 0, -1)
+    return covariance
 
 
 def _information(phase: Array, used: Array, variance: Array) -> Array:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from transientcam_moments._arrays import Array, in_range, moment_planes, phases, squared
+from transientcam_moments._shown import summary
 from transientcam_moments.biasing import EPSILON, bias, estimate_zeroth
 from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.maximum_entropy import density
@@ -35,6 +36,10 @@ class DensityNoise(NamedTuple):
     density: Array
     std: Array
     holds: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
 
 def density_noise(

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from transientcam_moments._arrays import (
     namespace,
     squared,
 )
+from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.four_bucket import ZEROTH_IMAGES
 from transientcam_moments.noise.sensor import Sensor
@@ -31,6 +33,10 @@ class MomentNoise(NamedTuple):
     """
 
     variance: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
     def covariance(self) -> Array:
         """Return the covariance (2m + 1, 2m + 1, ...) of b_0, Re b_1, Im b_1, ..., Im b_m."""
@@ -138,6 +144,22 @@ def smoothing_factor(sigma_px: float = SIGMA_PX) -> float:
         return 1.0
     taps = _taps(sigma_px)
     return float((taps**2).sum() / taps.sum() ** 2) ** 2
+
+
+def own_share(sigma_px: float = SIGMA_PX) -> float:
+    """Return what `smooth` leaves of the variance of a pixel at least, whatever is around it.
+
+    Parameters
+    ----------
+    sigma_px : float
+        Standard deviation of the Gaussian, 0 to 100.
+
+    Notes
+    -----
+    The square of the pixel's own weight, which is larger at the border and beside missing pixels.
+    """
+    in_range("sigma_px", sigma_px, 0.0, 100.0, "0 to 100 pixels")
+    return float(gaussian_taps(sigma_px).max()) ** 4
 
 
 def smoothed(noise: MomentNoise, sigma_px: float = SIGMA_PX) -> MomentNoise:
@@ -249,20 +271,21 @@ def smoothed_at(
     brightness = np.asarray(brightness)
     if brightness.ndim != 2:
         raise ShapeError("brightness", f"of shape {brightness.shape}", "(H, W)")
-    light = np.maximum(brightness, 0)
     if sigma_px == 0:
-        return noise_of(light.reshape(-1)[pixels])
-    (height, width), (row, column) = light.shape, np.divmod(pixels, light.shape[1])
+        return noise_of(np.maximum(brightness.reshape(-1)[pixels], 0))
+    height, width = brightness.shape
+    row, column = np.divmod(pixels, width)
     taps = gaussian_taps(sigma_px / math.sqrt(2))
     radius = len(taps) // 2
-    around = np.full((height + 2 * radius, width + 2 * radius), np.nan, light.dtype)
-    around[radius : radius + height, radius : radius + width] = light
-    shift = np.arange(len(taps))
-    near = around[(row[:, None] + shift)[:, :, None], (column[:, None] + shift)[:, None, :]]
-    present = np.isfinite(near)
+    shift = np.arange(-radius, radius + 1)
+    rows, columns = (row[:, None] + shift)[:, :, None], (column[:, None] + shift)[:, None, :]
+    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+    near = brightness[rows.clip(0, height - 1), columns.clip(0, width - 1)]
+    present = inside & np.isfinite(near)
+    light = np.where(present, np.maximum(near, 0), 0)
     weight = np.outer(taps, taps) * present
     with np.errstate(divide="ignore", invalid="ignore"):
-        mean = (np.where(present, near, 0) * weight).sum(axis=(1, 2)) / weight.sum(axis=(1, 2))
+        mean = (light * weight).sum(axis=(1, 2)) / weight.sum(axis=(1, 2))
     # a pixel that is not finite stays as it is
     variance = noise_of(np.where(present[:, radius, radius], mean, np.nan)).variance
     left = _factors(sigma_px, height)[row] * _factors(sigma_px, width)[column]
@@ -274,9 +297,12 @@ def _taps(sigma_px: float) -> Array:
     return np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma_px) ** 2)
 
 
+@lru_cache(maxsize=64)
 def _factors(sigma_px: float, length: int) -> Array:
     """Sum of squares over square of the sum of the weights inside an axis, for each place on it."""
     taps, inside = _taps(sigma_px), np.ones(length)
     sums = (np.convolve(inside, each)[len(taps) // 2 :][:length] for each in (taps**2, taps))
     squares, total = sums
-    return squares / total**2
+    factors = squares / total**2
+    factors.flags.writeable = False  # shared by all calls
+    return factors

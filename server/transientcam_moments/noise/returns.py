@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from transientcam_moments._arrays import Array, in_range, namespace
+from transientcam_moments._shown import summary
 from transientcam_moments.noise.cramer_rao import CramerRao, cramer_rao
 from transientcam_moments.noise.moments import MomentNoise
 from transientcam_moments.pisarenko import DIRECT_THRESHOLD, Returns
@@ -37,6 +38,10 @@ class ReturnNoise(NamedTuple):
     direct_std: Array
     indirect_std: Array
     holds: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
 
 
 def return_noise(

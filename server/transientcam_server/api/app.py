@@ -6,10 +6,11 @@ from typing import Final
 
 from fastapi import APIRouter, Depends, FastAPI
 
+from transientcam_driver import Camera
 from transientcam_server.api import problems
 from transientcam_server.api.auth import permissions
 from transientcam_server.api.auth.guard import Authentication, Guard
-from transientcam_server.api.docs import pages
+from transientcam_server.api.docs import openapi, pages
 from transientcam_server.api.metrics import Metrics
 from transientcam_server.api.middleware.answers import AnswerLimit
 from transientcam_server.api.middleware.requests import RequestLog
@@ -36,7 +37,6 @@ from transientcam_server.api.routes import (
     metrics as metrics_route,
 )
 from transientcam_server.api.stream import websocket
-from transientcam_server.camera import Camera
 from transientcam_server.service import VERSION, Service
 from transientcam_server.settings import Settings
 
@@ -82,6 +82,7 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
         description=pages.DESCRIPTION,
         license_info={"name": "BSD-3-Clause", "identifier": "BSD-3-Clause"},
         lifespan=lifespan,
+        openapi_url=None,  # openapi.router has one that is not made on the event loop
         docs_url=None,  # pages.router has one that needs no other host
         redoc_url=None,
         swagger_ui_oauth2_redirect_url=None,
@@ -94,11 +95,14 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
         api.include_router(resource.router, dependencies=[Depends(permissions.admit)])
     api.include_router(websocket.router)
     app.include_router(api)
-    for router in (info.versions, health.router, metrics_route.router, pages.router):
-        app.include_router(router)
+    for outside in (info.versions, health.router, metrics_route.router):
+        app.include_router(outside)
+    for documents in (openapi.router, pages.router):
+        app.include_router(documents)
     pages.add_dashboard(app)
     problems.install(app)
     permissions.describe(app, [resource.router for resource in _RESOURCES], prefix=API)
+    openapi.describe_limits(app, camera.capabilities, prefix=API)
     # the last one added is the first to see a request
     app.add_middleware(BodyLimit, counted_elsewhere=frozenset((f"{API}{calibrations.IMPORT}",)))
     app.add_middleware(AnswerLimit, limits=settings.limits)

@@ -3,6 +3,7 @@
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any, Final, Literal
 
 from fastapi import Depends, Path, Query, Request, Response
@@ -10,10 +11,11 @@ from fastapi.responses import StreamingResponse
 from pydantic import FiniteFloat
 
 from transientcam import wire
+from transientcam_server.api.middleware.answers import expect_bytes
 from transientcam_server.api.middleware.requests import asks_for_head
 from transientcam_server.api.negotiation import negotiate
 from transientcam_server.errors import Problem, kinds
-from transientcam_server.imaging.bands import banded
+from transientcam_server.imaging.bands import STREAMED_BYTES, banded, size_of
 from transientcam_server.imaging.encodings.encoding import (
     COLOUR_PNG,
     ENCODINGS,
@@ -68,6 +70,7 @@ class FrameQuery:
     view: Literal["colour"] | None
     accept: str | None
     head_alone: bool
+    expect_bytes: Callable[[int], None]
 
     def view_of(self, product: Product, frame: Frame) -> View:
         """Return which part of the frame's product that is.
@@ -140,7 +143,8 @@ async def _frame_query(
 ) -> FrameQuery:
     accept = request.headers.get("accept")
     head_alone = asks_for_head(request.scope)
-    return FrameQuery(time_s, bins, y, region, decimation, view, accept, head_alone)
+    expect = partial(expect_bytes, request.scope)
+    return FrameQuery(time_s, bins, y, region, decimation, view, accept, head_alone, expect)
 
 
 FrameQueryOf = Annotated[FrameQuery, Depends(_frame_query)]
@@ -176,6 +180,9 @@ async def product_answer(
     applied = found.recipe.applied
     planned = banded(chosen, encoding, view, applied=applied, height=height, width=width)
     if planned is None:
+        size_bytes = size_of(chosen, view, applied=applied, height=height, width=width)
+        if size_bytes > STREAMED_BYTES:  # the array, and the file that it is written to
+            query.expect_bytes(2 * size_bytes)
         data = await found.encoded(chosen, encoding, view)
         headers = _headers(chosen, encoding, view, found)
         return Response(data, media_type=encoding.media_type, headers=headers)

@@ -93,7 +93,10 @@ def of_sequence(
             1,
             min(capabilities.max_takes, capabilities.max_images // sequence.images_per_take),
         ),
-        "sub_phases.n": (1, capabilities.max_sub_phases),
+        "sub_phases.n": (
+            1,
+            1 if sequence.sub_phases.scheme == "none" else capabilities.max_sub_phases,
+        ),
     }
     lists: dict[str, tuple[object, ...]] = {
         "zeroth": tuple(
@@ -126,7 +129,7 @@ def of_sequence(
             min=least,
             max=most,
             allowed=lists.get(name),
-            access=access,
+            access="read-only" if name in ranges and least == most else access,
             description=schema["description"],
         )
 

@@ -14,6 +14,7 @@ from starlette.routing import Match
 from transientcam.wire import PROBLEM_MEDIA_TYPE
 from transientcam_driver import DriverError
 from transientcam_moments import ParameterError
+from transientcam_server.api.docs.openapi import Interface
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.errors.kinds import ProblemKind
 from transientcam_server.errors.translation import (
@@ -102,6 +103,7 @@ def describe(app: FastAPI) -> None:
 def install(app: FastAPI) -> None:
     """Answer every error of ``app`` as a problem, and document it as one."""
     describe(app)
+    app.state.interface = Interface(app)
 
     async def known(request: Request, error: Exception) -> Response:
         return problem_response(problem_of(error), instance=request.url.path)
@@ -115,7 +117,7 @@ def install(app: FastAPI) -> None:
         response = problem_response(_of_http(error, request), instance=request.url.path)
         response.headers.update(error.headers or {})
         if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
-            response.headers["Allow"] = _allowed(request) or response.headers.get("Allow", "")
+            response.headers["Allow"] = await _allowed(request) or response.headers.get("Allow", "")
         return response
 
     for kind in (Problem, DriverError, ParameterError):
@@ -137,14 +139,15 @@ def _of_http(error: HTTPException, request: Request) -> Problem:
     return Problem(kind, str(error.detail))
 
 
-def _allowed(request: Request) -> str:
+async def _allowed(request: Request) -> str:
     """Return every method of a path; the framework names only those of the first route.
 
     A path that the OpenAPI document names as it is has the methods that stand there, also where
     a pattern fits it: `/calibrations/active` is no id.
     """
     app: FastAPI = request.app
-    documented_there = app.openapi()["paths"].get(request.url.path)
+    document = await app.state.interface.document()
+    documented_there = document["paths"].get(request.url.path)
 
     def answered(method: str) -> bool:
         scope = {**request.scope, "method": method}

@@ -1,4 +1,4 @@
-"""The camera and all that has it: its source and thread, lease, jobs and calibrations.
+"""The camera and all that has it: its thread, lease, jobs and calibrations.
 
 `Acquisition` owns the camera on a thread of its own and reports events; `LeaseManager` decides
 which client may change it; `Jobs` run long work one after another; `Calibrator` is such work.
@@ -9,7 +9,6 @@ from transientcam_server.camera.calibration_store import CalibrationStore
 from transientcam_server.camera.calibrator import Calibrator
 from transientcam_server.camera.jobs import Jobs
 from transientcam_server.camera.lease import LeaseManager
-from transientcam_server.camera.source import Camera, open_camera
 from transientcam_server.camera.status import AcquisitionStatus
 
 __all__ = [
@@ -17,8 +16,6 @@ __all__ = [
     "AcquisitionStatus",
     "CalibrationStore",
     "Calibrator",
-    "Camera",
     "Jobs",
     "LeaseManager",
-    "open_camera",
 ]

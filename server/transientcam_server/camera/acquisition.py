@@ -16,6 +16,7 @@ from typing import Any, Final, TypeVar
 
 from transientcam_driver import (
     AppliedSequence,
+    Camera,
     CameraError,
     FrameTimeout,
     Sequence,
@@ -31,7 +32,6 @@ from transientcam_server.camera.events import (
     SequenceChanged,
 )
 from transientcam_server.camera.light import LightGuard
-from transientcam_server.camera.source import Camera
 from transientcam_server.camera.status import AcquisitionStatus, State
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import JobCancelled, Problem, SequenceConflict

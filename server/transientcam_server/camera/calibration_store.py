@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from numpy.typing import NDArray
+
 from transientcam_driver import CalibrationCapture, CalibrationFileError, CalibrationSubject
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
@@ -26,6 +28,7 @@ from transientcam_server.imaging.calibration import (
 )
 from transientcam_server.imaging.diffusor import judge
 from transientcam_server.imaging.verdict import Verdict
+from transientcam_server.imaging.waveform import usable
 from transientcam_server.settings import CalibrationSettings
 
 _log = logging.getLogger(__name__)
@@ -50,6 +53,8 @@ class StoredCalibration:
         ``name``, and what else is stored with it.
     verdict
         Whether it was measured on a diffusor.
+    waveform
+        Harmonics of the modulation (m, K), see `Gains`; None where none are known.
     """
 
     id: str
@@ -61,6 +66,7 @@ class StoredCalibration:
     temperature_c: float
     notes: Mapping[str, Any]
     verdict: Verdict
+    waveform: NDArray[Any] | None
 
     @property
     def usable(self) -> bool:
@@ -316,11 +322,12 @@ def _read(path: Path, size_bytes: int) -> StoredCalibration | None:
         temperature_c=capture.temperature_c,
         notes=dict(capture.notes),
         verdict=verdict_of(capture),
+        waveform=usable(capture.waveform),
     )
 
 
 def load_given(path: Path) -> Calibration:
-    """Read and evaluate a file that somebody names, unless it was not measured on a diffusor.
+    """Read and evaluate a file that a request names, unless it was not measured on a diffusor.
 
     Raises
     ------

@@ -16,6 +16,7 @@ from transientcam_driver import (
     AppliedSequence,
     CalibrationCapture,
     CalibrationMismatch,
+    Camera,
     RawFrame,
     capture_calibration,
 )
@@ -28,7 +29,6 @@ from transientcam_server.camera.calibration_store import (
     verdict_of,
 )
 from transientcam_server.camera.jobs import Job, Jobs
-from transientcam_server.camera.source import Camera
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import (
@@ -45,6 +45,7 @@ from transientcam_server.imaging.noise import contradictory_share
 from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.imaging.verdict import Verdict
+from transientcam_server.imaging.waveform import SWEEP_ON_A_SCENE, SweepEvaluation, to_document
 
 _log = logging.getLogger(__name__)
 _Array = NDArray[Any]
@@ -61,13 +62,15 @@ _EVALUATING: Final = 0.95  # of the work is done when all is captured
 class CalibrationOptions:
     """What to measure: ``frames`` of each kind; ``activate`` uses the result at once.
 
-    ``force`` uses it even where it was not measured on a diffusor.
+    ``force`` uses it even where it was not measured on a diffusor. ``harmonics`` sweeps the phase,
+    where the camera can.
     """
 
     name: str = ""
     frames: int = DEFAULT_TAKES
     activate: bool = False
     force: bool = False
+    harmonics: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,8 +253,11 @@ class Calibrator:
         async def work(job: Job) -> dict[str, Any]:
             await asyncio.to_thread(self.store.require_room)  # checked before anything is captured
             takes = _Takes()
+            sweep = SweepEvaluation(
+                self._camera.capabilities, takes=options.frames, zeroth=once.sequence.zeroth
+            )
             measuring = self._acquisition.occupy(
-                job.id, lambda camera, go_on: _capture(camera, job, options, takes, go_on)
+                job.id, lambda camera, go_on: _capture(camera, job, options, takes, sweep, go_on)
             )
             capture = await asyncio.wrap_future(measuring)
             job.report(_EVALUATING, "evaluating")
@@ -260,6 +266,9 @@ class Calibrator:
                 self._share_of_takes, calibration, takes, once
             )
             verdict = await self._judged(calibration, applied())
+            if verdict.word == "scene" and capture.waveform is not None:
+                capture = replace(capture, waveform=None)
+                sweep.reason = SWEEP_ON_A_SCENE
             notes = {
                 "name": options.name,
                 "invalid_share": share,
@@ -277,6 +286,8 @@ class Calibrator:
                 "images": int(capture.kept.size),
                 "invalid_share": share,
                 "verdict": verdict.to_document(),
+                "harmonics": to_document(capture.waveform),
+                "no_harmonics": sweep.reason if options.harmonics else None,
                 "activated": activated,
                 "former": self._former_id if activated else None,
             }
@@ -385,7 +396,12 @@ class _Takes:
 
 
 def _capture(
-    camera: Camera, job: Job, options: CalibrationOptions, takes: _Takes, go_on: Callable[[], None]
+    camera: Camera,
+    job: Job,
+    options: CalibrationOptions,
+    takes: _Takes,
+    sweep: SweepEvaluation,
+    go_on: Callable[[], None],
 ) -> CalibrationCapture:
     def progress(done: int, total: int) -> None:
         job.report(_EVALUATING * done / total, "capturing")
@@ -396,4 +412,10 @@ def _capture(
         go_on()
         return takes.average(of_one_image)
 
-    return capture_calibration(camera, takes=options.frames, average=average, progress=progress)
+    return capture_calibration(
+        camera,
+        takes=options.frames,
+        average=average,
+        waveform=sweep if options.harmonics else None,
+        progress=progress,
+    )

@@ -70,7 +70,7 @@ class LeaseManager:
     call_later
         Schedules a call after a delay in seconds.
     due
-        Called with the lease that is valid from now on, None for none: whoever acts on its end
+        Called with the lease that is valid from now on, None for none: what acts on its end
         although nothing is scheduled any more.
     """
 

@@ -1,87 +1,15 @@
-"""What the service serves: a camera on USB, a simulated one, or a recording."""
+"""The camera that the service serves: its sensor, and what it starts with."""
 
 import contextlib
 import logging
-from typing import Protocol, Self
 
-import transientcam_driver
 import transientcam_moments as tm
-from transientcam_driver import (
-    AppliedSequence,
-    CameraError,
-    Capabilities,
-    Counters,
-    RawFrame,
-    Sequence,
-    Simulation,
-    Status,
-)
+from transientcam_driver import Camera, CameraError, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.recording.replay import PREFIX, ReplayCamera, parse_replay
+from transientcam_server.recording.replay import ReplayCamera
 from transientcam_server.settings import SensorSettings, SequenceSettings
 
 _log = logging.getLogger(__name__)
-
-
-class Camera(Protocol):
-    """What the service requires of a camera; `transientcam_driver.Camera` documents the methods."""
-
-    counters: Counters
-
-    @property
-    def simulation(self) -> Simulation | None:
-        """The handle of a simulated camera, None of any other."""
-        ...
-
-    @property
-    def capabilities(self) -> Capabilities:
-        """Limits and size of the device."""
-        ...
-
-    @property
-    def applied(self) -> AppliedSequence:
-        """The sequence as the camera really runs it."""
-        ...
-
-    def validate(self, sequence: Sequence) -> AppliedSequence:
-        """Return what `configure` would set."""
-        ...
-
-    def configure(self, sequence: Sequence) -> AppliedSequence:
-        """Set a sequence."""
-        ...
-
-    def start(self) -> None:
-        """Capture frames back to back."""
-        ...
-
-    def stop(self) -> None:
-        """Capture nothing more."""
-        ...
-
-    def safe_off(self) -> None:
-        """Stop and switch the light off, in any state."""
-        ...
-
-    def status(self) -> Status:
-        """Read the status of the device."""
-        ...
-
-    def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
-        """Wait for the next frame."""
-        ...
-
-    def reconnect(self) -> None:
-        """Open a lost camera again."""
-        ...
-
-    def close(self) -> None:
-        """Release the camera."""
-        ...
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *_: object) -> None: ...
 
 
 def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:
@@ -110,7 +38,7 @@ def start_with(camera: Camera, settings: SequenceSettings) -> None:
     camera.configure(nearest)
 
 
-def twin_of(camera: Camera, spec: str) -> transientcam_driver.Camera:
+def twin_of(camera: Camera, spec: str) -> Camera:
     """Open another simulated camera before the same scene, as old as the first, in virtual time.
 
     Parameters
@@ -128,7 +56,7 @@ def twin_of(camera: Camera, spec: str) -> transientcam_driver.Camera:
     own = camera.simulation
     assert own is not None  # noqa: S101 - callers look
     clock = VirtualClock()
-    twin = transientcam_driver.open_camera(spec, clock=clock)
+    twin = open_camera(spec, clock=clock)
     with contextlib.suppress(CameraError):  # an unplugged one is as new as the twin
         clock.sleep(camera.status().device_time_s)
     there = twin.simulation
@@ -137,19 +65,3 @@ def twin_of(camera: Camera, spec: str) -> transientcam_driver.Camera:
     if not same:
         there.change(scene=own.scene, effects=own.effects, diffusor=own.diffusor)
     return twin
-
-
-def open_camera(spec: str) -> Camera:
-    """Open a camera by name, also ``recording:PATH[?speed=original|fast|2.0&loop=on]``.
-
-    Raises
-    ------
-    SpecError, SceneError, CameraError
-        As `transientcam_driver.open_camera`.
-    NotARecording, OSError
-        If the file cannot be replayed.
-    """
-    if not spec.startswith(PREFIX):
-        return transientcam_driver.open_camera(spec)
-    replay = parse_replay(spec)
-    return ReplayCamera(replay.path, speed=replay.speed, loop=replay.loop)

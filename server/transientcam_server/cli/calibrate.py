@@ -57,6 +57,10 @@ def calibrate(
             "--diffusor", help="Put it before the lens of a simulated camera, and take it away."
         ),
     ] = False,
+    harmonics: Annotated[
+        bool,
+        typer.Option(help="Measure the harmonics of the modulation, by a phase sweep."),
+    ] = True,
     undo: Annotated[
         bool,
         typer.Option("--undo", help="Measure nothing: let the daemon use the former one again."),
@@ -82,11 +86,20 @@ def calibrate(
             raise typer.BadParameter("is for simulated cameras", param_hint="--diffusor")
         if output is None:
             raise typer.BadParameter("names the file to write", param_hint="--output")
-        order = _Order(camera or "usb", takes, sequence, output, force=force, diffusor=diffusor)
+        order = _Order(
+            camera or "usb",
+            takes,
+            sequence,
+            output,
+            force=force,
+            diffusor=diffusor,
+            harmonics=harmonics,
+        )
         result = _measured_here(order)
     else:
         _refuse({"--camera": camera, "--sequence": sequence}, "is the daemon's, if there is one")
         options = {"name": name, "frames": takes, "activate": activate, "force": force}
+        options["harmonics"] = harmonics
         result = _measured_by_daemon(url, options, output, token, diffusor=diffusor)
     if as_json:
         typer.echo(json.dumps(result, indent=2))
@@ -109,6 +122,7 @@ class _Order:
     output: Path
     force: bool
     diffusor: bool
+    harmonics: bool
 
 
 def _undo(url: str | None, token: str | None, *, as_json: bool) -> None:
@@ -176,6 +190,7 @@ def _measured_here(order: _Order) -> dict[str, Any]:
     from transientcam_driver import Sequence, open_camera
     from transientcam_server.camera.source import start_with
     from transientcam_server.imaging.diffusor import judge
+    from transientcam_server.imaging.waveform import SWEEP_ON_A_SCENE, to_document
     from transientcam_server.settings import SequenceSettings
 
     requested = None
@@ -188,31 +203,44 @@ def _measured_here(order: _Order) -> dict[str, Any]:
             opened.configure(requested)
         simulation = opened.simulation if order.diffusor else None
         with nullcontext() if simulation is None else _before_lens(simulation.change):
-            measured = _measure(opened, order.takes)
+            measured, why_not = _measure(opened, order)
         full_scale = 2.0**opened.capabilities.bits - 1.0
     verdict = judge(measured.capture, measured.gains.bad, full_scale=full_scale).to_document()
     notes = {"verdict": verdict, "forced": order.force}
-    replace(measured.capture, notes=notes).save(order.output)
-    return _result(measured, order.output) | {"verdict": verdict, "forced": order.force}
+    capture = replace(measured.capture, notes=notes)
+    if verdict["verdict"] == "scene" and capture.waveform is not None:
+        capture, why_not = replace(capture, waveform=None), SWEEP_ON_A_SCENE
+    capture.save(order.output)
+    return _result(replace(measured, capture=capture), order.output) | {
+        "verdict": verdict,
+        "forced": order.force,
+        "harmonics": to_document(capture.waveform),
+        "no_harmonics": why_not,
+    }
 
 
-def _measure(camera: "Camera", takes: int) -> "Calibration":
+def _measure(camera: "Camera", order: _Order) -> "tuple[Calibration, str | None]":
+    """Measure with a camera; also return why there are no harmonics."""
     from rich.progress import Progress
 
     import transientcam_moments as tm
     from transientcam_driver import capture_calibration
     from transientcam_server.imaging.calibration import evaluate
+    from transientcam_server.imaging.waveform import SweepEvaluation
 
+    zeroth = camera.applied.sequence.zeroth
+    sweep = SweepEvaluation(camera.capabilities, takes=order.takes, zeroth=zeroth)
     with Progress(console=Console(stderr=True)) as shown:
         task = shown.add_task("capturing", total=None)
         capture = capture_calibration(
             camera,
-            takes=takes,
+            takes=order.takes,
             average=tm.average_takes,
+            waveform=sweep if order.harmonics else None,
             progress=lambda done, total: shown.update(task, completed=done, total=total),
         )
         shown.update(task, description="evaluating")
-        return evaluate(capture)
+        return evaluate(capture), sweep.reason if order.harmonics else None
 
 
 def _document(text: str) -> dict[str, Any]:
@@ -231,7 +259,7 @@ def _result(measured: "Calibration", output: Path) -> dict[str, Any]:
     images, height, width = capture.images.shape
     return {
         "file": str(output),
-        "calibration_id": measured.gains.id,
+        "calibration_id": capture.id,
         "serial": capture.serial,
         "width": width,
         "height": height,
@@ -251,10 +279,20 @@ def _print_capture(result: dict[str, Any]) -> None:
         f"  {result['width']} x {result['height']} pixels of {result['serial']} "
         f"at {result['temperature_c']:.1f} °C, {result['bad_pixels']} of them bad",
         f"  {result['rejected_images']} of {captured} images left out as outliers",
+        *_harmonics_lines(result),
         *_verdict_lines(result["verdict"]),
     )
     for line in lines:
         typer.echo(line)
+
+
+def _harmonics_lines(result: Mapping[str, Any]) -> list[str]:
+    """Say which harmonics of the modulation are known, or why none are."""
+    if (found := result.get("harmonics")) is not None:
+        share = found["largest_share"]
+        return [f"  harmonics of the modulation up to {share:.2%} of the fundamental; taken out"]
+    reason = result.get("no_harmonics")
+    return [] if reason is None else [f"  harmonics of the modulation are not known: {reason}"]
 
 
 def _verdict_lines(verdict: Mapping[str, Any]) -> list[str]:
@@ -278,6 +316,7 @@ def _print_measured(result: dict[str, Any]) -> None:
         f"at {calibration['temperature_c']:.1f} °C, {measured['bad_pixels']} of them bad",
         f"  {measured['rejected_images']} of {measured['images']} images left out as outliers",
     ]
+    lines += _harmonics_lines(measured)
     lines += _verdict_lines(measured["verdict"])
     if calibration["active"]:
         lines.append("  in use")

@@ -1,6 +1,6 @@
-"""The verbs ``serve`` and ``replay`` of the ``transientcam`` command.
+"""The verb ``serve`` of the ``transientcam`` command.
 
-What is heavy is imported when a verb runs, so that ``transientcam --help`` stays quick.
+What is heavy is imported when the verb runs, so that ``transientcam --help`` stays quick.
 """
 
 import json
@@ -12,14 +12,13 @@ import typer
 from rich.console import Console
 
 from transientcam.cli.options import JsonOption
-from transientcam_server.cli.options import RecordingArgument
 
 
 def serve(
     camera: Annotated[
         str | None,
         typer.Option(
-            help="usb[:SERIAL], sim:SCENE or recording:FILE  [default: sim:mirrors]",
+            help="NAME:ADDRESS, as `transientcam devices` lists them.  [default: sim:mirrors]",
             autocompletion=lambda: _camera_names(),
         ),
     ] = None,
@@ -79,8 +78,8 @@ def serve(
     settings = load_settings(command_line, file=config, environment=os.environ)
 
     import transientcam_moments as tm
+    from transientcam_driver import open_camera
     from transientcam_server.api.app import build_app
-    from transientcam_server.camera import open_camera
     from transientcam_server.camera.source import start_with
     from transientcam_server.daemon import server
 
@@ -94,7 +93,9 @@ def serve(
         with open_camera(settings.camera) as opened:
             start_with(opened, settings.sequence)
             # NumPy serves until the compiled kernels are ready
-            compiling = tm.kernels.compile_in_background()
+            first = opened.applied.sequence.harmonics
+            orders = tuple(dict.fromkeys((first, 3, 4, 8)))
+            compiling = tm.kernels.compile_in_background(orders)
             leave(compiling)
             app = build_app(opened, settings)
             server.freeze_startup_objects(compiling)
@@ -108,8 +109,9 @@ def serve(
 
 def _camera_names() -> list[str]:
     from transientcam_driver import list_scenes
+    from transientcam_driver.opening import kinds
 
-    return ["usb", *(f"sim:{scene.name}" for scene in list_scenes())]
+    return [*kinds(), *(f"sim:{scene.name}" for scene in list_scenes())]
 
 
 def _check(command_line: dict[str, Any], config: Path | None, *, as_json: bool) -> None:
@@ -144,26 +146,3 @@ def _announce(url: str, camera: str, *, as_json: bool) -> None:
         f"transientcam serves {camera} at [bold link={url}]{url}[/] (Ctrl-C ends it)",
         soft_wrap=True,
     )
-
-
-def replay(
-    recording: RecordingArgument,
-    speed: Annotated[
-        str, typer.Option(help="original, fast (as fast as it can be read) or a factor.")
-    ] = "original",
-    loop: Annotated[bool, typer.Option("--loop", help="Begin anew after the last frame.")] = False,
-    host: Annotated[
-        str | None, typer.Option(help="Address to listen on.  [default: 127.0.0.1]")
-    ] = None,
-    port: Annotated[
-        int | None, typer.Option(help="TCP port; 0 takes any free one.  [default: 8000]")
-    ] = None,
-    config: Annotated[
-        Path | None, typer.Option(help="Settings in TOML.  [default: ./transientcam.toml]")
-    ] = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Serve a recording as if it were the camera: every frame again, bit for bit."""
-    looped = "on" if loop else "off"
-    spec = f"recording:{recording}?speed={speed}&loop={looped}"
-    serve(camera=spec, host=host, port=port, config=config, as_json=as_json)

@@ -9,9 +9,10 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Final
 
-from transientcam_server.daemon.intake import Intake, Turns
+from transientcam_server.daemon.intake import PORTION_BYTES, Intake
 from transientcam_server.daemon.rate_limit import RateLimiter
 from transientcam_server.daemon.refusals import refusal
+from transientcam_server.daemon.turns import Turns
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.settings import LimitSettings
 
@@ -20,6 +21,12 @@ AT_ONCE: Final = 16
 """Connections accepted before other tasks run."""
 PAUSE_S: Final = 0.5
 """Before the next one is accepted where the system has no descriptors left."""
+REQUESTS_SHARE: Final = 0.4
+"""Of the event loop's thread, for requests and their answers, as far as they are made there."""
+UNWATCHED_SHARE: Final = 0.9
+"""The same while no frames are sent or recorded."""
+STREAMS_SHARE: Final = 0.2
+"""Of it, for what the clients of streams send. The rest is for what these are sent."""
 _REMEMBERED_ADDRESSES: Final = 1024
 
 
@@ -88,6 +95,8 @@ class Acceptor:
         It stays the caller's.
     protocol
         Makes the protocol of a connection.
+    watched
+        Whether frames are sent or recorded at present, for which time has to be left.
     tls
         With what connections are encrypted; None for not at all.
     """
@@ -98,6 +107,7 @@ class Acceptor:
         *,
         protocol: Callable[[], asyncio.Protocol],
         limits: LimitSettings,
+        watched: Callable[[], bool],
         tls: ssl.SSLContext | None = None,
     ) -> None:
         self._loop = asyncio.get_running_loop()
@@ -105,7 +115,10 @@ class Acceptor:
         self._protocol = protocol
         self._tls = tls
         self._limits = limits
-        self._turns = Turns(self._loop)
+        self._requests = Turns(
+            self._loop, share=lambda: REQUESTS_SHARE if watched() else UNWATCHED_SHARE
+        )
+        self._streams = Turns(self._loop, share=lambda: STREAMS_SHARE)
         self._admission = Admission(limits, clock=self._loop.time)
         self._refusals: dict[str, bytes] = {}
         self._handshakes: set[asyncio.Task[None]] = set()
@@ -151,7 +164,7 @@ class Acceptor:
         with contextlib.suppress(OSError):
             if self._tls is None:
                 connection.send(self._refusal(problem))
-                connection.recv(self._turns.buffer.nbytes)  # unread, it would reset the connection
+                connection.recv(PORTION_BYTES)  # unread, it would reset the connection
         connection.close()
 
     def _refusal(self, problem: Problem) -> bytes:
@@ -169,7 +182,12 @@ class Acceptor:
         counted.callback(self._admission.release, host)
         try:
             await self._loop.connect_accepted_socket(
-                lambda: Intake(self._protocol(), self._turns, lost=counted.close),
+                lambda: Intake(
+                    self._protocol(),
+                    requests=self._requests.account(host),
+                    streams=self._streams.account(host),
+                    lost=counted.close,
+                ),
                 connection,
                 ssl=self._tls,
                 ssl_handshake_timeout=None if self._tls is None else self._limits.head_s,

@@ -7,13 +7,11 @@ from typing import Any
 from pydantic import BaseModel
 
 from transientcam_driver import DriverError
-from transientcam_driver.opening import parse_spec, scene_of
+from transientcam_driver.opening import check_camera
 from transientcam_server.camera.calibration_store import load_given
 from transientcam_server.daemon.configuration import Configuration
 from transientcam_server.errors import ServerError, SettingsError
 from transientcam_server.errors.exceptions import SettingsMistake
-from transientcam_server.recording import Recording
-from transientcam_server.recording.replay import PREFIX, parse_replay
 from transientcam_server.settings import Settings
 
 
@@ -28,7 +26,7 @@ def require_usable(configuration: Configuration) -> None:
     settings = configuration.settings
     mistakes = []
     for name, value, read in (
-        ("camera", settings.camera, _read_camera),
+        ("camera", settings.camera, lambda read: check_camera(read.camera)),
         ("calibration", settings.calibration, _read_calibration),
     ):
         try:
@@ -38,16 +36,6 @@ def require_usable(configuration: Configuration) -> None:
             mistakes.append(SettingsMistake(place, str(value), str(error)))
     if mistakes:
         raise SettingsError(mistakes)
-
-
-def _read_camera(settings: Settings) -> None:
-    spec = settings.camera
-    if spec.startswith(PREFIX):
-        Recording(parse_replay(spec).path).close()
-        return
-    wanted = parse_spec(spec)
-    if wanted.scene is not None:
-        scene_of(wanted)
 
 
 def _read_calibration(settings: Settings) -> None:

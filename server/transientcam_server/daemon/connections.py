@@ -12,6 +12,7 @@ from uvicorn.protocols.http.flow_control import FlowControl
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from transientcam_server.daemon.intake import Valve
+from transientcam_server.daemon.metering import in_turns
 from transientcam_server.daemon.refusals import refusal
 from transientcam_server.daemon.stalls import StallTimer
 from transientcam_server.errors import Problem, kinds
@@ -46,6 +47,7 @@ class BoundedConnection(HttpToolsProtocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Register the connection."""
         super().connection_made(cast("asyncio.Transport", transport))
+        self.app = in_turns(self.app, self.transport.account)
         self.flow = FlowControl(cast("asyncio.Transport", transport))
         self._stall_timer = StallTimer(
             cast("asyncio.Transport", transport), limit_s=self._limits.stalled_s, loop=self.loop

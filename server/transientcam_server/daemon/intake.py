@@ -1,90 +1,19 @@
 """What clients send, in portions: a flood on one connection delays no other one.
 
 Between the transport of a connection and its protocol stands an `Intake`. It reads no more than
-`PORTION_BYTES` at once, and hands them over when `Turns` has time for them: handling what clients
-send takes no more than `SHARE` of the event loop's thread, and each connection has its turn.
+`PORTION_BYTES` at once, and hands them over when `Turns` has time for its address.
 """
 
 import asyncio
-import time
-from collections import deque
 from collections.abc import Callable
 from typing import Any, Final, cast
 
+from transientcam_server.daemon.turns import Account
+
 PORTION_BYTES: Final = 2048
 """Read of one connection at once: 340 of the smallest WebSocket frames, 1.5 ms of parsing."""
-SHARE: Final = 0.3
-"""Of the event loop's thread, for what clients send; the rest is for what they are sent."""
-BURST_S: Final = 0.01
-"""Processor time that may be spent at once where little was spent before."""
-_LEAST_PAUSE_S: Final = 0.001
-
-
-class Turns:
-    """Shares the time of an event loop between the connections from which bytes have arrived.
-
-    Parameters
-    ----------
-    loop
-        Whose time is shared.
-    clock
-        Real time in s.
-    spent
-        Processor time of this thread in s.
-    """
-
-    def __init__(
-        self,
-        loop: asyncio.AbstractEventLoop,
-        *,
-        clock: Callable[[], float] = time.monotonic,
-        spent: Callable[[], float] = time.thread_time,
-    ) -> None:
-        self.buffer = memoryview(bytearray(PORTION_BYTES))
-        self._loop = loop
-        self._clock = clock
-        self._spent = spent
-        self._waiting: deque[Callable[[], None]] = deque()
-        self._left_s = BURST_S
-        self._counted_s = clock()
-        self._timer: asyncio.TimerHandle | None = None
-
-    def run(self, work: Callable[[], None]) -> bool:
-        """Run ``work`` now if there is time and no other waits, in its turn otherwise.
-
-        Returns whether it has run.
-        """
-        if not self._waiting and self._has_time():
-            self._do(work)
-            return True
-        self._waiting.append(work)
-        self._go_on_later()
-        return False
-
-    def _serve(self) -> None:
-        self._timer = None
-        while self._waiting and self._has_time():
-            self._do(self._waiting.popleft())
-        if self._waiting:
-            self._go_on_later()
-
-    def _do(self, work: Callable[[], None]) -> None:
-        begin_s = self._spent()
-        try:
-            work()
-        finally:
-            self._left_s -= self._spent() - begin_s
-
-    def _has_time(self) -> bool:
-        now_s = self._clock()
-        self._left_s = min(BURST_S, self._left_s + SHARE * (now_s - self._counted_s))
-        self._counted_s = now_s
-        return self._left_s > 0.0
-
-    def _go_on_later(self) -> None:
-        if self._timer is None:
-            pause_s = max(_LEAST_PAUSE_S, -self._left_s / SHARE)
-            self._timer = self._loop.call_later(pause_s, self._serve)
+_buffer: Final = memoryview(bytearray(PORTION_BYTES))
+"""Of all connections: it is emptied before another one reads."""
 
 
 class Intake(asyncio.BufferedProtocol):
@@ -94,17 +23,23 @@ class Intake(asyncio.BufferedProtocol):
     ----------
     protocol
         An `asyncio.Protocol`; its transport is a `Valve`.
-    turns
-        Of the event loop that all this runs on.
+    requests, streams
+        What the address of the client has of the time for requests, and for WebSockets.
     lost
         Called once when the connection has ended.
     """
 
     def __init__(
-        self, protocol: asyncio.Protocol, turns: Turns, *, lost: Callable[[], None]
+        self,
+        protocol: asyncio.Protocol,
+        *,
+        requests: Account,
+        streams: Account,
+        lost: Callable[[], None],
     ) -> None:
         self.protocol = protocol
-        self.turns = turns
+        self.account = requests
+        self._streams = streams
         self._lost = lost
         self._valve: Valve | None = None
         self._portion = b""
@@ -121,14 +56,14 @@ class Intake(asyncio.BufferedProtocol):
         self.protocol.connection_lost(exc)
 
     def get_buffer(self, sizehint: int) -> memoryview:
-        """Return the buffer of all connections: it is emptied before another one reads."""
-        return self.turns.buffer
+        """Return the buffer."""
+        return _buffer
 
     def buffer_updated(self, nbytes: int) -> None:
         """Take a portion, and hand it over in turn."""
         assert self._valve is not None  # noqa: S101 - bytes come after the connection
-        self._portion += bytes(self.turns.buffer[:nbytes])
-        if not self.turns.run(self.hand_over):
+        self._portion += bytes(_buffer[:nbytes])
+        if not self.account.run(self.hand_over):
             self._valve.shut("turn")
 
     def hand_over(self) -> None:
@@ -141,6 +76,11 @@ class Intake(asyncio.BufferedProtocol):
         if not valve.is_closing():
             self.protocol.data_received(portion)
         valve.open("turn")
+
+    def upgrade(self, protocol: asyncio.Protocol) -> None:
+        """Hand everything to the protocol of a WebSocket from now on."""
+        self.protocol = protocol
+        self.account = self._streams
 
     def eof_received(self) -> bool | None:
         """Hand it on."""
@@ -176,6 +116,11 @@ class Valve:
         return getattr(self._transport, name)
 
     @property
+    def account(self) -> Account:
+        """What the address of the client has of the loop's time."""
+        return self._intake.account
+
+    @property
     def held(self) -> bool:
         """Whether the protocol reads nothing for now."""
         return "protocol" in self._reasons or "work" in self._reasons
@@ -203,11 +148,11 @@ class Valve:
             self._settle()
             self._hand_over()
 
-        self._intake.turns.run(go_on)
+        self._intake.account.run(go_on)
 
-    def set_protocol(self, protocol: asyncio.Protocol) -> None:
-        """Hand everything to another protocol from now on."""
-        self._intake.protocol = protocol
+    def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
+        """Hand everything to another protocol from now on; there is one, that of WebSockets."""
+        self._intake.upgrade(cast("asyncio.Protocol", protocol))
 
     def get_protocol(self) -> asyncio.Protocol:
         """Return the protocol."""
@@ -236,4 +181,4 @@ class Valve:
 
     def _hand_over(self) -> None:
         if self._intake.waits and not self.held:
-            self._intake.turns.run(self._intake.hand_over)
+            self._intake.account.run(self._intake.hand_over)

@@ -23,6 +23,7 @@ from transientcam_server import logs
 from transientcam_server.daemon.acceptor import Acceptor
 from transientcam_server.daemon.announcement import announced
 from transientcam_server.daemon.connections import BoundedConnection
+from transientcam_server.daemon.memory import give_back_large_blocks
 from transientcam_server.daemon.streams import BoundedStream
 from transientcam_server.daemon.systemd import ServiceManager, supervised
 from transientcam_server.errors.exceptions import AddressUnavailable
@@ -165,7 +166,11 @@ class Server(uvicorn.Server):
             _loop=asyncio.get_running_loop(),
         )
         return Acceptor(
-            listener, protocol=protocol, limits=self._settings.limits, tls=self.config.ssl
+            listener,
+            protocol=protocol,
+            limits=self._settings.limits,
+            watched=lambda: self._service.watched,
+            tls=self.config.ssl,
         )
 
     @contextmanager
@@ -206,6 +211,7 @@ def serve(
     KeyboardInterrupt
         If the signal was SIGINT.
     """
+    give_back_large_blocks()
     server = Server(app, settings, on_listening=on_listening)
     server.run(sockets=[listener])
     if signal.SIGINT in server.signals:

@@ -19,6 +19,7 @@ from transientcam.wire.messages import frame_document
 from transientcam_driver import AppliedSequence
 from transientcam_server.imaging.encodings.encoding import MSGPACK, NPY, Encoding
 from transientcam_server.imaging.products import Product
+from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.imaging.view import View
 
 BAND_BYTES: Final = 1024 * 1024
@@ -110,6 +111,26 @@ def size_of(
     rows, columns = view.crop.shape(height, width)
     shape = product.shape(applied, rows, columns, times=len(view.time_s))
     return math.prod(shape) * np.dtype(product.description.dtype).itemsize
+
+
+def computed(
+    product: Product, recipe: Recipe, given: Any, view: View, *, height: int, width: int
+) -> NDArray[Any]:
+    """Return a product, in bands where it is large: computing takes several times its memory."""
+    applied = recipe.applied
+    size_bytes = size_of(product, view, applied=applied, height=height, width=width)
+    if size_bytes <= STREAMED_BYTES:
+        return product.compute(recipe, given, view)
+    rows, columns = view.crop.shape(height, width)
+    shape = product.shape(applied, rows, columns, times=len(view.time_s))
+    whole = np.empty(shape, product.description.dtype)
+    axis = product.description.axes.index("time")
+    count = max(1, BAND_BYTES * shape[axis] // size_bytes)
+    for first in range(0, shape[axis], count):
+        part = replace(view, time_s=view.time_s[first : first + count])
+        at = (slice(None),) * axis + (slice(first, first + count),)
+        whole[at] = product.compute(recipe, given, part)
+    return whole
 
 
 def _bands(product: Product, view: View, shape: tuple[int, ...], size_bytes: int) -> Iterator[Band]:

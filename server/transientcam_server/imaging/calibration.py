@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import CalibrationCapture, Sequence
+from transientcam_server.imaging.waveform import usable
 
 _Array = NDArray[Any]
 NOMINAL_ID = "nominal"
@@ -28,11 +29,15 @@ class Gains:
     bad : boolean array, shape (H, W)
         Pixels that are hot, stuck, noisy or dead, and show their neighbours' mean instead; None
         where none are known.
+    waveform : array, shape (m, K), complex128
+        Odd harmonics of the modulation that are taken out of the moments; None where none are
+        known.
     """
 
     id: str
     planes: _Array
     bad: _Array | None
+    waveform: _Array | None = None
 
     @property
     def bad_pixels(self) -> int:
@@ -72,7 +77,7 @@ def evaluate(capture: CalibrationCapture) -> Calibration:
     measured[0] = _brightness(measured, nominal)
     # a brightness stays in digital numbers, as with nominal gains
     gains = tm.calibration_of(measured) * np.complex64(nominal[0])
-    return Calibration(capture, Gains(capture.id, gains, bad))
+    return Calibration(capture, Gains(capture.id, gains, bad, usable(capture.waveform)))
 
 
 def calibration_id(gains: Gains | None) -> str:
@@ -80,15 +85,20 @@ def calibration_id(gains: Gains | None) -> str:
     return NOMINAL_ID if gains is None else gains.id
 
 
-def nominal_gains(sequence: Sequence) -> _Array:
-    """Return the gains (m + 1,) that sub-phases alone give an ideal modulation."""
+def nominal_gains(sequence: Sequence, *, delay_s: float = 0.0) -> _Array:
+    """Return the gains (m + 1,) that sub-phases and a delay give an ideal modulation.
+
+    ``delay_s`` is what the light takes inside of the camera: a phase of 2 pi j f delay_s. The
+    zeroth moment, a modulus or a difference, has none.
+    """
     gains: _Array = tm.nominal_calibration(
         sequence.harmonics,
         sequence.sub_phases.phases_rad,
         sequence.sub_phases.weights,
         zeroth=sequence.zeroth,
     )
-    return gains
+    turns = sequence.base_frequency_hz * delay_s * np.arange(sequence.harmonics + 1)
+    return gains * np.exp(2j * np.pi * turns) if delay_s else gains
 
 
 def _brightness(measured: _Array, nominal: _Array) -> _Array:

@@ -24,7 +24,7 @@ from transientcam.frame import FrameMeta
 from transientcam_driver import RawFrame, Truth
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.bands import STREAMED_BYTES, Banded
+from transientcam_server.imaging.bands import STREAMED_BYTES, Banded, computed
 from transientcam_server.imaging.encodings.encoding import Encoding
 from transientcam_server.imaging.meta import frame_meta
 from transientcam_server.imaging.products import PRODUCTS, Product
@@ -38,7 +38,7 @@ _Array = NDArray[Any]
 _Memory = OrderedDict[Hashable, "asyncio.Future[Any]"]
 MAX_ANSWER_BYTES = 512 * 1024 * 1024
 """A product over time with more than this is not computed."""
-MAX_WHOLE_BYTES = 32 * 1024 * 1024
+MAX_WHOLE_BYTES = 24 * 1024 * 1024
 """One that is not sent in bands may have no more than this."""
 _REMEMBERED_BYTES: Final = STREAMED_BYTES
 _REMEMBERED_TIME_AXES: Final = 2
@@ -255,7 +255,9 @@ class Frame:
         with self._failure_of(product.name):
             given = await self._input(product)
             run = self._workers.run_long if product.over_time else self._run
-            array, _ = await run(product.compute, self.recipe, given, view)
+            height, width = self.shape
+            compute = partial(computed, height=height, width=width)
+            array, _ = await run(compute, product, self.recipe, given, view)
         return array
 
     async def _encode(
@@ -406,7 +408,10 @@ def _made(
 ) -> tuple[_Array, bytes]:
     """Return a product, computed where ``array`` is None, and the bytes of what the view shows."""
     begin_s = time.perf_counter()
-    whole = product.compute(recipe, given, view) if array is None else array
+    height, width = raw.images.shape[-2:]
+    if array is None:
+        array = computed(product, recipe, given, view, height=height, width=width)
+    whole = array
     shown, extra = whole, framed.keywords["extra"]
     if encoding.archive:
         extra |= product.archive(recipe, raw, view)

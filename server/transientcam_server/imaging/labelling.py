@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_driver import ImageLabel
-from transientcam_driver import Sequence as CaptureSequence
+from transientcam_driver import AppliedSequence, ImageLabel
 from transientcam_server.imaging.calibration import Gains, nominal_gains
 
 KINDS: Final = ("off", "on", "modulated")
@@ -49,15 +48,17 @@ def image_columns(labels: Sequence[ImageLabel]) -> dict[str, Column]:
 
 
 def moment_columns(
-    sequence: CaptureSequence, labels: Sequence[ImageLabel], gains: Gains | None
+    applied: AppliedSequence, labels: Sequence[ImageLabel], gains: Gains | None
 ) -> dict[str, Column]:
     """Return how the images become moments: weights, gains, and how an exposure is divided.
 
     ``gain`` is nominal, (moment), where no ``gains`` were measured, else theirs, (moment, y, x),
-    and then ``bad`` (y, x) says which pixels to replace by the mean of their neighbours.
+    and then ``bad`` (y, x) says which pixels to replace by the mean of their neighbours, and
+    ``waveform`` (modulated, odd) which harmonics of the modulation are known.
     """
+    sequence = applied.sequence
     how = moment_labels(labels)
-    nominal = {"long_name": "nominal gain: what sub-phases give an ideal modulation"}
+    nominal = {"long_name": "nominal gain: what sub-phases and delay give an ideal modulation"}
     measured = {"long_name": "measured gain"}
     columns = {
         "moment": Column(("moment",), np.arange(sequence.harmonics + 1, dtype=np.int32)),
@@ -71,7 +72,7 @@ def moment_columns(
             how.modulus.astype(np.uint8),
             {"long_name": "1 where the modulus of the sum is the moment: b_0 at a low frequency"},
         ),
-        "gain": Column(("moment",), nominal_gains(sequence), nominal)
+        "gain": Column(("moment",), nominal_gains(sequence, delay_s=applied.delay_s), nominal)
         if gains is None
         else Column(_pixels(gains.planes), gains.planes, measured),
         "sub_phase_rad": Column(
@@ -88,7 +89,19 @@ def moment_columns(
     if gains is not None and gains.bad is not None:
         says = {"long_name": "1 where the mean of the neighbours stands for a pixel"}
         columns["bad"] = Column(("y", "x"), gains.bad.astype(np.uint8), says)
+    if gains is not None and gains.waveform is not None:
+        columns |= _waveform_columns(gains.waveform)
     return columns
+
+
+def _waveform_columns(waveform: NDArray[Any]) -> dict[str, Column]:
+    modulated, odd = (np.arange(1, size + 1, dtype=np.int32) for size in waveform.shape)
+    says = {"long_name": "harmonics of the modulation over its fundamental, at each moment from 1"}
+    return {
+        "modulated": Column(("modulated",), modulated),
+        "odd": Column(("odd",), 2 * odd + 1),
+        "waveform": Column(("modulated", "odd"), waveform, says),
+    }
 
 
 def moment_labels(labels: Sequence[ImageLabel]) -> tm.Labels:

@@ -38,6 +38,7 @@ def frame_meta(
         "filled_images": None
         if found is None
         else [raw.index_of(take, place) for take, place in found.filled_images],
+        "corrected_pixels": None if found is None else found.corrected_pixels,
         "pixels": computed.pixels,
         "predicted_range_std_m": computed.range_noise,
     }

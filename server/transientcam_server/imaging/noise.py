@@ -1,5 +1,6 @@
 """The noise of frames: of their moments and of their range, and what it does not explain."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
@@ -8,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_server.imaging.calibration import nominal_gains
 from transientcam_server.imaging.recipe import Recipe
 
 _Array = NDArray[Any]
@@ -18,6 +18,9 @@ MEDIAN_OF_NORMAL: Final = 0.674490
 """Median of the absolute value of a standard normal variable."""
 EXPLAINED_DEVIATIONS: Final = 4.0
 """Standard deviations of a negative eigenvalue that noise explains."""
+_UNLIT: Final = np.uint8(tm.Flags.NO_SIGNAL | tm.Flags.NON_FINITE | tm.Flags.SATURATED)
+_FEW: Final = 1 / 16
+"""Share of the pixels up to which their neighbourhoods are quicker to average one by one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +32,8 @@ class RangeNoise:
     median_m, p90_m
         Half of the pixels, and 90 % of them, are better.
     first_order_share
-        Share of the pixels where first order holds; that of the others is by the order of
-        magnitude.
+        Share of the pixels where first order holds, which with the likelihood is where its returns
+        explain the moments; that of the others is by the order of magnitude.
     """
 
     median_m: float
@@ -56,15 +59,30 @@ def moment_noise(recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoi
 
 
 def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
-    """Predict the deviation of a frame's range from its own returns, by a sample of pixels.
+    """Predict the deviation of a frame's range from its own returns.
 
-    None where no pixel has a range. With another estimator than Pisarenko's it is that of
-    Pisarenko's nevertheless, which is cheap enough for every frame.
+    None where no pixel has a range. That of the likelihood is its own, of all pixels; of another
+    estimator it is that of Pisarenko's returns in a sample of pixels, which is cheap enough for
+    every frame.
     """
-    seen = np.flatnonzero(np.asarray(found.has_range).ravel())
-    if not seen.size:
+    if not np.asarray(found.has_range).any():
         return None
-    sample = seen[:: max(1, seen.size // SAMPLED_PIXELS)]
+    if recipe.settings.estimator == "likelihood":
+        std_m = np.asarray(found.range_std_m)
+        first_order = np.asarray(found.likelihood.explained())[np.asarray(found.has_range)]
+    else:
+        std_m, first_order = _of_pisarenko(recipe, found)
+    known = std_m[np.isfinite(std_m)]
+    if not known.size:
+        return None
+    return RangeNoise(
+        float(np.median(known)), float(np.quantile(known, 0.9)), float(first_order.mean())
+    )
+
+
+def _of_pisarenko(recipe: Recipe, found: tm.Reconstruction) -> tuple[_Array, _Array]:
+    """Return the deviation of the range in m in a sample of pixels, and where first order holds."""
+    sample = _sample(np.asarray(found.has_range).ravel())
 
     def sampled(planes: _Array) -> _Array:
         return np.asarray(planes).reshape((planes.shape[0], -1))[:, sample]
@@ -83,14 +101,14 @@ def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
     )
     deviation = tm.noise.return_noise(returns, noise, threshold=recipe.settings.return_threshold)
     std_m = tm.range_m(deviation.direct_phase_std_rad, recipe.base_frequency_hz)
-    known = np.isfinite(std_m)
-    if not known.any():
-        return None
-    return RangeNoise(
-        float(np.median(std_m[known])),
-        float(np.quantile(std_m[known], 0.9)),
-        float(deviation.holds.mean()),
-    )
+    return np.asarray(std_m), np.asarray(deviation.holds)
+
+
+def _sample(seen: _Array) -> _Array:
+    """Return the places of about `SAMPLED_PIXELS` of the pixels that are seen, evenly."""
+    count = int(np.count_nonzero(seen))
+    step = max(1, count // SAMPLED_PIXELS)
+    return np.arange(0, count, step) if count == seen.size else np.flatnonzero(seen)[::step]
 
 
 def _of_pixels(recipe: Recipe, brightness: _Array) -> tm.noise.MomentNoise:
@@ -100,7 +118,7 @@ def _of_pixels(recipe: Recipe, brightness: _Array) -> tm.noise.MomentNoise:
     return tm.noise.moment_noise(
         brightness,
         recipe.sensor,
-        calibration=nominal_gains(sequence),
+        calibration=recipe.nominal_gains,
         zeroth=sequence.zeroth,
         takes=sequence.takes,
     )
@@ -126,12 +144,14 @@ def contradictions(recipe: Recipe, found: tm.Reconstruction) -> _Array | None:
         """Return the variance of all moments together, which grows linearly with the light."""
         return tm.noise.MomentNoise((dark + (lit - dark) * light)[None])
 
-    brightness = np.asarray(found.smoothed[0].real)
-    noise = tm.noise.smoothed_of(of_all, brightness, recipe.settings.smoothing_px)
-    return beyond_noise(found, noise)
+    return beyond_noise(found, of_all, recipe.settings.smoothing_px)
 
 
-def beyond_noise(found: tm.Reconstruction, noise: tm.noise.MomentNoise) -> _Array:
+def beyond_noise(
+    found: tm.Reconstruction,
+    noise_of: Callable[[_Array], tm.noise.MomentNoise],
+    smoothing_px: float,
+) -> _Array:
     """Return which lit pixels have moments that noise alone does not explain.
 
     Moments of light have a Toeplitz matrix without negative eigenvalues (Proposition 1); here the
@@ -141,18 +161,35 @@ def beyond_noise(found: tm.Reconstruction, noise: tm.noise.MomentNoise) -> _Arra
     ----------
     found
         The frame, (m + 1, H, W).
-    noise
-        Of its smoothed moments, one by one (m + 1, H, W) or all together (1, H, W).
+    noise_of
+        Returns the noise of moments with a brightness above 0 before smoothing, to which its
+        variance is affine: of each moment (m + 1, ...), or of all together (1, ...).
+    smoothing_px
+        What the frame was smoothed with.
 
     Returns
     -------
     boolean array, shape (H, W)
     """
-    eigenvalue = np.asarray(found.validity) * np.asarray(found.smoothed[0].real)
-    # noise moves no eigenvalue by more than the norm of its own Toeplitz matrix
-    std = np.sqrt(np.asarray(noise.variance).sum(axis=0))
-    with np.errstate(invalid="ignore"):  # of pixels that are not finite
-        return np.asarray((eigenvalue < -EXPLAINED_DEVIATIONS * std) & _lit(found))
+    brightness = np.asarray(found.smoothed[0].real)
+    eigenvalue = np.asarray(found.validity) * brightness
+    # noise moves no eigenvalue by more than the norm of its own Toeplitz matrix, and a pixel's own
+    # share of it settles most pixels without a look at their neighbours
+    variance = noise_of(np.maximum(brightness, 0)).variance.sum(axis=0)
+    limit = EXPLAINED_DEVIATIONS**2 * tm.noise.own_share(smoothing_px)
+    beyond = _lit(found)
+    beyond &= eigenvalue * np.abs(eigenvalue) < -limit * variance
+    doubtful = np.flatnonzero(beyond)
+    if not doubtful.size:
+        return beyond
+    if doubtful.size > _FEW * beyond.size:
+        noise = tm.noise.smoothed_of(noise_of, brightness, smoothing_px).variance
+        noise = noise.reshape((len(noise), -1))[:, doubtful]
+    else:
+        noise = tm.noise.smoothed_at(noise_of, brightness, doubtful, smoothing_px).variance
+    std = np.sqrt(noise.sum(axis=0))
+    beyond.flat[doubtful] = eigenvalue.flat[doubtful] < -EXPLAINED_DEVIATIONS * std
+    return beyond
 
 
 def contradictory_share(recipe: Recipe, found: tm.Reconstruction) -> float | None:
@@ -164,5 +201,4 @@ def contradictory_share(recipe: Recipe, found: tm.Reconstruction) -> float | Non
 
 
 def _lit(found: tm.Reconstruction) -> _Array:
-    unlit = tm.Flags.NO_SIGNAL | tm.Flags.NON_FINITE | tm.Flags.SATURATED
-    return np.asarray(np.asarray(found.flags) & unlit == 0)
+    return np.asarray(np.asarray(found.flags) & _UNLIT == 0)

@@ -47,9 +47,8 @@ class Pipeline:
     ----------
     workers
         What computes for its frames.
-    products
-        Products that this camera's frames have; only a simulated camera has
-        a ground truth, and noise is predicted for a sensor that is known.
+    products, absent
+        Products that this camera's frames have, and of the others why they do not.
     reconstruction
         How frames are computed from the next one on.
     calibration
@@ -77,14 +76,19 @@ class Pipeline:
         self._frames = 0
         self._last: RawFrame | None = None
         self._recipe: Recipe | None = None
+        lacking = {name: self._lacks(product) for name, product in PRODUCTS.items()}
+        self.absent = {name: reason for name, reason in lacking.items() if reason is not None}
         self.products: dict[str, Product] = {
-            name: product for name, product in PRODUCTS.items() if self._has(product)
+            name: product for name, product in PRODUCTS.items() if name not in self.absent
         }
 
-    def _has(self, product: Product) -> bool:
-        if product.needs == "truth":
-            return self._truth is not None
-        return self._sensor is not None or not product.of_noise
+    def _lacks(self, product: Product) -> str | None:
+        """Return why frames of this camera do not have a product; None where they do."""
+        if product.needs == "truth" and self._truth is None:
+            return "only a simulated camera knows the true range"
+        if product.of_noise and self._sensor is None:
+            return "the noise of this camera's sensor is not known"
+        return None
 
     def frame(self, raw: RawFrame, applied: AppliedSequence) -> Frame:
         """Return the next frame, counted from 1."""
@@ -149,9 +153,10 @@ class Pipeline:
             return self.products[name]
         except KeyError:
             known = sorted(self.products)
+            why = f": {self.absent[name]}" if name in self.absent else ""
             raise Problem(
                 kinds.UNKNOWN_PRODUCT,
-                f"There is no product {name[:64]!r}; there are {', '.join(known)}.",
+                f"There is no product {name[:64]!r}{why}; there are {', '.join(known)}.",
                 field="product",
                 value=name[:64],
                 known=known,

@@ -218,7 +218,7 @@ def _labels(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
 def _evaluation(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
     """Return what the images show and how they become moments, and the settings of the service."""
     columns = image_columns(raw.labels)
-    columns |= moment_columns(recipe.applied.sequence, raw.labels, recipe.gains)
+    columns |= moment_columns(recipe.applied, raw.labels, recipe.gains)
     arrays = {
         name: view.crop.apply(in_words(column), column.axes) for name, column in columns.items()
     }

@@ -94,6 +94,12 @@ class Recipe:
     sensor: tm.noise.Sensor | None = None
 
     @property
+    def waveform(self) -> NDArray[Any] | None:
+        """Harmonics of the modulation (m, K) that are taken out of the moments, if any."""
+        known = None if self.gains is None else self.gains.waveform
+        return known if self.settings.modulation_harmonics == "take-out" else None
+
+    @property
     def fills(self) -> bool:
         """Whether the frame before is needed."""
         return self.settings.spoilt_images == "fill"
@@ -108,6 +114,11 @@ class Recipe:
     def base_frequency_hz(self) -> float:
         """The frequency whose period is the unambiguous time of flight."""
         return self.applied.sequence.base_frequency_hz
+
+    @cached_property
+    def nominal_gains(self) -> NDArray[np.complex128]:
+        """The gains (m + 1,) that sub-phases and the camera's delay alone give."""
+        return nominal_gains(self.applied.sequence, delay_s=self.applied.delay_s)
 
     def reconstruct(self, raw: RawFrame, previous: RawFrame | None = None) -> tm.Reconstruction:
         """Return the reconstruction of a capture; it computes what is read of it.
@@ -130,8 +141,9 @@ class Recipe:
         )
         return tm.Reconstructor(
             settings,
-            calibration=nominal_gains(sequence) if gains is None else gains.planes,
+            calibration=self.nominal_gains if gains is None else gains.planes,
             bad_pixels=None if gains is None else gains.bad,
+            waveform=self.waveform,
         )
 
 

@@ -22,6 +22,7 @@ STAGES: Final[dict[str, tuple[str, ...]]] = {
     "likelihood": ("likelihood",),
 }
 """Properties of `tm.Reconstruction` that each stage computes, in the order they build on."""
+_BITS: Final = {str(flag.name).lower(): np.uint8(flag) for flag in tm.Flags if flag}
 FIRST: Final = "light"
 """The stage that all others build on."""
 
@@ -82,7 +83,7 @@ def compute(
 
 def _flag_contradictions(recipe: Recipe, found: tm.Reconstruction) -> None:
     contradictory = contradictions(recipe, found)
-    if contradictory is not None:
+    if contradictory is not None and contradictory.any():
         found.add_flag(tm.Flags.CONTRADICTORY, contradictory)
 
 
@@ -94,13 +95,9 @@ def _read(found: tm.Reconstruction, stage: str) -> None:
 
 def pixel_counts(found: tm.Reconstruction) -> dict[str, int]:
     """Return how many pixels carry each flag."""
-    per_value = np.bincount(np.asarray(found.flags).ravel(), minlength=256)
-    values = np.arange(len(per_value))
-    counts = {"total": int(per_value.sum()), "valid": int(per_value[0])}
-    for flag in tm.Flags:
-        if flag:
-            counts[str(flag.name).lower()] = int(per_value[values & flag.value != 0].sum())
-    return counts
+    flags = np.asarray(found.flags)
+    counts = {"total": flags.size, "valid": flags.size - int(np.count_nonzero(flags))}
+    return counts | {name: int(np.count_nonzero(flags & bit)) for name, bit in _BITS.items()}
 
 
 def _range_noise(recipe: Recipe, found: tm.Reconstruction, number: int) -> dict[str, float] | None:

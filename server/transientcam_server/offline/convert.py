@@ -78,7 +78,7 @@ def columns_of(recording: Recording) -> dict[str, Column]:
     for name, size in zip(_AXES[1:], recording.shape[1:], strict=True):
         columns[name] = Column((name,), np.arange(size, dtype=np.int32))
     columns |= image_columns(labels)
-    return columns | moment_columns(header.applied.sequence, labels, header.gains)
+    return columns | moment_columns(header.applied, labels, header.gains)
 
 
 def attributes_of(recording: Recording) -> dict[str, str]:

@@ -81,7 +81,9 @@ class OpenedRecording(Sequence[ComputedFrame]):
         self.sequence: dict[str, Any] = header.applied.to_document()
         self.settings: dict[str, Any] = chosen.model_dump()
         self.gains: NDArray[Any] = (
-            nominal_gains(header.applied.sequence) if header.gains is None else header.gains.planes
+            nominal_gains(header.applied.sequence, delay_s=header.applied.delay_s)
+            if header.gains is None
+            else header.gains.planes
         )
         columns = image_columns(recording.labels)
         self.labels: dict[str, NDArray[Any]] = {

@@ -157,13 +157,17 @@ def _members(
     takes = (goal.base.takes,) if "takes" in goal.fixed else TAKES
     images = sequence.images_per_take
     most_takes = min(capabilities.max_takes, capabilities.max_images // images)
+    settling_s = {
+        each: capabilities.settle_s * replace(sequence, takes=each).frequency_changes
+        for each in takes
+    }
     members = []
     for (exposure_s, zeroth), scale in scales.items():
         if zeroth != sequence.zeroth:
             continue
         image_s = exposure_s + capabilities.streaming_readout_s
         members += [
-            Member(exposure_s, each, each * images * image_s, scale / each**0.5)
+            Member(exposure_s, each, each * images * image_s + settling_s[each], scale / each**0.5)
             for each in takes
             if each <= most_takes
         ]

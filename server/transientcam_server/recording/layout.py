@@ -19,6 +19,7 @@ from pydantic import TypeAdapter, ValidationError
 from transientcam_driver import AppliedSequence, Capabilities, ImageLabel, RawFrame, Sequence
 from transientcam_server.imaging.calibration import Gains
 from transientcam_server.imaging.labelling import Column, image_columns, moment_columns
+from transientcam_server.imaging.waveform import usable
 from transientcam_server.recording import swmr
 from transientcam_server.recording.storage import MAX_CHUNK_BYTES, Storage
 
@@ -77,6 +78,8 @@ class Header:
         complex (m+1,) or (m+1, H, W): what moments are divided by; None for the nominal gains.
     calibration_bad
         bool (H, W): pixels that show their neighbours' mean instead.
+    calibration_waveform
+        complex (m, K): harmonics of the modulation, see `Gains`.
     reconstruction
         Settings at the time of recording.
     versions
@@ -92,6 +95,7 @@ class Header:
     calibration: Mapping[str, Any] = field(default_factory=lambda: {"id": "nominal"})
     calibration_planes: NDArray[np.complexfloating[Any, Any]] | None = None
     calibration_bad: NDArray[np.bool_] | None = None
+    calibration_waveform: NDArray[np.complexfloating[Any, Any]] | None = None
     reconstruction: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(
         default_factory=lambda: {name: version(name) for name in ("transientcam", "h5py", "numpy")}
@@ -103,7 +107,7 @@ class Header:
         if self.calibration_planes is None:
             return None
         name = str(self.calibration.get("id", "recorded"))
-        return Gains(name, self.calibration_planes, self.calibration_bad)
+        return Gains(name, self.calibration_planes, self.calibration_bad, self.calibration_waveform)
 
 
 def utc(unix_s: float) -> datetime:
@@ -150,7 +154,7 @@ def _create(file: swmr.File, header: Header, annotations: Mapping[str, Any]) -> 
     for name in _AXES:
         file[name].make_scale(name)
     _create_columns(file, image_columns(labels))
-    _create_columns(file, moment_columns(header.applied.sequence, labels, header.gains))
+    _create_columns(file, moment_columns(header.applied, labels, header.gains))
     if header.calibration_planes is not None:
         # names that readers of the first version of this format look for, of the same datasets
         file["calibration_planes"] = file["gain"]
@@ -239,6 +243,7 @@ def read_header(storage: Storage, *, with_images: bool = True) -> Header:
         calibration=parsed(storage.attribute("calibration")),
         calibration_planes=planes,
         calibration_bad=bad,
+        calibration_waveform=_waveform(storage, applied.sequence.harmonics),
         reconstruction=parsed(storage.attribute("reconstruction")),
         versions={name: str(value) for name, value in versions.items()},
     )
@@ -273,6 +278,17 @@ def _calibration(
         if bad.shape != shape[1:]:
             raise ValueError(f"its bad pixels have shape {bad.shape}")
     return planes, bad
+
+
+def _waveform(storage: Storage, harmonics: int) -> NDArray[Any] | None:
+    """Return the harmonics of the modulation (m, K), where it has any."""
+    if "waveform" not in storage:
+        return None
+    found = storage.values("waveform")
+    known = usable(found) if found.ndim == 2 and len(found) == harmonics else None
+    if known is None:
+        raise ValueError(f"its waveform is {found.dtype} of shape {found.shape}, or too strong")
+    return known
 
 
 def read_labels(storage: Storage, applied: AppliedSequence) -> tuple[ImageLabel, ...]:

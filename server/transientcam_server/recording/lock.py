@@ -1,7 +1,7 @@
 """The lock on a recording that is being written.
 
 Its writer holds a shared flock of the unfinished file, which the kernel releases with the writer,
-however that ends. Whoever recovers or deletes such a file asks for the exclusive one. The
+however that ends. What recovers or deletes such a file asks for the exclusive one. The
 writer's is shared because other programs' HDF5 takes a shared one to read. Linux passes flock on
 to an NFS server, so that it holds between machines too, unless the directory is mounted with
 ``nolock`` or ``local_lock``. Where the file system has no locks, only one service may use it.

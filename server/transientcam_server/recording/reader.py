@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from transientcam_driver import RawFrame
 from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
 from transientcam_server.recording import layout, swmr
+from transientcam_server.recording.heaps import require_sound_heaps
 from transientcam_server.recording.storage import Storage, read_rows
 
 
@@ -51,6 +52,8 @@ class Recording:
             self._close_source()
             raise
         try:
+            with contextlib.nullcontext(source) if source else path.open("rb") as stream:
+                require_sound_heaps(stream)
             # the writer of an unfinished one may still run: only SWMR readers may open it
             unfinished = source is None and path.name.endswith(".part")
             self._file = (

@@ -19,6 +19,7 @@ from transientcam_server.recording.writer import RecordingWriter
 _log = logging.getLogger(__name__)
 CHECK_S: Final = 0.2
 """Interval at which limits are checked while no frame comes."""
+_REMOVED: Final = "its file was removed while it was written"
 _CHECK_DISK_S: Final = 1.0
 
 Reason = Literal[
@@ -272,7 +273,7 @@ class Recorder:
         if now_s - self._checked_s >= _CHECK_DISK_S:
             self._checked_s = now_s
             if not self._writer.is_there:
-                raise FileNotFoundError(2, "its file was removed while it was written")
+                raise FileNotFoundError
             self._writer.synchronise(now_s)
             self._report_dropped()
             if self._free_bytes() < self.limits.free_bytes:
@@ -295,8 +296,10 @@ class Recorder:
     def _fail(self, error: Exception) -> None:
         # the first failure is the cause; one while closing follows from it
         if self._problem is None:
-            _log.error("recording %s failed: %s", self.header.recording_id, error)
-            self._problem = in_words(error)
+            # whatever is looked for first, file or directory, was there when it began
+            gone = isinstance(error, FileNotFoundError)
+            self._problem = _REMOVED if gone else in_words(error)
+            _log.error("recording %s failed: %s", self.header.recording_id, self._problem)
         with self._changed:
             self._reason = "failed"
             self._past.clear()

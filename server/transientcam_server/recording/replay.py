@@ -5,12 +5,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
-from urllib.parse import parse_qsl
 
 from transientcam_driver import (
     AppliedSequence,
+    Camera,
     CameraClosed,
     CameraLost,
+    CameraName,
+    CameraPlugin,
     CameraState,
     Capabilities,
     Counters,
@@ -27,11 +29,9 @@ from transientcam_driver.protocol import DeviceState
 from transientcam_driver.protocol.status import StatusFlag
 from transientcam_server.recording.reader import Recording
 
-PREFIX: Final = "recording:"
 LOOP_BYTES: Final = 256 * 1024**2
 """A looped recording of at most so many bytes of images is read once and kept in memory."""
 _FAST: Final = float("inf")
-_OPTIONS: Final = ("speed", "loop")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,35 +43,29 @@ class ReplaySpec:
     loop: bool = False
 
 
-def parse_replay(spec: str) -> ReplaySpec:
-    """Parse ``recording:PATH[?speed=original|fast|2.0&loop=on|off]``.
+def parse_replay(name: CameraName) -> ReplaySpec:
+    """Read ``recording:PATH[?speed=original|fast|2.0&loop=on|off]``.
 
     Raises
     ------
     SpecError
-        Naming what cannot be parsed.
+        Naming what cannot be read.
     """
-    path, _, query = spec.removeprefix(PREFIX).partition("?")
-    if not path:
-        raise SpecError(spec, "it names no recording")
-    options = dict(parse_qsl(query, keep_blank_values=True))
-    for name in options:
-        if name not in _OPTIONS:
-            raise SpecError(spec, f"unknown option {name!r}; known are {', '.join(_OPTIONS)}")
-    loop = options.get("loop", "off")
-    if loop not in ("on", "off"):
-        raise SpecError(spec, f"loop = {loop!r}: must be one of on, off")
-    return ReplaySpec(Path(path), _speed(spec, options.get("speed", "original")), loop == "on")
+    if not name.address:
+        raise SpecError(name.spec, "it names no recording")
+    loop = name.choice("loop", ("off", "on")) == "on"
+    return ReplaySpec(Path(name.address), _speed(name), loop)
 
 
-def _speed(spec: str, text: str) -> float:
+def _speed(name: CameraName) -> float:
+    text = name.options.get("speed", "original")
     named = {"original": 1.0, "fast": _FAST}
     try:
         speed = named[text] if text in named else float(text)
     except ValueError:
         speed = 0.0
     if not speed > 0.0:  # also NaN
-        raise SpecError(spec, f"speed = {text!r}: must be original, fast or a factor above 0")
+        raise name.refused("speed", "original, fast or a factor above 0")
     return speed
 
 
@@ -321,3 +315,21 @@ class ReplayCamera:
 
     def _over(self) -> CameraLost:
         return CameraLost(f"the recording is over after {self._recording.frames} frames")
+
+
+def _open(name: CameraName, clock: Clock) -> Camera:
+    replay = parse_replay(name)
+    return ReplayCamera(replay.path, speed=replay.speed, loop=replay.loop, clock=clock)
+
+
+def _check(name: CameraName) -> None:
+    Recording(parse_replay(name).path).close()
+
+
+PLUGIN: Final = CameraPlugin(
+    summary="a recording, every frame again, bit for bit (docs/recordings.md)",
+    usage="recording:FILE",
+    open=_open,
+    check=_check,
+    options={"speed": "original, fast or a factor", "loop": "on: begin anew after the last frame"},
+)

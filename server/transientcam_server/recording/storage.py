@@ -62,11 +62,12 @@ class Storage:
         """Return a dataset with so many axes and, in either byte order, a type."""
         if name not in self:
             raise ValueError(f"it has no {name}")
-        if not isinstance(self._file.get(name, getlink=True), h5py.HardLink):
+        if self._file.id.links.get_info(name.encode()).type != h5py.h5l.TYPE_HARD:
             raise ValueError(f"{name} is a link to elsewhere")
-        dataset = self._file[name]
-        if not isinstance(dataset, h5py.Dataset):
+        opened = h5py.h5o.open(self._file.id, name.encode())
+        if not isinstance(opened, h5py.h5d.DatasetID):
             raise ValueError(f"{name} is no dataset")
+        dataset = h5py.Dataset(opened)
         _require_inside(dataset, name)
         if axes is not None and dataset.ndim != axes:
             raise ValueError(f"{name} has {dataset.ndim} axes, not {axes}")
@@ -143,7 +144,7 @@ def _require_inside(dataset: swmr.Dataset, name: str) -> None:
     properties = dataset.id.get_create_plist()
     if properties.get_layout() == h5py.h5d.VIRTUAL or properties.get_external_count():
         raise ValueError(f"{name} is stored in other files")
-    if _filters(dataset) not in _PIPELINES:
+    if _filters_of(properties) not in _PIPELINES:
         raise ValueError(f"{name} is packed with filters other than shuffle and deflate")
     if (
         dataset.chunks
@@ -153,5 +154,8 @@ def _require_inside(dataset: swmr.Dataset, name: str) -> None:
 
 
 def _filters(dataset: swmr.Dataset) -> tuple[int, ...]:
-    properties = dataset.id.get_create_plist()
+    return _filters_of(dataset.id.get_create_plist())
+
+
+def _filters_of(properties: Any) -> tuple[int, ...]:
     return tuple(properties.get_filter(index)[0] for index in range(properties.get_nfilters()))

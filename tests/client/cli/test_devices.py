@@ -10,24 +10,30 @@ import pytest
 from transientcam.cli import devices, run
 from transientcam.discovery import FoundCamera
 from transientcam.errors import ServerUnreachable
-from transientcam_driver import LibusbMissing
-from transientcam_driver.cli import scenes
-from transientcam_driver.usb import UsbCamera
+from transientcam_driver import CameraUnreachable, LibusbMissing
+from transientcam_driver.entries import tofcam660, usb
+from transientcam_driver.plugin import FoundCamera as Camera
+from transientcam_driver.tofcam660.wire import Answer, AnswerType
 
-FREE = UsbCamera("/dev/bus/usb/001/004", "A-17", "AMCW lidar")
-FORBIDDEN = UsbCamera("/dev/bus/usb/001/005", problem="no permission to open it")
+FREE = Camera("usb:A-17", "A-17", "AMCW lidar", "/dev/bus/usb/001/004")
+FORBIDDEN = Camera("usb", node="/dev/bus/usb/001/005", problem="no permission to open it")
 ANNOUNCED = FoundCamera("lidar B-3", "http://192.168.7.5:8000", "B-3", "1.2", "v1", tls=False)
 
 
 @pytest.fixture(autouse=True)
 def nothing_there(monkeypatch: pytest.MonkeyPatch) -> None:
     """Start from empty buses and silent networks."""
-    monkeypatch.setattr(scenes, "list_cameras", lambda: ())
+    monkeypatch.setattr(usb, "list_cameras", lambda: ())
     monkeypatch.setattr(devices, "discover", lambda **_: ())
 
+    def nobody(address: str, *_: object, **__: object) -> None:
+        raise CameraUnreachable(address)
 
-def plug(monkeypatch: pytest.MonkeyPatch, *cameras: UsbCamera) -> None:
-    monkeypatch.setattr(scenes, "list_cameras", lambda: cameras)
+    monkeypatch.setattr(tofcam660, "ControlConnection", nobody)
+
+
+def plug(monkeypatch: pytest.MonkeyPatch, *cameras: Camera) -> None:
+    monkeypatch.setattr(usb, "list_cameras", lambda: cameras)
 
 
 def failing(error: Exception) -> Callable[..., Any]:
@@ -81,7 +87,8 @@ def test_cameras_are_printed_as_json(
             "tls": False,
         }
     ]
-    assert (document["problem"], document["network_problem"]) == (None, None)
+    assert (document["problems"], document["network_problem"]) == ({}, None)
+    assert document["cameras"][0]["kind"] == "usb"
     assert "sim:mirrors" in document["simulated"]
 
 
@@ -90,7 +97,7 @@ def test_an_empty_bus_and_a_silent_network_are_no_failure(
 ) -> None:
     words = printed_by(capsys)
 
-    assert "No camera is plugged in." in words
+    assert "No camera was found." in words
     assert "No camera announces itself on the network." in words
 
 
@@ -109,7 +116,7 @@ def test_the_network_is_asked_as_told_or_not_at_all(
     words = printed_by(capsys, "--no-network")
 
     assert asked == [{"timeout_s": 0.5, "interfaces": ["127.0.0.1"]}]
-    assert "network" not in words
+    assert "announces itself on the network" not in words
 
 
 def test_a_missing_libusb_is_told_beside_the_others(
@@ -118,12 +125,12 @@ def test_a_missing_libusb_is_told_beside_the_others(
     def missing() -> None:
         raise LibusbMissing
 
-    monkeypatch.setattr(scenes, "list_cameras", missing)
+    monkeypatch.setattr(usb, "list_cameras", missing)
     monkeypatch.setattr(devices, "discover", lambda **_: (ANNOUNCED,))
 
     assert "libusb-1.0 was not found" in printed_by(capsys)
     document = listed(capsys)
-    assert "apt install" in document["problem"]
+    assert "apt install" in document["problems"]["usb"]
     assert len(document["network"]) == 1
 
 
@@ -149,16 +156,62 @@ def test_a_network_that_cannot_be_asked_is_told_beside_usb(
     assert "usb:A-17" in printed
 
 
+def test_each_kind_says_how_its_names_are_written(capsys: pytest.CaptureFixture[str]) -> None:
+    kinds = {kind["name"]: kind for kind in listed(capsys)["kinds"]}
+
+    assert kinds.keys() >= {"usb", "sim", "recording"}
+    assert kinds["usb"]["usage"] == "usb[:SERIAL]"
+    assert "noise" in kinds["sim"]["options"]
+    assert "usb[:SERIAL] a camera on USB" in printed_by(capsys)
+
+
 @pytest.mark.parametrize(
-    "points", [[], [EntryPoint("usb", "package_that_is_not_there:plugged_in", devices.GROUP)]]
+    ("value", "problem"),
+    [
+        ("transientcam_driver.not_there:PLUGIN", "pip install 'transientcam[driver]'"),
+        ("math:pi", "AttributeError"),
+    ],
 )
-def test_without_the_driver_the_network_is_asked_all_the_same(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], points: list[EntryPoint]
+def test_a_plug_in_that_fails_hides_no_other(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    value: str,
+    problem: str,
 ) -> None:
+    points = [
+        EntryPoint("odd", value, devices.GROUP),
+        EntryPoint("usb", "transientcam_driver.entries.usb:PLUGIN", devices.GROUP),
+    ]
     monkeypatch.setattr(devices, "entry_points", lambda **_: points)
+    plug(monkeypatch, FREE)
     monkeypatch.setattr(devices, "discover", lambda **_: (ANNOUNCED,))
 
     document = listed(capsys)
 
-    assert "transientcam[driver]" in document["problem"]
+    assert problem in document["problems"]["odd"]
+    assert [camera["spec"] for camera in document["cameras"]] == ["usb:A-17"]
     assert len(document["network"]) == 1
+
+
+class _Answering:
+    """The connection to a TOFcam660 that has its factory's address."""
+
+    def __init__(self, address: str, *_: object, **__: object) -> None:
+        self.address = address
+
+    def exchange(self, command: int) -> Answer:
+        return Answer(AnswerType.CHIP, bytes([0, 7, 0x10, 0x92]))
+
+    def close(self) -> None:
+        pass
+
+
+def test_a_tofcam660_is_looked_for_at_its_factorys_address_on_the_network_only(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(tofcam660, "ControlConnection", _Answering)
+
+    (camera,) = listed(capsys)["cameras"]
+
+    assert (camera["spec"], camera["serial"]) == ("tofcam660:10.10.31.180", "7-4242")
+    assert listed(capsys, "--no-network")["cameras"] == []

@@ -237,7 +237,7 @@ def document(path: Path, **changes: Any) -> str:
         (lambda _: {"dark_deviation": None}, "dark_deviation"),
         (lambda _: {"document": None}, "document"),
         (lambda _: {"document": "{"}, "document"),
-        (lambda path: {"document": document(path, format=2)}, "format"),
+        (lambda path: {"document": document(path, format=3)}, "format"),
         (lambda path: {"document": document(path, sequence={"harmonics": 99})}, "document"),
         (lambda path: {"document": document(path, temperature_c="warm")}, "document"),
         (lambda _: {"document": '{"format": 1}'}, "document"),

@@ -1,5 +1,6 @@
 """Large answers: computed while they are read, and counted until they are."""
 
+import io
 import socket
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -13,6 +14,7 @@ from tests.serving import Served, serving
 from transientcam import wire
 from transientcam_server.api.middleware.answers import AnswerBudget
 from transientcam_server.errors import Problem
+from transientcam_server.imaging.frame import Frame
 from transientcam_server.settings import LimitSettings
 
 LATEST = "/api/v1/frames/latest"
@@ -68,6 +70,15 @@ def test_a_large_answer_in_a_format_that_is_made_whole_is_refused(stopped: Serve
     assert (problem["type"], problem["field"]) == ("/problems/answer-too-large", "time_s")
 
 
+def wait_for_room(daemon: Served) -> None:
+    """Wait until answers that nobody reads any more are not counted any more."""
+    with httpx.Client(base_url=daemon.url, timeout=60.0) as client:
+        statuses = iter(
+            lambda: client.get(f"{LATEST}/transient", params={"bins": 61}).status_code, 200
+        )
+        assert set(statuses) <= {503}
+
+
 def test_readers_who_read_nothing_leave_no_room_until_they_are_gone(stopped: Served) -> None:
     address = urlsplit(stopped.url)
     assert address.port is not None
@@ -81,14 +92,52 @@ def test_readers_who_read_nothing_leave_no_room_until_they_are_gone(stopped: Ser
             assert slow.recv(12) == b"HTTP/1.1 200"  # so it is counted
             refused = client.get(f"{LATEST}/transient", params={"bins": 400})
             small = client.get(f"{LATEST}/flags")
-        statuses = iter(
-            lambda: client.get(f"{LATEST}/transient", params={"bins": 61}).status_code, 200
-        )
-        assert set(statuses) <= {503}
+        wait_for_room(stopped)
 
     assert (refused.status_code, refused.json()["type"]) == (503, "/problems/too-many-answers")
     assert refused.headers["Retry-After"] == "1"
     assert small.status_code == 200
+
+
+def test_a_large_file_for_which_there_is_no_room_is_refused_before_it_is_computed(
+    stopped: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    address = urlsplit(stopped.url)
+    assert address.port is not None
+    request = f"GET {LATEST}/transient?bins=401 HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()
+    computed = []
+    with socket.socket() as slow, httpx.Client(base_url=stopped.url, timeout=60.0) as client:
+        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        slow.connect(("127.0.0.1", address.port))
+        slow.sendall(request)
+        assert slow.recv(12) == b"HTTP/1.1 200"  # so it is counted
+
+        async def encoded(frame: Frame, *arguments: object) -> bytes:
+            computed.append(arguments)
+            return b""
+
+        monkeypatch.setattr(Frame, "encoded", encoded)
+        refused = client.get(f"{LATEST}/transient.npz", params={"bins": 300})
+        small = client.get(f"{LATEST}/flags")
+    wait_for_room(stopped)
+
+    assert (refused.status_code, refused.json()["type"]) == (503, "/problems/too-many-answers")
+    assert refused.headers["Retry-After"] == "1"
+    assert small.status_code == 200
+    assert len(computed) == 1  # the small one
+
+
+def test_what_is_computed_in_bands_is_what_is_computed_at_once(stopped: Served) -> None:
+    bins = {"bins": 300}  # more than 4 MiB
+    with httpx.Client(base_url=stopped.url, timeout=60.0) as client:
+        whole = client.get(f"{LATEST}/cumulative.npz", params=bins).raise_for_status()
+        banded = client.get(f"{LATEST}/cumulative.npy", params=bins).raise_for_status()
+
+    with np.load(io.BytesIO(whole.content)) as archive:
+        array = archive["array"]
+    expected = np.load(io.BytesIO(banded.content))
+    assert (array.shape, array.dtype) == ((300, 120, 163), np.dtype("<f4"))
+    np.testing.assert_array_equal(array, expected)
 
 
 def budget(total: int, of_one: int) -> AnswerBudget:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
+import httpx
 import pytest
 
 from tests.server.contract import find_operation, validate
@@ -177,3 +178,56 @@ def resolved(document: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]
         found = found[part]
     assert isinstance(found, dict)
     return found
+
+
+def bounds(schema: dict[str, Any]) -> Iterator[tuple[dict[str, Any], bool]]:
+    """Yield bodies at each limit of a schema and beyond it, and whether it has them."""
+    for name, field in schema["properties"].items():
+        if "properties" in field:
+            yield from (({name: body}, fits) for body, fits in bounds(field))
+        for limit, beyond in (("minimum", -1), ("maximum", 1)):
+            if limit in field:
+                whole = field["type"] == "integer"
+                at = int(field[limit]) if whole else field[limit]
+                yield {name: at}, True
+                yield {name: at + beyond * (1 if whole else at * 1e-3)}, False
+        for value in field.get("enum", ()):
+            yield {name: value}, True
+    yield {"unheard_of": 1}, False
+
+
+def test_a_sequence_at_the_limits_that_are_stated_is_accepted_and_beyond_refused(
+    document: dict[str, Any], steady_daemon: Served
+) -> None:
+    operation = document["paths"]["/api/v1/sequence/validate"]["post"]
+    schema = operation["requestBody"]["content"]["application/json"]["schema"]
+    least = {"harmonics": 1, "zeroth": "estimated"}  # leave room for the frequency and the takes
+    tried = list(bounds(schema))
+    with httpx.Client(base_url=steady_daemon.url) as client:
+        answers = [
+            (body, fits, client.post("/api/v1/sequence/validate", json=least | body).status_code)
+            for body, fits in tried
+        ]
+
+    assert len([body for body, _ in tried if "sub_phases" in body]) >= 7
+    assert {"base_frequency_hz", "exposure_s", "takes", "harmonics"} <= {
+        name for body, _ in tried for name in body
+    }
+    highest = {"harmonics": 32}  # of all cameras; this one's frequencies allow for fewer at 23 MHz
+    wrong = [each for each in answers if each[2] != (200 if each[1] else 422)]
+    assert [each for each in wrong if each[0] != highest] == []
+
+
+def test_the_pixels_that_are_stated_are_those_of_the_camera(
+    document: dict[str, Any], steady_daemon: Served
+) -> None:
+    parameters = document["paths"]["/api/v1/frames/{frame}/pixel"]["get"]["parameters"]
+    most = {each["name"]: each["schema"].get("maximum") for each in parameters}
+
+    with httpx.Client(base_url=f"{steady_daemon.url}/api/v1/frames/latest/") as client:
+        last = {"x": most["x"], "y": most["y"]}
+        inside = client.get("pixel", params=last | {"wait_s": 10})
+        beyond = [client.get("pixel", params=last | {name: last[name] + 1}) for name in last]
+
+    assert inside.status_code == 200
+    assert [each.status_code for each in beyond] == [422, 422]

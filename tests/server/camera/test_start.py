@@ -4,8 +4,7 @@ import logging
 
 import pytest
 
-from transientcam_driver import Sequence
-from transientcam_server.camera import open_camera
+from transientcam_driver import Sequence, open_camera
 from transientcam_server.camera.source import start_with
 from transientcam_server.settings import SequenceSettings, Settings
 

@@ -111,6 +111,7 @@ def test_a_daemon_measures_keeps_uses_and_exports_one(
     said = capfd.readouterr().out
     assert f"{active} (warm)" in said
     assert "163 x 120 pixels of SIM-ideal-0" in said
+    assert "harmonics of the modulation are not known: a phase sweep needs" in said
     assert "in use" in said
 
 

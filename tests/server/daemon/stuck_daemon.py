@@ -9,8 +9,8 @@ from pathlib import Path
 from fastapi import FastAPI
 
 from transientcam.cli import main
+from transientcam_driver import Camera
 from transientcam_server.api import app as application
-from transientcam_server.camera.source import Camera
 from transientcam_server.settings import Settings
 
 _build = application.build_app

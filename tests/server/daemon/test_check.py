@@ -64,7 +64,7 @@ def test_what_is_printed_is_a_file_that_sets_the_same(
     [
         ("sim:nowhere", "nowhere"),
         ("sim:wall?colour=on", "colour"),
-        ("lidar", "neither a USB camera nor a simulated one"),
+        ("lidar", "no camera is called 'lidar'"),
         ("recording:absent.h5", "absent.h5"),
         ("sim:broken.toml", "broken.toml"),
     ],

@@ -1,37 +1,11 @@
 """Portions and turns: what arrives is handed over in turn, for so much of the loop's time."""
 
 import asyncio
-from collections.abc import Callable
 from typing import Any, cast
 
-from transientcam_server.daemon.intake import BURST_S, PORTION_BYTES, SHARE, Intake, Turns
-
-
-class Loop:
-    """A loop whose clocks the test moves: real time, and the processor's."""
-
-    def __init__(self) -> None:
-        self.now_s = 0.0
-        self.spent_s = 0.0
-        self.timers: list[tuple[float, Callable[[], None]]] = []
-
-    def call_later(self, delay_s: float, callback: Callable[[], None]) -> object:
-        self.timers.append((self.now_s + delay_s, callback))
-        return object()
-
-    def pass_s(self, duration_s: float) -> None:
-        self.now_s += duration_s
-        due = [each for each in self.timers if each[0] <= self.now_s]
-        self.timers = [each for each in self.timers if each[0] > self.now_s]
-        for _, callback in due:
-            callback()
-
-    def turns(self) -> Turns:
-        return Turns(
-            cast("asyncio.AbstractEventLoop", self),
-            clock=lambda: self.now_s,
-            spent=lambda: self.spent_s,
-        )
+from tests.server.daemon.loops import SHARE, Loop
+from transientcam_server.daemon.intake import PORTION_BYTES, Intake
+from transientcam_server.daemon.turns import BURST_S, Turns
 
 
 class Transport:
@@ -81,7 +55,12 @@ class Connection:
         self.protocol = Protocol(loop, costs_s=costs_s)
         self.transport = Transport()
         self.lost = 0
-        self.intake = Intake(self.protocol, turns, lost=self._count)
+        self.intake = Intake(
+            self.protocol,
+            requests=turns.account("client"),
+            streams=loop.turns().account("client"),
+            lost=self._count,
+        )
         self.intake.connection_made(cast("asyncio.Transport", self.transport))
 
     def _count(self) -> None:
@@ -104,7 +83,6 @@ def test_what_arrives_is_handed_over_at_once_in_portions() -> None:
 
     assert [len(each) for each in connection.protocol.received] == [PORTION_BYTES] * 2 + [10]
     assert connection.transport.reading
-    assert not loop.timers
 
 
 def test_a_flood_is_read_for_its_share_of_the_time_and_no_more() -> None:

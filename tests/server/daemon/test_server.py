@@ -18,8 +18,8 @@ import pytest
 
 from tests.server.streaming import streaming
 from transientcam import wire
+from transientcam_driver import open_camera
 from transientcam_server.api.app import build_app
-from transientcam_server.camera import open_camera
 from transientcam_server.daemon.configuration import ENVIRONMENT_PREFIX
 from transientcam_server.daemon.server import (
     NOTSENT_LOWAT_BYTES,

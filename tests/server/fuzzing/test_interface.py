@@ -26,6 +26,8 @@ def fuzz(
     url: str, directory: Path, *options: str, phases: str = ALL_PHASES
 ) -> "subprocess.CompletedProcess[str]":
     """Run schemathesis against a daemon, one request at a time."""
+    # made with the first request; schemathesis waits 10 s for it, which a busy machine exceeds
+    httpx.get(f"{url}/openapi.json", timeout=60.0).raise_for_status()
     return in_its_own_process(
         *("-c", PROGRAM, "--config-file", str(CONFIG)),
         *("run", f"{url}/openapi.json", "--no-color", "--exclude-path-regex", ENDLESS),

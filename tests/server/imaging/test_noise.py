@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence, open_camera
 from transientcam_server.camera.source import sensor_of
-from transientcam_server.imaging.noise import beyond_noise, contradictions, contradictory_share
+from transientcam_server.imaging.noise import (
+    beyond_noise,
+    contradictions,
+    contradictory_share,
+    range_noise,
+)
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
@@ -33,8 +38,11 @@ def moments(phase_error_rad: tuple[float, ...], *, seed: int = 1) -> NDArray[np.
 def share(b: NDArray[np.complex64]) -> float | None:
     found = tm.reconstruct(b, tm.Settings(smoothing_sigma_px=0.0))
     lit = (found.flags & tm.Flags.NO_SIGNAL) == 0
-    noise = tm.noise.MomentNoise(np.full(b.shape, 2 * STD_DN**2))
-    beyond = beyond_noise(found, noise)
+
+    def noise_of(light: NDArray[np.float32]) -> tm.noise.MomentNoise:
+        return tm.noise.MomentNoise(np.full((len(b), *light.shape), 2 * STD_DN**2))
+
+    beyond = beyond_noise(found, noise_of, 0.0)
     assert not beyond[~lit].any()
     return float(beyond[lit].mean()) if lit.any() else None
 
@@ -76,6 +84,31 @@ def test_pixels_without_light_are_not_counted() -> None:
     assert share(np.zeros_like(b)) is None
 
 
+@pytest.mark.parametrize("spoilt", [(8, 12), (30, 50)], ids=["few", "many"])
+@pytest.mark.parametrize("smoothing_px", [0.0, 0.6])
+def test_pixels_settled_without_their_neighbours_are_those_of_the_smoothed_noise(
+    smoothing_px: float, spoilt: tuple[int, int]
+) -> None:
+    b = moments((0.0, 0.0, 0.0, 0.0))
+    b *= np.random.default_rng(2).uniform(0.05, 1.0, SHAPE).astype(np.float32)
+    rows, columns = spoilt
+    b[2, :rows, :columns] *= np.linspace(1.0, 1.6, columns, dtype=np.float32)
+    b[:, 3, 4] = np.nan
+    found = tm.reconstruct(b, tm.Settings(smoothing_sigma_px=smoothing_px))
+    brightness = found.smoothed[0].real
+
+    def noise_of(light: NDArray[np.float32]) -> tm.noise.MomentNoise:
+        return tm.noise.MomentNoise(np.stack([1.0 + 0.01 * light] * len(b)))
+
+    beyond = beyond_noise(found, noise_of, smoothing_px)
+
+    of_pixels = noise_of(np.maximum(brightness, 0))
+    std = np.sqrt(tm.noise.smoothed(of_pixels, smoothing_px).variance.sum(axis=0))
+    expected = (found.validity * brightness < -4 * std) & found.has_range
+    assert 0 < expected.sum() < expected.size
+    np.testing.assert_array_equal(beyond, expected)
+
+
 def recipe(zeroth: Literal["low-frequency", "estimated"]) -> Recipe:
     with open_camera("sim:wall") as camera:
         applied = camera.validate(Sequence(harmonics=3, zeroth=zeroth))
@@ -113,3 +146,24 @@ def test_an_estimated_zeroth_moment_hides_contradictions_and_says_so() -> None:
 
     assert contradictions(recipe("estimated"), found) is None
     assert contradictory_share(recipe("estimated"), found) is None
+
+
+def test_the_predicted_deviation_is_that_of_the_default_estimator() -> None:
+    likely = recipe("low-frequency")
+    assert likely.settings.estimator == "likelihood"
+    settings = likely.settings.for_moments(
+        base_frequency_hz=likely.base_frequency_hz,
+        zeroth="low-frequency",
+        takes=1,
+        sensor=likely.sensor,
+    )
+    found = tm.Reconstruction(moments((0.0, 0.0, 0.0, 0.0)), settings)
+
+    predicted = range_noise(likely, found)
+
+    assert predicted is not None
+    assert predicted.median_m == pytest.approx(float(np.nanmedian(found.range_std_m)))
+    assert predicted.p90_m >= predicted.median_m
+    assert predicted.first_order_share == found.likelihood.explained().mean()
+    dark = tm.Reconstruction(np.zeros((4, *SHAPE), np.complex64), settings)
+    assert range_noise(likely, dark) is None

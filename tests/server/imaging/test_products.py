@@ -13,6 +13,7 @@ from tests.serving import Served, serving
 from transientcam import wire
 from transientcam_driver import Sequence, Truth, open_camera
 from transientcam_driver.clock import VirtualClock
+from transientcam_moments.likelihood import MODEL_ERROR
 from transientcam_server.camera.source import sensor_of
 from transientcam_server.imaging.noise import moment_noise
 from transientcam_server.imaging.products import PRODUCTS
@@ -284,12 +285,13 @@ def test_deviation_and_misfit_of_a_frame_are_those_of_its_likelihood() -> None:
     std_m = PRODUCTS["range_std"].compute(recipe, found, View())
     misfit = PRODUCTS["reduced_chi_square"].compute(recipe, found, View())
 
-    expected = tm.likelihood(found.smoothed, moment_noise(recipe, found))
+    noise = moment_noise(recipe, found)
+    expected = tm.likelihood(found.smoothed, noise, model_error=MODEL_ERROR)
     # the noise is smoothed in another order
     assert np.allclose(misfit, expected.reduced_chi_square, rtol=0.02, atol=0.02, equal_nan=True)
     direct = tm.range_m(expected.direct_phase_std_rad(), recipe.base_frequency_hz)
     known = np.isfinite(std_m) & np.isfinite(direct)
     assert known.mean() > 0.9
     assert np.quantile(np.abs(std_m / direct - 1)[known], 0.99) < 0.02
-    # as much as it says: the truth is within two standard deviations nearly everywhere
-    assert np.nanmedian(misfit) == pytest.approx(1.0, abs=0.5)
+    # of three returns in seven numbers there is one degree of freedom, whose median is 0.45
+    assert np.nanmedian(misfit) == pytest.approx(0.45, abs=0.3)

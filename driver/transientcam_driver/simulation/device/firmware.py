@@ -132,7 +132,7 @@ class Firmware:
             raise
 
     def _stage(self, data: bytes) -> None:
-        if len(data) != SequenceWords.BYTES:
+        if len(data) not in (SequenceWords.BYTES, SequenceWords.MOST_BYTES):
             detail = f"{len(data)} bytes, {SequenceWords.BYTES} needed"
             raise Refusal(ErrorCode.BAD_LENGTH, detail)
         try:

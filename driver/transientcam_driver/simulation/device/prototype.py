@@ -31,4 +31,5 @@ def prototype(*, serial: str, width: int, height: int, bits: int) -> Capabilitie
         take_orders=("sequential", "interleaved"),
         fifo_bytes=32 * (IMAGE_HEADER_BYTES + width * height * 2),
         heartbeat_s=2.0,
+        phase_offsets=True,
     )

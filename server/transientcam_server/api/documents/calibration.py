@@ -68,6 +68,22 @@ class VerdictDocument(Document):
     """What it was compared with: the id of a calibration, or `nominal`."""
 
 
+class HarmonicsDocument(Document):
+    """Odd harmonics of the modulation, over the fundamental; from a phase sweep.
+
+    They are taken out of the moments, unless `modulation_harmonics` of the reconstruction is
+    `keep`.
+    """
+
+    orders: list[int]
+    """3, 5, 7, ..."""
+    share: list[list[float]]
+    """Magnitude over that of the fundamental: for each frequency, each order."""
+    phase_rad: list[list[float]]
+    """Phase where that of the fundamental is zero."""
+    largest_share: float
+
+
 class CalibrationDocument(Document):
     """A calibration, and whether it is good for what is captured at present."""
 
@@ -93,6 +109,8 @@ class CalibrationDocument(Document):
     verdict: VerdictDocument
     forced: bool
     """Whether it was to be used whatever the verdict, when it was measured."""
+    harmonics: HarmonicsDocument | None = None
+    """Null where they were not measured."""
     drift: DriftDocument | None = None
     """Null where it is not active, no frame was calibrated by it yet, or the zeroth moment is
     estimated, as drift does not show then."""
@@ -140,6 +158,9 @@ class CalibrationRequest(Document):
     """Use it at once, if it was measured on a diffusor."""
     force: bool = False
     """Let it be used whatever the verdict on it."""
+    harmonics: bool = True
+    """Sweep the phase as well, to measure the harmonics of the modulation; with 30 frames or more,
+    if the camera can."""
 
 
 class ActivationRequest(Document):

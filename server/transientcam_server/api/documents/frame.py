@@ -17,6 +17,8 @@ class PixelCountsDocument(Document):
     replaced: int
     contradictory: int
     """Moments that contradict each other by more than noise explains: something is wrong."""
+    unexplained: int
+    """Moments that the returns of the likelihood do not explain: the range may be biased."""
 
 
 class PredictedStdDocument(Document):
@@ -64,6 +66,9 @@ class FrameDocument(Document):
     """Images of pairs that contradict the others and could not be rebuilt; null until computed."""
     filled_images: list[int] | None = None
     """Which images are those of the frame before, by their index in it; null until computed."""
+    corrected_pixels: int | None = None
+    """Pixels from whose moments the known harmonics of the modulation were taken out; null where
+    the calibration knows none, and until computed."""
     pixels: PixelCountsDocument | None = None
     """Null until something was computed."""
     predicted_range_std_m: PredictedStdDocument | None = None

@@ -1,6 +1,7 @@
 """The JSON documents of recordings."""
 
-from typing import Annotated, Any, Literal
+import re
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, ConfigDict, Field, JsonValue
 
@@ -10,9 +11,13 @@ from transientcam_server.api.documents.sequence import AppliedDocument
 _ANNOTATIONS_EXAMPLE: dict[str, JsonValue] = {"sample": "corner, white paint", "operator": "Åsa"}
 
 
-def _printable(name: str) -> str:
-    if not name.isprintable() or not name.strip():
-        raise ValueError("must be text that can be printed")
+_ONE_LINE: Final = r"^(?=.*\S)[^\x00-\x1f\x7f-\x9f\u2028\u2029]+$"
+"""Text without control characters and line ends, that is not blank."""
+
+
+def _one_line(name: str) -> str:
+    if not re.match(_ONE_LINE, name):
+        raise ValueError("must be a line of text without control characters")
     return name
 
 
@@ -109,9 +114,14 @@ class RecordingRequest(Document):
         },
     )
 
-    name: Annotated[str, AfterValidator(_printable)] | None = Field(
-        default=None, min_length=1, max_length=200
-    )
+    name: (
+        Annotated[
+            str,
+            AfterValidator(_one_line),
+            Field(min_length=1, max_length=200, json_schema_extra={"pattern": _ONE_LINE}),
+        ]
+        | None
+    ) = None
     """For people; without one it is named after the time."""
     duration_s: float | None = Field(default=None, gt=0, allow_inf_nan=False)
     """From now on."""

@@ -32,6 +32,12 @@ class InfoDocument(Document):
         streamed: bool
         """Whether the stream offers it."""
 
+    class AbsentDocument(Document):
+        """A product that frames of this camera do not have."""
+
+        name: str
+        reason: str
+
     class StreamDocument(Document):
         """Where the stream is."""
 
@@ -45,6 +51,8 @@ class InfoDocument(Document):
     api: str
     stream: StreamDocument
     products: list[ProductDocument]
+    absent_products: list[AbsentDocument]
+    """What other cameras have, and why this one does not."""
     caller: CallerDocument
     history: HistoryDocument
     """Which frames can be had, as in `GET /frames`."""

@@ -16,6 +16,7 @@ PART_BYTES: Final = 256 * 1024
 FREE_BYTES: Final = 64 * 1024
 """Answers in parts of no more than this are not counted."""
 _KEPT_PARTS: Final = 4
+_ANSWER: Final = "transientcam.answer"
 
 
 class AnswerBudget:
@@ -75,13 +76,20 @@ class AnswerLimit:
         client = scope.get("client")
         answer = _Answer(self._budget, send, "" if client is None else str(client[0]))
         try:
-            await self._app(scope, receive, answer.send)
+            await self._app({**scope, _ANSWER: answer}, receive, answer.send)
         except _NoRoom as refusal:
             response = problem_response(refusal.problem, instance=scope["path"])
             response.headers["Retry-After"] = "1"
             await response(scope, receive, send)
         finally:
             answer.end()
+
+
+def expect_bytes(scope: Scope, size_bytes: int) -> None:
+    """Count what will be taken for an answer before it is computed, or end the request here."""
+    answer = scope.get(_ANSWER)
+    if isinstance(answer, _Answer):
+        answer.reserve(size_bytes)
 
 
 class _NoRoom(BaseException):
@@ -113,8 +121,8 @@ class _Answer:
         body, more = message.get("body", b""), message.get("more_body", False)
         if self._start is not None:
             start, self._start = self._start, None
-            if len(body) > FREE_BYTES:
-                self._reserve(len(body) * (_KEPT_PARTS if more else 1))
+            if len(body) > FREE_BYTES and self._reserved is None:
+                self.reserve(len(body) * (_KEPT_PARTS if more else 1))
             await self._send(start)
         await self._send_parts(message, body)
 
@@ -124,7 +132,8 @@ class _Answer:
             self._reserved.__exit__(None, None, None)
             self._reserved = None
 
-    def _reserve(self, size_bytes: int) -> None:
+    def reserve(self, size_bytes: int) -> None:
+        """Count so much until the end."""
         reserved = self._budget.reserved(self._client, size_bytes)
         try:
             reserved.__enter__()

@@ -22,6 +22,7 @@ from transientcam_server.api.documents.calibration import (
     CalibrationsDocument,
     DeviceDocument,
     DriftDocument,
+    HarmonicsDocument,
     VerdictDocument,
 )
 from transientcam_server.api.documents.job import JobDocument
@@ -30,6 +31,7 @@ from transientcam_server.api.routes import jobs
 from transientcam_server.camera.calibration_store import StoredCalibration
 from transientcam_server.camera.calibrator import CalibrationOptions, Drift
 from transientcam_server.errors import Problem, kinds
+from transientcam_server.imaging.waveform import to_document
 from transientcam_server.service import Service
 
 router = APIRouter(tags=["calibrations"])
@@ -94,7 +96,8 @@ async def measure_calibration(
     (Sec. 4.2). The job has the camera for itself, so that no frames come meanwhile; switching the
     light off ends it. Its result holds the id of the calibration, in `calibration`, and in
     `verdict` whether the images look like a diffusor's. If they don't, the calibration is kept, but
-    not used without `force`: `activated` says whether it is.
+    not used without `force`: `activated` says whether it is. `harmonics` has those of the
+    modulation, from a phase sweep, or `no_harmonics` why there are none.
     """
     running = service.recordings.active_id
     if running is not None:
@@ -225,6 +228,11 @@ async def read_calibration_file(
     return await downloads.answer(stored.path, wanted, media_type=NPZ, filename=f"{stored.id}.npz")
 
 
+def _harmonics(stored: StoredCalibration) -> HarmonicsDocument | None:
+    document = to_document(stored.waveform)
+    return None if document is None else HarmonicsDocument(**document)
+
+
 async def _receive(request: Request, part: FilePath, *, limit: int) -> None:
     received, waiting = 0, bytearray()
     with part.open("wb") as file:
@@ -269,5 +277,6 @@ def _document(
         active=active,
         verdict=VerdictDocument.model_validate(stored.verdict.to_document()),
         forced=stored.notes.get("forced") is True,
+        harmonics=_harmonics(stored),
         drift=DriftDocument(**drift.to_document()) if active and drift is not None else None,
     )

@@ -38,6 +38,10 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
             encodings=list(wire.encoding_names()),
         ),
         products=[_product(product) for product in service.pipeline.products.values()],
+        absent_products=[
+            InfoDocument.AbsentDocument(name=name, reason=reason)
+            for name, reason in service.pipeline.absent.items()
+        ],
         caller=InfoDocument.CallerDocument.model_validate(
             {"name": principal.name, "role": str(principal.role)}
         ),

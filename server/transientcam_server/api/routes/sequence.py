@@ -88,12 +88,13 @@ async def change_sequence(
     sequence: _Sequence,
     if_match: etags.IfMatch = None,
 ) -> AppliedDocument:
-    """Set the camera to a sequence, between two frames; what is absent takes its default.
+    """Set the camera to a sequence, between two frames; what is absent takes its default, or where
+    the camera cannot do that what is nearest.
 
     A document read from here may be changed and sent back: what only the camera can state
     is ignored. Streams are sent a `sequence-changed` notice.
     """
-    wanted = Sequence.from_document(sequence)
+    wanted = service.camera.capabilities.sequence_of(sequence)
     applied = await _configure(service, wanted, if_match)
     response.headers["ETag"] = _tag(applied)
     return AppliedDocument.model_validate(applied.to_document())
@@ -107,7 +108,7 @@ async def change_sequence(
 @needs(Role.VIEWER, lease=False)
 async def validate_sequence(service: ServiceOf, sequence: _Sequence) -> AppliedDocument:
     """Return what the camera would make of a sequence, without touching it."""
-    applied = service.camera.validate(Sequence.from_document(sequence))
+    applied = service.camera.validate(service.camera.capabilities.sequence_of(sequence))
     return AppliedDocument.model_validate(applied.to_document())
 
 

@@ -129,6 +129,7 @@ def test_the_built_in_scenes_are_listed_with_a_sentence_each() -> None:
         "calibration",
         "corner",
         "corner-left",
+        "hall",
         "measured",
         "mirrors",
         "translucent",

@@ -1,16 +1,17 @@
 """Calibrations are measured, used, taken elsewhere, and refused where they are not good."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 
 from tests.server.contract import hold_to_contract
 from tests.serving import Served, serving
-from transientcam import Camera
+from transientcam import Camera, wire
 from transientcam_driver import Sequence
 
 CALIBRATIONS = "/api/v1/calibrations"
@@ -35,8 +36,10 @@ def measured(http: httpx.Client, **wanted: Any) -> dict[str, Any]:
     """The job that measured a calibration, after its end."""
     answer = http.post(CALIBRATIONS, json={"frames": 3, **wanted})
     assert answer.status_code == 202, answer.text
-    job: dict[str, Any] = http.get(answer.headers["location"], params={"wait_s": 30}).json()
-    return job
+    while True:
+        job: dict[str, Any] = http.get(answer.headers["location"], params={"wait_s": 30}).json()
+        if job["state"] != "running":
+            return job
 
 
 def next_meta(http: httpx.Client) -> dict[str, Any]:
@@ -52,6 +55,8 @@ def test_a_calibration_is_measured_and_used(bench: Served, http: httpx.Client) -
 
     job = measured(http, name="after warm-up", activate=True)
 
+    assert job["result"]["harmonics"] is None
+    assert "30 takes or more" in job["result"]["no_harmonics"]
     assert (job["state"], job["progress"], job["problem"]) == ("done", 1.0, None)
     identity = job["result"]["calibration"]
     document = http.get(f"{CALIBRATIONS}/{identity}").json()
@@ -66,6 +71,39 @@ def test_a_calibration_is_measured_and_used(bench: Served, http: httpx.Client) -
     listed = http.get(CALIBRATIONS).json()
     assert listed["active"] == identity
     assert [each["id"] for each in listed["calibrations"]] == [identity]
+
+
+def test_harmonics_are_measured_by_a_phase_sweep_and_taken_out(tmp_path: Path) -> None:
+    """At 23 MHz the third harmonic of the prototype is 11.1 %, before the sub-phases' share."""
+    phases_rad = np.arccos(1 - (2 * np.arange(4) + 1) / 4)
+    gain = abs(np.exp(-3j * phases_rad).sum() / np.exp(-1j * phases_rad).sum())
+    kept = {"directory": tmp_path / "kept"}
+    with (
+        serving("sim:calibration?device=prototype", calibrations=kept) as daemon,
+        httpx.Client(base_url=daemon.url, timeout=60.0) as http,
+    ):
+        hold_to_contract(http, daemon.app.openapi())
+        sub_phases = {"scheme": "arccos", "n": 4}
+        http.put("/api/v1/sequence", json=QUICK | {"sub_phases": sub_phases})
+        result = measured(http, frames=30, activate=True, force=True)["result"]
+        document = http.get(f"{CALIBRATIONS}/{result['calibration']}").json()
+        meta = meta_of_flags(http)
+        http.put("/api/v1/reconstruction", json={"modulation_harmonics": "keep"})
+        plain = meta_of_flags(http)
+
+    assert result["no_harmonics"] is None
+    assert document["harmonics"] == result["harmonics"]
+    assert document["harmonics"]["orders"] == list(range(3, 31, 2))
+    assert document["harmonics"]["share"][0][0] == pytest.approx(0.111 * gain, abs=3e-4)
+    assert meta["calibration_id"] == plain["calibration_id"] == result["calibration"]
+    assert meta["corrected_pixels"] > 0.5 * 163 * 120
+    assert plain["corrected_pixels"] is None
+
+
+def meta_of_flags(http: httpx.Client) -> Mapping[str, Any]:
+    """What is known of a frame from now on once its moments are computed."""
+    answer = http.get(f"/api/v1/frames/{next_meta(http)['frame']}/flags")
+    return wire.parse_frame(answer.content).meta
 
 
 def test_the_active_one_says_how_many_pixels_are_invalid(http: httpx.Client) -> None:

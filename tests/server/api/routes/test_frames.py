@@ -222,7 +222,7 @@ def test_a_former_frame_is_computed_as_it_was_when_it_was_the_latest(http: httpx
 def test_a_former_frame_keeps_the_settings_it_was_captured_under(http: httpx.Client) -> None:
     number = wait_for_frame(http)["frame"]
     then = wire.parse_frame(http.get(f"/api/v1/frames/{number}/range").content)
-    http.put("/api/v1/reconstruction", json={"smoothing_px": 3.0})
+    http.put("/api/v1/reconstruction", json={"smoothing_px": 3.0, "estimator": "pisarenko"})
     changed = http.get(LATEST).json()["frame"]
     later = http.get(LATEST, params={"after": changed, "wait_s": 10.0}).json()
 

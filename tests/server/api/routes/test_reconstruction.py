@@ -59,7 +59,7 @@ def test_the_same_settings_again_are_no_change(http: httpx.Client) -> None:
 
 def test_only_what_one_has_read_is_changed(http: httpx.Client) -> None:
     tag = http.get(PATH).headers["etag"]
-    http.put(PATH, json={"bias": 0.01})
+    http.put(PATH, json={"bias": 0.01, "estimator": "pisarenko"})
 
     late = http.put(PATH, json={"bias": 0.02}, headers={"If-Match": tag})
 
@@ -103,7 +103,7 @@ def test_streams_are_notified_and_a_lease_keeps_others_out(
         next(frames)
         with camera.lease("bench"):
             assert http.put(PATH, json={"bias": 0.01}).json()["type"] == "/problems/lease-held"
-        http.put(PATH, json={"bias": 0.02})
+        http.put(PATH, json={"bias": 0.02, "estimator": "pisarenko"})
         frame = next(each for each in frames if each.meta["reconstruction_id"] == 2)
 
     assert frame.meta["reconstruction_id"] == 2

@@ -32,8 +32,8 @@ export function ReconstructionView() {
       name="reconstruction"
       title={<h2>Reconstruction</h2>}
       tools={
-        <Steer title="Smoothing, bias and all else as in the paper" disabled={task.busy.value !== null || current === null} onClick={() => void apply({}, current?.tag ?? null)}>
-          The paper's values
+        <Steer title="Smoothing, bias and all else as the daemon has them by default" disabled={task.busy.value !== null || current === null} onClick={() => void apply({}, current?.tag ?? null)}>
+          The defaults
         </Steer>
       }
     >

@@ -1,61 +1,14 @@
 import json
-import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import h5py
-import httpx
 import numpy as np
 import pytest
 import xarray
 from zarr.core.sync import cleanup_resources
 
-from tests.server.recording.made import frame, record
-from tests.server.recording.test_recovery import abandoned
+from tests.server.recording.made import record
 from transientcam.cli import run
-from transientcam_server.recording import Recording
-
-
-def test_recover_takes_a_file_or_a_directory(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    one = abandoned(tmp_path / "a.h5", 2)
-    assert run(["recover", str(one)]) == 0
-    assert "1 of 1 recovered" in capsys.readouterr().out
-
-    abandoned(tmp_path / "b.h5", 3)
-    (tmp_path / "c.h5.part").write_bytes(b"nothing")
-    assert run(["recover", str(tmp_path), "--json"]) == 1
-    assert json.loads(capsys.readouterr().out) == {
-        "recovered": [str(tmp_path / "b.h5")],
-        "left": [str(tmp_path / "c.h5.part")],
-    }
-    with Recording(tmp_path / "b.h5") as recording:
-        assert recording.frames == 3
-
-
-def test_recover_refuses_what_is_no_unfinished_recording(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run(["recover", str(record(tmp_path / "a.h5", 1))]) == 1
-    assert "ends in .part" in capsys.readouterr().err
-    assert run(["recover", str(tmp_path / "absent.h5.part")]) == 1
-
-
-def test_convert_writes_what_the_suffix_says(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    source = record(tmp_path / "a.h5", 2)
-
-    assert run(["convert", str(source), "-o", str(tmp_path / "a.npz")]) == 0
-    with np.load(tmp_path / "a.npz") as archive:
-        np.testing.assert_array_equal(archive["raw"][1], frame(1).images)
-    assert run(["convert", str(source), "-o", str(tmp_path / "b.npz"), "--json"]) == 0
-    document = {"file": str(tmp_path / "b.npz"), "frames": 2}
-    assert json.loads(capsys.readouterr().out) == document
-    assert run(["convert", str(source), "-o", str(tmp_path / "a.xyz")]) == 1
-    assert ".nc, .npz, .zarr" in capsys.readouterr().err
 
 
 def test_reconstruct_takes_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -127,31 +80,3 @@ def test_a_recording_is_reconstructed_with_what_was_recorded_unless_told_otherwi
     with h5py.File(other) as file:
         settings = json.loads(file.attrs["reconstruction"])
         assert (settings["bias"], settings["smoothing_px"]) == (0.05, 0.0)
-
-
-def test_replay_serves_a_recording(tmp_path: Path) -> None:
-    source = record(tmp_path / "a.h5", 3)
-    with subprocess.Popen(
-        [
-            Path(sys.executable).with_name("transientcam"),
-            "replay",
-            source,
-            "--loop",
-            "--port",
-            "0",
-            "--json",
-        ],
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as daemon:
-        assert daemon.stdout is not None
-        try:
-            announced = json.loads(daemon.stdout.readline())
-            assert announced["pid"] == daemon.pid
-            url = announced["url"]
-            answer = httpx.get(f"{url}/api/v1/frames/latest", params={"wait_s": 10}, timeout=30)
-            assert answer.json()["width"] == 16
-        finally:
-            daemon.send_signal(signal.SIGTERM)
-            daemon.stdout.read()
-    assert daemon.returncode == 0

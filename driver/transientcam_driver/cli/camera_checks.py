@@ -1,0 +1,67 @@
+"""Checks of one camera for ``transientcam doctor --camera``: its facts, and the contract.
+
+Findings are tuples ``(level, check, message, remedy)``, as that verb's entry points yield them.
+"""
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Final
+
+from transientcam_driver.contract import CLAUSES, Bench, ContractBroken, ContractSkipped
+from transientcam_driver.errors import DriverError
+from transientcam_driver.opening import open_camera, plugin_of
+
+Reported = tuple[str, str, str, str | None]
+
+_FRAMES: Final = 3
+_REPORT: Final = "send this whole report, with --json, to whoever maintains the plug-in"
+
+
+def checks(spec: str) -> Iterator[Reported]:
+    """Read what a camera says of itself, capture a few frames, and hold it to the contract.
+
+    Its light is on while frames are captured. The sequence that it has afterwards is its own.
+    """
+    try:
+        name, plugin = plugin_of(spec)
+        for fact, text in plugin.facts(name):
+            yield "ok", fact, text, None
+        yield from _capabilities(spec)
+    except DriverError as error:
+        yield "fault", "camera", str(error), None
+        return
+    bench = Bench.of(spec)
+    for clause in CLAUSES:
+        try:
+            clause.run(bench)
+        except ContractSkipped as skipped:
+            yield "ok", clause.name, f"not tried: {skipped}", None
+        except ContractBroken as broken:
+            yield "fault", clause.name, f"{clause.promise} But: {broken}", _REPORT
+        else:
+            yield "ok", clause.name, clause.promise, None
+
+
+def _capabilities(spec: str) -> Iterator[Reported]:
+    with open_camera(spec) as camera:
+        can = camera.capabilities
+        yield "ok", "camera", f"{can.model} {can.serial}, firmware {can.firmware}", None
+        stated = ", ".join(f"{name}={value}" for name, value in asdict(can).items())
+        yield "ok", "can do", stated, None
+        applied = camera.applied
+        camera.start()
+        first = camera.read_frame(timeout_s=_time_s(applied.frame_rate_hz))
+        rest = [camera.read_frame(timeout_s=_time_s(applied.frame_rate_hz)) for _ in range(_FRAMES)]
+        took_s = (rest[-1].device_time_s - first.device_time_s) / _FRAMES
+        rates = f"{1 / took_s:.3g} frames/s, stated {applied.frame_rate_hz:.3g}"
+        lost = f"{camera.counters.lost} images lost, {rest[-1].temperature_c:.1f} °C"
+        yield "ok", "frames", f"{applied.images} images each, {rates}; {lost}", None
+        spread = (
+            f"{int(image.min())}..{int(image.max())} (mean {float(image.mean()):.0f})"
+            for image in rest[-1].images[:4]
+        )
+        yield "ok", "first images", f"in DN: {', '.join(spread)}", None
+
+
+def _time_s(frame_rate_hz: float) -> float:
+    return 10.0 + 5.0 / frame_rate_hz

@@ -1,0 +1,58 @@
+"""From a scene to an emulated TOFcam660 in front of it."""
+
+from dataclasses import replace
+
+from transientcam_driver.clock import Clock
+from transientcam_driver.simulation.build import world_before
+from transientcam_driver.simulation.handle import SimulationHandle
+from transientcam_driver.simulation.scene import Scene
+from transientcam_driver.simulation.tofcam660.firmware import EmulatedFirmware
+from transientcam_driver.simulation.tofcam660.network import EmulatedTofcam660
+from transientcam_driver.simulation.tofcam660.pixels import DifferentialPixels
+from transientcam_driver.tofcam660.device import READOUT_S
+from transientcam_driver.tofcam660.region import COLUMNS, ROWS
+from transientcam_driver.tofcam660.wire import DATA_PORT
+
+_BITS = 12
+
+
+def build_tofcam660(
+    scene: Scene,
+    *,
+    seed: int | None,
+    clock: Clock,
+    host: str = "127.0.0.1",
+    control_port: int = 0,
+    data_port: int = 0,
+    udp_port: int = DATA_PORT,
+) -> tuple[EmulatedTofcam660, SimulationHandle]:
+    """Build an emulated camera, which listens from now on, and the handle on it.
+
+    Raises
+    ------
+    SceneError
+        A file that the scene names cannot be read.
+    CameraError
+        A port cannot be had.
+    """
+    finer = 2.0 ** (scene.sensor.bits - _BITS)
+    sensor = replace(
+        scene.sensor,
+        bits=_BITS,
+        gain_e_per_dn=scene.sensor.gain_e_per_dn * finer,
+        dark_dn=scene.sensor.dark_dn / finer,
+    )
+    scene = replace(scene, sensor=sensor)
+    world, prepare = world_before(scene, width=COLUMNS, height=ROWS, seed=seed, readout_s=READOUT_S)
+
+    def power_on() -> EmulatedFirmware:
+        begin_s = clock.now_s()
+        pixels = DifferentialPixels(world)
+        firmware = EmulatedFirmware(pixels, lambda: clock.now_s() - begin_s)
+        pixels.expose_for(firmware.integration_us[0] * 1e-6)
+        return firmware
+
+    device = EmulatedTofcam660(
+        power_on, host=host, control_port=control_port, data_port=data_port, udp_port=udp_port
+    )
+    return device, SimulationHandle(scene, world, device, prepare=prepare)

@@ -1,0 +1,106 @@
+"""One round of taking known harmonics out of the moments of every pixel."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.compiled_entry import (
+    PIXELS,
+    PLACES,
+    complex_arrays,
+    entry,
+    order_type,
+    real_arrays,
+)
+from transientcam_moments._kernels.parallel import Spread, at_once
+
+MOST_ODD = 31
+"""The highest harmonic there is room for: b_0 .. b_31m in (m + 12)^2 registers."""
+
+
+@njit(nogil=True, error_model="numpy")
+def _without_harmonics(
+    order: Any,
+    odd: Any,
+    given: Any,
+    current: Any,
+    polynomial: Any,
+    mixed: Any,
+    inverse: Any,
+    following: Any,
+    misfit: Any,
+    start: int,
+    stop: int,
+) -> None:
+    m = len(order)
+    one = simd.ones(misfit, 1)
+    step = simd.width(one)
+    re, im = simd.matrix(one, order, 12), simd.matrix(one, order, 12)
+    ar, ai = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    for left in range(start, stop, step):
+        p = min(left, stop - step)
+        for j in range(1, m + 1):
+            re[j], im[j] = simd.load_complex(one, current[j], p)
+            ar[j], ai[j] = simd.load_complex(one, polynomial[j], p)
+        for n in range(m + 1, m * odd[-1] + 1):  # `predicted`
+            sum_re, sum_im = one * 0.0, one * 0.0
+            for j in range(1, m + 1):
+                sum_re = sum_re + (ar[j] * re[n - j] - ai[j] * im[n - j])
+                sum_im = sum_im + (ar[j] * im[n - j] + ai[j] * re[n - j])
+            re[n], im[n] = -sum_re, -sum_im
+        x, y = simd.load_complex(one, given[0], p)
+        simd.store_complex(following[0], p, x, y)
+        distance = one * 0.0
+        for j in range(1, m + 1):
+            x, y = simd.load_complex(one, given[j], p)
+            for i in range(len(odd)):
+                k = odd[i]
+                dr, di = simd.load_complex(one, mixed[i * m + j - 1], p)
+                hr, hi = re[k * j], im[k * j]
+                if k % 4 == 3:
+                    hi = -hi
+                x = x - (dr * hr - di * hi)
+                y = y - (dr * hi + di * hr)
+            dr, di = simd.load_complex(one, inverse[j - 1], p)
+            new_re, new_im = x * dr - y * di, x * di + y * dr
+            simd.store_complex(following[j], p, new_re, new_im)
+            off_re, off_im = new_re - re[j], new_im - im[j]
+            distance = distance + (off_re * off_re + off_im * off_im)
+        simd.store(misfit, p, distance)
+
+
+def harmonics_lane(m: int, precision: str) -> Callable[..., Any]:
+    """Compile the round of order m; see the table in ``_kernels``."""
+    order = (0,) * m
+    real, cplx = real_arrays(precision), complex_arrays(precision)
+    planes = (cplx[2],) * 6
+    run = entry(_without_harmonics, order_type(m), PLACES, *planes, real[1], PIXELS, PIXELS)
+
+    def lane(
+        given: Any,
+        current: Any,
+        polynomial: Any,
+        mixed: Any,
+        inverse: Any,
+        orders: tuple[int, ...],
+        *,
+        spread: Spread = at_once,
+    ) -> tuple[Any, Any] | None:
+        if orders[-1] > MOST_ODD:
+            return None
+        odd = np.array(orders, dtype=np.int64)
+        inputs = [np.ascontiguousarray(each) for each in (given, current, polynomial, mixed)]
+        following = np.empty_like(inputs[0])
+        misfit = np.empty(following.shape[1], precision)
+        scale = np.ascontiguousarray(inverse)
+
+        def part(start: int, stop: int) -> None:
+            run(order, odd, *inputs, scale, following, misfit, start, stop)
+
+        spread(part, following.shape[1])
+        return following, misfit
+
+    return lane

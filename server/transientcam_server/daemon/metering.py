@@ -1,0 +1,54 @@
+"""Requests in turns: what answering one takes of the event loop's time is counted."""
+
+from collections.abc import Awaitable, Callable, Generator
+from functools import partial
+from typing import Any
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from transientcam_server.daemon.turns import Account
+
+
+class Metered:
+    """Awaits a coroutine, and counts the processor time of each of its steps."""
+
+    def __init__(self, coroutine: Any, account: Account) -> None:
+        self._coroutine = coroutine
+        self._account = account
+
+    def __await__(self) -> Generator[Any, Any, Any]:
+        """Do as the coroutine does (PEP 380)."""
+        step: Callable[[], Any] = partial(self._coroutine.send, None)
+        while True:
+            try:
+                awaited = self._account.count(step)
+            except StopIteration as end:
+                return end.value
+            try:
+                value = yield awaited
+            except BaseException as error:
+                step = partial(self._coroutine.throw, error)
+            else:
+                step = partial(self._coroutine.send, value)
+
+
+def in_turns(app: ASGIApp, account: Account) -> ASGIApp:
+    """Return an application whose work counts, and whose long answers wait for their turns."""
+
+    async def counted(scope: Scope, receive: Receive, send: Send) -> None:
+        begun = False
+
+        async def send_in_turn(message: Message) -> None:
+            nonlocal begun
+            if begun:
+                await account.turn()
+            begun = message["type"] == "http.response.body"
+            await Metered(_sent(send, message), account)  # it may be a task of its own
+
+        await Metered(app(scope, receive, send_in_turn), account)
+
+    return counted
+
+
+async def _sent(send: Callable[[Message], Awaitable[None]], message: Message) -> None:
+    await send(message)

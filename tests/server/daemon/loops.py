@@ -1,0 +1,58 @@
+"""An event loop whose clocks the test moves."""
+
+from collections.abc import Callable
+from typing import Any, cast
+
+from transientcam_server.daemon.turns import Turns
+
+SHARE = 0.3
+
+
+class Handle:
+    """Something that is to be done later."""
+
+    def __init__(self, due_s: float, callback: Callable[[], None]) -> None:
+        self.due_s = due_s
+        self.callback = callback
+
+
+class Loop:
+    """A loop with two clocks: real time, and the processor's."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+        self.spent_s = 0.0
+        self.due: list[Handle] = []
+
+    def call_later(self, delay_s: float, callback: Callable[[], None]) -> Handle:
+        self.due.append(Handle(self.now_s + delay_s, callback))
+        return self.due[-1]
+
+    def call_soon(self, callback: Callable[[], None]) -> Handle:
+        return self.call_later(0.0, callback)
+
+    def turn(self) -> None:
+        """Do what is due, and nothing of what that asks for."""
+        due = [each for each in self.due if each.due_s <= self.now_s]
+        self.due = [each for each in self.due if each not in due]
+        for each in due:
+            each.callback()
+
+    def pass_s(self, duration_s: float) -> None:
+        """Let time pass, in which the loop turns as often as it may."""
+        self.now_s += duration_s
+        while any(each.due_s <= self.now_s for each in self.due):
+            self.turn()
+
+    def work(self, costs_s: float) -> None:
+        """Spend processor time."""
+        self.spent_s += costs_s
+
+    def turns(self, share: float = SHARE) -> Turns:
+        """Return turns by these clocks."""
+        return Turns(
+            cast("Any", self),
+            share=lambda: share,
+            clock=lambda: self.now_s,
+            spent=lambda: self.spent_s,
+        )

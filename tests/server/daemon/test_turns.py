@@ -1,0 +1,181 @@
+"""Turns by clocks that the test moves: so much in all, and as much for each address."""
+
+from collections.abc import Callable
+from functools import partial
+
+import pytest
+
+from tests.server.daemon.loops import SHARE, Loop
+from transientcam_server.daemon.turns import (
+    BURST_S,
+    MOST_DEBT_S,
+    MOST_LEAD_S,
+    SLICE_S,
+    Account,
+)
+
+STEP_S = 0.0005
+
+
+class Client:
+    """Always has something to do, on as many connections as it likes."""
+
+    def __init__(self, loop: Loop, account: Account, *, costs_s: float = STEP_S) -> None:
+        self.had = 0
+        self._loop = loop
+        self._account = account
+        self._costs_s = costs_s
+
+    def ask(self, connections: int = 1) -> None:
+        for _ in range(connections):
+            self._account.run(self._have)
+
+    def _have(self) -> None:
+        self.had += 1
+        self._loop.work(self._costs_s)
+        self._loop.call_soon(self.ask)  # the next one, as soon as this is done
+
+
+def test_all_together_have_their_share_of_the_time() -> None:
+    loop = Loop()
+    turns = loop.turns()
+    for name in ("a", "b", "c"):
+        Client(loop, turns.account(name)).ask(16)
+    for _ in range(1000):
+        loop.pass_s(0.001)
+
+    allowed_s = BURST_S + SHARE * loop.now_s
+    assert allowed_s - 2 * STEP_S <= loop.spent_s <= allowed_s + STEP_S
+
+
+def test_an_address_has_no_more_for_having_more_connections_or_dearer_requests() -> None:
+    loop = Loop()
+    turns = loop.turns()
+    many = Client(loop, turns.account("many"), costs_s=4 * STEP_S)
+    one = Client(loop, turns.account("one"))
+    many.ask(64)
+    one.ask()
+    for _ in range(1000):
+        loop.pass_s(0.001)
+
+    assert one.had * STEP_S == pytest.approx(many.had * 4 * STEP_S, rel=0.05)
+
+
+def test_who_comes_now_and_then_waits_for_one_turn_of_each_other_address_at_most() -> None:
+    loop = Loop()
+    turns = loop.turns()
+    for address in range(16):
+        Client(loop, turns.account(f"flooding {address}")).ask(16)
+    loop.pass_s(1.0)
+
+    waits_s = []
+    for _ in range(20):
+        loop.pass_s(0.1)
+        asked_s = loop.now_s
+        answered: list[float] = []
+        turns.account("healthy").run(partial(_note, answered, loop))
+        while not answered:
+            loop.pass_s(0.0005)
+        waits_s.append(answered[0] - asked_s)
+
+    assert max(waits_s) <= 17 * STEP_S / SHARE + 0.002  # of them each has 16 that wait
+
+
+def _note(answered: list[float], loop: Loop) -> None:
+    answered.append(loop.now_s)
+
+
+def test_the_rest_of_the_loop_has_its_turn_between() -> None:
+    loop = Loop()
+    account = loop.turns().account("a")
+    at: list[float] = []
+
+    def step() -> None:
+        loop.work(STEP_S)
+        at.append(loop.spent_s)
+
+    for _ in range(10):
+        account.run(step)
+    before_s = loop.spent_s
+    loop.turn()
+
+    assert before_s <= SLICE_S + STEP_S
+    assert loop.spent_s - before_s <= SLICE_S + STEP_S
+    loop.pass_s(0.1)
+    assert len(at) == 10
+
+
+def test_a_single_step_that_took_long_holds_nobody_up_for_long() -> None:
+    loop = Loop()
+    turns = loop.turns()
+    heavy, light = turns.account("heavy"), turns.account("light")
+    heavy.run(lambda: loop.work(30.0))
+    answered: list[float] = []
+    light.run(partial(_note, answered, loop))
+    heavy.run(partial(_note, answered, loop))
+    loop.pass_s((MOST_DEBT_S + 0.001) / SHARE)
+
+    assert len(answered) == 2
+
+
+def test_what_an_address_had_is_held_against_it_for_so_long_and_no_longer() -> None:
+    loop = Loop()
+    turns = loop.turns()
+    first, second = turns.account("first"), turns.account("second")
+    for _ in range(5):
+        first.count(lambda: loop.work(1.0))
+    ahead = Client(loop, first)
+    behind = Client(loop, second)
+    ahead.ask()
+    behind.ask()
+    begin_s = loop.spent_s
+    while not ahead.had:
+        loop.pass_s(0.01)
+
+    assert loop.spent_s - begin_s <= MOST_LEAD_S + 3 * STEP_S
+
+
+def test_a_step_within_a_step_counts_once() -> None:
+    loop = Loop()
+    account = loop.turns().account("a")
+
+    def outer() -> None:
+        account.count(lambda: loop.work(0.004))
+        loop.work(0.004)
+
+    account.run(outer)
+    done: list[float] = []
+    loop.turn()
+    account.run(partial(_note, done, loop))
+
+    assert done  # 8 ms of the 10 that may be spent at once
+
+
+def test_accounts_of_addresses_that_are_gone_are_forgotten() -> None:
+    loop = Loop()
+    turns = loop.turns()
+    first = turns.account("0")
+    for number in range(5000):
+        account = turns.account(str(number))
+        account.run(_nothing)
+        loop.pass_s(0.001)
+
+    assert turns.account("0") is not first
+
+
+def _nothing() -> None: ...
+
+
+@pytest.mark.parametrize("fail", [ValueError, StopIteration])
+def test_a_step_that_fails_counts_too(fail: type[Exception]) -> None:
+    loop = Loop()
+    account = loop.turns().account("a")
+
+    def failing() -> None:
+        loop.work(MOST_DEBT_S)
+        raise fail
+
+    with pytest.raises(fail):
+        account.count(failing)
+    work: Callable[[], None] = _nothing
+    assert not account.run(work)
