@@ -127,7 +127,7 @@ def _answers(http: httpx.Client) -> Iterator[tuple[str, Any]]:
         ("TradeoffDocument", "tradeoff"),
     ):
         yield name, get(f"{api}/{path}")
-    yield "PlanDocument", post(f"{api}/plan", {"target": {"range_std_m": 0.01}})
+    yield "PlanDocument", post(f"{api}/plan", {"target": {"range_error_m": 0.005}})
     parameters = get(f"{api}/parameters")
     yield "ParametersDocument", parameters
     yield "ParameterDocument", parameters["parameters"][0]

@@ -16,7 +16,8 @@ import transientcam_moments as tm
 from benchmarks.accuracy.capturing import SEED, known_scenes
 from benchmarks.accuracy.noise import draw_noise, predicted_and_observed
 from benchmarks.accuracy.page import report
-from benchmarks.accuracy.plans import planned
+from benchmarks.accuracy.pictures import drawn
+from benchmarks.accuracy.promises import BUILT_IN, GOALS, Kept, kept
 from benchmarks.measured_scenes import composite_scene
 from transientcam_experiments import tradeoff
 from transientcam_experiments.tradeoff.report import file_name
@@ -42,11 +43,16 @@ def main() -> None:
             scenes["composite"] = composite
         records = measured(scenes, folder, "quick" if arguments.quick else "paper")
         noise = predicted_and_observed()
-        plans = [each for name in ("wall", "mirrors", "corner") for each in planned(name)]
-        page = report(scenes, records, noise, plans)
+        plans = [
+            each for name in BUILT_IN for each in kept(name, GOALS, 30) if isinstance(each, Kept)
+        ]
+        figures = DOCS / "figures" if arguments.write else folder
+        figures.mkdir(exist_ok=True)
+        drawings = dict(drawn(name, figures) for name in BUILT_IN)
+        sentences = {name: document["summary"] for name, document in drawings.items()}
+        page = report(scenes, records, noise, plans, sentences)
         print(page)
         if arguments.write:
-            (DOCS / "figures").mkdir(exist_ok=True)
             (DOCS / "accuracy.md").write_text(page, encoding="utf-8")
             draw_noise(noise, DOCS / "figures" / "noise-prediction.png")
             for spec in scenes.values():

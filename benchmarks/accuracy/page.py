@@ -4,7 +4,7 @@ import numpy as np
 
 from benchmarks.accuracy.capturing import short
 from benchmarks.accuracy.noise import FRAMES, Compared
-from benchmarks.accuracy.plans import Planned
+from benchmarks.accuracy.promises import Kept, summary, table
 from benchmarks.machine import machine
 from transientcam_driver import Sequence
 from transientcam_experiments import tradeoff
@@ -15,7 +15,8 @@ def report(
     scenes: dict[str, str],
     records: tradeoff.Records,
     noise: list[Compared],
-    plans: list[Planned],
+    plans: list[Kept],
+    pictures: dict[str, str],
 ) -> str:
     """Return the page."""
     lines = [
@@ -24,6 +25,7 @@ def report(
         "Written by `python -m benchmarks.accuracy --write` on",
         f"{machine()}.",
         "",
+        *_pictures(pictures),
         "All scenes are simulated, so that the truth is known; images come over the emulated USB "
         "and go through what the daemon computes. `transientcam tradeoff --scene NAME -o FOLDER` "
         "measures the same on any scene and makes a page on which every point can be copied as a "
@@ -287,23 +289,30 @@ def _noise(noise: list[Compared]) -> list[str]:
     ]
 
 
-def _plans(plans: list[Planned]) -> list[str]:
-    rows = [
-        f"| {each.scene} | {each.wanted} | {short(each.sequence)} | {each.capture_s * 1e3:.0f} "
-        f"| {each.predicted_m * 1e3:.3g} ({each.low_m * 1e3:.3g} to {each.high_m * 1e3:.3g}) "
-        f"| {each.measured_m * 1e3:.3g} | {each.measured_m / each.predicted_m - 1:+.0%} |"
-        for each in plans
+def _pictures(pictures: dict[str, str]) -> list[str]:
+    lines = []
+    for name, sentence in pictures.items():
+        figure = f"figures/accuracy-{name}-error.png"
+        lines += [f"![Range error against capture time on {name}]({figure})", "", sentence, ""]
+    return [
+        "Each pair of thin lines is one set of frequencies: noise falls with time, bias stays. The "
+        "thick line is the best that `transientcam plan` finds; the star is the default sequence.",
+        "",
+        *lines,
     ]
+
+
+def _plans(plans: list[Kept]) -> list[str]:
     return [
         "## Do plans keep what they promise?",
         "",
-        "Planned from one look at the scene (m = 6, 16 takes), then captured eight times with what "
-        "was recommended.",
+        "Each scene is looked at once, and what is recommended is captured with other noise; "
+        "`python -m benchmarks.accuracy.promises` measures all scenes. Errors are of the median "
+        "lit pixel in mm.",
         "",
-        "| scene | wanted | recommended | capture ms | predicted deviation mm | measured mm "
-        "| off |",
-        "|---|---|---|---|---|---|---|",
-        *rows,
+        table(plans),
+        "",
+        *[f"- {line}" for line in summary(plans).splitlines()],
         "",
     ]
 

@@ -219,7 +219,7 @@ class Capabilities:
             sequence=sequence,
             epoch=epoch,
             images=sequence.images,
-            capture_s=sequence.capture_s(self.readout_s) + settling_s,
+            capture_s=streaming_s,
             frame_rate_hz=1 / streaming_s,
             unambiguous_range_m=sequence.unambiguous_range_m,
             data_rate_bytes_s=frame_bytes / streaming_s,

@@ -36,7 +36,7 @@ from transientcam_server.camera.events import (
 from transientcam_server.camera.jobs import Job
 from transientcam_server.camera.lease import Change, Lease, Timer
 from transientcam_server.camera.light import LightGuard
-from transientcam_server.camera.source import sensor_of
+from transientcam_server.camera.source import sensor_of, twin_of
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import (
     NOMINAL_ID,
@@ -50,7 +50,7 @@ from transientcam_server.imaging.lens import Intrinsics, known_intrinsics
 from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.imaging.recipe import SettingsVersion, require_harmonics
 from transientcam_server.imaging.workers import Workers
-from transientcam_server.planning import FrontCache, Planner
+from transientcam_server.planning import FrontCache, Looks, Planner
 from transientcam_server.recording import Header, Library, RecordingOptions, ReplayCamera
 from transientcam_server.recording.frames import RecordedFramesCache
 from transientcam_server.settings import ReconstructionSettings, Settings
@@ -112,9 +112,10 @@ class Service:
             calibration=_calibration(camera, settings, kept),
             intrinsics=lambda: self.intrinsics,
         )
-        self.fronts = FrontCache(
-            self.planner, self.workers, simulated=camera.simulation is not None
-        )
+        simulated = camera.simulation is not None
+        twin = partial(twin_of, camera, settings.camera) if simulated else None
+        self.looks = Looks(self.planner, self.workers, twin)
+        self.fronts = FrontCache(self.planner, self.workers, self.looks, simulated=simulated)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._light = LightGuard(unserved_s=settings.limits.unserved_s)
         self.acquisition = Acquisition(camera, report=self._from_acquisition, light=self._light)

@@ -74,6 +74,31 @@ def test_frames_come_back_to_back_at_the_papers_video_rate(
     assert camera.counters.images == 60
 
 
+@pytest.mark.parametrize(
+    "sequence",
+    [
+        VIDEO,
+        Sequence(harmonics=4),
+        Sequence(harmonics=1, zeroth="on-off", exposure_s=2e-4),
+        Sequence(harmonics=2, takes=3, take_order="interleaved", exposure_s=7e-3),
+    ],
+)
+def test_a_capture_takes_as_long_as_the_sequence_says_by_the_clock_of_the_device(
+    sequence: Sequence, camera: Camera
+) -> None:
+    applied = camera.configure(sequence)
+    camera.start()
+    single = camera.read_frame()
+    camera.stop()
+    camera.start()
+    first, second = camera.read_frame(), camera.read_frame()
+
+    assert single.capture_s == pytest.approx(applied.capture_s, rel=5e-3)
+    assert second.capture_s == pytest.approx(applied.capture_s, rel=5e-3)
+    assert second.device_time_s - first.device_time_s == pytest.approx(applied.capture_s, rel=5e-3)
+    assert applied.frame_rate_hz == pytest.approx(1 / applied.capture_s)
+
+
 def test_the_same_seed_gives_the_same_frames(open_virtual: OpenCamera) -> None:
     def frame_bytes(spec: str) -> bytes:
         camera = open_virtual(spec)

@@ -92,7 +92,7 @@ def test_an_applied_sequence_says_what_follows_from_it() -> None:
     assert document == video.to_document() | {
         "sequence_id": 7,
         "images": 12,
-        "capture_s": pytest.approx(12 * 4.23e-3),
+        "capture_s": pytest.approx(12 * 4.48e-3),
         "frame_rate_hz": pytest.approx(1 / (12 * 4.48e-3)),
         "unambiguous_range_m": pytest.approx(6.517, abs=1e-3),
         "data_rate_bytes_s": pytest.approx(image_bytes / 4.48e-3),

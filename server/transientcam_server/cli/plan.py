@@ -4,7 +4,7 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 """
 
 import json
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 from rich.console import Console
@@ -12,12 +12,18 @@ from rich.console import Console
 from transientcam.cli.options import JsonOption
 
 if TYPE_CHECKING:
-    import transientcam_moments as tm
-    from transientcam_driver import Camera
-    from transientcam_server.imaging.recipe import Recipe
+    from transientcam_driver import Camera, Sequence
+    from transientcam_server.planning import Planner, SceneStatistics
+
+MOVING: Final = 0.02
+"""Share of moving pixels from which on it is said."""
 
 
 def plan(
+    range_error_m: Annotated[
+        float | None,
+        typer.Option(help="Noise and bias of the range together, of the median pixel, at most."),
+    ] = None,
     range_std_m: Annotated[
         float | None, typer.Option(help="Standard deviation of the range, at most.")
     ] = None,
@@ -45,9 +51,19 @@ def plan(
             "--fix", help="A field of the sequence that must stay, as in zeroth=on-off; repeatable."
         ),
     ] = None,
+    estimator: Annotated[
+        str | None,
+        typer.Option(
+            help="The only estimator to plan with: single-frequency, maximum-entropy, likelihood "
+            "or pisarenko.  [default: all of these]"
+        ),
+    ] = None,
     camera: Annotated[
-        str, typer.Option(help="The camera, and the scene before it; one capture is taken.")
+        str, typer.Option(help="The camera, and the scene before it; a few captures are taken.")
     ] = "sim:mirrors",
+    real_time: Annotated[
+        bool, typer.Option("--real-time", help="Let a simulated camera take its time, too.")
+    ] = False,
     brightness_dn_per_s: Annotated[
         float | None,
         typer.Option(
@@ -62,23 +78,32 @@ def plan(
         ),
     ] = None,
     ambient_dn_per_s: Annotated[
-        float, typer.Option(help="Light that is not the camera's, in DN for each second.")
-    ] = 0.0,
+        float | None,
+        typer.Option(
+            help="Light that is not the camera's, in DN for each second.  [default: as measured]"
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Find the sequence for a target accuracy or a budget of time, and predict what it costs.
+    """Find the sequence and estimator for a target accuracy or a budget of time.
 
-    Where the target is out of reach the best that is possible is printed, and the exit code is 1.
+    Where the target is out of reach what limits it is printed, and the exit code is 1.
     """
     import transientcam_moments as tm
     from transientcam_driver import Sequence, open_camera
+    from transientcam_driver.clock import RealClock, VirtualClock
     from transientcam_server.camera.source import sensor_of
     from transientcam_server.errors.exceptions import Problem
     from transientcam_server.planning import Goal, Planner, uniform_scene
+    from transientcam_server.planning.estimation import ESTIMATORS
     from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
+    if estimator is not None and estimator not in ESTIMATORS:
+        known = ", ".join(ESTIMATORS)
+        raise typer.BadParameter(f"{estimator!r} is none of {known}", param_hint="--estimator")
     document = _fields(fixed or [])
     goal = Goal(
+        range_error_m=range_error_m,
         range_std_m=range_std_m,
         separation_m=separation_m,
         separation_share=separation_share,
@@ -88,56 +113,56 @@ def plan(
         computing_share=computing_share,
         base=Sequence.from_document(document),
         fixed=frozenset(document),
+        estimator=estimator,
     )
     console = Console(stderr=True)
-    with open_camera(camera) as opened:
-        planner = Planner(
-            opened.capabilities, sensor_of(opened, SensorSettings()), ReconstructionSettings()
-        )
-        if computing_share is not None:
-            with console.status("compiling kernels"):
-                tm.kernels.compile()  # the daemon's speed is timed
-        with console.status("looking at the scene"):
+    virtual = camera.startswith("sim:") and not real_time
+    try:
+        goal.require_sensible()
+        with open_camera(camera, clock=VirtualClock() if virtual else RealClock()) as opened:
+            planner = Planner(
+                opened.capabilities, sensor_of(opened, SensorSettings()), ReconstructionSettings()
+            )
+            if computing_share is not None:
+                with console.status("compiling kernels"):
+                    tm.kernels.compile()  # the daemon's speed is timed
             if brightness_dn_per_s is None:
-                scene = planner.scene_statistics(*_captured(opened), ambient_dn_per_s)
+                scene = _looked(planner, opened, goal.base, ambient_dn_per_s, console)
             else:
                 scene = uniform_scene(
                     brightness_dn_per_s,
                     [_return(text) for text in returns or ["2"]],
-                    ambient_dn_per_s=ambient_dn_per_s,
+                    ambient_dn_per_s=ambient_dn_per_s or 0.0,
                 )
         with console.status("predicting"):
-            try:
-                made = planner.plan(goal, scene)
-            except Problem as problem:
-                if as_json:
-                    typer.echo(json.dumps({"detail": problem.detail, **problem.extensions}))
-                else:
-                    console.print(problem.detail, style="red", soft_wrap=True)
-                raise typer.Exit(1) from problem
+            made = planner.plan(goal, scene)
+    except Problem as problem:
+        if as_json:
+            typer.echo(json.dumps({"detail": problem.detail, **problem.extensions}))
+        else:
+            console.print(problem.detail, style="red", soft_wrap=True)
+        raise typer.Exit(1) from problem
     if as_json:
         typer.echo(json.dumps(made.to_document()))
     else:
         _print_plan(made.to_document(), computing=computing_share is not None)
 
 
-def _captured(camera: "Camera") -> tuple["Recipe", "tm.Reconstruction"]:
-    """Capture the scene with many harmonics and little noise, to describe it by."""
-    from transientcam_driver import Sequence
-    from transientcam_server.camera.source import sensor_of
-    from transientcam_server.imaging.recipe import Recipe
-    from transientcam_server.settings import ReconstructionSettings, SensorSettings
-
-    applied = camera.configure(
-        camera.capabilities.nearest(Sequence(harmonics=6, takes=16, exposure_s=0.0015))
-    )
-    camera.start()
-    frame = camera.read_frame()
-    camera.stop()
-    full_scale = 2.0**camera.capabilities.bits - 1.0
-    sensor = sensor_of(camera, SensorSettings())
-    recipe = Recipe(applied, ReconstructionSettings(), full_scale, sensor=sensor)
-    return recipe, recipe.reconstruct(frame)
+def _looked(
+    planner: "Planner",
+    camera: "Camera",
+    base: "Sequence",
+    ambient_dn_per_s: float | None,
+    console: Console,
+) -> "SceneStatistics":
+    """Look at the scene, and name each stage of that."""
+    with console.status("looking at the scene") as status:
+        return planner.look(
+            camera,
+            base,
+            ambient_dn_per_s=ambient_dn_per_s,
+            go_on=lambda stage: status.update(f"looking at the scene: {stage}"),
+        )
 
 
 def _fields(texts: list[str]) -> dict[str, Any]:
@@ -166,8 +191,10 @@ def _return(text: str) -> tuple[float, float]:
 
 
 def _print_plan(document: dict[str, Any], *, computing: bool) -> None:
-    std = document["predicted"]["range_std_m"]
+    predicted = document["predicted"]
+    error, std = predicted["range_error_m"], predicted["range_std_m"]
     typer.echo(json.dumps(document["sequence"]))
+    typer.echo(f"estimator {document['estimator']}")
     time_ms, rate_hz = document["capture_s"] * 1e3, document["frame_rate_hz"]
     typer.echo(f"captures in {time_ms:.1f} ms ({rate_hz:.1f} Hz back to back)")
     if computing:
@@ -176,9 +203,21 @@ def _print_plan(document: dict[str, Any], *, computing: bool) -> None:
             f"{document['computing_share']:.1%} of the time"
         )
     typer.echo(
-        f"range to {std['median'] * 1e3:.2f} mm ({std['low'] * 1e3:.2f} to "
-        f"{std['high'] * 1e3:.2f}), 90 % of the pixels to {std['p90'] * 1e3:.2f} mm"
+        f"range to {error['median'] * 1e3:.2f} mm ({error['low'] * 1e3:.2f} to "
+        f"{error['high'] * 1e3:.2f}): noise {std['median'] * 1e3:.2f} mm, "
+        f"bias {predicted['range_bias_m'] * 1e3:.2f} mm; "
+        f"{predicted['outlier_share']:.1%} of the ranges are outliers"
     )
+    typer.echo(document["summary"])
+    scene = document["scene"]
+    typer.echo(
+        f"seen: {scene['lit_share']:.0%} of the pixels lit, at {scene['range_m']:.2f} m; "
+        f"{scene['ambient_dn_per_s']:.3g} DN/s of ambient light"
+    )
+    if scene["moving_share"] > MOVING:
+        typer.echo(f"{scene['moving_share']:.0%} of them move: what that costs is not predicted")
+    if not scene["ambiguity_checked"]:
+        typer.echo("whether ranges are short by a period was not checked")
     if document["predicted"]["beyond_scene"]:
         typer.echo("at best: this resolves more of the scene than the capture it is predicted from")
     if document["predicted"]["separation_share"] is not None:

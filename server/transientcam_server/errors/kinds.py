@@ -301,11 +301,11 @@ ANSWER_TOO_LARGE: Final = ProblemKind(
 )
 TARGET_UNREACHABLE: Final = ProblemKind(
     "target-unreachable",
-    422,
+    409,
     "Target unreachable",
     "No sequence of this camera reaches the target on this scene within the budget. `field` names "
-    "what is out of reach, `limit` the best value within reach, and `best` the sequence that "
-    "achieves it.",
+    "what is out of reach, `limit` the best value within reach, `best` the sequence that "
+    "achieves it, and `limited_by` what limits it: `bias`, `noise`, `budget` or `together`.",
 )
 INTERNAL_ERROR: Final = ProblemKind(
     "internal-error",

@@ -6,14 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from transientcam_driver import AppliedSequence
+from transientcam_driver import AppliedSequence, Sequence
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.workers import Workers
 from transientcam_server.planning.goal import Goal
+from transientcam_server.planning.looks import Looks
 from transientcam_server.planning.planner import Planner, range_error
 
 KEPT_S: Final = 10.0
-_WIDE_BOUNDS: Final = 1e9  # a target that every sequence reaches: it only requests the prediction
+_WIDE: Final = 1e9  # a target that every sequence reaches: it only requests the prediction
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +22,7 @@ class _CachedFront:
     made_with: tuple[int, int]
     frame: int
     until_s: float
-    choices: list[dict[str, Any]]
+    document: dict[str, Any]
 
 
 class FrontCache:
@@ -31,12 +32,14 @@ class FrontCache:
         self,
         planner: Planner,
         workers: Workers,
+        looks: Looks,
         *,
         simulated: bool,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._planner = planner
         self._workers = workers
+        self._looks = looks
         self._simulated = simulated
         self._clock = clock
         self._cached: dict[str, _CachedFront] = {}
@@ -48,29 +51,36 @@ class FrontCache:
             cached = self._cached.get(by)
             made_with = frame.raw.epoch, frame.recipe.settings_version
             if cached is None or cached.made_with != made_with or self._clock() > cached.until_s:
-                choices = await self._predicted(frame, by)
-                cached = _CachedFront(made_with, frame.number, self._clock() + KEPT_S, choices)
+                document = await self._predicted(frame, by)
+                cached = _CachedFront(made_with, frame.number, self._clock() + KEPT_S, document)
                 self._cached[by] = cached
         return {
             "compared_by": by,
             "scene_of_frame": cached.frame,
             "current": await self._current(frame),
-            "front": cached.choices,
+            **cached.document,
         }
 
     def forget(self) -> None:
         """Drop the fronts, as when the scene is another one."""
         self._cached.clear()
+        self._looks.forget()
 
-    async def _predicted(self, frame: Frame, by: str) -> list[dict[str, Any]]:
-        found = await frame.reconstruction("returns")
-        scene, _ = await self._workers.run(self._planner.scene_statistics, frame.recipe, found, 0.0)
+    async def _predicted(self, frame: Frame, by: str) -> dict[str, Any]:
+        base = frame.recipe.applied.sequence
+        if self._looks.needs_frame:
+            scene = await self._looks.of_frame(frame, None)
+        else:
+            frequency_hz = base.base_frequency_hz
+            base = Sequence(base_frequency_hz=frequency_hz, sub_phases=base.sub_phases)
+            scene = await self._looks.of_twin(base, None, lambda: None)
         goal = Goal(
-            base=frame.recipe.applied.sequence,
-            bound_width=_WIDE_BOUNDS if by == "bound_width" else None,
+            base=base,
+            range_std_m=_WIDE if by == "range_std_m" else None,
+            bound_width=_WIDE if by == "bound_width" else None,
         )
-        choices, _ = await self._workers.run_long(self._planner.front_documents, goal, scene)
-        return choices
+        document, _ = await self._workers.run_long(self._planner.tradeoff_document, goal, scene)
+        return document
 
     async def _current(self, frame: Frame) -> dict[str, Any]:
         found = await frame.reconstruction("returns")

@@ -18,6 +18,8 @@ class Goal:
 
     Attributes
     ----------
+    range_error_m
+        Noise and bias of the range together, of the median lit pixel, at most.
     range_std_m
         Standard deviation of the range of a typical pixel, at most.
     separation_m
@@ -32,11 +34,14 @@ class Goal:
     computing_share
         Share of the time between two frames that reconstruction may take on this machine.
     base
-        Sequence whose base frequency, or half of it, is used, and its sub-phases.
+        Sequence whose base frequency, half of it or a multiple, is used, and its sub-phases.
     fixed
         Names of further fields of it that must stay.
+    estimator
+        The only one that is planned with; None for any.
     """
 
+    range_error_m: float | None = None
     range_std_m: float | None = None
     separation_m: float | None = None
     separation_share: float = 0.9
@@ -46,6 +51,7 @@ class Goal:
     computing_share: float | None = None
     base: Sequence = field(default_factory=Sequence)
     fixed: frozenset[str] = frozenset()
+    estimator: str | None = None
 
     @property
     def empty(self) -> bool:
@@ -63,20 +69,29 @@ class Goal:
             return 1.0 - self.separation_share
         return float(getattr(self, target))
 
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """The targets that are given."""
+        return tuple(name for name in TARGETS if getattr(self, name) is not None)
+
     def affords(self, choice: Choice) -> bool:
-        """Return whether a sequence is within the budgets."""
+        """Return whether a choice is within the budgets."""
         return (
-            (self.capture_s is None or choice.applied.capture_s <= self.capture_s)
+            self.affords_time(choice.applied.capture_s)
             and (self.frame_rate_hz is None or choice.applied.frame_rate_hz >= self.frame_rate_hz)
             and (self.computing_share is None or choice.computing_share <= self.computing_share)
         )
 
+    def affords_time(self, capture_s: float) -> bool:
+        """Return whether captures of this length, back to back, are within the budgets."""
+        return (self.capture_s is None or capture_s <= self.capture_s) and (
+            self.frame_rate_hz is None or capture_s * self.frame_rate_hz <= 1 + 1e-9
+        )
+
     def reached_by(self, choice: Choice) -> bool:
-        """Return whether a sequence reaches all targets."""
+        """Return whether a choice reaches all targets, with the margin of its intervals."""
         return all(
-            choice.error(target) <= self.limit(target)
-            for target in TARGETS
-            if getattr(self, target) is not None
+            choice.error_with_margin(target) <= self.limit(target) for target in self.targets
         )
 
     def require_sensible(self) -> None:

@@ -1,28 +1,28 @@
-"""From a target accuracy or a budget of time to a sequence.
+"""From a target accuracy or a budget of time to a sequence and an estimator.
 
-Every sequence of a grid is predicted; of those within the budgets that reach the targets the one
-with the shortest capture is recommended, or, without a target, the most accurate one. Beside it
-stand its two neighbours on the Pareto front: what half the time gives, and what twice the accuracy
-costs.
+Of all that the camera can run within the budgets the quickest that reaches the targets with margin
+is recommended, or, without a target, the most accurate. Beside it stand what half the time gives,
+and what twice the accuracy costs.
 """
 
-from collections.abc import Callable
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
 from transientcam.notebook import table_html
-from transientcam_driver import Capabilities, Sequence
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
-from transientcam_server.planning.candidates import candidates
-from transientcam_server.planning.choice import TARGETS, Choice
-from transientcam_server.planning.goal import BUDGETS, Goal
+from transientcam_driver import Capabilities
+from transientcam_server.planning.choice import Choice
+from transientcam_server.planning.families import families
+from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.prediction import Predictor
+from transientcam_server.planning.refusal import too_small, unreachable
+from transientcam_server.planning.scene import SceneStatistics
+from transientcam_server.planning.search import Search, Timed
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Plan:
-    """A recommendation and its neighbours on the front; None where there is none.
+    """A recommendation and its neighbours; None where there is none.
 
     Attributes
     ----------
@@ -32,18 +32,26 @@ class Plan:
         The quickest one with at most half the error.
     leading
         The target by which they are compared.
+    summary
+        One sentence about noise, bias and what half the error costs.
+    scene
+        What it was planned for.
     """
 
     recommended: Choice
     half_time: Choice | None
     twice_accuracy: Choice | None
     leading: str
+    summary: str
+    scene: SceneStatistics
 
     def to_document(self) -> dict[str, Any]:
         """Return the plan as JSON has it."""
         return {
             **self.recommended.to_document(),
             "compared_by": self.leading,
+            "summary": self.summary,
+            "scene": self.scene.to_document(),
             "half_time": self._neighbour(self.half_time),
             "twice_accuracy": self._neighbour(self.twice_accuracy),
         }
@@ -75,14 +83,8 @@ class Plan:
         }
 
 
-def plan(
-    goal: Goal,
-    predictor: Predictor,
-    capabilities: Capabilities,
-    *,
-    reconstruct_s: Callable[[Sequence], float],
-) -> Plan:
-    """Recommend a sequence.
+def plan(goal: Goal, predictor: Predictor, capabilities: Capabilities, *, timed: Timed) -> Plan:
+    """Recommend a sequence and an estimator.
 
     Parameters
     ----------
@@ -92,104 +94,72 @@ def plan(
         Of the scene.
     capabilities
         Of the camera.
-    reconstruct_s
-        Computing time of a frame of a sequence on this machine.
+    timed
+        Computing time in s of a frame of a sequence with an estimator on this machine.
 
     Raises
     ------
     Problem
         ``invalid-request`` where the goal is empty or a value is out of bounds;
-        ``target-unreachable`` with the best that can be achieved.
+        ``target-unreachable`` with the best that can be achieved and what limits it.
     """
     goal.require_sensible()
-    choices = candidates(goal, predictor, capabilities, reconstruct_s=reconstruct_s)
-    affordable = [choice for choice in choices if goal.affords(choice)]
-    if not affordable:
-        raise _unaffordable(goal, choices)
-    reached = [choice for choice in affordable if goal.reached_by(choice)]
-    if not reached:
-        raise _unreachable(goal, affordable)
+    search = Search(goal, families(goal, predictor, capabilities), predictor, timed)
+    targets = {name: goal.limit(name) for name in goal.targets}
     leading = goal.leading
-    if any(getattr(goal, name) is not None for name in TARGETS):
-        best = min(reached, key=lambda each: (each.applied.capture_s, each.error(leading)))
-    else:
-        best = min(reached, key=lambda each: (each.error(leading), each.applied.capture_s))
-    return Plan(best, *_neighbours(best, choices, leading), leading)
+    best = search.quickest(targets) if targets else search.finest(leading)
+    if best is None:
+        best = search.finest(leading)
+        if best is None:
+            raise too_small(goal, search)
+        if not goal.reached_by(best):
+            raise unreachable(goal, search, best)
+    half_time = search.finest(leading, best.applied.capture_s / 2, contenders=1)
+    half = {leading: best.error(leading) / 2}
+    twice = search.without_budgets().quickest(half, contenders=1)
+    return Plan(best, half_time, twice, leading, _summary(best, twice), predictor.scene)
+
+
+def in_a_sentence(front: list[Choice]) -> str:
+    """State from where on bias rules, of choices by rising time."""
+    if not front:
+        return "Nothing reaches any accuracy on this scene."
+    finest = front[-1]
+    best = (
+        f"the best is {finest.predicted.range_error.median * 1e3:.3g} mm in "
+        f"{finest.applied.capture_s * 1e3:.3g} ms ({finest.in_words()})"
+    )
+    ruled = list(
+        itertools.takewhile(
+            lambda each: each.predicted.range_bias.median > each.predicted.range_std.median,
+            reversed(front),
+        )
+    )
+    if not ruled:
+        return f"Noise rules everywhere: more time buys accuracy; {best}."
+    return (
+        f"From {ruled[-1].applied.capture_s * 1e3:.3g} ms on bias rules and more time buys little; "
+        f"{best}."
+    )
+
+
+def _summary(best: Choice, twice: Choice | None) -> str:
+    predicted = best.predicted
+    noise_m, bias_m = predicted.range_std.median, predicted.range_bias.median
+    first = f"{noise_m * 1e3:.3g} mm noise, {bias_m * 1e3:.3g} mm off"
+    if twice is None:
+        what = "more frequencies or another estimator" if bias_m > noise_m else "a longer capture"
+        return f"{first}: nothing that this camera can capture halves the error, not even {what}."
+    factor = twice.applied.capture_s / best.applied.capture_s
+    error_m = twice.predicted.range_error.median
+    return f"{first}: {twice.in_words()} takes {factor:.2g} x as long for {error_m * 1e3:.3g} mm."
 
 
 def _in_words(choice: Choice) -> str:
-    sequence = choice.applied.sequence
+    predicted = choice.predicted
     return (
-        f"m = {sequence.harmonics} at {sequence.base_frequency_hz / 1e6:g} MHz, "
-        f"zeroth {sequence.zeroth}, {sequence.exposure_s * 1e3:g} ms, takes {sequence.takes}: "
-        f"captures in {choice.applied.capture_s * 1e3:.1f} ms, "
-        f"range to {choice.range_std.median_m * 1e3:.2f} mm"
-    )
-
-
-def _neighbours(
-    best: Choice, choices: list[Choice], leading: str
-) -> tuple[Choice | None, Choice | None]:
-    half_s, half_error = best.applied.capture_s / 2, best.error(leading) / 2
-    quick = [choice for choice in choices if choice.applied.capture_s <= half_s]
-    fine = [choice for choice in choices if choice.error(leading) <= half_error]
-    return (
-        min(quick, key=lambda choice: (choice.error(leading), choice.applied.capture_s))
-        if quick
-        else None,
-        min(fine, key=lambda choice: (choice.applied.capture_s, choice.error(leading)))
-        if fine
-        else None,
-    )
-
-
-def _unaffordable(goal: Goal, choices: list[Choice]) -> Problem:
-    """Return the problem of the budget that is too small, with the least that is possible."""
-    quickest = min(choices, key=lambda choice: choice.applied.capture_s)
-    lightest = min(choices, key=lambda choice: choice.computing_share)
-    least = {
-        "capture_s": (quickest, quickest.applied.capture_s),
-        "frame_rate_hz": (quickest, quickest.applied.frame_rate_hz),
-        "computing_share": (lightest, lightest.computing_share),
-    }
-    for budget, (best, value) in least.items():
-        limit = getattr(goal, budget)
-        if limit is not None and not Goal(**{budget: limit}).affords(best):
-            return _refusal(budget, limit, value, best)
-    # each by itself is enough, but no sequence keeps all of them
-    budget = next(name for name in BUDGETS if getattr(goal, name) is not None)
-    best, value = least[budget]
-    return _refusal(budget, getattr(goal, budget), value, best, together=True)
-
-
-def _unreachable(goal: Goal, affordable: list[Choice]) -> Problem:
-    """Return the problem of the target out of reach, with the best that the budgets allow."""
-    for target in TARGETS:
-        limit = getattr(goal, target)
-        if limit is None:
-            continue
-        best = min(affordable, key=lambda each, target=target: each.error(target))  # type: ignore[misc] # mypy cannot infer a lambda with a default
-        if best.error(target) > goal.limit(target):
-            value = best.separation_share if target == "separation_m" else best.error(target)
-            return _refusal(target, limit, value, best)
-    # each by itself is in reach, but none reaches all of them
-    best = min(affordable, key=lambda each: each.error(goal.leading))
-    return _refusal(
-        goal.leading, getattr(goal, goal.leading), best.error(goal.leading), best, together=True
-    )
-
-
-def _refusal(
-    field: str, limit: Any, achieved: Any, best: Choice, *, together: bool = False
-) -> Problem:
-    what = "Together with the others this" if together else "This"
-    named = "share of captures that find both" if field == "separation_m" else field
-    return Problem(
-        kinds.TARGET_UNREACHABLE,
-        f"{what} cannot be reached on this scene: {field} = {limit:g}. "
-        f"The best {named} is {achieved:.4g}.",
-        field=field,
-        value=limit,
-        limit=achieved,
-        best=best.to_document(),
+        f"{choice.in_words()}: captures in {choice.applied.capture_s * 1e3:.1f} ms, "
+        f"range to {predicted.range_error.median * 1e3:.2f} mm "
+        f"({predicted.range_std.median * 1e3:.2f} noise, "
+        f"{predicted.range_bias.median * 1e3:.2f} bias)"
     )

@@ -1,22 +1,23 @@
 """Plans sequences for the scene that a camera sees. Runs on workers."""
 
 import threading
+from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 import transientcam_moments as tm
-from transientcam_driver import Capabilities, Truth
+from transientcam_driver import Capabilities, Sequence, Truth
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.noise import moment_noise
-from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.planning.candidates import candidates
-from transientcam_server.planning.choice import Choice, choices_on_front
+from transientcam_server.planning.families import Family, families
 from transientcam_server.planning.goal import Goal
-from transientcam_server.planning.plan import Plan, plan
+from transientcam_server.planning.look import LookedThrough, look_at
+from transientcam_server.planning.plan import Plan, in_a_sentence, plan
 from transientcam_server.planning.prediction import Predictor
-from transientcam_server.planning.scene import SceneStatistics, scene_of_frame
+from transientcam_server.planning.scene import SceneStatistics
+from transientcam_server.planning.search import Search
 from transientcam_server.planning.timing import ReconstructionTimer
 from transientcam_server.settings import ReconstructionSettings
 
@@ -47,62 +48,77 @@ class Planner:
         self._settings = settings
         self._computing = ReconstructionTimer(self._capabilities, settings)
 
-    def scene_statistics(
-        self, recipe: Recipe, found: tm.Reconstruction, ambient_dn_per_s: float
+    def look(
+        self,
+        camera: LookedThrough,
+        base: Sequence,
+        *,
+        ambient_dn_per_s: float | None = None,
+        go_on: Callable[[str], None] = lambda stage: None,
     ) -> SceneStatistics:
-        """Describe the scene of a frame.
+        """Look at the scene before a camera; see `look_at`."""
 
-        Raises
-        ------
-        Problem
-            ``target-unreachable`` where the frame shows no light.
-        """
-        statistics = scene_of_frame(
-            found,
-            moment_noise(recipe, found),
-            exposure_s=recipe.applied.sequence.exposure_s,
-            base_frequency_hz=recipe.base_frequency_hz,
-            ambient_dn_per_s=ambient_dn_per_s,
-        )
-        if statistics is None:
-            raise Problem(
-                kinds.TARGET_UNREACHABLE,
-                "The current frame shows no pixel with light that does not saturate; give a scene.",
-                field="scene",
-                value=None,
-                best=None,
-            )
-        return statistics
-
-    def plan(self, goal: Goal, scene: SceneStatistics) -> Plan:
-        """Recommend a sequence; see `planning.plan`."""
-        return plan(goal, self._predictor(scene), self._capabilities, reconstruct_s=self._computing)
-
-    def plan_document(self, goal: Goal, scene: SceneStatistics) -> dict[str, Any]:
-        """Return `plan` as JSON, with intervals by a bootstrap."""
-        return self.plan(goal, scene).to_document()
-
-    def front(self, goal: Goal, scene: SceneStatistics) -> list[Choice]:
-        """Return all sequences that no other beats, by rising time."""
-        choices = candidates(
-            goal, self._predictor(scene), self._capabilities, reconstruct_s=self._computing
-        )
-        return choices_on_front(choices, goal.leading)
-
-    def front_documents(self, goal: Goal, scene: SceneStatistics) -> list[dict[str, Any]]:
-        """Return `front` as JSON, with intervals by a bootstrap: seconds of computing."""
-        documents = []
-        for choice in self.front(goal, scene):
+        def checked(stage: str) -> None:
             self._go_on()
-            documents.append(choice.to_document())
-        return documents
+            go_on(stage)
+
+        return look_at(
+            camera,
+            self._sensor,
+            self._settings,
+            base=base,
+            ambient_dn_per_s=ambient_dn_per_s,
+            go_on=checked,
+        )
+
+    def plan(
+        self, goal: Goal, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
+    ) -> Plan:
+        """Recommend a sequence; see `planning.plan`. What ``go_on`` raises ends it."""
+        return plan(goal, self._predictor(scene, go_on), self._capabilities, timed=self._computing)
+
+    def plan_document(
+        self, goal: Goal, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
+    ) -> dict[str, Any]:
+        """Return `plan` as JSON."""
+        return self.plan(goal, scene, go_on).to_document()
+
+    def families(self, goal: Goal, scene: SceneStatistics) -> list[Family]:
+        """Return all that is searched for a goal; see `planning.families`."""
+        return families(goal, self._predictor(scene), self._capabilities)
+
+    def tradeoff_document(self, goal: Goal, scene: SceneStatistics) -> dict[str, Any]:
+        """Return all that no other beats, and the lines they lie on, as JSON: seconds of work."""
+        predictor = self._predictor(scene)
+        found = families(goal, predictor, self._capabilities)
+        search = Search(goal, found, predictor, self._computing)
+        choices = search.front(goal.leading)
+        return {
+            "front": [choice.to_document() for choice in choices],
+            "lines": [
+                {
+                    "estimator": line.estimator,
+                    "harmonics": line.sequence.harmonics,
+                    "base_frequency_hz": line.sequence.base_frequency_hz,
+                    "points": [asdict(point) for point in line.points],
+                }
+                for line in search.lines(choices)
+            ],
+            "summary": in_a_sentence(choices),
+        }
 
     def close(self) -> None:
         """End what is being computed: it raises Problem ``shutting-down``. From any thread."""
         self._closing.set()
 
-    def _predictor(self, scene: SceneStatistics) -> Predictor:
-        return Predictor(scene, self._sensor, self._settings, go_on=self._go_on)
+    def _predictor(
+        self, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
+    ) -> Predictor:
+        def checked() -> None:
+            self._go_on()
+            go_on()
+
+        return Predictor(scene, self._sensor, self._settings, go_on=checked)
 
     def _go_on(self) -> None:
         if self._closing.is_set():

@@ -1,6 +1,6 @@
 """The JSON documents of planning."""
 
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -16,6 +16,8 @@ class _Asked(Document):
 class TargetDocument(_Asked):
     """What has to be reached; all that is given."""
 
+    range_error_m: float | None = Field(default=None, gt=0)
+    """Noise and bias of the range together, of the median lit pixel, at most."""
     range_std_m: float | None = Field(default=None, gt=0)
     """Standard deviation of the range of a typical pixel, at most."""
     separation_m: float | None = Field(default=None, gt=0)
@@ -64,7 +66,7 @@ class PlanRequest(_Asked):
         extra="forbid",
         json_schema_extra={
             "examples": [
-                {"target": {"range_std_m": 0.01}},
+                {"target": {"range_error_m": 0.005}},
                 {"budget": {"frame_rate_hz": 15.0}, "fixed": {"zeroth": "low-frequency"}},
             ]
         },
@@ -74,18 +76,24 @@ class PlanRequest(_Asked):
     budget: BudgetDocument = BudgetDocument()
     fixed: dict[str, Any] = Field(default_factory=dict)
     """Fields of the sequence that must stay as given here."""
+    estimator: Literal["single-frequency", "maximum-entropy", "likelihood", "pisarenko"] | None = (
+        None
+    )
+    """The only estimator to plan with; null considers all of these."""
     scene: SceneDocument | None = None
-    """Null takes the current frame's."""
-    ambient_dn_per_s: float = Field(default=0.0, ge=0)
-    """Light on the current frame's scene that is not the camera's."""
+    """Null looks at the scene: by a simulated camera of its own in virtual time, or else by the
+    current frame."""
+    ambient_dn_per_s: float | None = Field(default=None, ge=0)
+    """Light on that scene that is not the camera's; null measures it."""
 
 
-class DeviationDocument(Document):
-    """Predicted standard deviation of the range in m."""
+class FigureDocument(Document):
+    """A predicted error of the range in m."""
 
     median: float
+    """Of the median lit pixel."""
     low: float
-    """The median lies above this with 97.5 %."""
+    """What is measured lies above this with 95 %."""
     high: float
     """And below this."""
     p90: float
@@ -95,15 +103,17 @@ class DeviationDocument(Document):
 class PredictedDocument(Document):
     """Predicted accuracy."""
 
-    range_std_m: DeviationDocument
+    range_error_m: FigureDocument
+    """Noise and bias together: root sum of squares, pixel by pixel."""
+    range_std_m: FigureDocument
+    """Noise: standard deviation between captures."""
     range_bias_m: float
-    """How far the range of the median pixel is off without any noise."""
+    """How far the mean range of the median pixel is off; more captures do not reduce it."""
+    outlier_share: float
+    """Share of the ranges that are off by more than five times `range_error_m`."""
     beyond_scene: bool
-    """Whether it sees more of the scene than the frame that the scene was judged by, so that the
+    """Whether it sees more of the scene than the look that the scene was judged by, so that the
     prediction is a bound on how good it can be."""
-    first_order_share: float
-    """Share of the pixels where the noise model holds to first order; noise was drawn for the
-    others."""
     bound_width: float | None = None
     separation_share: float | None = None
 
@@ -113,6 +123,8 @@ class ChoiceDocument(Document):
 
     sequence: SequenceDocument
     """The body for `PUT /sequence`."""
+    estimator: str
+    """What the range is to be taken from, as in `PUT /reconstruction`."""
     applied: dict[str, Any]
     """What the camera would make of it."""
     capture_s: float
@@ -132,11 +144,30 @@ class NeighbourDocument(ChoiceDocument):
     """Its error over the recommended one's."""
 
 
+class SeenDocument(Document):
+    """The scene that was planned for, by its median lit pixel."""
+
+    range_m: float
+    brightness_dn_per_s: float
+    """Zeroth moment for each second of exposure."""
+    ambient_dn_per_s: float
+    """Light that is not the camera's, in DN an image for each second of exposure."""
+    lit_share: float
+    """Share of all pixels whose light stands clear of the noise; no others count."""
+    moving_share: float
+    """Share of those that changed while the scene was looked at: what moves is not predicted."""
+    ambiguity_checked: bool
+    """Whether a second base frequency showed that no range is short by a period."""
+
+
 class PlanDocument(ChoiceDocument):
     """A recommendation and its neighbours."""
 
     compared_by: str
     """The target that neighbours are compared by."""
+    summary: str
+    """Noise and bias in a sentence, and what half the error costs."""
+    scene: SeenDocument
     half_time: NeighbourDocument | None = None
     """What half the time gives; null where nothing is that quick."""
     twice_accuracy: NeighbourDocument | None = None
@@ -161,6 +192,24 @@ class CurrentDocument(Document):
     """Null for a real camera."""
 
 
+class PointDocument(Document):
+    """Predicted errors of the range of the median pixel, in m."""
+
+    capture_s: float
+    range_std_m: float
+    range_bias_m: float
+    range_error_m: float
+
+
+class LineDocument(Document):
+    """How the error of the same frequencies falls with capture time."""
+
+    estimator: str
+    harmonics: int
+    base_frequency_hz: float
+    points: list[PointDocument]
+
+
 class TradeoffDocument(Document):
     """What accuracy costs on the scene before the camera."""
 
@@ -170,3 +219,7 @@ class TradeoffDocument(Document):
     current: CurrentDocument
     front: list[ChoiceDocument]
     """By rising capture time and falling error."""
+    lines: list[LineDocument]
+    """Of every estimator and set of frequencies on the front: noise falls onto the bias."""
+    summary: str
+    """From where on bias rules, and the best there is, in a sentence."""

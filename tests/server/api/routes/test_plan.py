@@ -34,13 +34,19 @@ def ask(client: httpx.Client, **request: Any) -> httpx.Response:
 
 
 def test_a_plan_for_the_scene_before_the_camera_is_a_sequence_it_takes(noisy: httpx.Client) -> None:
-    answer = ask(noisy, target={"range_std_m": 0.005}).json()
+    answer = ask(noisy, target={"range_error_m": 0.02}).json()
 
-    assert answer["predicted"]["range_std_m"]["median"] <= 0.005
+    predicted = answer["predicted"]
+    assert predicted["range_error_m"]["median"] <= 0.02
+    assert predicted["range_std_m"]["median"] > 0
+    assert predicted["range_bias_m"] < predicted["range_error_m"]["p90"]
+    assert 0 <= predicted["outlier_share"] < 0.2
+    assert "mm noise, " in answer["summary"]
+    assert answer["scene"]["ambiguity_checked"] is True
+    assert answer["scene"]["lit_share"] > 0.9
     assert answer["sequence"]["harmonics"] == 3
     checked = noisy.post("/api/v1/sequence/validate", json=answer["sequence"]).json()
     assert checked["capture_s"] == pytest.approx(answer["capture_s"])
-    assert answer["half_time"]["error_factor"] > 1
     assert answer["twice_accuracy"]["time_factor"] > 1
 
 
@@ -65,12 +71,13 @@ def test_ambient_light_costs_accuracy(noisy: httpx.Client) -> None:
 
 
 def test_an_impossible_target_is_refused_with_the_best_achievable(noisy: httpx.Client) -> None:
-    response = ask(noisy, target={"range_std_m": 1e-7}, scene=SCENE)
+    response = ask(noisy, target={"range_error_m": 1e-7}, scene=SCENE)
 
     problem = response.json()
-    assert response.status_code == 422
+    assert response.status_code == 409
     assert problem["type"] == "/problems/target-unreachable"
-    assert problem["field"] == "range_std_m"
+    assert problem["field"] == "range_error_m"
+    assert problem["limited_by"] in ("noise", "bias")
     assert problem["limit"] > 1e-7
     assert noisy.post("/api/v1/sequence/validate", json=problem["best"]["sequence"]).is_success
 
@@ -79,7 +86,8 @@ def test_an_impossible_target_is_refused_with_the_best_achievable(noisy: httpx.C
     ("request_body", "field"),
     [
         ({}, "target"),
-        ({"target": {"range_std_m": -1}}, "target.range_std_m"),
+        ({"target": {"range_error_m": -1}}, "target.range_error_m"),
+        ({"estimator": "guess", "budget": {"capture_s": 1}}, "estimator"),
         ({"target": {"range": 1}}, "target.range"),
         ({"budget": {"frame_rate_hz": "fast"}}, "budget.frame_rate_hz"),
         ({"fixed": {"harmonics": 99}, "budget": {"capture_s": 1}}, "harmonics"),
@@ -99,16 +107,25 @@ def test_a_request_that_cannot_be_meant_is_refused_by_name(
 def test_the_front_falls_and_the_current_frame_says_where_it_stands(
     noisy: httpx.Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    candidates = import_module("transientcam_server.planning.candidates")  # not the function
-    monkeypatch.setattr(candidates, "HARMONICS", (3,))
+    families = import_module("transientcam_server.planning.families")  # not the function
+    monkeypatch.setattr(families, "HARMONICS", (3,))
+    monkeypatch.setattr(families, "SEARCHED", ("maximum-entropy",))
 
     answer = noisy.get("/api/v1/tradeoff").json()
 
     times_s = [each["capture_s"] for each in answer["front"]]
-    errors_m = [each["predicted"]["range_std_m"]["median"] for each in answer["front"]]
+    errors_m = [each["predicted"]["range_error_m"]["median"] for each in answer["front"]]
     assert len(times_s) > 3
     assert times_s == sorted(times_s)
     assert errors_m == sorted(errors_m, reverse=True)
+    assert {(each["harmonics"], each["estimator"]) for each in answer["lines"]} == {
+        (each["sequence"]["harmonics"], each["estimator"]) for each in answer["front"]
+    }
+    for line in answer["lines"]:
+        noise_m = [point["range_std_m"] for point in line["points"]]
+        assert noise_m == sorted(noise_m, reverse=True)
+        assert all(point["range_error_m"] > 0 for point in line["points"])
+    assert answer["summary"].endswith(".")
     current = answer["current"]
     assert 0 < current["range_error_m"]["median"] < 0.05
     # noise is most of what the median pixel is off by

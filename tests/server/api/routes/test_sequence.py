@@ -16,7 +16,7 @@ def test_the_running_sequence_is_reported_with_what_follows_from_it(http: httpx.
     assert document["harmonics"] == 3
     assert document["images"] == 16
     # 16 images of 1.92 ms, read out in 3.73 ms each
-    assert document["capture_s"] == pytest.approx(16 * (1.92e-3 + 3.73e-3))
+    assert document["capture_s"] == pytest.approx(16 * (1.92e-3 + 3.98e-3))
     assert document["unambiguous_range_m"] == pytest.approx(299_792_458.0 / 46e6)
 
 

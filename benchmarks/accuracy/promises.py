@@ -1,0 +1,275 @@
+"""Plans held to what they promise: predicted against measured noise, bias and error.
+
+Every scene is looked at once; every goal is planned, and what is recommended is captured by another
+specimen of noise and compared with the truth of the simulation. ::
+
+    python -m benchmarks.accuracy.promises              # 30 captures a plan: minutes
+    python -m benchmarks.accuracy.promises --quick      # 10, and two goals
+"""
+
+import argparse
+import json
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam_driver import Camera, Sequence, open_camera
+from transientcam_driver.clock import VirtualClock
+from transientcam_server.camera.source import sensor_of
+from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.planning import Goal, Planner, SceneStatistics
+from transientcam_server.planning.choice import Choice
+from transientcam_server.planning.estimation import ranges_m
+from transientcam_server.planning.measures import pixel_errors
+from transientcam_server.settings import ReconstructionSettings, SensorSettings
+
+ROOT = Path(__file__).parents[2]
+OWN = Path(__file__).parent / "scenes"
+BUILT_IN = ("wall", "corner", "corner-left", "mirrors", "translucent")
+BEGINS_S: Final = 5.0
+LOOK_SEED, CAPTURE_SEED = 7, 11
+PIXELS: Final = 400
+SETTINGS = ReconstructionSettings()
+GOALS: Final = {
+    "20 mm": Goal(range_error_m=0.020),
+    "5 mm": Goal(range_error_m=0.005),
+    "2 mm": Goal(range_error_m=0.002),
+    "15 Hz": Goal(frame_rate_hz=15.0),
+    "0.2 s": Goal(capture_s=0.2),
+}
+_Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A plan and what was measured of it; errors in m, None where a goal was refused."""
+
+    scene: str
+    goal: str
+    target_m: float | None
+    choice: str
+    capture_s: float
+    device_s: float
+    predicted: dict[str, float]
+    interval: tuple[float, float]
+    measured: dict[str, float]
+    saturated: float
+    planned_in_s: float
+
+    @property
+    def ratios(self) -> dict[str, float]:
+        """Measured over predicted noise, bias and error."""
+        return {
+            name: self.measured[name] / self.predicted[name] for name in ("std", "bias", "error")
+        }
+
+    @property
+    def covered(self) -> bool:
+        """Whether the interval of the error holds what was measured."""
+        return self.interval[0] <= self.measured["error"] <= self.interval[1]
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the target was met; None without one."""
+        return None if self.target_m is None else self.measured["error"] <= self.target_m
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A goal that is out of reach, and why."""
+
+    scene: str
+    goal: str
+    why: str
+
+
+def scenes() -> Iterator[str]:
+    """Yield all scenes there are: built in, of the tests' data, and of this folder."""
+    yield from BUILT_IN
+    data = Path(os.environ.get("TRANSIENTCAM_TEST_DATA", ROOT.parent / "shared" / "data"))
+    yield from sorted(str(path) for path in (data / "scenes").glob("*.toml"))
+    yield from sorted(str(path) for path in OWN.glob("*.toml"))
+
+
+def opened(scene: str, seed: int) -> Camera:
+    """Open a simulated camera some seconds after power-up."""
+    clock = VirtualClock()
+    camera = open_camera(f"sim:{scene}?seed={seed}", clock=clock)
+    clock.sleep(BEGINS_S)
+    return camera
+
+
+def looked(scene: str) -> tuple[Planner, SceneStatistics]:
+    """Look at a scene."""
+    with opened(scene, LOOK_SEED) as camera:
+        planner = Planner(camera.capabilities, sensor_of(camera, SensorSettings()), SETTINGS)
+        return planner, planner.look(camera, Sequence())
+
+
+def measured(
+    scene: str, sequence: Sequence, estimator: str, captures: int
+) -> tuple[dict[str, float], float, float]:
+    """Capture, and return noise, bias, error and outliers, the device's time, and saturation."""
+    with opened(scene, CAPTURE_SEED) as camera:
+        assert camera.simulation is not None
+        applied = camera.configure(sequence)
+        sensor = sensor_of(camera, SensorSettings())
+        recipe = Recipe(applied, SETTINGS, float(sensor.highest_dn), sensor=sensor)
+        camera.start()
+        truth, pixels, ranges, device_s, full = camera.simulation.truth(), None, [], 0.0, 0.0
+        for _ in range(captures):
+            raw = camera.read_frame(timeout_s=1e3)
+            device_s = raw.capture_s
+            if pixels is None:
+                truth = camera.simulation.truth()
+                lit = np.flatnonzero(np.isfinite(truth.range_m) & (truth.brightness > 0))
+                random = np.random.default_rng(1)
+                pixels = np.sort(random.choice(lit, min(PIXELS, lit.size), replace=False))
+                full = float((raw.images.max(axis=0).ravel()[lit] >= sensor.highest_dn).mean())
+            b = tm.smooth(np.asarray(recipe.reconstruct(raw).measured), SETTINGS.smoothing_px)
+            part = b.reshape((len(b), -1))[:, pixels]
+            variance = _variance(part, recipe, sensor)
+            frequency_hz = recipe.base_frequency_hz
+            ranges.append(ranges_m(part, variance, estimator, frequency_hz, SETTINGS))
+        camera.stop()
+    assert pixels is not None
+    errors = pixel_errors(np.stack(ranges), truth.range_m.ravel()[pixels])
+    values = {
+        "std": float(np.median(errors.std_m)),
+        "bias": float(np.median(errors.bias_m)),
+        "error": float(np.median(errors.error_m)),
+        "outliers": errors.outlier_share,
+    }
+    return values, device_s, full
+
+
+def _variance(b: _Array, recipe: Recipe, sensor: tm.noise.Sensor) -> _Array:
+    sequence = recipe.applied.sequence
+    gains = tm.nominal_calibration(
+        sequence.harmonics,
+        sequence.sub_phases.phases_rad,
+        sequence.sub_phases.weights,
+        zeroth=sequence.zeroth,
+    )
+    light = np.abs(b[1:]).max(axis=0).astype(float)
+    noise = tm.noise.moment_noise(
+        light, sensor, calibration=gains, zeroth=sequence.zeroth, takes=sequence.takes
+    )
+    return np.asarray(noise.variance) * tm.noise.smoothing_factor(SETTINGS.smoothing_px)
+
+
+def kept(scene: str, goals: dict[str, Goal], captures: int) -> Iterator[Kept | Refused]:
+    """Plan all goals on a scene, and measure what is recommended."""
+    name = Path(scene).stem
+    try:
+        planner, statistics = looked(scene)
+    except Problem as problem:
+        yield Refused(name, "look", problem.detail)
+        return
+    for wanted, goal in goals.items():
+        begin_s = time.process_time()
+        try:
+            best = planner.plan(goal, statistics).recommended
+        except Problem as problem:
+            yield Refused(name, wanted, problem.detail)
+            continue
+        planned_in_s = time.process_time() - begin_s
+        values, device_s, full = measured(scene, best.applied.sequence, best.estimator, captures)
+        yield Kept(
+            name,
+            wanted,
+            goal.range_error_m,
+            best.in_words(),
+            best.applied.capture_s,
+            device_s,
+            _predicted(best),
+            (best.predicted.range_error.low, best.predicted.range_error.high),
+            values,
+            full,
+            planned_in_s,
+        )
+
+
+def _predicted(choice: Choice) -> dict[str, float]:
+    predicted = choice.predicted
+    return {
+        "std": predicted.range_std.median,
+        "bias": predicted.range_bias.median,
+        "error": predicted.range_error.median,
+        "outliers": predicted.outlier_share,
+    }
+
+
+def summary(rows: list[Kept]) -> str:
+    """State ratios, coverage and targets met."""
+    lines = []
+    for name in ("std", "bias", "error"):
+        ratios = np.array([row.ratios[name] for row in rows])
+        quantiles = ", ".join(f"{np.quantile(ratios, q):.2f}" for q in (0.0, 0.1, 0.5, 0.9, 1.0))
+        lines.append(f"{name}: measured / predicted least, 10 %, 50 %, 90 %, most: {quantiles}")
+    covered = np.mean([row.covered for row in rows])
+    lines.append(f"90 % intervals hold the measured error in {covered:.0%} of {len(rows)}")
+    targets = [row.met for row in rows if row.met is not None]
+    if targets:
+        lines.append(f"targets met: {sum(targets)} of {len(targets)}")
+    off = max(abs(row.device_s / row.capture_s - 1) for row in rows)
+    lines.append(f"times of the device differ from planned ones by at most {off:.2%}")
+    lines.append(f"saturated pixels: at most {max(row.saturated for row in rows):.2%}")
+    return "\n".join(lines)
+
+
+def table(rows: list[Kept]) -> str:
+    """Return all plans as a table."""
+    head = (
+        "| scene | goal | recommended | ms | noise | bias | error (90 %) mm | "
+        "measured noise, bias, error | ratio | outliers % | met |\n" + "|---" * 11 + "|"
+    )
+    lines = [head]
+    for row in rows:
+        p, q = row.predicted, row.measured
+        low, high = row.interval
+        met = {None: "–", True: "yes", False: "no"}[row.met]
+        lines.append(
+            f"| {row.scene} | {row.goal} | {row.choice} | {row.capture_s * 1e3:.0f} "
+            f"| {p['std'] * 1e3:.3g} | {p['bias'] * 1e3:.3g} "
+            f"| {p['error'] * 1e3:.3g} ({low * 1e3:.3g} to {high * 1e3:.3g}) "
+            f"| {q['std'] * 1e3:.3g}, {q['bias'] * 1e3:.3g}, {q['error'] * 1e3:.3g} "
+            f"| {row.ratios['error']:.2f} | {p['outliers'] * 100:.1f}, {q['outliers'] * 100:.1f} "
+            f"| {met} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Measure all scenes, or those named, and print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("scenes", nargs="*", help="names or .toml; all there are by default")
+    parser.add_argument("--quick", action="store_true", help="10 captures of two goals")
+    parser.add_argument("--json", type=Path, help="write all numbers here")
+    arguments = parser.parse_args()
+    goals = {name: GOALS[name] for name in ("5 mm", "0.2 s")} if arguments.quick else GOALS
+    rows: list[Kept] = []
+    refused: list[Refused] = []
+    for scene in arguments.scenes or scenes():
+        for each in kept(scene, goals, 10 if arguments.quick else 30):
+            if isinstance(each, Kept):
+                rows.append(each)
+                print(table([each]).splitlines()[-1], f"{each.planned_in_s:.1f} s", flush=True)
+            else:
+                refused.append(each)
+                print(f"{each.scene}, {each.goal}: {each.why}", flush=True)
+    print(table(rows), summary(rows), sep="\n\n")
+    if arguments.json:
+        arguments.json.write_text(json.dumps([*map(asdict, rows), *map(asdict, refused)]))
+
+
+if __name__ == "__main__":
+    main()

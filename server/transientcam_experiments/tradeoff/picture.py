@@ -1,0 +1,96 @@
+"""What accuracy costs in time, in one picture: noise falls with time onto the bias that stays."""
+
+import io
+from collections.abc import Mapping
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+
+def error_picture(
+    tradeoff: Mapping[str, Any], title: str, present: tuple[float, float] | None = None
+) -> Figure:
+    """Draw time across and range error up, both logarithmic.
+
+    Parameters
+    ----------
+    tradeoff
+        The answer of `GET /api/v1/tradeoff`, or `Planner.tradeoff_document`: its ``lines``,
+        ``front`` and ``summary``.
+    title
+        Of the scene.
+    present
+        Time of one capture in s and error in m of the present setting.
+    """
+    figure = Figure(figsize=(7.2, 5.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    panel: Axes = figure.subplots()
+    for number, line in enumerate(tradeoff["lines"]):
+        colour = f"C{number}"
+        time_s = [point["capture_s"] for point in line["points"]]
+        for name, style in (("range_std_m", "--"), ("range_bias_m", ":"), ("range_error_m", "-")):
+            panel.plot(
+                time_s,
+                [point[name] for point in line["points"]],
+                style,
+                color=colour,
+                linewidth=1,
+                label=_label(line) if name == "range_error_m" else None,
+            )
+    front = tradeoff["front"]
+    time_s = [choice["capture_s"] for choice in front]
+    error_m = [choice["predicted"]["range_error_m"]["median"] for choice in front]
+    panel.plot(time_s, error_m, "o-", color="black", linewidth=3, label="best for the time")
+    panel.set(
+        xscale="log",
+        yscale="log",
+        xlabel="time of one capture / s",
+        ylabel="range error of the median pixel / m",
+        title=f"{title}: noise (dashed), bias (dotted), both together",
+    )
+    _shade(panel, front)
+    if present is not None:
+        panel.plot(*present, "*", color="red", markersize=14, label="present setting")
+    panel.legend(fontsize="small")
+    panel.grid(alpha=0.25)
+    figure.supxlabel(tradeoff["summary"], fontsize="small", wrap=True)
+    return figure
+
+
+def saved(figure: Figure, suffix: str) -> bytes:
+    """Return a figure as ``png`` or ``svg``, the same for the same figure."""
+    stream = io.BytesIO()
+    metadata = {"Software": None} if suffix == "png" else {"Date": None}
+    figure.savefig(stream, format=suffix, dpi=110, metadata=metadata)
+    return stream.getvalue()
+
+
+def _label(line: Mapping[str, Any]) -> str:
+    return (
+        f"m = {line['harmonics']} at {line['base_frequency_hz'] / 1e6:g} MHz, {line['estimator']}"
+    )
+
+
+def _shade(panel: Axes, front: list[Mapping[str, Any]]) -> None:
+    """Shade the times from which on the best choices are off by more than their noise."""
+    ruled_s = None
+    for choice in reversed(front):
+        predicted = choice["predicted"]
+        if predicted["range_bias_m"] <= predicted["range_std_m"]["median"]:
+            break
+        ruled_s = choice["capture_s"]
+    if ruled_s is None:
+        return
+    left, right = panel.get_xlim()
+    panel.axvspan(ruled_s, right, color="0.85", zorder=0)
+    panel.set_xlim(left, right)
+    panel.text(
+        ruled_s,
+        0.02,
+        " bias rules: more time\n does not help",
+        transform=panel.get_xaxis_transform(),
+        fontsize="small",
+        va="bottom",
+    )

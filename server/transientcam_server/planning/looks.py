@@ -1,0 +1,90 @@
+"""The scene before the daemon's camera, as plans see it; kept for ten seconds."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import Final
+
+from transientcam_driver import Sequence
+from transientcam_server.imaging.frame import Frame
+from transientcam_server.imaging.workers import Workers
+from transientcam_server.planning.look import LookedThrough, look_of_frame
+from transientcam_server.planning.planner import Planner
+from transientcam_server.planning.scene import SceneStatistics
+
+KEPT_S: Final = 10.0
+Twin = Callable[[], AbstractContextManager[LookedThrough]]
+"""Opens a simulated camera before the same scene, in virtual time."""
+
+
+class Looks:
+    """Looks at the present scene; on the event loop, computed on workers.
+
+    A simulated camera has a twin that looks in its place, so that frames go on undisturbed and no
+    busy machine loses images. Of any other camera the current frame has to be enough.
+    """
+
+    def __init__(
+        self,
+        planner: Planner,
+        workers: Workers,
+        twin: Twin | None,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._planner = planner
+        self._workers = workers
+        self._twin = twin
+        self._clock = clock
+        self._kept: tuple[Sequence, float | None, float, SceneStatistics] | None = None
+        self._looking = asyncio.Lock()
+
+    @property
+    def needs_frame(self) -> bool:
+        """Whether the current frame is what is looked at."""
+        return self._twin is None
+
+    async def of_twin(
+        self, base: Sequence, ambient_dn_per_s: float | None, go_on: Callable[[], None]
+    ) -> SceneStatistics:
+        """Return the scene by the twin of a simulated camera; ``go_on`` may raise to end it.
+
+        Raises
+        ------
+        Problem
+            ``target-unreachable`` where the scene has no light, or too much.
+        """
+        async with self._looking:
+            kept = self._kept
+            if kept is None or kept[:2] != (base, ambient_dn_per_s) or self._clock() > kept[2]:
+                scene, _ = await self._workers.run_long(self._look, base, ambient_dn_per_s, go_on)
+                kept = self._kept = (base, ambient_dn_per_s, self._clock() + KEPT_S, scene)
+            return kept[3]
+
+    async def of_frame(self, frame: Frame, ambient_dn_per_s: float | None) -> SceneStatistics:
+        """Return the scene as far as one frame resolves it.
+
+        Raises
+        ------
+        Problem
+            ``target-unreachable`` where the frame shows no light.
+        """
+        found = await frame.reconstruction("moments")
+        scene, _ = await self._workers.run_long(
+            look_of_frame, frame.recipe, found, frame.raw, ambient_dn_per_s
+        )
+        return scene
+
+    def forget(self) -> None:
+        """Drop what was seen, as when the scene is another one."""
+        self._kept = None
+
+    def _look(
+        self, base: Sequence, ambient_dn_per_s: float | None, go_on: Callable[[], None]
+    ) -> SceneStatistics:
+        assert self._twin is not None  # noqa: S101 - callers look at `needs_frame`
+        with self._twin() as camera:
+            return self._planner.look(
+                camera, base, ambient_dn_per_s=ambient_dn_per_s, go_on=lambda _: go_on()
+            )
