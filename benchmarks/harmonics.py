@@ -32,6 +32,7 @@ from transientcam_driver.simulation.build import DEFAULT_HEIGHT, DEFAULT_WIDTH, 
 from transientcam_driver.simulation.device.bus import SimulatedBus
 from transientcam_driver.simulation.imperfections import DeviceProfile, Pattern, Waveform
 from transientcam_driver.usb import open_transport
+from transientcam_driver.usb_camera import UsbCamera
 from transientcam_server.imaging.calibration import Calibration, evaluate
 from transientcam_server.imaging.waveform import SweepEvaluation
 
@@ -82,7 +83,7 @@ def camera_at(scene: str, waveform: Path, sequence: Capture) -> Iterator[Camera]
         clock=clock,
     )
     bus = SimulatedBus([emulated])
-    with Camera(
+    with UsbCamera(
         lambda serial: open_transport(serial, backend=bus), clock=clock, simulation=simulation
     ) as camera:
         camera.configure(sequence)

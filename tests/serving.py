@@ -61,8 +61,6 @@ def serving(
     """
     with open_camera(camera) as opened, TemporaryDirectory() as state:
         usual = {"port": 0, "log_level": "warning", "calibrations": {"directory": state}}
-        # without compiled lanes the likelihood takes a fraction of a second a frame
-        usual |= {"reconstruction": {"estimator": "pisarenko"}}
         chosen = Settings(camera=camera, **{**usual, **settings})
         app = build_app(opened, chosen)
         prepare(app)

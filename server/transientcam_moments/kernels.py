@@ -56,7 +56,7 @@ LANES = (
     "covariance",
 )
 WHEN_NEEDED = ("likelihood", "harmonics")
-"""Those that `compile_in_background` leaves out, but for the likelihood of its first order."""
+"""Those that `compile_in_background` leaves out."""
 Progress = Callable[[int, int, str], None]
 """Takes lanes done, lanes in all, and the name of the lane that is next ("" after the last)."""
 
@@ -133,18 +133,13 @@ def compile_in_background(
 ) -> threading.Thread:
     """Start compiling on a thread and return it; arguments and errors as in `compile`.
 
-    Leaves out "harmonics", which few cameras need, and "likelihood", which takes long to compile,
-    but for that of the first order: they are prepared by themselves when they are first needed.
+    Leaves out "likelihood", which takes long to compile, and "harmonics", which few cameras need:
+    they are prepared by themselves when they are first needed.
 
     The thread is named "transientcam-compile", and can be joined. A process that ends in the
     meantime waits at most for the lane that is being compiled.
     """
-    keys = [
-        key
-        for key in _keys(harmonics, precisions)
-        if key.name not in WHEN_NEEDED
-        or (key.name == "likelihood" and key.harmonics == harmonics[0])
-    ]
+    keys = [key for key in _keys(harmonics, precisions) if key.name not in WHEN_NEEDED]
     main = threading.main_thread()
     # not a daemon: those are frozen at exit wherever they are, which a compiler doesn't survive
     thread = threading.Thread(target=_compile, args=(keys, None, main.is_alive), name=THREAD)

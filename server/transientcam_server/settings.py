@@ -59,7 +59,7 @@ class ReconstructionSettings(_Group):
     """Smallest eigenvalue every pixel's moments are raised to, over its brightness (Sec. 4.3)."""
     return_threshold: _Finite = Field(default=_DEFAULTS.threshold, ge=0.0, le=1.0)
     """Weight from which a return counts as the first, over the pixel's strongest return."""
-    estimator: Estimator = "likelihood"
+    estimator: Estimator = "pisarenko"
     """What range, direct and indirect light are taken from. `likelihood` errs least over the
     scenes of docs/likelihood.md together; the paper's are `pisarenko` and `maximum-entropy`, the
     others are there for comparison."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from epc.tofCam660 import TOFcam660  # type: ignore[import-not-found,unused-ignore]
+from epc import tofCam660  # type: ignore[import-not-found,unused-ignore]
 
 FREE_MHZ = (7, 14, 21, 28, 3.5, 0.25)
 PRESETS_MHZ = (24, 3)
@@ -52,5 +52,5 @@ def use(camera: Any) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    opened = TOFcam660(sys.argv[1])
+    opened: Any = tofCam660.TOFcam660(sys.argv[1])  # type: ignore[attr-defined,no-untyped-call,unused-ignore]
     np.savez(Path(sys.argv[2]), **use(opened))

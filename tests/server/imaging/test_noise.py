@@ -1,5 +1,6 @@
 """Contradictory pixels are those whose moments disagree by more than noise explains."""
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -148,9 +149,10 @@ def test_an_estimated_zeroth_moment_hides_contradictions_and_says_so() -> None:
     assert contradictory_share(recipe("estimated"), found) is None
 
 
-def test_the_predicted_deviation_is_that_of_the_default_estimator() -> None:
-    likely = recipe("low-frequency")
-    assert likely.settings.estimator == "likelihood"
+def test_the_predicted_deviation_is_that_of_the_likelihood_where_it_is_the_estimator() -> None:
+    likely = replace(
+        recipe("low-frequency"), settings=ReconstructionSettings(estimator="likelihood")
+    )
     settings = likely.settings.for_moments(
         base_frequency_hz=likely.base_frequency_hz,
         zeroth="low-frequency",
