@@ -19,6 +19,7 @@ SMALL_BYTES: Final = 16 * 1024**2
 """May be read of any file: one that was repacked can hold little data in still less space."""
 MAX_CHUNK_BYTES: Final = 256 * 1024**2
 """Also the largest size of a frame; 10 of them a second are five times what USB 3 takes."""
+_HARD: Final = h5py.h5l.TYPE_HARD  # pyright: ignore[reportAttributeAccessIssue]
 _DEFLATE: Final = h5py.h5z.FILTER_DEFLATE
 _PIPELINES: Final = ((), (_DEFLATE,), (h5py.h5z.FILTER_SHUFFLE, _DEFLATE))
 """Filters that are undone here, in the order of writing."""
@@ -62,9 +63,11 @@ class Storage:
         """Return a dataset with so many axes and, in either byte order, a type."""
         if name not in self:
             raise ValueError(f"it has no {name}")
-        if self._file.id.links.get_info(name.encode()).type != h5py.h5l.TYPE_HARD:
+        if self._file.id.links.get_info(name.encode()).type != _HARD:
             raise ValueError(f"{name} is a link to elsewhere")
-        opened = h5py.h5o.open(self._file.id, name.encode())
+        opened = h5py.h5o.open(  # pyright: ignore[reportAttributeAccessIssue]
+            self._file.id, name.encode()
+        )
         if not isinstance(opened, h5py.h5d.DatasetID):
             raise ValueError(f"{name} is no dataset")
         dataset = h5py.Dataset(opened)

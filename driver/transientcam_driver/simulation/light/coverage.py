@@ -41,7 +41,7 @@ class Crossing:
 
     def entered(self, root: Plane) -> Plane:
         """Return the t at which lines enter, given the square root of ``inside`` for ellipsoids."""
-        return self.at if self._length is None else self.at - root / self._length
+        return self.at if self._length is None else single(self.at - root / self._length)
 
 
 def crossing(shape: Shape, apex: Points, way: tuple[Plane, ...]) -> Crossing:
@@ -54,14 +54,14 @@ def crossing(shape: Shape, apex: Points, way: tuple[Plane, ...]) -> Crossing:
 def _ellipsoid(shape: Ellipsoid, apex: Points, way: tuple[Plane, ...]) -> Crossing:
     origin = (apex - shape.centre) / shape.radii
     x, y, z = (w * np.float32(1 / r) for w, r in zip(way, shape.radii, strict=True))
-    squared: Plane = x * x
+    squared = single(x * x)
     squared += y * y
     squared += z * z
     squared += _TINY
     along: Plane = x * np.float32(origin[0])
     along += y * np.float32(origin[1])
     along += z * np.float32(origin[2])
-    closest: Plane = along / squared
+    closest = single(along / squared)
     # 1 minus the squared distance of the line from the centre, where the ellipsoid is a unit sphere
     inside: Plane = along * closest
     inside += np.float32(1 - origin @ origin)
@@ -74,16 +74,20 @@ def _rectangle(shape: Rectangle, apex: Points, way: tuple[Plane, ...]) -> Crossi
 
     def part(axis: Points) -> Plane:
         x, y, z = (w * np.float32(a) for w, a in zip(way, axis, strict=True))
-        total: Plane = x + y + z + _TINY
-        return total
+        return single(x + y + z + _TINY)
 
-    at: Plane = np.float32(-(origin @ shape.normal)) / part(shape.normal)
+    at = single(np.float32(-(origin @ shape.normal)) / part(shape.normal))
     inside: list[Plane] = []
     for axis, length in ((shape.right, shape.width), (shape.up, shape.height)):
         place = at * part(axis)
         place += np.float32(origin @ axis)
         inside.append(1 - np.abs(place) * np.float32(2 / length))
     return Crossing(tuple(inside), at)
+
+
+def single(values: NDArray[np.floating]) -> Plane:
+    """Return them in single precision, which they are in already."""
+    return values.astype(np.float32, copy=False)
 
 
 def covered(inside: Plane, *, rooted: bool = True) -> tuple[Plane, Plane]:
@@ -150,6 +154,6 @@ def _half_plane(value: Plane, steep: Plane, gentle: Plane) -> Plane:
     for sign, offset in ((1, half), (-1, rest), (-1, -rest), (1, -half)):
         part = np.maximum(value + offset, np.float32(0))
         area += sign * part * part
-    share: Plane = np.clip(area / (2 * steep * gentle), 0, 1)
+    share = single(np.clip(area / (2 * steep * gentle), 0, 1))
     share[np.isnan(share)] = 0
     return share

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
-from transientcam_driver.simulation.light.coverage import Crossing, Plane, crossing
+from transientcam_driver.simulation.light.coverage import Crossing, Plane, crossing, single
 from transientcam_driver.simulation.light.paths import ImageLight, Lit, RayEnds, beam, highlight
 from transientcam_driver.simulation.scene.geometry import (
     Ellipsoid,
@@ -110,7 +110,9 @@ class Ends:
                 ends = RayEnds(
                     np.arange(count), lit.point, self.index, lit.distance_m, facing, direction
                 )
-                sent = sent + highlight(self.still, light, ends, np.stack(normal, axis=-1))
+                sent = sent + highlight(
+                    self.still, light, ends, np.stack(normal, axis=-1).astype(np.float64)
+                )
             on, segments = _ways(light, self.point)
             if not on.size:
                 continue
@@ -135,7 +137,7 @@ class Ends:
         if self.still.light.beam_exponent:
             along = -sum(w * np.float32(a) for w, a in zip(way, light.axis, strict=True))
             irradiance *= beam(self.still.light, along / length_m).astype(np.float32)
-        return length_m, irradiance
+        return single(length_m), single(irradiance)
 
     def _clear(
         self, segment: Segment, on: NDArray[np.intp], movers: tuple[int, ...], cover: Cover
@@ -175,7 +177,7 @@ class Ends:
                     plane[mine] = shape.normal[k]
         x, y, z = normals
         length = np.sqrt(x * x + y * y + z * z)
-        return x / length, y / length, z / length
+        return single(x / length), single(y / length), single(z / length)
 
 
 def _ways(

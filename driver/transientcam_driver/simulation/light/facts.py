@@ -70,9 +70,13 @@ class SceneFacts:
             self._times_s = tuple((k + 0.5) / _TIMES * period_s for k in range(_TIMES))
         self._found: dict[tuple[str, tuple[float, ...], float], tuple[Values, ...]] = {}
 
-    @cached_property
+    @property
     def glimpses(self) -> tuple[Glimpse, ...]:
         """Direct light and mirrors on the pixels judged."""
+        return self._glimpses
+
+    @cached_property
+    def _glimpses(self) -> tuple[Glimpse, ...]:
         cosine = cosine_to_axis(self._camera, self._rays(self._camera))
         return tuple(
             Glimpse(each.lits[0].weight.sum(axis=0), each.lits[0].reflectance, cosine, self._shape)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.light.bundle import Region, union
+from transientcam_driver.simulation.light.coverage import single
 from transientcam_driver.simulation.light.layers import MovingResponses
 from transientcam_driver.simulation.scene.scene import Scene
 
@@ -97,8 +98,7 @@ class Between:
     def reflectance(self) -> NDArray[np.float32]:
         """(H, W) of what the pixels see."""
         (one, first), (other, second) = self._parts
-        mean: NDArray[np.float32] = one * first.reflectance + other * second.reflectance
-        return mean
+        return single(one * first.reflectance + other * second.reflectance)
 
     def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return those at the nearer time."""
