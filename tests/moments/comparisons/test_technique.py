@@ -56,7 +56,7 @@ def test_every_technique_says_what_it_is(technique: Technique) -> None:
 
 
 def test_only_the_papers_and_our_own_techniques_are_not_labelled_after_others() -> None:
-    own = {"maximum-entropy", "pisarenko", "single-frequency", "likelihood"}
+    own = {"maximum-entropy", "pisarenko", "pisarenko-merged", "single-frequency", "likelihood"}
 
     assert {each.name for each in ALL if not each.label.startswith("after ")} == own
 
