@@ -1,7 +1,6 @@
 """`transientcam emulate`: an emulated camera in a process of its own."""
 
 import json
-import signal
 import subprocess
 import sys
 
@@ -17,7 +16,7 @@ app()
 """
 
 
-def test_another_process_is_a_camera_until_it_is_interrupted() -> None:
+def test_another_process_is_a_camera_until_it_is_terminated() -> None:
     command = [sys.executable, "-c", PROGRAM, "wall?noise=off", "--json"]
     ports = ["--control-port", "0", "--data-port", "0"]
     with subprocess.Popen([*command, *ports], stdout=subprocess.PIPE, text=True) as process:
@@ -32,7 +31,7 @@ def test_another_process_is_a_camera_until_it_is_interrupted() -> None:
         with TriggeredCamera(lambda: Tofcam660(where["host"], options)) as camera:
             camera.start()
             frame = camera.read_frame(timeout_s=60.0)
-        process.send_signal(signal.SIGINT)
+        process.terminate()
         process.wait(timeout=30)
 
     assert frame.images.shape[1:] == (16, 16)
