@@ -18,7 +18,13 @@ from transientcam_driver.simulation.light.bundle import (
     overlap,
     union,
 )
-from transientcam_driver.simulation.light.coverage import Crossing, Plane, covered, crossing
+from transientcam_driver.simulation.light.coverage import (
+    Crossing,
+    Plane,
+    covered,
+    crossing,
+    shared,
+)
 from transientcam_driver.simulation.light.ends import Ends
 from transientcam_driver.simulation.light.layers import Layer, MovingResponses, Shadow
 from transientcam_driver.simulation.light.paths import ImageLight, image_lights, light_rays
@@ -26,7 +32,8 @@ from transientcam_driver.simulation.light.still import StillLight
 from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene
 
-_SIDE_IN_MIRRORS = 2  # rays a side of pixels that show something that moves in a mirror
+_RAYS_IN_MIRRORS = 16  # into pixels that show something that moves in a mirror
+_TINY = np.float32(1e-9)
 _AWAY = np.array([0.0, 0.0, -1e6])  # where surfaces that move are put while the rest is traced
 
 
@@ -107,11 +114,15 @@ class MovingLight:
     def _share(self, cross: Crossing, *, rooted: bool = False) -> tuple[Plane, Plane]:
         """Share of each pixel that a shape covers; with the mean root that says where, if asked."""
         if not self._soft:
-            shares = [(each > 0).astype(np.float32) for each in cross.inside]
+            shares = [self._above(each) for each in cross.inside]
             root = np.sqrt(np.maximum(cross.inside[0], 0)) if rooted else shares[0]
             return _product(shares), root
         parts = [covered(each, rooted=rooted) for each in cross.inside]
         return _product([share for share, _root in parts]), parts[0][1]
+
+    def _above(self, values: Plane) -> Plane:
+        """Share of each pixel where values are above 0."""
+        return covered(values, rooted=False)[0] if self._soft else (values > 0).astype(np.float32)
 
     def _visible(self, seen: list[_Seen]) -> list[_Seen]:
         """Take from each share what nearer surfaces that move cover of it."""
@@ -122,9 +133,10 @@ class MovingLight:
                 if both is None:
                     continue
                 mine, its = inside(both, one.region), inside(both, other.region)
-                nearer = one.at_m[mine] <= other.at_m[its]
-                share[its] *= 1 - one.share[mine] * nearer
-                left[k][mine] *= 1 - other.share[its] * ~nearer
+                hidden = shared(one.share[mine], other.share[its])
+                nearer = self._above(other.at_m[its] - one.at_m[mine])
+                share[its] *= 1 - nearer * hidden / np.maximum(other.share[its], _TINY)
+                left[k][mine] *= 1 - (1 - nearer) * hidden / np.maximum(one.share[mine], _TINY)
         return [replace(each, share=share) for each, share in zip(seen, left, strict=True)]
 
     def _lit(self, scene: Scene, seen: list[_Seen]) -> Layer:
@@ -197,7 +209,7 @@ class MovingLight:
         pixel = np.flatnonzero(over)
         if not pixel.size:
             return None
-        rays = self.still.rays_in(pixel, _SIDE_IN_MIRRORS) if self._soft else self.still.rays[pixel]
+        rays = self.still.rays_in(pixel, _RAYS_IN_MIRRORS) if self._soft else self.still.rays[pixel]
         rows, columns = np.nonzero(over)
         region = (
             slice(int(rows.min()), int(rows.max()) + 1),

@@ -20,8 +20,9 @@ from transientcam_driver.simulation.responses import Scatter, SparseResponses
 from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene
 
-_SIDE = 4
-"""Rays a side of a pixel that light differs in."""
+_RAYS = 64
+"""Into a pixel that light differs in."""
+_GOLDEN = (5**0.5 - 1) / 2
 _DIFFERS_ABOVE = 0.25  # of the noise
 
 
@@ -63,11 +64,16 @@ class StillLight:
         middle = self.height // 2 * self.width + self.width // 2
         return float(np.arccos(np.clip(self.rays[middle] @ self.rays[middle - 1], -1, 1)))
 
-    def rays_in(self, pixel: NDArray[np.intp], side: int = _SIDE) -> Points:
-        """Return rays, so many a side, in some pixels: for each place in a pixel, all pixels."""
+    def rays_in(self, pixel: NDArray[np.intp], count: int = _RAYS) -> Points:
+        """Return rays, so many each, in some pixels: for each place in a pixel, all pixels.
+
+        Places are a lattice by the golden ratio, no two in one row or column: an edge along the
+        pixels, as of most things that are built, is resolved as finely as others.
+        """
         rows, columns = np.divmod(pixel, self.width)
-        offsets = (2 * np.arange(side) + 1) / (2 * side) - 0.5
-        down, right = (grid.reshape(-1, 1) for grid in np.meshgrid(offsets, offsets))
+        place = np.arange(count)[:, None]
+        right = (place + 0.5) / count - 0.5
+        down = (place * _GOLDEN + 0.5 / count) % 1.0 - 0.5
         size = {"width": self.width, "height": self.height}
         return rays_through(self._camera, (columns + right).ravel(), (rows + down).ravel(), **size)
 
