@@ -28,7 +28,7 @@ from transientcam_driver.simulation.light.coverage import (
 from transientcam_driver.simulation.light.ends import Ends
 from transientcam_driver.simulation.light.layers import Layer, MovingResponses, Shadow
 from transientcam_driver.simulation.light.paths import ImageLight, image_lights, light_rays
-from transientcam_driver.simulation.light.still import StillLight
+from transientcam_driver.simulation.light.still import StillLight, grown
 from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene
 
@@ -206,6 +206,9 @@ class MovingLight:
                     way, near, far = bundle.within(region)
                     cross = crossing(shape, bundle.apex, way)
                     over[region] |= (self._share(cross)[0] > 0) & cross.between(near, far)
+        mixed = np.zeros_like(over)
+        mixed.ravel()[self.still.mixed] = True
+        over |= grown(over) & mixed  # pixels that a mirror fills in part
         pixel = np.flatnonzero(over)
         if not pixel.size:
             return None
@@ -220,9 +223,8 @@ class MovingLight:
 
     def _light_segments(self, chain: int, light: ImageLight) -> list[Bundle]:
         """Ways of light to what stands still, where it arrives, one bundle a segment."""
-        lit = self.still.lit
         shape = self.still.height, self.still.width
-        on = lit.weight[chain] > 0
+        on, point = self.still.lit_by(chain)
         if not on.any():
             return []
         return [
@@ -233,7 +235,7 @@ class MovingLight:
                 near=near.reshape(shape) if np.ndim(near) else near,
                 far=1.0,
             )
-            for apex, start, near in _segments(light, lit.point)
+            for apex, start, near in _segments(light, point)
         ]
 
 

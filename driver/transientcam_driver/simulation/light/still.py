@@ -91,6 +91,21 @@ class StillLight:
         """Light of several rays in each of the pixels ``mixed``."""
         return light_rays(self.scene, self.rays_in(self.mixed))
 
+    def lit_by(self, chain: int) -> tuple[NDArray[np.bool_], Points]:
+        """Return which pixels (H W) a chain of mirrors lights, and a point (H W, 3) that it does.
+
+        Of pixels that it lights in part, one where one of several rays ends.
+        """
+        on, point = self.lit.weight[chain] > 0, self.lit.point
+        if self.mixed.size:
+            fine = self.fine.weight[chain].reshape(-1, len(self.mixed)) > 0
+            more = np.flatnonzero(fine.any(axis=0) & ~on[self.mixed])
+            of_ray = fine[:, more].argmax(axis=0) * len(self.mixed) + more
+            on, point = on.copy(), point.copy()
+            on[self.mixed[more]] = True
+            point[self.mixed[more]] = self.fine.point[of_ray]
+        return on, point
+
     def phasors(self, frequency_hz: float) -> tuple[NDArray[np.complex64], NDArray[np.complex64]]:
         """Moments (K, H, W) by chain of mirrors, and (H, W) in all."""
         if frequency_hz not in self._phasors:
@@ -192,14 +207,14 @@ class StillLight:
             for plane in planes:
                 bend = np.abs(np.diff(np.moveaxis(plane, axis, 0), 2, axis=0))
                 of[1:-1] |= bend > np.moveaxis(limit, axis, 0)[1:-1]
-        return _grown(differs).ravel()
+        return grown(differs).ravel()
 
 
-def _grown(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def grown(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Mark the neighbours too, whose corners an edge may cut."""
-    grown = marked.copy()
-    grown[1:] |= marked[:-1]
-    grown[:-1] |= marked[1:]
-    grown[:, 1:] |= marked[:, :-1]
-    grown[:, :-1] |= marked[:, 1:]
-    return grown
+    more = marked.copy()
+    more[1:] |= marked[:-1]
+    more[:-1] |= marked[1:]
+    more[:, 1:] |= marked[:, :-1]
+    more[:, :-1] |= marked[:, 1:]
+    return more
