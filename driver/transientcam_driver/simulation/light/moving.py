@@ -91,7 +91,7 @@ class MovingLight:
         """Impulse responses at a time."""
         scene = self.scene.at(time_s)
         seen = self._visible([each for k in self._movers if (each := self._cover(scene, k))])
-        layers = [self._lit(scene, seen)] if seen else []
+        layers = self._lit(scene, seen) if seen else []
         if mirrored := self._seen_in_mirrors(scene):
             layers.append(mirrored)
         shadows = [shadow for k in range(len(self._chains)) if (shadow := self._shadow(scene, k))]
@@ -139,7 +139,7 @@ class MovingLight:
                 left[k][mine] *= 1 - (1 - nearer) * hidden / np.maximum(one.share[mine], _TINY)
         return [replace(each, share=share) for each, share in zip(seen, left, strict=True)]
 
-    def _lit(self, scene: Scene, seen: list[_Seen]) -> Layer:
+    def _lit(self, scene: Scene, seen: list[_Seen]) -> list[Layer]:
         """Light the parts of surfaces that are seen, all at once."""
         region = union([each.region for each in seen])
         places = [np.nonzero(each.share) for each in seen]
@@ -171,7 +171,15 @@ class MovingLight:
         lit = Ends(self.still.scene, scene.surfaces, owner, (x, y, z), at_m).lit(
             self._lights, eye=self._sight.apex, movers=self._movers, cover=cover
         )
-        return Layer(region, rows * self.still.width + columns, share, lit)
+        pixel = rows * self.still.width + columns
+        ends = np.cumsum([len(place[0]) for place in places])
+        parts = [
+            slice(int(start), int(end)) for start, end in zip([0, *ends[:-1]], ends, strict=True)
+        ]
+        return [
+            Layer(each.region, pixel[of], share[of], lit.part(of))
+            for each, of in zip(seen, parts, strict=True)
+        ]
 
     def _shadow(self, scene: Scene, chain: int) -> Shadow | None:
         """Share of the light by a chain of mirrors that is left on what stands still."""
