@@ -1,83 +1,79 @@
-"""Moments of pixels by many rays: 16 in each, 256 in those where the 16 differ.
+"""Moments of pixels by many rays: 16 in each, 256 in those whose rays differ.
 
-Nothing here is taken from how the simulation finds edges: a pixel is followed more finely where
-its own rays end on different surfaces, get light by different ways, or differ by their moments.
+Nothing here is taken from how the simulation finds edges. A pixel is followed more finely where
+its own rays or its corners end on different surfaces, get light by different ways, or differ in
+brightness: a straight edge cannot cross a pixel between its corners. Light over several surfaces
+is followed over 60 bounces.
 """
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.light.paths import Lit, light_rays
+from transientcam_driver.simulation.light.radiosity import Interreflection
 from transientcam_driver.simulation.light.rays import rays_through
 from transientcam_driver.simulation.scene.scene import Scene
 
-COARSE, FINE = 16, 256
-_CORNERS = [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)]
-_DIFFERS_ABOVE = 0.1  # standard deviation of a pixel's rays over their mean
+COARSE, FINE = 16, 256  # rays
+BOUNCES = 60
+_CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)])
+_UNEVEN_ABOVE = 0.1  # standard deviation of a pixel's rays over their mean
 
 Moments = NDArray[np.complex128]
+Pixels = NDArray[np.intp]
+Places = NDArray[np.float64]
 
 
-def fine_moments(
-    scene: Scene,
-    pixel: NDArray[np.intp],
-    size: tuple[int, int],
-    frequencies_hz: tuple[float, ...],
+def reference_moments(
+    scene: Scene, pixel: Pixels, size: tuple[int, int], frequencies_hz: tuple[float, ...]
 ) -> Moments:
-    """Return mean moments (F, P) over the rays of each of some pixels, by index, at a time."""
-    lit = rays_at(scene, pixel, size, _hammersley(COARSE))
-    moments = _means(scene, lit, frequencies_hz)
-    # a straight edge cannot cross a pixel between its corners
-    edge = np.flatnonzero(_differ([*lit, *rays_at(scene, pixel, size, _CORNERS)]))
+    """Return mean moments (F, P) over the rays of some pixels, by index, of a scene at a time."""
+    coarse = _rays(scene, pixel, size, _hammersley(COARSE))
+    moments = _means(scene, coarse, len(pixel), frequencies_hz)
+    corners = _rays(scene, pixel, size, _CORNERS)
+    edge = np.flatnonzero(_differ(coarse, corners, len(pixel)))
     if edge.size:
-        fine = rays_at(scene, pixel[edge], size, _hammersley(FINE))
-        moments[:, edge] = _means(scene, fine, frequencies_hz)
-    mean: Moments = moments
-    return mean
+        fine = _rays(scene, pixel[edge], size, _hammersley(FINE))
+        moments[:, edge] = _means(scene, fine, len(edge), frequencies_hz)
+    return moments
 
 
-def rays_at(
-    scene: Scene,
-    pixel: NDArray[np.intp],
-    size: tuple[int, int],
-    places: list[tuple[float, float]],
-) -> list[Lit]:
-    """Follow rays through places in some pixels, from their centres; one entry for each place."""
+def _rays(scene: Scene, pixel: Pixels, size: tuple[int, int], places: Places) -> Lit:
+    """Follow rays through places in pixels, from their centres: for each place, all pixels."""
     assert scene.camera is not None
     width, height = size
     rows, columns = np.divmod(pixel, width)
-    return [
-        light_rays(
-            scene, rays_through(scene.camera, columns + x, rows + y, width=width, height=height)
-        )
-        for x, y in places
-    ]
+    x, y = (columns + places[:, :1]).ravel(), (rows + places[:, 1:]).ravel()
+    return light_rays(scene, rays_through(scene.camera, x, y, width=width, height=height))
 
 
-def _hammersley(count: int) -> list[tuple[float, float]]:
+def _hammersley(count: int) -> Places:
     """Evenly spread places in a pixel, a power of two of them, no two in one row or column."""
     bits = count.bit_length() - 1
     reversed_bits = [int(f"{k:0{bits}b}"[::-1], 2) for k in range(count)]
-    return [
-        ((k + 0.5) / count - 0.5, (other + 0.5) / count - 0.5)
-        for k, other in enumerate(reversed_bits)
-    ]
+    places: Places = (np.stack([np.arange(count), reversed_bits], axis=1) + 0.5) / count - 0.5
+    return places
 
 
-def _means(scene: Scene, lits: list[Lit], frequencies_hz: tuple[float, ...]) -> Moments:
-    return np.array(
-        [
-            np.mean([lit.moments(frequency_hz, lit.scatter(scene)) for lit in lits], axis=0)
-            for frequency_hz in frequencies_hz
-        ]
-    )
+def _means(scene: Scene, lit: Lit, pixels: int, frequencies_hz: tuple[float, ...]) -> Moments:
+    scatter = lit.scatter(scene)
+    of_rays = [lit.moments(frequency_hz, scatter) for frequency_hz in frequencies_hz]
+    if scene.transport.diffuse_bounces != 0 and sum(each.scatters for each in scene.surfaces) > 1:
+        every = replace(scene, transport=replace(scene.transport, diffuse_bounces=BOUNCES))
+        light = Interreflection(every, lit, width=len(lit.surface), height=1)
+        for moments, frequency_hz in zip(of_rays, frequencies_hz, strict=True):
+            moments += light.moments(frequency_hz).ravel()
+    means: Moments = np.array(of_rays).reshape(len(of_rays), -1, pixels).mean(axis=1)
+    return means
 
 
-def _differ(lits: list[Lit]) -> NDArray[np.bool_]:
+def _differ(one: Lit, other: Lit, pixels: int) -> NDArray[np.bool_]:
     """Pixels whose rays differ."""
-    surfaces = np.array([lit.surface for lit in lits])
-    ways = np.array([lit.weight > 0 for lit in lits])
-    differ = (surfaces != surfaces[0]).any(axis=0) | (ways != ways[0]).any(axis=(0, 1))
-    brightness = np.array([lit.weight.sum(axis=0) for lit in lits])
-    uneven: NDArray[np.bool_] = brightness.std(axis=0) > _DIFFERS_ABOVE * brightness.mean(axis=0)
-    return differ | uneven
+    surface = np.concatenate([one.surface, other.surface]).reshape(-1, pixels)
+    weight = np.concatenate([one.weight, other.weight], axis=1)
+    ways = (weight > 0).reshape(len(weight), -1, pixels)
+    brightness = weight.sum(axis=0).reshape(-1, pixels)
+    uneven: NDArray[np.bool_] = brightness.std(axis=0) > _UNEVEN_ABOVE * brightness.mean(axis=0)
+    return (surface != surface[0]).any(axis=0) | (ways != ways[:, :1]).any(axis=(0, 1)) | uneven

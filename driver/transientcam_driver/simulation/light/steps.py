@@ -64,7 +64,9 @@ class Steps:
         if step_s < _WORTH * self._every_s or farthest > 1 + 1e-6:
             return self._at(time_s)
         step = int(np.floor(time_s / step_s))
-        return Between(self._of(step * step_s), self._of((step + 1) * step_s), time_s / step_s - step)
+        return Between(
+            self._of(step * step_s), self._of((step + 1) * step_s), time_s / step_s - step
+        )
 
     def _farthest(self, block: int) -> float:
         """Farthest that anything moves in one of the shortest steps of a block.
