@@ -20,7 +20,7 @@ from transientcam_driver.simulation.responses import Scatter, SparseResponses
 from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene
 
-_RAYS = 64
+_RAYS = 32
 """Into a pixel that light differs in."""
 _GOLDEN = (5**0.5 - 1) / 2
 _DIFFERS_ABOVE = 0.25  # of the noise
