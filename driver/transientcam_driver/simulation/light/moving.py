@@ -204,7 +204,7 @@ class MovingLight:
         return Shadow(chain, whole, left)
 
     def _seen_in_mirrors(self, scene: Scene) -> Layer | None:
-        """Follow again the rays that meet something that moves behind a mirror, four a pixel."""
+        """Follow again, several a pixel, the rays that meet something that moves behind a mirror."""
         over = np.zeros((self.still.height, self.still.width), dtype=bool)
         for bundle in self._mirrored:
             for index in self._movers:
