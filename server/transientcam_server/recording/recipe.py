@@ -1,4 +1,4 @@
-"""How recorded frames are computed: with the gains and the sensor that were recorded beside them."""
+"""How recorded frames are computed: with the gains and the sensor of the recording."""
 
 import contextlib
 from typing import Final
