@@ -8,8 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.effects import Glimpse
-from transientcam_driver.simulation.effects.glimpses import Values
+from transientcam_driver.simulation.effects.glimpses import Glimpse, Values
 from transientcam_driver.simulation.imperfections import PINHOLE
 from transientcam_driver.simulation.light.exchange import Exchange
 from transientcam_driver.simulation.light.paths import Lit, light_rays

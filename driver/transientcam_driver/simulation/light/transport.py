@@ -8,9 +8,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.effects import CALLED_ABOVE, Facts, Glimpse
+from transientcam_driver.simulation.effects import CALLED_ABOVE
 from transientcam_driver.simulation.effects.distortion import Distortion
-from transientcam_driver.simulation.effects.glimpses import Noise
+from transientcam_driver.simulation.effects.glimpses import Facts, Glimpse, Noise
 from transientcam_driver.simulation.effects.gloss import Gloss
 from transientcam_driver.simulation.effects.interreflection import DiffuseInterreflection
 from transientcam_driver.simulation.effects.mirror_paths import MirrorPaths
