@@ -91,9 +91,10 @@ _INTRODUCTION = (
     "The range of a frame is that of its first return. Which method finds it is the setting "
     "`reconstruction.estimator` of the daemon, `PUT /api/v1/reconstruction` while it runs, and "
     "`tm.Settings(estimator=...)` in Python. The daemon's default is `automatic`: "
-    "`likelihood`, which errs least over the scenes of [likelihood.md](likelihood.md) together, "
-    "and `pisarenko` until its kernel is compiled. The paper's own are `pisarenko`, as printed and the default of `tm.Settings`, and `maximum-entropy`; "
-    "`pisarenko-merged` merges returns that noise split. All others are there to be compared with. "
+    "`likelihood`, which errs least over the scenes of [likelihood.md](likelihood.md), "
+    "and `pisarenko` until its kernel is compiled. The paper's own are `pisarenko`, as printed and "
+    "the default of `tm.Settings`, and `maximum-entropy`; `pisarenko-merged` merges returns that "
+    "noise split. All others are there to be compared with. "
     "Direct and indirect light are those of the estimator, too, and uniform light is what they "
     "leave of the brightness.",
     "",
