@@ -75,5 +75,7 @@ def _differ(one: Lit, other: Lit, pixels: int) -> NDArray[np.bool_]:
     weight = np.concatenate([one.weight, other.weight], axis=1)
     ways = (weight > 0).reshape(len(weight), -1, pixels)
     brightness = weight.sum(axis=0).reshape(-1, pixels)
-    uneven: NDArray[np.bool_] = brightness.std(axis=0) > _UNEVEN_ABOVE * brightness.mean(axis=0)
-    return (surface != surface[0]).any(axis=0) | (ways != ways[:, :1]).any(axis=(0, 1)) | uneven
+    several = (surface != surface[0]).any(axis=0) | (ways != ways[:, :1]).any(axis=(0, 1))
+    uneven = brightness.std(axis=0) > _UNEVEN_ABOVE * brightness.mean(axis=0)
+    differ: NDArray[np.bool_] = several | uneven
+    return differ

@@ -138,7 +138,7 @@ def _at_border(positive: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return border
 
 
-def shared(one: Plane, other: Plane) -> Plane:
+def overlapped(one: Plane, other: Plane) -> Plane:
     """Share of each pixel (H, W) that lies in both of two shapes, given the share in either.
 
     Two borders in one pixel are mostly nearly parallel, as of a surface and of its own shadow: the

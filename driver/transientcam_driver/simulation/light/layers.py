@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.light.bundle import Region, inside
-from transientcam_driver.simulation.light.coverage import Plane, shared
+from transientcam_driver.simulation.light.coverage import Plane, overlapped, single
 from transientcam_driver.simulation.light.paths import Lit, scatter_of, sparse_image
 from transientcam_driver.simulation.light.still import StillLight
 from transientcam_driver.simulation.responses import Scatter, SparseResponses
@@ -72,8 +72,8 @@ class MovingResponses:
     def _uncovered_part(self, shadow: Shadow) -> Shadow:
         """Return a shadow by its share of what of each pixel is not covered."""
         seen = self._uncovered.reshape(self._shape)[shadow.region]
-        left = shared(seen, shadow.left) / np.maximum(seen, np.float32(1e-9))
-        return Shadow(shadow.chain, shadow.region, left)
+        left = overlapped(seen, shadow.left) / np.maximum(seen, np.float32(1e-9))
+        return Shadow(shadow.chain, shadow.region, single(left))
 
     @property
     def kind(self) -> Literal["sparse", "dense"]:

@@ -23,7 +23,7 @@ from transientcam_driver.simulation.light.coverage import (
     Plane,
     covered,
     crossing,
-    shared,
+    overlapped,
 )
 from transientcam_driver.simulation.light.ends import Ends
 from transientcam_driver.simulation.light.layers import Layer, MovingResponses, Shadow
@@ -133,7 +133,7 @@ class MovingLight:
                 if both is None:
                     continue
                 mine, its = inside(both, one.region), inside(both, other.region)
-                hidden = shared(one.share[mine], other.share[its])
+                hidden = overlapped(one.share[mine], other.share[its])
                 nearer = self._above(other.at_m[its] - one.at_m[mine])
                 share[its] *= 1 - nearer * hidden / np.maximum(other.share[its], _TINY)
                 left[k][mine] *= 1 - (1 - nearer) * hidden / np.maximum(one.share[mine], _TINY)
@@ -204,7 +204,7 @@ class MovingLight:
         return Shadow(chain, whole, left)
 
     def _seen_in_mirrors(self, scene: Scene) -> Layer | None:
-        """Follow again, several a pixel, the rays that meet something that moves behind a mirror."""
+        """Follow several rays a pixel that meet something that moves behind a mirror."""
         over = np.zeros((self.still.height, self.still.width), dtype=bool)
         for bundle in self._mirrored:
             for index in self._movers:

@@ -73,7 +73,7 @@ class Steps:
 
         In units of what it may; more than that where a path starts again.
         """
-        times_s = (block * _BLOCK + np.arange(_BLOCK + 1)) * self.step_s
+        times_s = [(block * _BLOCK + k) * self.step_s for k in range(_BLOCK + 1)]
         return max((path.farthest(times_s) for path in self._paths), default=0.0)
 
     def _of(self, time_s: float) -> MovingResponses:
@@ -96,7 +96,7 @@ class _Path:
         """Longest step at its highest speed."""
         return self.most_m / sum(motion.speed_m_s for motion in self.motions)
 
-    def farthest(self, times_s: NDArray[np.float64]) -> float:
+    def farthest(self, times_s: list[float]) -> float:
         """Longest way between successive times, over the one that is allowed."""
         places = np.array([sum(m.offset_m(t) for m in self.motions) for t in times_s])
         return float(np.linalg.norm(np.diff(places, axis=0), axis=-1).max() / self.most_m)

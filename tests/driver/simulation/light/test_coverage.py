@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.light.coverage import covered, shared
+from transientcam_driver.simulation.light.coverage import covered, overlapped
 
 FINE = 64  # places a side of a pixel
 
@@ -18,7 +18,8 @@ def half_plane(
     x, y = np.meshgrid(along, along)
     across = x * np.cos(angle_rad) + y * np.sin(angle_rad) - offset
     sideways = -x * np.sin(angle_rad) + y * np.cos(angle_rad)
-    return (across + bent * (across**2 + sideways**2)).astype(np.float32)
+    beyond: NDArray[np.float32] = (across + bent * (across**2 + sideways**2)).astype(np.float32)
+    return beyond
 
 
 def share_of(places: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -46,7 +47,7 @@ def test_two_shapes_overlap_in_a_pixel_as_their_borders_lie(
     borders = [(0.1, 0.1), (0.1 + turned_rad, offset)]
     one, other = (covered(half_plane(*border), rooted=False)[0] for border in borders)
 
-    both = shared(one, other)
+    both = overlapped(one, other)
 
     first, second = (half_plane(*border, fine=True) > 0 for border in borders)
     inner = (slice(1, 4), slice(1, 4))
