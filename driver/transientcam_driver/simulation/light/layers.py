@@ -89,6 +89,8 @@ class MovingResponses:
         """Moments of a region that holds all that differs."""
         if frequency_hz not in self._found:
             self._found[frequency_hz] = self._moments(frequency_hz)
+        if region == self.region:
+            return self._found[frequency_hz]
         moments = self._still.phasors(frequency_hz)[1][region].copy()
         moments[inside(self.region, region)] = self._found[frequency_hz]
         return moments

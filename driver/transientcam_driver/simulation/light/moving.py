@@ -134,6 +134,8 @@ class MovingLight:
                     continue
                 mine, its = inside(both, one.region), inside(both, other.region)
                 hidden = overlapped(one.share[mine], other.share[its])
+                if not hidden.any():
+                    continue
                 nearer = self._above(other.at_m[its] - one.at_m[mine])
                 share[its] *= 1 - nearer * hidden / np.maximum(other.share[its], _TINY)
                 left[k][mine] *= 1 - (1 - nearer) * hidden / np.maximum(one.share[mine], _TINY)
