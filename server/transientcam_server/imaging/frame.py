@@ -200,8 +200,9 @@ class Frame:
 
     async def _compute_accuracy(self) -> RangeAccuracy:
         found = await self.reconstruction("returns")
-        self._accuracy, _ = await self._workers.run_long(range_accuracy, self.recipe, found)
-        return self._accuracy
+        accuracy, _ = await self._workers.run_long(range_accuracy, self.recipe, found)
+        self._accuracy = accuracy
+        return accuracy
 
     async def _input(self, product: Product) -> Any:
         """Return what a product is computed from."""
