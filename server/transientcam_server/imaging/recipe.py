@@ -1,19 +1,24 @@
 """How images become moments and moments become returns."""
 
+import logging
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_driver import AppliedSequence, RawFrame
+from transientcam_driver import AppliedSequence, RawFrame, Sampling, Sequence
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import Gains, nominal_gains
 from transientcam_server.imaging.lens import ASSUMED_FIELD_OF_VIEW_DEG, Intrinsics
 from transientcam_server.settings import ReconstructionSettings
+
+_log = logging.getLogger(__name__)
+OF_ANY_MULTIPLES: Final = "likelihood"
+"""The estimator that does without consecutive multiples of one frequency."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +43,8 @@ class SettingsVersion:
         return self.settings.model_dump() | {"reconstruction_id": self.id}
 
 
-def require_harmonics(settings: ReconstructionSettings, harmonics: int, *, field: str) -> None:
-    """Refuse an estimator and a number of harmonics that do not go together.
+def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, field: str) -> None:
+    """Refuse an estimator and a sequence that do not go together.
 
     Parameters
     ----------
@@ -51,7 +56,16 @@ def require_harmonics(settings: ReconstructionSettings, harmonics: int, *, field
     Problem
         ``estimator-misfit``.
     """
-    least = settings.least_harmonics
+    if not sequence.sampling.consecutive and settings.estimator != OF_ANY_MULTIPLES:
+        raise Problem(
+            kinds.ESTIMATOR_MISFIT,
+            f"The estimator {settings.estimator} needs consecutive multiples of one frequency, and "
+            f"this camera measures the multiples {listed(sequence.multiples)}.",
+            field="estimator",
+            value=settings.estimator,
+            limit=OF_ANY_MULTIPLES,
+        )
+    least, harmonics = settings.least_harmonics, sequence.harmonics
     if harmonics >= least:
         return
     raise Problem(
@@ -63,6 +77,25 @@ def require_harmonics(settings: ReconstructionSettings, harmonics: int, *, field
         if field == "harmonics"
         else f"one that does with {harmonics} harmonics",
     )
+
+
+def suited(settings: ReconstructionSettings, sampling: Sampling) -> ReconstructionSettings:
+    """Return settings with an estimator that goes with the frequencies of a camera."""
+    if sampling.consecutive or settings.estimator == OF_ANY_MULTIPLES:
+        return settings
+    _log.warning(
+        "the camera measures the multiples %s, which %s cannot serve: the estimator is %s",
+        listed(sampling.multiples),
+        settings.estimator,
+        OF_ANY_MULTIPLES,
+    )
+    return settings.model_copy(update={"estimator": OF_ANY_MULTIPLES})
+
+
+def listed(multiples: tuple[int, ...]) -> str:
+    """Return multiples in words: "2, 10 and 15"."""
+    *first, last = map(str, multiples)
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 @dataclass(frozen=True)
@@ -136,6 +169,8 @@ class Recipe:
             base_frequency_hz=sequence.base_frequency_hz,
             zeroth=sequence.zeroth,
             takes=sequence.takes,
+            multiples=sequence.multiples,
+            phases_rad=sequence.sampling.phases_rad,
             full_scale=self.full_scale,
             sensor=self.sensor,
         )
