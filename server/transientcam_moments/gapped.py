@@ -27,6 +27,8 @@ class GappedReconstruction(Reconstruction):
     is the light of the returns that were found.
     """
 
+    _of_any_multiples = True
+
     @cached_property
     def smoothed(self) -> Array:
         """Moments (K + 1, ...) smoothed over pixels; b_0 is 0 where it was not measured."""

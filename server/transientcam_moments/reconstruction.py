@@ -196,7 +196,14 @@ class Reconstruction:
         What is taken out of the moments once they are smoothed.
     spread : callable, optional
         How the likelihood uses several threads, as `kernels.over` returns it.
+
+    Raises
+    ------
+    ParameterError
+        When the settings have other multiples than 1 to m, which `reconstruct` serves.
     """
+
+    _of_any_multiples = False
 
     def __init__(
         self,
@@ -211,6 +218,8 @@ class Reconstruction:
         correction: HarmonicCorrection | None = None,
         spread: Spread = at_once,
     ) -> None:
+        if not (settings.consecutive or self._of_any_multiples):
+            raise ParameterError("multiples", settings.multiples, "1 to m")
         self.settings = settings
         self._correction = correction
         self._spread = spread

@@ -18,7 +18,8 @@ from transientcam_server.imaging.calibration import Calibration, Gains
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.lens import Intrinsics
 from transientcam_server.imaging.products import PRODUCTS, Product
-from transientcam_server.imaging.recipe import Recipe, SettingsVersion, listed
+from transientcam_server.imaging.recipe import Recipe, SettingsVersion
+from transientcam_server.imaging.requirements import unmet
 from transientcam_server.imaging.workers import Workers
 from transientcam_server.settings import ReconstructionSettings
 
@@ -88,15 +89,7 @@ class Pipeline:
             return "only a simulated camera knows the true range"
         if product.of_noise and self._sensor is None:
             return "the noise of this camera's sensor is not known"
-        sampling = self._capabilities.sampling
-        if sampling.consecutive:
-            return None
-        measured = f"this camera measures the multiples {listed(sampling.multiples)}"
-        if product.of_toeplitz:
-            return f"it needs consecutive multiples of one frequency, and {measured}"
-        if product.of_brightness and self._capabilities.zeroths == ("estimated",):
-            return f"it needs a zeroth moment, which cannot be estimated: {measured} and not 0"
-        return None
+        return unmet(product, self._capabilities.sampling, self._capabilities.zeroths)
 
     def frame(self, raw: RawFrame, applied: AppliedSequence) -> Frame:
         """Return the next frame, counted from 1."""

@@ -140,6 +140,8 @@ def test_what_they_cannot_give_is_absent_with_the_reason(fixed: Served) -> None:
     with Device(fixed.url, timeout_s=20.0) as device:
         refused = device.send("POST", "/api/v1/plan", json={"target": {"range_error_m": 0.01}})
         problem = device.refusal(refused, 409, "target-unreachable")
+        pixel = device.send("GET", "/api/v1/frames/latest/pixel", params={"x": 1, "y": 1})
+        device.refusal(pixel, 409, "estimator-misfit")
 
     assert problem["field"] == "sampling"
     of_toeplitz = {"validity", "coefficients", "transient", "density_std", "cumulative", "streak"}
@@ -149,9 +151,12 @@ def test_what_they_cannot_give_is_absent_with_the_reason(fixed: Served) -> None:
     assert estimator == "likelihood"
 
 
-def test_their_recordings_are_reconstructed_and_replayed(fixed: Served) -> None:
+def test_their_recordings_are_reconstructed_and_replayed(
+    fixed: Served, capsys: pytest.CaptureFixture[str]
+) -> None:
     with Camera(fixed.url, timeout_s=60.0) as client:
-        recording = client.stop_recording(client.record()["id"])["id"]
+        client.frame("flags")  # there is a frame to begin with
+        recording = client.stop_recording(client.record(history_s=60.0)["id"])["id"]
         path = f"/api/v1/recordings/{recording}/frames/1/range"
         with Device(fixed.url, timeout_s=60.0) as device:
             recorded = device.frame(path)
@@ -160,7 +165,15 @@ def test_their_recordings_are_reconstructed_and_replayed(fixed: Served) -> None:
     copy.write_bytes(file)
     with serving(f"recording:{copy}") as replay, Camera(replay.url, timeout_s=60.0) as client:
         replayed = client.frame("range")
+    products = copy.with_name("products.npz")
+    again = ["reconstruct", str(copy), "-o", str(copy.with_name("again.npz"))]
+    assert command(["reconstruct", str(copy), "-o", str(products)]) == 0
 
+    with np.load(products) as computed:
+        assert computed["range"] == pytest.approx(FAR_M, abs=2e-3)
+        assert not {"validity", "brightness"} & set(computed)
+    assert command([*again, "--product", "validity"]) == 1
+    assert "2, 10 and 15" in capsys.readouterr().err
     assert recorded.array == pytest.approx(FAR_M, abs=2e-3)
     assert replayed.array == pytest.approx(FAR_M, abs=2e-3)
 
