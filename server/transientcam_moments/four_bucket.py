@@ -82,9 +82,15 @@ def demodulate(images: Array, phase_rad: Array | Sequence[float]) -> Array:
     if images.ndim < 2 or images.shape[1] != len(weight):
         raise ShapeError("images", f"of shape {tuple(images.shape)}", f"(F, {len(weight)}, ...)")
     values = _real(images)
-    xp = namespace(values)
-    parts = (xp.asarray(part).astype(values.dtype) for part in (weight.real, weight.imag))
-    return to_complex(*(xp.tensordot(part, values, axes=((0,), (1,))) for part in parts))
+    return to_complex(_weighted(values, weight.real), _weighted(values, weight.imag))
+
+
+def _weighted(values: Array, weight: Array) -> Array:
+    """Return sum_k weight_k values_k (F, ...): several times as fast as a product of matrices."""
+    total = float(weight[0]) * values[:, 0]
+    for k in range(1, len(weight)):
+        total = total + float(weight[k]) * values[:, k]
+    return total
 
 
 def measure(

@@ -44,7 +44,7 @@ class GappedReconstruction(Reconstruction):
         return xp.full(self.smoothed.shape[1:], np.nan, dtype=self.smoothed.real.dtype)
 
     @property
-    def validity(self) -> Array:  # type: ignore[override]
+    def validity(self) -> Array:
         """NaN: there is no Toeplitz matrix."""
         return self.eigenvalue
 

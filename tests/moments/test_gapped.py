@@ -22,7 +22,7 @@ def moments(*returns: tuple[Array, float], zeroth: bool = False) -> Array:
 
 
 def settings(**changes: Any) -> tm.Settings:
-    chosen = {
+    chosen: dict[str, Any] = {
         "base_frequency_hz": F_HZ,
         "zeroth": "estimated",
         "multiples": MULTIPLES,
