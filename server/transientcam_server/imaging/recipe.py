@@ -1,7 +1,8 @@
 """How images become moments and moments become returns."""
 
 import logging
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -19,6 +20,8 @@ from transientcam_server.settings import ReconstructionSettings
 _log = logging.getLogger(__name__)
 OF_ANY_MULTIPLES: Final = "likelihood"
 """The estimator that does without consecutive multiples of one frequency."""
+_UNTIL_COMPILED: Final = "pisarenko"
+"""In NumPy as in compiled lanes fast enough for a camera of 163 x 120 pixels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +36,19 @@ class SettingsVersion:
 
     id: int
     settings: ReconstructionSettings
+
+    def for_live_frames(
+        self, sequence: Sequence, *, ready: Callable[[str, int], bool] = tm.kernels.ready
+    ) -> "SettingsVersion":
+        """Return these settings with an estimator that keeps up with a camera now.
+
+        ``automatic`` is the likelihood where ``ready`` says that its kernel of this order is
+        compiled, and Pisarenko's returns elsewhere, if the multiples are consecutive.
+        """
+        if self.settings.estimator != "automatic" or not sequence.sampling.consecutive:
+            return self
+        now = "likelihood" if ready("likelihood", sequence.harmonics) else _UNTIL_COMPILED
+        return replace(self, settings=self.settings.model_copy(update={"estimator": now}))
 
     def followed_by(self, settings: ReconstructionSettings) -> "SettingsVersion":
         """Return the next version; the same one where the settings are equal."""
@@ -56,7 +72,7 @@ def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, f
     Problem
         ``estimator-misfit``.
     """
-    if not sequence.sampling.consecutive and settings.estimator != OF_ANY_MULTIPLES:
+    if not sequence.sampling.consecutive and settings.technique != OF_ANY_MULTIPLES:
         raise Problem(
             kinds.ESTIMATOR_MISFIT,
             f"The estimator {settings.estimator} needs consecutive multiples of one frequency, and "
@@ -70,7 +86,7 @@ def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, f
         return
     raise Problem(
         kinds.ESTIMATOR_MISFIT,
-        f"The estimator {settings.estimator} needs {least} harmonics, and there are {harmonics}.",
+        f"The estimator {settings.technique} needs {least} harmonics, and there are {harmonics}.",
         field=field,
         value=harmonics if field == "harmonics" else settings.estimator,
         limit=f"at least {least}"
@@ -81,7 +97,7 @@ def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, f
 
 def suited(settings: ReconstructionSettings, sampling: Sampling) -> ReconstructionSettings:
     """Return settings with an estimator that goes with the frequencies of a camera."""
-    if sampling.consecutive or settings.estimator == OF_ANY_MULTIPLES:
+    if sampling.consecutive or settings.technique == OF_ANY_MULTIPLES:
         return settings
     _log.warning(
         "the camera measures the multiples %s, which %s cannot serve: the estimator is %s",
