@@ -14,7 +14,6 @@ from transientcam.conformance import Device
 from transientcam.conformance.device import API
 from transientcam.wire import LEASE_HEADER
 
-
 CAMERA = "sim:wall?noise=off"  # the scene that is rendered quickest
 
 

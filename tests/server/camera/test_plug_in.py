@@ -148,7 +148,7 @@ def test_what_they_cannot_give_is_absent_with_the_reason(fixed: Served) -> None:
     assert set(absent) == of_toeplitz | {"bounds", "brightness", "uniform", "truth"}
     assert "needs consecutive multiples of one frequency" in absent["transient"]
     assert "needs a zeroth moment" in absent["brightness"]
-    assert estimator == "automatic"  # which is the likelihood
+    assert estimator == "likelihood"
 
 
 def test_their_recordings_are_reconstructed_and_replayed(
