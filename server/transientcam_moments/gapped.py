@@ -1,17 +1,19 @@
 """What follows from moments whose frequencies are not 1 to m times one: few returns, no density."""
 
 from functools import cached_property
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 
 from transientcam_moments._arrays import Array, namespace
 from transientcam_moments.errors import ParameterError
 from transientcam_moments.flags import Flags
+from transientcam_moments.levinson import Coefficients
 from transientcam_moments.likelihood import MODEL_ERROR, Likelihood
 from transientcam_moments.likelihood.choice import MOST_RETURNS
 from transientcam_moments.likelihood.estimate import assumed_noise, fitted
 from transientcam_moments.noise.moments import MomentNoise
+from transientcam_moments.peaks import Peaks
 from transientcam_moments.pisarenko import Returns, Separation
 from transientcam_moments.reconstruction import Reconstruction
 from transientcam_moments.smoothing import smooth
@@ -43,7 +45,7 @@ class GappedReconstruction(Reconstruction):
         xp = namespace(self.smoothed)
         return xp.full(self.smoothed.shape[1:], np.nan, dtype=self.smoothed.real.dtype)
 
-    @property
+    @cached_property
     def validity(self) -> Array:
         """NaN: there is no Toeplitz matrix."""
         return self.eigenvalue
@@ -122,13 +124,13 @@ class GappedReconstruction(Reconstruction):
         """b_0 as it was measured, or else the light of all returns."""
         return self.smoothed[0].real if self._has_zeroth else self.direct + self.indirect
 
-    @property
-    def coefficients(self) -> Any:
+    @cached_property
+    def coefficients(self) -> Coefficients:
         """Raises ParameterError."""
         self._refuse("coefficients of a density")
 
-    @property
-    def peaks(self) -> Any:
+    @cached_property
+    def peaks(self) -> Peaks:
         """Raises ParameterError."""
         self._refuse("peaks of a density")
 

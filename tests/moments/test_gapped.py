@@ -109,7 +109,7 @@ def test_predicted_deviations_are_those_of_noisy_frames() -> None:
     phases = (0.0, 2 * np.pi / 3, 4 * np.pi / 3)
     phase = np.full((20, 30), 1.7)
     b = moments((phase, 900.0))[1:]
-    light = (900 + (b[:, None] * np.exp(-1j * np.array(phases))[:, None, None]).real) / 2
+    light = (900 + np.real(b[:, None] * np.exp(-1j * np.array(phases))[:, None, None])) / 2
     electrons = rng.poisson(9 * light) + rng.normal(0, 30, light.shape)
     raw = (64 + electrons / 9).reshape(9, *phase.shape)
     noisy = settings(takes=1, phases_rad=phases, sensor=sensor)
