@@ -15,6 +15,7 @@ MAX_HARMONICS = 32
 FOUR_PHASES_RAD = (0.0, math.pi / 2, math.pi, 3 * math.pi / 2)
 """Four-bucket sampling."""
 MAX_PHASES = 16
+_MAX_PHASE_RAD = 1e3  # beyond, turns cannot be told from rounding
 _SAME_PHASE_RAD = 1e-6
 
 
@@ -89,7 +90,7 @@ def _require_phases(phases_rad: object) -> None:
     if not isinstance(phases_rad, tuple | list) or not 3 <= len(phases_rad) <= MAX_PHASES:
         raise SequenceError("sampling.phases_rad", phases_rad, limit)
     for each in phases_rad:
-        if isinstance(each, bool) or not isinstance(each, Real) or not math.isfinite(each):
+        if isinstance(each, bool) or not isinstance(each, Real) or not abs(each) <= _MAX_PHASE_RAD:
             raise SequenceError("sampling.phases_rad", phases_rad, limit)
     turns = sorted(float(each) % (2 * math.pi) for each in phases_rad)
     gaps = [after - before for before, after in pairwise(turns)]
