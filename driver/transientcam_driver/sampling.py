@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from numbers import Integral, Real
+from numbers import Integral
 from typing import Any
 
 from transientcam_driver.errors import SequenceError
@@ -90,7 +90,8 @@ def _require_phases(phases_rad: object) -> None:
     if not isinstance(phases_rad, tuple | list) or not 3 <= len(phases_rad) <= MAX_PHASES:
         raise SequenceError("sampling.phases_rad", phases_rad, limit)
     for each in phases_rad:
-        if isinstance(each, bool) or not isinstance(each, Real) or not abs(each) <= _MAX_PHASE_RAD:
+        real = isinstance(each, int | float) and not isinstance(each, bool)
+        if not real or not abs(each) <= _MAX_PHASE_RAD:
             raise SequenceError("sampling.phases_rad", phases_rad, limit)
     turns = sorted(float(each) % (2 * math.pi) for each in phases_rad)
     gaps = [after - before for before, after in pairwise(turns)]
