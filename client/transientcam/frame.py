@@ -155,6 +155,11 @@ class Frame:
         return tuple(self.extra.get("labels", ()))
 
     @property
+    def frequencies_hz(self) -> Sequence[float]:
+        """Modulation frequency of each plane of ``moments``, 0 for b_0; empty otherwise."""
+        return tuple(self.extra.get("frequencies_hz", ()))
+
+    @property
     def points(self) -> NDArray[np.float32]:
         """The points (N, 3) of a ``pointcloud`` that have a range, in m, row by row.
 

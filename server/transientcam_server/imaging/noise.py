@@ -136,6 +136,7 @@ def _of_pixels(recipe: Recipe, brightness: _Array) -> tm.noise.MomentNoise:
         calibration=recipe.nominal_gains,
         zeroth=sequence.zeroth,
         takes=sequence.takes,
+        phases_rad=sequence.sampling.phases_rad,
     )
 
 
@@ -148,10 +149,13 @@ def contradictions(recipe: Recipe, found: tm.Reconstruction) -> _Array | None:
     Returns
     -------
     boolean array, shape (H, W)
-        None where that cannot be known: without a sensor, and where b_0 is estimated, as any
-        moments then agree.
+        None where that cannot be known: without a sensor, where b_0 is estimated, as any moments
+        then agree, and where their frequencies are not consecutive multiples.
     """
-    if recipe.sensor is None or recipe.applied.sequence.zeroth == "estimated":
+    sequence = recipe.applied.sequence
+    if recipe.sensor is None or sequence.zeroth == "estimated":
+        return None
+    if not sequence.sampling.consecutive:
         return None
     dark, lit = np.asarray(_of_pixels(recipe, np.array([0.0, 1.0])).variance).sum(axis=0).tolist()
 
