@@ -126,6 +126,12 @@ def colours(values: NDArray[Any], low: float, high: float, name: str) -> NDArray
     return painted
 
 
+def choose_from(place: Page | Locator, menu: str, action: str) -> None:
+    """Choose an entry of a menu by the menu's name and its own."""
+    place.get_by_role("button", name=menu).click()
+    place.get_by_role("menuitem", name=action, exact=True).click()
+
+
 def choose(page: Page, panel: str, action: str) -> None:
     """Choose from the menu of a panel."""
-    page.locator(f".panel-{panel} .action-menu").select_option(label=action)
+    choose_from(page.locator(f".panel-{panel}"), f"Panel {panel}", action)

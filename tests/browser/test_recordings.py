@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import Watch
-from tests.browser.dashboard import choose, colours, map_canvas, map_pixels, open_page, point_at
+from tests.browser.dashboard import choose, choose_from, colours, map_canvas, map_pixels, open_page, point_at
 from tests.serving import Served
 
 PANEL = ".panel-recordings"
@@ -95,7 +95,7 @@ def test_a_recording_is_annotated_downloaded_and_deleted(
     url = f"{served.url}/api/v1/recordings/{recording}"
     show(page)
     row = page.locator(f"{PANEL} [data-recording]")
-    row.get_by_label("More of corner").select_option(label="Notes…")
+    choose_from(row, "More of corner", "Notes…")
     dialog = page.get_by_role("dialog", name="Notes on corner")
     dialog.get_by_label("Name of line 1").fill("sample")
     dialog.get_by_label("Text of line 1").fill("white paint")
@@ -109,11 +109,11 @@ def test_a_recording_is_annotated_downloaded_and_deleted(
         row.get_by_role("button", name="Download corner").click()
     assert download.value.suggested_filename == f"{recording}.h5"
     assert Path(download.value.path()).read_bytes() == httpx.get(f"{url}/file").content
-    row.get_by_label("More of corner").select_option(label="Delete…")
+    choose_from(row, "More of corner", "Delete…")
     confirm = page.get_by_role("dialog", name="Delete this recording?")
     confirm.get_by_role("button", name="Keep").click()
     assert httpx.get(url).status_code == 200
-    row.get_by_label("More of corner").select_option(label="Delete…")
+    choose_from(row, "More of corner", "Delete…")
     confirm.get_by_role("button", name="Delete").click()
     expect(row).to_have_count(0)
     assert httpx.get(url).status_code == 404

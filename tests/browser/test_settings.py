@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import Watch
-from tests.browser.dashboard import choose, open_page, shows_frame
+from tests.browser.dashboard import choose, choose_from, open_page, shows_frame
 from tests.browser.test_map import product, stop
 from tests.serving import Served
 
@@ -164,7 +164,7 @@ class TestCalibrations:
         download.value.save_as(exported)
         assert exported.read_bytes() == httpx.get(f"{url}/{identity}/file").content
         row = panel.locator(f"[data-calibration='{identity}']")
-        row.get_by_label("More of bench").select_option(label="Delete…")
+        choose_from(row, "More of bench", "Delete…")
         confirm = page.get_by_role("dialog", name="Delete this calibration?")
         confirm.get_by_role("button", name="Delete").click()
         expect(row).to_have_count(0)

@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.conftest import Watch
-from tests.browser.dashboard import open_page, shows_frame
+from tests.browser.dashboard import choose_from, open_page, shows_frame
 from tests.serving import Served, serving
 from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
 
@@ -192,7 +192,7 @@ def test_a_service_that_asks_for_a_token_is_shown_one(page_of_guarded: Any) -> N
     page.reload()
     page.locator(".panel-map canvas[data-frame]").wait_for()
     assert page.evaluate("() => Object.values(localStorage).join()").find("tc_") == -1
-    page.get_by_label("Page: layout, colours, help").select_option(label="Forget the token")
+    choose_from(page, "Page: layout, colours, help", "Forget the token")
     expect(page.locator("[data-field=state]")).to_have_text("Not let in")
     expect(page.locator("[data-banner=token]")).to_be_visible()
     assert page.evaluate("() => Object.values(sessionStorage).join()") == ""
@@ -206,7 +206,7 @@ def test_a_viewer_looks_and_is_told_what_it_may_not(page_of_guarded: Any) -> Non
     stop = page.get_by_role("button", name="Stop", exact=True)
     expect(stop).to_be_disabled()
     expect(stop).to_have_attribute("title", "The token viewer is a viewer's")
-    page.get_by_label("Page: layout, colours, help").select_option(label="Token…")
+    choose_from(page, "Page: layout, colours, help", "Token…")
     dialog = page.get_by_role("dialog", name="Authentication required")
     expect(dialog.locator("[data-field=caller]")).to_contain_text("knows this page as viewer")
     # with another one it may at once

@@ -10,6 +10,8 @@ export class Player {
   readonly playing = signal(false);
   readonly speed_ns = signal<number>(5);
   readonly time_s: ReadonlySignal<number>;
+  /** The part of the period in which there is light, in shares of it: what plays passes over the rest. */
+  readonly lit = signal<{ readonly first: number; readonly last: number } | null>(null);
   readonly phase_rad = computed(() => 2 * Math.PI * this.turn.value);
 
   /** `period_s` is 1/f of what is streamed: the time after which the flight repeats. */
@@ -21,6 +23,8 @@ export class Player {
   advance(elapsed_s: number): boolean {
     if (!this.playing.peek()) return false;
     this.step(elapsed_s * this.speed_ns.peek() * 1e-9);
+    const [lit, turn] = [this.lit.peek(), this.turn.peek()];
+    if (lit !== null && (turn < lit.first || turn > lit.last)) this.turn.value = lit.first;
     return true;
   }
 

@@ -62,16 +62,24 @@ function nextLayout({ layout, alone }: Store): void {
 
 /** Keys for the whole page; the answer takes them away again. */
 export function shortcuts(target: Window, store: Store): () => void {
+  /** The button that was pressed by pointer and has the focus since; keys that come after are not meant for it. */
+  let clicked: Element | null = null;
+  const onClick = (event: MouseEvent): void => {
+    clicked = event.detail > 0 && event.target instanceof Element ? event.target.closest("button") : null;
+  };
   const onKeyDown = (event: KeyboardEvent): void => {
+    if (event.key === "Tab") clicked = null;
     if (event.ctrlKey || event.metaKey || event.altKey || typesText(event.target)) return;
     const shortcut = SHORTCUTS.find(({ keys }) => keys.includes(event.key));
-    // A focused button is pressed by the space bar already.
-    if (shortcut === undefined || (event.key === " " && event.target instanceof HTMLButtonElement)) return;
+    // A button that was reached by keys is pressed by the space bar already.
+    if (shortcut === undefined || (event.key === " " && event.target instanceof HTMLButtonElement && event.target !== clicked)) return;
     event.preventDefault();
     shortcut.run(store, event);
   };
+  target.addEventListener("click", onClick, true);
   target.addEventListener("keydown", onKeyDown);
   return () => {
+    target.removeEventListener("click", onClick, true);
     target.removeEventListener("keydown", onKeyDown);
   };
 }

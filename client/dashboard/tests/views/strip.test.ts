@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 
-import { PICTURES, turnsOf } from "../../src/views/transient/strip";
+import { litOf, PICTURES, turnsOf } from "../../src/views/transient/strip";
 
 test("a strip's times lie evenly where light arrives", () => {
   const arrivals = new Float32Array(100);
@@ -12,7 +12,23 @@ test("a strip's times lie evenly where light arrives", () => {
   expect(turns[PICTURES - 1]).toBeCloseTo(0.575, 6);
 });
 
+test("a strip shows no time without light, however far apart the light arrives", () => {
+  const arrivals = new Float32Array(100);
+  arrivals.fill(1, 10, 14);
+  arrivals.fill(0.6, 80, 84);
+  for (const turn of turnsOf(arrivals)) expect(arrivals[Math.floor(100 * turn)]).toBeGreaterThan(0);
+  expect(turnsOf(arrivals).some((turn) => turn > 0.8)).toBe(true);
+});
+
 test("without light they lie over the whole period", () => {
   const turns = turnsOf(new Float32Array(10), 5);
   for (const [n, turn] of turns.entries()) expect(turn).toBeCloseTo(0.1 + 0.2 * n, 12);
+});
+
+test("light is there from its first to its last arrival, with a little dark around", () => {
+  const arrivals = new Float32Array(100);
+  arrivals.fill(1, 20, 24);
+  arrivals[60] = 0.3;
+  expect(litOf(arrivals)).toEqual({ first: expect.closeTo(0.18, 9), last: expect.closeTo(0.63, 9) });
+  expect(litOf(new Float32Array(10))).toBeNull();
 });
