@@ -2,6 +2,7 @@
 
 import base64
 import io
+import re
 from typing import Any
 
 import matplotlib
@@ -9,6 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Locator, Page
+
+# The words of a camera whose frames come; on a laden machine they may come slowly.
+LIVE = re.compile("^Live")
 
 # A canvas by way of a 2D copy: one of WebGL can be read only in the task that drew it.
 _READ_CANVAS = """
@@ -114,6 +118,24 @@ def text(page: Page, panel: str, name: str) -> str:
     """A figure of a view, without the thin spaces before its unit and between thousands."""
     shown = page.locator(f"{panel} [data-field={name}]").first.text_content()
     return (shown or "").replace("\u202f", " ").replace("\u2212", "-")
+
+
+# what the page paints below and above a scale
+BEYOND = {
+    "viridis": ((0x1C, 0x00, 0x29), (0xFF, 0xFB, 0xD5)),
+    "cividis": ((0x00, 0x09, 0x14), (0xFF, 0xFA, 0xC9)),
+    "gray": ((0x0B, 0x2A, 0x55), (0xFF, 0xC9, 0xB0)),
+    "coolwarm": ((0x1A, 0x23, 0x70), (0x6B, 0x00, 0x19)),
+}
+
+
+def map_colours(values: NDArray[Any], low: float, high: float, name: str) -> NDArray[np.uint8]:
+    """RGBA of a map, (..., 4): as `colours`, with colours of their own beyond the limits."""
+    painted = colours(values, low, high, name)
+    under, over = BEYOND[name]
+    painted[values.astype(np.float64) < low] = (*under, 255)
+    painted[values.astype(np.float64) > high] = (*over, 255)
+    return painted
 
 
 def colours(values: NDArray[Any], low: float, high: float, name: str) -> NDArray[np.uint8]:

@@ -6,6 +6,8 @@ from playwright.sync_api import Page, expect
 from tests.browser.dashboard import choose_from, open_page, point_at
 from tests.browser.test_transient import F_HZ
 
+pytestmark = pytest.mark.shared_daemon
+
 PAGE_MENU = "Page: layout, colours, help"
 
 

@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import Watch
-from tests.browser.dashboard import choose, choose_from, open_page, shows_frame
+from tests.browser.dashboard import LIVE, choose, choose_from, open_page, shows_frame
 from tests.browser.test_map import product, stop
 from tests.serving import Served
 
@@ -89,7 +89,7 @@ class TestCalibrations:
         row = panel.locator("[data-calibration]").last
         expect(row).to_contain_text("after warm-up")
         expect(row).to_contain_text("in use")
-        expect(page.locator("[data-field=state]")).to_have_text("Live")
+        expect(page.locator("[data-field=state]")).to_have_text(LIVE)
         listed = httpx.get(f"{served.url}/api/v1/calibrations").json()
         assert listed["active"] == listed["calibrations"][0]["id"]
         page.wait_for_function(

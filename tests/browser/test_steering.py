@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.conftest import Watch
-from tests.browser.dashboard import choose_from, open_page, shows_frame
+from tests.browser.dashboard import LIVE, choose_from, open_page, shows_frame
 from tests.serving import Served, serving
 from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
 
@@ -183,7 +183,7 @@ def test_a_service_that_asks_for_a_token_is_shown_one(page_of_guarded: Any) -> N
     show_token(page, "tc_mistyped")
     expect(dialog).to_contain_text("does not know this token")
     show_token(page, tokens[Role.OPERATOR])
-    expect(page.locator("[data-field=state]")).to_have_text("Live")
+    expect(page.locator("[data-field=state]")).to_have_text(LIVE)
     page.locator(".panel-map canvas[data-frame]").wait_for()
     assert tokens[Role.OPERATOR] not in page.url
     page.get_by_role("button", name="Stop", exact=True).click()
@@ -235,4 +235,4 @@ def test_a_token_that_is_revoked_is_asked_for_again(page_of_guarded: Any) -> Non
     expect(page.get_by_role("dialog", name="Authentication required")).to_be_visible()
     expect(page.locator("[data-field=state]")).to_have_text("Not let in")
     show_token(page, tokens[Role.VIEWER])
-    expect(page.locator("[data-field=state]")).to_have_text("Live")
+    expect(page.locator("[data-field=state]")).to_have_text(LIVE)

@@ -10,10 +10,20 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
-from tests.browser.dashboard import canvas_pixels, choose, colours, open_page, point_at, shows_frame
+from tests.browser.dashboard import (
+    canvas_pixels,
+    choose,
+    colours,
+    map_colours,
+    open_page,
+    point_at,
+    shows_frame,
+)
 from tests.browser.test_map import product, stop
 from tests.serving import Served
 from transientcam.wire.codec import pack_with_array
+
+pytestmark = pytest.mark.shared_daemon
 
 F_HZ = 23e6
 BINS = 256
@@ -147,7 +157,7 @@ def test_points_stand_where_their_pixels_look(page: Page, served: Served) -> Non
     assert np.any(aside != eye)
     # seen from the camera, the cloud is the camera's own picture
     low, high = (float(str(canvas.get_attribute(f"data-{key}"))) for key in ("low", "high"))
-    expected = colours(ranges, low, high, "viridis").astype(int)
+    expected = map_colours(ranges, low, high, "viridis").astype(int)
     rows, columns = eye.shape[:2]
     scale = min(columns / 163, rows / 120)
     found = []
