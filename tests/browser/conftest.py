@@ -100,7 +100,7 @@ def _storing_in(directory: Path, camera: str) -> Iterator[Served]:
         yield daemon
 
 
-# used by all tests, so that its threads are there before any test and are nobody's who is left behind
+# of every module, so that its threads are there before any test and none seems left behind
 @pytest.fixture(scope="module", autouse=True)
 def shared_daemon(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory

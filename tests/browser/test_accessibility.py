@@ -62,7 +62,7 @@ def test_no_view_offends_a_rule(page: Page, scheme: str) -> None:
         choose(page, shown, title)
         panel = page.locator("[data-view]", has=page.get_by_role("heading", name=title))
         shown = str(panel.get_attribute("data-view"))
-        # what is beside the panel is held to all rules by the test before; of the scheme, only colours depend
+        # what is beside the panel is held to all rules above; the scheme changes colours alone
         rules = _RULES if scheme == "light" else {"runOnly": ["color-contrast"]}
         if found := _offences(page, within=f".panel-{shown}", rules=rules):
             offences[title] = found

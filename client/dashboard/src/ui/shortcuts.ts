@@ -39,6 +39,8 @@ export const SHORTCUTS: readonly Shortcut[] = [
   { keys: ["ArrowLeft"], shown: "←", words: "back by 0.1 ns, with Shift by 1 ns", run: (store, { shiftKey }) => { scrub(store, shiftKey ? -LONG_STEP_S : -STEP_S); } },
   { keys: ["ArrowRight"], shown: "→", words: "on by 0.1 ns, with Shift by 1 ns", run: (store, { shiftKey }) => { scrub(store, shiftKey ? LONG_STEP_S : STEP_S); } },
   { keys: ["Home"], shown: "Home", words: "to the start of the flight", run: ({ player }) => { player.seek(0); } },
+  { keys: ["n"], shown: "N", words: "to the next arrival of light", run: ({ player }) => { player.jump(true); } },
+  { keys: ["b"], shown: "B", words: "to the arrival before", run: ({ player }) => { player.jump(false); } },
   { keys: [","], shown: ",", words: "slower", run: (store) => { speedUp(store, -1); } },
   { keys: ["."], shown: ".", words: "faster", run: (store) => { speedUp(store, 1); } },
   { keys: ["h"], shown: "H", words: "hold the frame, or let it go", run: ({ held }) => { held.value = !held.peek(); } },

@@ -76,6 +76,19 @@ describe("the player", () => {
     [player.playing.value, player.lit.value] = [false, null];
   });
 
+  test("jumps between the arrivals of light, around the period", () => {
+    player.arrivals.value = [0.2, 0.6];
+    player.seek(0.3);
+    const turns = [true, true, false, false].map((forward) => {
+      player.jump(forward);
+      return player.turn.value;
+    });
+    expect(turns).toEqual([0.6, 0.2, 0.6, 0.2]);
+    player.arrivals.value = [];
+    player.jump(true);
+    expect(player.turn.value).toBe(0.2);
+  });
+
   test("steps back over the start to the end", () => {
     player.seek(0);
     player.step(-1e-9);

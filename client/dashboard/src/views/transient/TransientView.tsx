@@ -15,10 +15,11 @@ import { useDrawing, useProducts } from "../../ui/hooks";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
 import { AMPLITUDE } from "../map/catalogue";
+import { litOf, peaksOf, turnsOf } from "./arrivals";
 import { TransientLook } from "./look";
 import { LightSoFar } from "./LightSoFar";
 import { Picture } from "./Picture";
-import { litOf, stripOf, turnsOf } from "./strip";
+import { stripOf, PICTURES } from "./strip";
 import { Timeline, TimeReadout } from "./Timeline";
 
 const TONE_NAMES: Record<ToneKind, string> = { linear: "linear", root: "root", logarithmic: "log" };
@@ -32,7 +33,9 @@ export function TransientView() {
   const { player } = store;
   useDrawing(() => {
     const arrivals = frame.value?.light?.arrivals;
-    if (arrivals !== undefined) player.lit.value = steady(player.lit.peek(), litOf(arrivals));
+    if (arrivals === undefined) return;
+    player.lit.value = steady(player.lit.peek(), litOf(arrivals));
+    player.arrivals.value = peaksOf(arrivals);
   }, [frame, player]);
   const cumulative = look.play.value === "cumulative";
   return (
@@ -53,7 +56,7 @@ export function TransientView() {
             const arrivals = frame.peek()?.light?.arrivals;
             if (arrivals === undefined) return;
             const turn = player.turn.peek();
-            const strip = stripOf(turnsOf(arrivals), store.period_s.peek(), (each) => {
+            const strip = stripOf(turnsOf(arrivals, PICTURES), store.period_s.peek(), (each) => {
               player.seek(each);
               return look.snapshot();
             });
