@@ -200,8 +200,8 @@ def test_a_copied_link_shows_the_same_page_to_somebody_else(
     views = "(all) => JSON.stringify(all.map((each) => each.dataset.view))"
     shown = other.locator("[data-view]").evaluate_all(views)
     assert json.loads(shown) == ["transient", "map", "response"]
-    expect(other.locator(".panel-map canvas")).to_have_attribute("data-high", "3.5")
-    expect(other.locator(".panel-map canvas")).to_have_attribute("data-colours", "cividis")
+    expect(map_canvas(other)).to_have_attribute("data-high", "3.5")
+    expect(map_canvas(other)).to_have_attribute("data-colours", "cividis")
     context.close()
 
 

@@ -93,6 +93,7 @@ def test_the_streak_is_painted_as_its_numbers_say(page: Page, served: Served) ->
 def test_a_click_into_the_streak_chooses_time_and_column(page: Page, served: Served) -> None:
     show(page, served, "Streak", "streak")
     canvas = page.locator("canvas[data-product=streak]")
+    page.get_by_label("Scanline").fill("60")
     box = canvas.bounding_box()
     assert box is not None
     page.mouse.click(box["x"] + 0.25 * box["width"], box["y"] + 0.5 * box["height"])

@@ -111,7 +111,7 @@ function Handle({ end, base, scale, text, unit, held, onLimit }: HandleProps) {
       class={`colour-bar-handle colour-bar-${end}`}
       role="slider"
       tabIndex={0}
-      aria-label={`${end === "low" ? "Low" : "High"} end of the colours`}
+      aria-label={`${end === "low" ? "Lower" : "Upper"} handle of the scale`}
       aria-orientation="vertical"
       aria-valuenow={scale[end]}
       aria-valuetext={withUnit(text, unit)}

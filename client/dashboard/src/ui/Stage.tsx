@@ -73,7 +73,10 @@ export function Stage({ width, height, label, children }: StageProps) {
     picture.current?.setPointerCapture(event.pointerId);
   };
   const onPointerMove = (event: PointerEvent): void => {
-    store.pointed.value = pixelAt(event);
+    moveDrag(event);
+    store.pointed.value = pixelAt(event); // after the picture was moved under the pointer
+  };
+  const moveDrag = (event: PointerEvent): void => {
     const now = drag.current;
     if (now === null) return;
     now.moved ||= Math.hypot(event.clientX - now.last.clientX, event.clientY - now.last.clientY) > CLICK_PX;

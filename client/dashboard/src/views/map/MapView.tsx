@@ -39,23 +39,6 @@ export function MapView() {
           onChange={(product) => (choice.value = product)}
         />
       }
-      tools={
-        <>
-          <Toggle
-            pressed={look.kind.value === "logarithmic"}
-            title="Logarithmic scale"
-            onToggle={() => (look.kind.value = look.kind.peek() === "linear" ? "logarithmic" : "linear")}
-          >
-            log
-          </Toggle>
-          <Choice
-            label="Colours"
-            value={look.colours.value}
-            options={COLOUR_MAPS.map((name) => ({ value: name, text: name }))}
-            onChange={(name) => (look.colours.value = name)}
-          />
-        </>
-      }
     >
       <Map look={look} canvas={canvas} />
     </Panel>
@@ -119,7 +102,22 @@ function Map({ look, canvas }: MapProps) {
       <footer class="panel-foot">
         <div class="panel-row">
           <Readout key={shown.product} look={look} />
-          <LimitFields key={`${shown.product} limits`} look={look} looks={store.looks} />
+          <div class="panel-tools">
+            <LimitFields key={`${shown.product} limits`} look={look} looks={store.looks} />
+            <Toggle
+              pressed={look.kind.value === "logarithmic"}
+              title="Logarithmic scale"
+              onToggle={() => (look.kind.value = look.kind.peek() === "linear" ? "logarithmic" : "linear")}
+            >
+              log
+            </Toggle>
+            <Choice
+              label="Colours"
+              value={look.colours.value}
+              options={COLOUR_MAPS.map((name) => ({ value: name, text: name }))}
+              onChange={(name) => (look.colours.value = name)}
+            />
+          </div>
         </div>
         <Measured look={look} />
       </footer>

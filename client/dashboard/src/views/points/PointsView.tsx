@@ -152,7 +152,9 @@ export function PointsView() {
         />
         {(trouble.value ?? text.value) !== null && <p class="stage-empty">{trouble.value ?? text.value}</p>}
       </div>
-        {bar.value !== null && (
+        {bar.value === null ? (
+          <div class="colour-bar" />
+        ) : (
           <ColourBar
             scale={bar.value.scale.value}
             colours={bar.value.colours.value}

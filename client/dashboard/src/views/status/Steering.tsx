@@ -55,7 +55,7 @@ function Capture() {
         <SingleIcon /> <span class="wide">Single</span>
       </Steer>
       <Steer title={occupied ?? (running ? "Stop the camera; its light goes off" : "Start the camera")} disabled={busy} onClick={() => void toggle()}>
-        {running ? <PauseIcon /> : <PlayIcon />} {running ? "Stop" : "Start"}
+        {running ? <PauseIcon /> : <PlayIcon />} <span class="wide">{running ? "Stop" : "Start"}</span>
       </Steer>
     </>
   );
