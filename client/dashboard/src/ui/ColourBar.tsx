@@ -138,7 +138,7 @@ function Handle({ end, base, scale, text, unit, held, onLimit }: HandleProps) {
   );
 }
 
-/** Colours at the left, how often each value occurs at the right; both from the foot upwards. */
+/** Colours at the left, those beyond the scale only where there are values that may lie there; at the right how often each value occurs; both from the foot upwards. */
 function paintBar(context: CanvasRenderingContext2D, base: Scale, scale: Scale, colours: ColourMapName, values: ArrayLike<number> | null): void {
   const table = colourTable(colours);
   const { under, over } = beyond(colours);
@@ -147,7 +147,7 @@ function paintBar(context: CanvasRenderingContext2D, base: Scale, scale: Scale, 
   for (let row = 0; row < height; row++) {
     const place = fraction(scale, valueAt(base, (1 - (row + 0.5) / height) * LENGTH - MARGIN));
     const level = 4 * Math.min(LEVELS - 1, levelOf(place));
-    context.fillStyle = place < 0 ? css(under) : place > 1 ? css(over) : `rgb(${table[level]} ${table[level + 1]} ${table[level + 2]})`;
+    context.fillStyle = values !== null && place < 0 ? css(under) : values !== null && place > 1 ? css(over) : `rgb(${table[level]} ${table[level + 1]} ${table[level + 2]})`;
     context.fillRect(0, row, COLOURS_PX, 1);
   }
   if (values === null) return;

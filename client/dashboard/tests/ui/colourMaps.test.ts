@@ -12,17 +12,26 @@ function lightness(rgb: ArrayLike<number>): number {
   return y > 0.008856 ? 116 * Math.cbrt(y) - 16 : 903.3 * y;
 }
 
-describe.each(COLOUR_MAPS)("%s", (name) => {
+const coloursOf = (name: (typeof COLOUR_MAPS)[number]): Uint8ClampedArray[] => {
   const table = colourTable(name);
-  const colours = Array.from({ length: LEVELS }, (_, level) => table.slice(4 * level, 4 * level + 4));
+  return Array.from({ length: LEVELS }, (_, level) => table.slice(4 * level, 4 * level + 4));
+};
 
-  test.skipIf(name === "coolwarm")("gets lighter from end to end, so that it reads without seeing colour", () => {
+describe.each(COLOUR_MAPS.filter((name) => name !== "coolwarm"))("%s", (name) => {
+  const colours = coloursOf(name);
+
+  test("gets lighter from end to end, so that it reads without seeing colour", () => {
     const values = colours.map(lightness);
     values.slice(1).forEach((value, level) => {
       expect(value).toBeGreaterThan(values[level] - 0.35); // rounding to bytes
     });
     expect(values[LEVELS - 1] - values[0]).toBeGreaterThan(70);
   });
+
+});
+
+describe.each(COLOUR_MAPS)("%s", (name) => {
+  const colours = coloursOf(name);
 
   test("has no steps, and covers what is behind it", () => {
     colours.slice(1).forEach((colour, level) => {
@@ -34,8 +43,7 @@ describe.each(COLOUR_MAPS)("%s", (name) => {
 });
 
 test("coolwarm is lightest in its middle and gets darker evenly towards both ends", () => {
-  const table = colourTable("coolwarm");
-  const values = Array.from({ length: LEVELS }, (_, level) => lightness(table.slice(4 * level, 4 * level + 4)));
+  const values = coloursOf("coolwarm").map(lightness);
   for (let level = 1; level < 120; level++) expect(values[level]).toBeGreaterThan(values[level - 1] - 0.35);
   for (let level = 137; level < LEVELS; level++) expect(values[level]).toBeLessThan(values[level - 1] + 0.35);
   expect(values[128] - Math.max(values[0], values[255])).toBeGreaterThan(35);
