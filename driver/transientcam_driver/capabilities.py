@@ -194,9 +194,14 @@ class Capabilities:
         wanted = Sequence.from_document(document)
         possible = self.nearest(wanted)
         absent = {each.name for each in fields(Sequence)} - document.keys()
-        if "scheme" not in document.get("sub_phases", {}):
-            absent.add("sub_phases")
-        return replace(wanted, **{name: getattr(possible, name) for name in absent})
+        filled = {name: getattr(possible, name) for name in absent}
+        if "sub_phases" in document:
+            given = document["sub_phases"]
+            filled["sub_phases"] = SubPhases(
+                (wanted if "scheme" in given else possible).sub_phases.scheme,
+                (wanted if "n" in given else possible).sub_phases.n,
+            )
+        return replace(wanted, **filled)
 
     def apply(self, sequence: Sequence, *, epoch: int = 0) -> AppliedSequence:
         """Return a sequence as this camera would apply it, without a request to it."""

@@ -152,6 +152,7 @@ def test_what_a_document_leaves_out_is_nearest_to_its_default() -> None:
     assert (sequence.sub_phases, sequence.exposure_s) == (SubPhases("none"), 1e-3)
     assert sequence.base_frequency_hz == pytest.approx(7e6, abs=1.0)
     assert camera.sequence_of({"sub_phases": {"n": 3}}).sub_phases == SubPhases("none")
+    assert camera.sequence_of({"sub_phases": {}}).sub_phases == SubPhases("none")
 
 
 def test_what_a_document_says_is_not_bent() -> None:
@@ -160,3 +161,5 @@ def test_what_a_document_says_is_not_bent() -> None:
     sequence = camera.sequence_of({"zeroth": "on-off", "sub_phases": {"scheme": "arccos"}})
 
     assert (sequence.zeroth, sequence.sub_phases.scheme) == ("on-off", "arccos")
+    beyond = {"sub_phases": {"n": CAPABILITIES.max_sub_phases + 1}}
+    assert CAPABILITIES.sequence_of(beyond).sub_phases.n == CAPABILITIES.max_sub_phases + 1

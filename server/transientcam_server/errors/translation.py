@@ -47,7 +47,7 @@ def problem_document(problem: Problem, *, instance: str | None = None) -> dict[s
         "type": problem.kind.type,
         "title": problem.kind.title,
         "status": problem.kind.status,
-        "detail": problem.detail,
+        "detail": _encodable(problem.detail),  # it may name a field in the client's words
     }
     if instance is not None:
         document["instance"] = instance
@@ -125,5 +125,10 @@ def plain(value: object, *, levels: int = _SHOWN_LEVELS) -> object:
 
 def shortened(text: str) -> str:
     """Return a text of at most 200 characters that can be encoded."""
-    text = text.encode("utf-8", "replace").decode()  # JSON may bring half a character
+    text = _encodable(text)
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
+
+
+def _encodable(text: str) -> str:
+    """Return a text without halves of characters (surrogates), which JSON can escape."""
+    return text.encode("utf-8", "replace").decode()

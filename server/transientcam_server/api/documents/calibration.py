@@ -5,7 +5,7 @@ from typing import Any, Final, Literal
 from pydantic import ConfigDict, Field
 
 from transientcam_driver.calibration.capture import DEFAULT_TAKES
-from transientcam_server.api.documents.document import Document
+from transientcam_server.api.documents.document import Document, JsonInteger
 
 MAX_NAME: Final = 200
 
@@ -152,7 +152,7 @@ class CalibrationRequest(Document):
     )
 
     name: str = Field(default="", max_length=MAX_NAME)
-    frames: int = Field(default=DEFAULT_TAKES, ge=2, le=10_000)
+    frames: JsonInteger = Field(default=DEFAULT_TAKES, ge=2, le=10_000)
     """Captured with the light on, and as many in the dark; averaged without outliers."""
     activate: bool = False
     """Use it at once, if it was measured on a diffusor."""

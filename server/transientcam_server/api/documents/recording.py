@@ -18,6 +18,8 @@ _ONE_LINE: Final = r"^(?=.*\S)[^\x00-\x1f\x7f-\x9f\u2028\u2029]+$"
 def _one_line(name: str) -> str:
     if not re.match(_ONE_LINE, name):
         raise ValueError("must be a line of text without control characters")
+    if re.search("[\ud800-\udfff]", name):  # JSON can escape half a character, UTF-8 has none
+        raise ValueError("must be text without halves of characters (surrogates)")
     return name
 
 

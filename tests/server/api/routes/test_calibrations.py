@@ -8,11 +8,13 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from tests.server.contract import hold_to_contract
 from tests.serving import Served, serving
 from transientcam import Camera, wire
 from transientcam_driver import Sequence
+from transientcam_server.api.documents.calibration import CalibrationRequest
 
 CALIBRATIONS = "/api/v1/calibrations"
 QUICK = {"harmonics": 1, "zeroth": "estimated", "exposure_s": 0.0005}
@@ -208,6 +210,13 @@ def test_what_is_no_calibration_is_not_taken_in(
     assert answer.json()["type"] == "/problems/invalid-calibration"
     assert str(bench.settings.calibrations.directory) not in answer.text
     assert list(bench.settings.calibrations.directory.glob("*")) == []
+
+
+def test_a_number_of_frames_is_an_integer_as_json_schema_has_it() -> None:
+    assert CalibrationRequest.model_validate_json('{"frames": 40.0}').frames == 40
+    for refused in ("40.5", '"40"', "true", "1e400", "null"):
+        with pytest.raises(ValidationError, match="frames"):
+            CalibrationRequest.model_validate_json(f'{{"frames": {refused}}}')
 
 
 def test_a_disk_that_takes_nothing_is_a_problem_and_no_more(tmp_path: Path) -> None:
