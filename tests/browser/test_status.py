@@ -29,8 +29,8 @@ def frame_period_s(served: Served) -> float:
     address = f"{served.url}/api/v1/frames/latest"
     first = httpx.get(address).raise_for_status().json()
     last = httpx.get(address, params={"after": first["frame"] + 4, "wait_s": 10}).json()
-    period_s: float = last["device_time_s"] - first["device_time_s"]
-    return period_s / (last["frame"] - first["frame"])
+    span_s = float(last["device_time_s"] - first["device_time_s"])
+    return span_s / int(last["frame"] - first["frame"])
 
 
 def test_a_live_camera_says_so_with_its_figures(page: Page, served: Served) -> None:

@@ -5,8 +5,8 @@ import { useMemo, useRef } from "preact/hooks";
 import type { Look } from "../../store/looks";
 import { useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
-import { COLOUR_MAPS } from "../../ui/colourMaps";
-import { Choice, Tabs, Toggle } from "../../ui/controls";
+import { ColourChoice } from "../../ui/ColourChoice";
+import { Tabs, Toggle } from "../../ui/controls";
 import { saveNumbers, savePicture } from "../../ui/download";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { LimitFields } from "../../ui/LimitFields";
@@ -111,12 +111,7 @@ function Map({ look, canvas }: MapProps) {
             >
               log
             </Toggle>
-            <Choice
-              label="Colours"
-              value={look.colours.value}
-              options={COLOUR_MAPS.map((name) => ({ value: name, text: name }))}
-              onChange={(name) => (look.colours.value = name)}
-            />
+            <ColourChoice colours={look.colours} />
           </div>
         </div>
         <Measured look={look} />

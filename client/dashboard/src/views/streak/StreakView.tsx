@@ -6,6 +6,7 @@ import { rangeOfTime_m } from "../../physics/constants";
 import { oneOf, remembered } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
+import { ColourChoice } from "../../ui/ColourChoice";
 import { COLOUR_MAPS, type ColourMapName } from "../../ui/colourMaps";
 import { Choice } from "../../ui/controls";
 import { npy, save, savePicture } from "../../ui/download";
@@ -71,7 +72,7 @@ export function StreakView() {
       tools={
         <>
           <Choice label="Tone" value={tone.value} options={TONES.map((kind) => ({ value: kind, text: TONE_NAMES[kind] }))} onChange={(kind) => (tone.value = kind)} />
-          <Choice label="Colours" value={colours.value} options={COLOUR_MAPS.map((each) => ({ value: each, text: each }))} onChange={(each) => (colours.value = each)} />
+          <ColourChoice colours={colours} />
         </>
       }
       downloads={[

@@ -7,7 +7,7 @@ import { Poles } from "../../physics/poles";
 import { SPEEDS_NS } from "../../store/player";
 import { useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
-import { COLOUR_MAPS } from "../../ui/colourMaps";
+import { ColourChoice } from "../../ui/ColourChoice";
 import { Choice, Toggle } from "../../ui/controls";
 import { savePicture } from "../../ui/download";
 import { fixed, significant, superscript, withUnit } from "../../ui/format";
@@ -95,12 +95,7 @@ export function TransientView() {
               scene
             </Toggle>
           )}
-          <Choice
-            label="Colours"
-            value={look.colours.value}
-            options={COLOUR_MAPS.map((name) => ({ value: name, text: name }))}
-            onChange={(name) => (look.colours.value = name)}
-          />
+          <ColourChoice colours={look.colours} />
         </>
       }
     >
