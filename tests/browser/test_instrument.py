@@ -181,8 +181,8 @@ def test_a_copied_link_shows_the_same_page_to_somebody_else(
     page.get_by_label("High end of the scale in m").press("Enter")
     page.locator(".panel-map").get_by_label("Colours").select_option("cividis")
     choose_from(page, "Page: layout, colours, help", "Copy a link to what is shown")
-    toast = page.locator(".toast").last
-    expect(toast).to_contain_text("The link was copied")
+    toast = page.locator(".toast", has_text="The link was copied")
+    expect(toast).to_be_visible()
     # it is told where nothing can be pressed
     covered = toast.evaluate(
         """(toast) => { const box = toast.getBoundingClientRect();

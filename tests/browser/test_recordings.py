@@ -84,7 +84,7 @@ def test_a_recording_is_started_watched_and_stopped(page: Page, served: Served) 
     assert (reported["state"], reported["reason"]) == ("complete", "stopped")
     expect(row.locator("[data-field=frames]")).to_have_text(f"{reported['frames']} frames")
     expect(row.locator("[data-field=size]")).to_have_text(re.compile(r"^\d+(\.\d+)?\u202f[kM]B$"))
-    expect(page.locator(".toast").last).to_have_text("The recording stopped.")
+    expect(page.locator(".toast", has_text="The recording stopped.")).to_be_visible()
 
 
 def test_what_just_happened_is_saved(page: Page, served: Served) -> None:
@@ -210,9 +210,11 @@ def test_an_address_shows_a_recorded_frame(page: Page, served: Served, watch: Wa
     page.goto(f"/?debug#map=direct&recording={recording}&frame=3")
     shows_recorded(page, 3)
     page.get_by_role("button", name="One frame on").click()
-    expect(page).to_have_url(re.compile(rf"#map=direct&recording={recording}&frame=4$"))
+    expect(page).to_have_url(
+        re.compile(rf"#map=direct&pixel=\d+,\d+&recording={recording}&frame=4$")
+    )
     page.get_by_role("button", name="Back to live").click()
-    expect(page).to_have_url(re.compile(r"#map=direct$"))
+    expect(page).to_have_url(re.compile(r"#map=direct&pixel=\d+,\d+$"))
     watch.refusals_expected = True
     page.evaluate("() => { location.hash = '#recording=gone'; }")
     expect(page.locator("[data-banner=message]")).to_contain_text("cannot be shown")

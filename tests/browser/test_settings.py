@@ -59,7 +59,7 @@ def test_settings_that_somebody_else_changed_meanwhile_are_not_overwritten(
     panel.get_by_label("Bias").fill("0.01")
     url = f"{served.url}/api/v1/reconstruction"
     httpx.put(url, json={"smoothing_px": 3.0}).raise_for_status()
-    expect(page.locator(".toast").last).to_contain_text("settings of the reconstruction changed")
+    expect(page.locator(".toast", has_text="of the reconstruction changed")).to_be_visible()
     watch.refusals_expected = True
     panel.get_by_role("button", name="Apply").click()
     expect(panel.locator("[data-field=reconstruction-status]")).to_have_class(re.compile("refusal"))

@@ -58,7 +58,8 @@ def test_while_somebody_else_steers_controls_say_who_and_wait(page: Page, served
     expect(page.locator("[data-field=control]")).to_have_text(
         re.compile(r"^the night shift \d+ s$")
     )
-    expect(page.locator(".toast").last).to_contain_text("the night shift has taken control.")
+    told = page.locator(".toast", has_text="the night shift has taken control.")
+    expect(told).to_be_visible()
     lease(served, "DELETE", lease_id=granted["lease_id"])
     expect(edit).to_be_enabled()
 
