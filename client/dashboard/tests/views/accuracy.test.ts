@@ -2,6 +2,7 @@ import { describe, expect, test } from "vitest";
 
 import type { AppliedSequence, Choice, FrameMeta, Tradeoff } from "../../src/stream/protocol";
 import { endsOf, marksOf, nearest, placeOf, sameSequence, standingOf } from "../../src/views/accuracy/place";
+import { goalWords } from "../../src/views/accuracy/words";
 
 const choice = (capture_s: number, median: number): Choice =>
   ({ capture_s, sequence: { takes: capture_s }, predicted: { range_error_m: { median, low: 0.9 * median, high: 1.1 * median, p90: 2 * median } } }) as unknown as Choice;
@@ -57,4 +58,11 @@ test("a click means the nearest point within reach", () => {
   expect(nearest(points, 13, 41)).toBeNull();
   expect(nearest(points, 200, 10)).toBeNull();
   expect(nearest([], 0, 0)).toBeNull();
+});
+
+test("a goal that cannot be reached is refused in the names and units of the form", () => {
+  const detail = "This cannot be reached on this scene: frame_rate_hz = 30. The best frame_rate_hz is 19.94.";
+  expect(goalWords({ detail })).toBe("This cannot be reached on this scene: frame rate of 30.0\u202fHz. The best frame rate is 19.9\u202fHz.");
+  const other = "This cannot be reached on this scene: range_std_m = 0.0001. The best range_std_m is 2.5e-04.";
+  expect(goalWords({ detail: other })).toBe("This cannot be reached on this scene: deviation of the range of 100\u202fµm. The best deviation of the range is 250\u202fµm.");
 });

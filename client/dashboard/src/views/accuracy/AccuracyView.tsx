@@ -12,6 +12,7 @@ import { Fact } from "../sequence/Figures";
 import { ZEROTH_NAMES } from "../sequence/words";
 import { FrontPlot } from "./FrontPlot";
 import { standingOf } from "./place";
+import { goalWords } from "./words";
 
 /** What accuracy costs in time on the scene before the camera, and the way to a better sequence. */
 export function AccuracyView() {
@@ -40,7 +41,7 @@ export function AccuracyView() {
     } catch (error) {
       if (abort.current.signal.aborted) return;
       if (!(error instanceof RequestError)) throw error;
-      refusal.value = error.message;
+      refusal.value = goalWords(error.problem);
     } finally {
       busy.value = null;
     }
@@ -51,6 +52,7 @@ export function AccuracyView() {
     });
   const plan = (goal: Parameters<typeof store.api.plan>[0]): Promise<void> =>
     ask("Looking for the best sequence…", async (signal) => {
+      chosen.value = null; // it would seem to answer this question
       chosen.value = await store.api.plan(goal, signal);
     });
   const apply = (choice: Choice): Promise<void> =>
