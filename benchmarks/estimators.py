@@ -90,10 +90,11 @@ def report(records: Iterable[tradeoff.Record]) -> str:
 _INTRODUCTION = (
     "The range of a frame is that of its first return. Which method finds it is the setting "
     "`reconstruction.estimator` of the daemon, `PUT /api/v1/reconstruction` while it runs, and "
-    "`tm.Settings(estimator=...)` in Python. The daemon's default is `likelihood`, which errs "
-    "least over the scenes of [likelihood.md](likelihood.md) together. The paper's own "
-    "are `pisarenko`, as printed and the default of `tm.Settings`, and `maximum-entropy`; "
-    "`pisarenko-merged` merges returns that noise split. All others are there to be compared with. "
+    "`tm.Settings(estimator=...)` in Python. The daemon's default is `automatic`: "
+    "`likelihood`, which errs least over the scenes of [likelihood.md](likelihood.md), "
+    "and `pisarenko` until its kernel is compiled. The paper's own are `pisarenko`, as printed and "
+    "the default of `tm.Settings`, and `maximum-entropy`; `pisarenko-merged` merges returns that "
+    "noise split. All others are there to be compared with. "
     "Direct and indirect light are those of the estimator, too, and uniform light is what they "
     "leave of the brightness.",
     "",
@@ -172,7 +173,7 @@ def _best(records: list[tradeoff.Record], quantity: str) -> str:
 
 def _fewer_outliers(records: list[tradeoff.Record]) -> str:
     """Say which have fewer outliers there than the default."""
-    default = ReconstructionSettings().estimator
+    default = ReconstructionSettings().technique
     share = {str(each.point["estimator"]): each.values["range_outliers"] for each in records}
     ours = share[default] or 0.0
     fewer = [f"`{name}`" for name, value in share.items() if value is not None and value < ours]

@@ -54,6 +54,14 @@ _VIDEO = {"base_frequency_hz": 23e6, "harmonics": 3, "zeroth": "estimated", "exp
 
 
 @dataclass(frozen=True)
+class Daemon:
+    """The daemon of a checkout, and the estimator that its frames are computed with."""
+
+    tree: Path
+    estimator: str = "pisarenko"
+
+
+@dataclass(frozen=True)
 class Cost:
     """What frames of one size and order cost one daemon.
 
@@ -90,11 +98,15 @@ def record(directory: Path, width: int, height: int, harmonics: int) -> tuple[Pa
 
 
 @contextmanager
-def daemon_of(tree: Path, camera: str) -> Iterator[Process]:
+def daemon_of(daemon: Daemon, camera: str) -> Iterator[Process]:
     """Run the daemon of a checkout once all its kernels are compiled."""
-    path = ":".join(str(tree / name) for name in ("client", "driver", "server"))
+    path = ":".join(str(daemon.tree / name) for name in ("client", "driver", "server"))
     command = [sys.executable, "-c", _SERVE, "--port", "0", "--camera", camera]
-    with running(command, {"PYTHONPATH": path}) as process:
+    environment = {
+        "PYTHONPATH": path,
+        "TRANSIENTCAM_RECONSTRUCTION__ESTIMATOR": daemon.estimator,
+    }
+    with running(command, environment) as process:
         end_s = time.monotonic() + _COMPILED_WITHIN_S
         while _kernels(process)["compiling"] is not None or not _kernels(process)["compiled"]:
             if time.monotonic() > end_s:
@@ -143,12 +155,12 @@ def _idle_cost_s(process: Process, duration_s: float) -> float:
 
 
 def measure(
-    tree: Path, recording: Path, recorded_hz: float, width: int, *, duration_s: float
+    daemon: Daemon, recording: Path, recorded_hz: float, width: int, *, duration_s: float
 ) -> Cost:
     """Return what frames of a recording cost the daemon of a checkout."""
     paced_hz, offered_hz = PACED_HZ[width], OFFERED_HZ[width]
     replay = f"recording:{recording}?loop=on&speed="
-    with daemon_of(tree, f"{replay}{paced_hz / recorded_hz:.6f}") as process:
+    with daemon_of(daemon, f"{replay}{paced_hz / recorded_hz:.6f}") as process:
         idle_s = _idle_cost_s(process, duration_s)
         seen, elapsed_s, spent_s = viewed(
             process, "range", computed=COMPUTED, duration_s=duration_s
@@ -156,14 +168,14 @@ def measure(
         rate_hz = len(set(seen.numbers)) / elapsed_s
         assert rate_hz > 0.9 * paced_hz, f"{rate_hz:.1f} of {paced_hz:g} frames a second"
         cpu_ms = 1e3 * (spent_s / elapsed_s - idle_s) / rate_hz
-    with daemon_of(tree, f"{replay}{offered_hz / recorded_hz:.6f}") as process:
+    with daemon_of(daemon, f"{replay}{offered_hz / recorded_hz:.6f}") as process:
         seen, elapsed_s, _ = viewed(process, "range", computed=COMPUTED, duration_s=duration_s)
     return Cost(cpu_ms, 1e3 * idle_s / paced_hz, len(set(seen.numbers)) / elapsed_s)
 
 
-def latency(tree: Path, *, duration_s: float) -> tuple[float, float]:
+def latency(daemon: Daemon, *, duration_s: float) -> tuple[float, float]:
     """Return p50 and p99 of the time from a frame's last image to a client, in ms."""
-    with daemon_of(tree, "sim:mirrors") as process:
+    with daemon_of(daemon, "sim:mirrors") as process:
         body = json.dumps(_VIDEO).encode()
         request = Request(
             f"{process.url}/api/v1/sequence",
@@ -184,26 +196,26 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=8.0, help="for each figure")
     parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
     arguments = parser.parse_args()
-    trees = (
-        {"now": ROOT} if arguments.against is None else {"before": arguments.against, "now": ROOT}
-    )
+    daemons = {"now": Daemon(ROOT), "now, likelihood": Daemon(ROOT, "likelihood")}
+    if arguments.against is not None:
+        daemons = {"before": Daemon(arguments.against)} | daemons
     costs: dict[tuple[int, int, str], Cost] = {}
     with tempfile.TemporaryDirectory() as name:
         for width, height in SIZES:
             for harmonics in HARMONICS:
                 recording, rate_hz = record(Path(name), width, height, harmonics)
-                for when, tree in trees.items():
+                for when, daemon in daemons.items():
                     costs[width, harmonics, when] = cost = measure(
-                        tree, recording, rate_hz, width, duration_s=arguments.seconds
+                        daemon, recording, rate_hz, width, duration_s=arguments.seconds
                     )
                     print(f"{width} x {height}, m = {harmonics}, {when}: {cost}", flush=True)
     latencies = {
-        when: latency(tree, duration_s=3 * arguments.seconds) for when, tree in trees.items()
+        when: latency(daemon, duration_s=3 * arguments.seconds) for when, daemon in daemons.items()
     }
     page = report(
         costs,
         latencies,
-        list(trees),
+        list(daemons),
         against=arguments.against is not None,
         duration_s=arguments.seconds,
     )
@@ -215,7 +227,7 @@ def main() -> None:
 def report(
     costs: Mapping[tuple[int, int, str], Cost],
     latencies: Mapping[str, tuple[float, float]],
-    trees: list[str],
+    daemons: list[str],
     *,
     against: bool,
     duration_s: float,
@@ -235,6 +247,7 @@ def report(
         "gets where far more frames are offered. The viewer runs on the same two cores.",
         f"Each figure is one run of {duration_s:g} s; at 640 x 480 that is "
         f"{PACED_HZ[640] * duration_s:.0f} frames, so expect some 20 % either way there.",
+        "The estimator is Pisarenko's, or the likelihood where that is said.",
     ]
     if against:
         lines += ["", "*Before* is the daemon of commit 0553079."]
@@ -245,7 +258,7 @@ def report(
     ]
     for width, height in SIZES:
         for harmonics in HARMONICS:
-            for when in trees:
+            for when in daemons:
                 cost = costs[width, harmonics, when]
                 lines.append(
                     f"| {width} x {height} | {harmonics} | {when} | {cost.cpu_ms:.2f} "

@@ -61,6 +61,8 @@ def serving(
     """
     with open_camera(camera) as opened, TemporaryDirectory() as state:
         usual = {"port": 0, "log_level": "warning", "calibrations": {"directory": state}}
+        # "automatic" depends on the kernels that other tests of this process have compiled
+        usual |= {"reconstruction": {"estimator": "pisarenko"}}
         chosen = Settings(camera=camera, **{**usual, **settings})
         app = build_app(opened, chosen)
         prepare(app)

@@ -49,6 +49,8 @@ class FrameMeta(TypedDict):
     calibration_id: str
     reconstruction_id: int
     """Counts the settings of the reconstruction that the server has had."""
+    estimator: NotRequired[str]
+    """What range, direct and indirect light are taken from; absent from older daemons."""
     device_time_s: float
     """Start of the first exposure, by the camera's clock."""
     host_time_s: float
@@ -73,8 +75,10 @@ class FrameMeta(TypedDict):
     unrepaired_images: int | None
     """Images of pairs that contradict the others and could not be rebuilt; None until computed."""
     filled_images: list[int] | None
-    corrected_pixels: int | None
     """Which images are those of the frame before, by their index in it; None until computed."""
+    corrected_pixels: int | None
+    """Pixels from whose moments known harmonics of the modulation were taken out; None where the
+    calibration knows none, and until computed."""
     pixels: PixelCounts | None
     predicted_range_std_m: PredictedStd | None
     """None until the range of this frame was computed."""

@@ -21,7 +21,13 @@ from collections.abc import Callable, Sequence
 from typing import TypedDict
 
 from transientcam_moments._arrays import MAX_HARMONICS, chosen
-from transientcam_moments._kernels.automatic import MOST_ROOTS, THREAD, compile_one, is_offered
+from transientcam_moments._kernels.automatic import (
+    MOST_ROOTS,
+    THREAD,
+    compile_one,
+    is_offered,
+    want,
+)
 from transientcam_moments._kernels.parallel import Spread, at_once, over, use_one_thread
 from transientcam_moments._kernels.registry import PRECISION_NAMES, REGISTRY, Key
 from transientcam_moments.errors import ParameterError
@@ -38,6 +44,7 @@ __all__ = [
     "compile",
     "compile_in_background",
     "over",
+    "ready",
     "state",
     "use_one_thread",
 ]
@@ -56,7 +63,7 @@ LANES = (
     "covariance",
 )
 WHEN_NEEDED = ("likelihood", "harmonics")
-"""Those that `compile_in_background` leaves out."""
+"""Those that `compile_in_background` leaves out, but for the likelihood of its first order."""
 Progress = Callable[[int, int, str], None]
 """Takes lanes done, lanes in all, and the name of the lane that is next ("" after the last)."""
 
@@ -87,6 +94,33 @@ def state() -> State:
         "compiling": None if compiling is None else str(compiling),
         "failed": [f"{key}: {reason}" for key, reason in list(REGISTRY.failed.items())],
     }
+
+
+def ready(name: str, harmonics: int) -> bool:
+    """Say whether a lane for single precision serves calls from now on.
+
+    One that does not is made ready in the background, unless another one just is; ask again.
+
+    Parameters
+    ----------
+    name : str
+        One of `LANES`.
+    harmonics : int
+        The order m, 1 to 32. Where there is no such lane, it is never ready.
+
+    Raises
+    ------
+    ParameterError
+        For another order or lane.
+    """
+    chosen("name", name, LANES)
+    _require_order(harmonics)
+    key = Key(name, harmonics, "f")
+    if key in REGISTRY.compiled:
+        return True
+    if REGISTRY.compiling is None:
+        want(key)
+    return False
 
 
 def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the builtin isn't used here
@@ -133,13 +167,18 @@ def compile_in_background(
 ) -> threading.Thread:
     """Start compiling on a thread and return it; arguments and errors as in `compile`.
 
-    Leaves out "likelihood", which takes long to compile, and "harmonics", which few cameras need:
-    they are prepared by themselves when they are first needed.
+    Leaves out "harmonics", which few cameras need, and "likelihood", which takes long to compile,
+    but for that of the first order: they are prepared by themselves when they are first needed.
 
     The thread is named "transientcam-compile", and can be joined. A process that ends in the
     meantime waits at most for the lane that is being compiled.
     """
-    keys = [key for key in _keys(harmonics, precisions) if key.name not in WHEN_NEEDED]
+    keys = [
+        key
+        for key in _keys(harmonics, precisions)
+        if key.name not in WHEN_NEEDED
+        or (key.name == "likelihood" and key.harmonics == harmonics[0])
+    ]
     main = threading.main_thread()
     # not a daemon: those are frozen at exit wherever they are, which a compiler doesn't survive
     thread = threading.Thread(target=_compile, args=(keys, None, main.is_alive), name=THREAD)
@@ -147,10 +186,14 @@ def compile_in_background(
     return thread
 
 
+def _require_order(harmonics: int) -> None:
+    if not 1 <= harmonics <= MAX_HARMONICS:
+        raise ParameterError("harmonics", harmonics, f"1 to {MAX_HARMONICS}")
+
+
 def _keys(harmonics: Sequence[int], precisions: Sequence[str]) -> list[Key]:
     for m in harmonics:
-        if not 1 <= m <= MAX_HARMONICS:
-            raise ParameterError("harmonics", m, f"1 to {MAX_HARMONICS}")
+        _require_order(m)
     for precision in precisions:
         if precision not in PRECISION_NAMES:
             raise ParameterError("precisions", precision, "float32 or float64")

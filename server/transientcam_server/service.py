@@ -107,7 +107,7 @@ class Service:
             settings.workers, WORKER_THREADS, initializer=tm.kernels.use_one_thread
         )
         self.workers = Workers(self._executor, count=settings.workers)
-        sensor = sensor_of(camera, settings.sensor)
+        self._sensor = sensor = sensor_of(camera, settings.sensor)
         self.planner = Planner(
             camera.capabilities,
             sensor,
@@ -274,6 +274,7 @@ class Service:
                 "spec": self.settings.camera,
                 "scene": None if simulation is None else simulation.scene,
                 "intrinsics": asdict(self.intrinsics),
+                "sensor": asdict(self._sensor),
             },
             calibration={"id": calibration_id(gains)},
             calibration_planes=None if gains is None else gains.planes,

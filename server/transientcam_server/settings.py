@@ -26,7 +26,10 @@ else:
     # a closed set for pydantic and OpenAPI: those that keep up with a camera, all pixels at once;
     # the others are for recordings, through the library
     Estimator = Literal[
-        tuple(name for name in ESTIMATORS if tm.comparisons.TECHNIQUES[name].planar)
+        (
+            "automatic",
+            *(name for name in ESTIMATORS if tm.comparisons.TECHNIQUES[name].planar),
+        )
     ]
 SpoiltImages = Literal["keep", "repair", "fill"]
 
@@ -59,10 +62,11 @@ class ReconstructionSettings(_Group):
     """Smallest eigenvalue every pixel's moments are raised to, over its brightness (Sec. 4.3)."""
     return_threshold: _Finite = Field(default=_DEFAULTS.threshold, ge=0.0, le=1.0)
     """Weight from which a return counts as the first, over the pixel's strongest return."""
-    estimator: Estimator = "pisarenko"
-    """What range, direct and indirect light are taken from. `likelihood` errs least over the
-    scenes of docs/likelihood.md together; the paper's are `pisarenko` and `maximum-entropy`, the
-    others are there for comparison."""
+    estimator: Estimator = "automatic"
+    """What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
+    least over the scenes of docs/likelihood.md together, and in the daemon `pisarenko` until its
+    kernel is compiled; each frame names its `estimator`. The paper's are `pisarenko` and
+    `maximum-entropy`, the others are there for comparison."""
     minimum_brightness_dn: _Finite = Field(default=0.0, ge=0.0)
     """Pixels with no more light than this have no range."""
     spoilt_images: SpoiltImages = "repair"
@@ -73,9 +77,14 @@ class ReconstructionSettings(_Group):
     moments, or kept in them."""
 
     @property
+    def technique(self) -> str:
+        """The estimator by its name in `transientcam_moments`."""
+        return "likelihood" if self.estimator == "automatic" else self.estimator
+
+    @property
     def least_harmonics(self) -> int:
         """The smallest number of harmonics that the estimator gives a range of."""
-        return tm.comparisons.TECHNIQUES[self.estimator].least_harmonics
+        return tm.comparisons.TECHNIQUES[self.technique].least_harmonics
 
     def for_moments(self, **others: Any) -> tm.Settings:
         """Return these settings as `tm.Settings`, together with its other ones."""
@@ -83,7 +92,7 @@ class ReconstructionSettings(_Group):
             epsilon=self.bias,
             smoothing_sigma_px=self.smoothing_px,
             threshold=self.return_threshold,
-            estimator=self.estimator,
+            estimator=self.technique,
             minimum_brightness=self.minimum_brightness_dn,
             spoilt_images=self.spoilt_images,
             **others,

@@ -47,7 +47,7 @@ def test_the_reconstruction_is_set_within_its_limits(page: Page, served: Served)
     )
     panel.get_by_role("button", name="The defaults").click()
     expect(smoothing).to_have_value("0.6")
-    assert reconstruction(served)["estimator"] == "pisarenko"
+    assert reconstruction(served)["estimator"] == "automatic"
 
 
 def test_settings_that_somebody_else_changed_meanwhile_are_not_overwritten(

@@ -228,7 +228,8 @@ def test_several_threads_compile_each_lane_once(monkeypatch: pytest.MonkeyPatch)
 
     assert len(made) == len(set(made))
     in_background = set(compiler.LANES) - set(tm.kernels.WHEN_NEEDED)
-    assert {(name, m) for name, m, _ in made} == {(n, m) for n in in_background for m in (3, 5)}
+    expected = {(name, m) for name in in_background for m in (3, 5)} | {("likelihood", 3)}
+    assert {(name, m) for name, m, _ in made} == expected
 
 
 @pytest.mark.parametrize(
@@ -278,3 +279,18 @@ def test_what_no_lane_takes_finds_none(planes: object) -> None:
     REGISTRY.compiled[Key("levinson", 3, "f")] = lambda b: b
 
     assert _kernels.find("levinson", planes) is None
+
+
+def test_a_lane_is_ready_once_it_is_compiled() -> None:
+    assert not tm.kernels.ready("likelihood", 4)
+    REGISTRY.compiled[Key("likelihood", 4, "f")] = lambda b: b
+    assert tm.kernels.ready("likelihood", 4)
+    assert not tm.kernels.ready("likelihood", 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "harmonics"), [("likelihood", 33), ("likelihood", 0), ("range", 3)]
+)
+def test_what_no_lane_is_offered_for_is_never_asked_for(name: str, harmonics: int) -> None:
+    with pytest.raises(tm.ParameterError):
+        tm.kernels.ready(name, harmonics)

@@ -200,3 +200,16 @@ def test_a_worker_uses_no_other_thread_unless_it_says_so() -> None:
 
     assert found[0] is tm.kernels.at_once
     assert found[1] is not tm.kernels.at_once
+
+
+def test_a_lane_that_is_not_ready_is_made_ready_once_the_compiler_is_free(
+    compiler: Compiler, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(REGISTRY, "compiling", Key("levinson", 4, "f"))
+    assert not tm.kernels.ready("likelihood", 4)
+    assert compiler.finish() == []
+
+    monkeypatch.setattr(REGISTRY, "compiling", None)
+    assert not tm.kernels.ready("likelihood", 4)
+    assert not tm.kernels.ready("likelihood", 9), "no lane of this order is offered"
+    assert compiler.finish() == [Key("likelihood", 4, "f")]

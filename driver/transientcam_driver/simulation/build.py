@@ -17,8 +17,8 @@ from transientcam_driver.simulation.imperfections import DeviceProfile
 from transientcam_driver.simulation.light import (
     GivenScenery,
     Scenery,
-    SurfaceScenery,
     load_responses,
+    shared_scenery,
 )
 from transientcam_driver.simulation.responses import SparseResponses
 from transientcam_driver.simulation.scene import (
@@ -80,7 +80,7 @@ def scenery_of(scene: Scene, *, width: int, height: int) -> Scenery:
         return GivenScenery(load_responses(scene, width=width, height=height))
     if scene.diffusor is not None:
         return GivenScenery(through_diffusor(scene.diffusor, width=width, height=height))
-    return SurfaceScenery(scene, width=width, height=height)
+    return shared_scenery(scene, width=width, height=height)
 
 
 def through_diffusor(diffusor: Diffusor, *, width: int, height: int) -> SparseResponses:

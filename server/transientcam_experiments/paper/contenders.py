@@ -61,6 +61,7 @@ _HALF: Final = 11e6
 CONTENDERS: Final = (
     Contender("maximum-entropy", _F, 3),
     Contender("pisarenko", _F, 3),
+    Contender("pisarenko-merged", _F, 3),
     Contender("likelihood", _F, 3),
     Contender("godbaz", _HALF, 4),
     Contender("spumic", _HALF, 6),

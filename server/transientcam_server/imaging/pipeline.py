@@ -93,12 +93,13 @@ class Pipeline:
     def frame(self, raw: RawFrame, applied: AppliedSequence) -> Frame:
         """Return the next frame, counted from 1."""
         self._frames += 1
+        version = self.reconstruction.for_live_frames(applied.sequence.harmonics)
         recipe = Recipe(
             applied,
-            self.reconstruction.settings,
+            version.settings,
             self._full_scale,
             self.gains_for(applied),
-            self.reconstruction.id,
+            version.id,
             None if self._intrinsics is None else self._intrinsics(),
             self._sensor,
         )
@@ -137,9 +138,9 @@ class Pipeline:
             return None
         return self.calibration.capture.misfit(applied, self._capabilities)
 
-    def beside(self, camera: Source) -> "Pipeline":
+    def beside(self, camera: Source, *, sensor: tm.noise.Sensor | None) -> "Pipeline":
         """Return one for frames of another camera, as of a recording, on the same workers."""
-        return Pipeline(camera, self.reconstruction.settings, self.workers)
+        return Pipeline(camera, self.reconstruction.settings, self.workers, sensor=sensor)
 
     def product(self, name: str) -> Product:
         """Return a product this camera has.

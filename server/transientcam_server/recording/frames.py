@@ -26,7 +26,7 @@ from transientcam_server.imaging.recipe import SettingsVersion
 from transientcam_server.recording.layout import Header
 from transientcam_server.recording.library import Library
 from transientcam_server.recording.reader import Recording
-from transientcam_server.recording.recipe import recorded_recipe
+from transientcam_server.recording.recipe import recorded_recipe, recorded_sensor
 from transientcam_server.settings import LensSettings, ReconstructionSettings
 
 LATEST: Final = "latest"
@@ -55,12 +55,14 @@ class RecordedFrames:
     def __init__(
         self, find: Find, header: Header, pipeline: Pipeline, *, lens: LensSettings
     ) -> None:
-        self.pipeline = pipeline.beside(RecordedCamera(header.capabilities))
+        self.pipeline = pipeline.beside(
+            RecordedCamera(header.capabilities), sensor=recorded_sensor(header)
+        )
         self._camera_pipeline = pipeline
         self._find = find
         self._header = header
         self._lens = lens
-        self._frames: OrderedDict[tuple[int, int], asyncio.Task[Frame]] = OrderedDict()
+        self._frames: OrderedDict[tuple[int, int, str], asyncio.Task[Frame]] = OrderedDict()
 
     async def frame(self, name: str, settings: SettingsChoice = "recorded") -> Frame:
         """Return a frame by its number, or the last one that was written.
@@ -71,8 +73,10 @@ class RecordedFrames:
             ``unknown-frame``, ``recording-damaged``.
         """
         number = len(await self.host_time_s()) if name == LATEST else int(name)
-        reconstruction = self._reconstruction(settings)
-        key = number, reconstruction.id
+        reconstruction = self._reconstruction(settings).for_live_frames(
+            self._header.applied.sequence.harmonics
+        )
+        key = number, reconstruction.id, reconstruction.settings.estimator
         task = self._frames.get(key)
         if task is None or _failed(task):  # a frame not yet written may exist next time
             task = self.pipeline.workers.start(self._read(number, reconstruction))

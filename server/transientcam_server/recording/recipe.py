@@ -1,9 +1,24 @@
-"""How recorded frames are computed: with the gains that were recorded beside them."""
+"""How recorded frames are computed: with the gains and the sensor of the recording."""
 
+import contextlib
+from typing import Final
+
+from pydantic import TypeAdapter
+
+import transientcam_moments as tm
 from transientcam_server.imaging.lens import known_intrinsics
 from transientcam_server.imaging.recipe import Recipe, SettingsVersion
 from transientcam_server.recording.layout import Header
 from transientcam_server.settings import LensSettings
+
+_SENSOR: Final = TypeAdapter(tm.noise.Sensor)
+
+
+def recorded_sensor(header: Header) -> tm.noise.Sensor | None:
+    """Return the sensor whose noise a recording's images have; None where it says none."""
+    with contextlib.suppress(ValueError):
+        return _SENSOR.validate_python(header.camera.get("sensor"))
+    return None
 
 
 def recorded_recipe(
@@ -23,4 +38,5 @@ def recorded_recipe(
             height=capabilities.height,
             recorded=header.camera.get("intrinsics"),
         ),
+        recorded_sensor(header),
     )

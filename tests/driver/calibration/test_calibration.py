@@ -315,7 +315,7 @@ def test_one_who_ends_it_is_heard_while_no_frame_comes(
         if len(reported) == 3:
             raise Enough
 
-    monkeypatch.setattr(Camera, "read_frame", silent)
+    monkeypatch.setattr(type(camera), "read_frame", silent)
     with pytest.raises(Enough):
         capture_calibration(camera, takes=TAKES, progress=lose_patience)
     assert reported == [(0, 2 * TAKES)] * 3

@@ -12,14 +12,17 @@ import numpy as np
 import pytest
 
 import transientcam_moments as tm
+from tests.moments.kernel_lanes import without_lanes
 from transientcam import wire
 from transientcam_driver import Camera, RawFrame, open_camera
+from transientcam_moments._kernels.registry import REGISTRY, Key
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging import frame as module
 from transientcam_server.imaging import stages
 from transientcam_server.imaging.encodings.encoding import MSGPACK, NPY, Encoding
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.pipeline import Pipeline
+from transientcam_server.imaging.recipe import SettingsVersion
 from transientcam_server.imaging.view import View
 from transientcam_server.imaging.workers import Workers
 from transientcam_server.settings import ReconstructionSettings
@@ -74,7 +77,7 @@ def with_frame(
     async def main() -> None:
         with ThreadPoolExecutor(2, thread_name_prefix="worker") as executor:
             workers = Workers(executor, count=2)
-            pipeline = Pipeline(camera, ReconstructionSettings(), workers)
+            pipeline = Pipeline(camera, ReconstructionSettings(estimator="pisarenko"), workers)
             try:
                 await test(pipeline, pipeline.frame(raw, camera.applied))
             finally:
@@ -320,3 +323,27 @@ def test_an_unknown_product_is_answered_with_the_known_ones(camera: Camera, raw:
         assert len(str(caught.value.extensions["value"])) < 100
 
     with_frame(camera, raw, test)
+
+
+def test_frames_are_those_of_pisarenko_until_the_likelihood_is_compiled_and_say_so(
+    camera: Camera, raw: RawFrame
+) -> None:
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        pipeline.reconstruction = SettingsVersion(7, ReconstructionSettings())
+        with without_lanes():
+            before = pipeline.frame(raw, camera.applied)
+            harmonics = camera.applied.sequence.harmonics
+            REGISTRY.compiled[Key("likelihood", harmonics, "f")] = lambda *_: None
+            behind = pipeline.frame(raw, camera.applied)
+
+        estimators = [each.meta()["estimator"] for each in (frame, before, behind)]
+        assert estimators == ["pisarenko", "pisarenko", "likelihood"]
+        assert [each.meta()["reconstruction_id"] for each in (before, behind)] == [7, 7]
+
+    with_frame(camera, raw, test)
+
+
+@pytest.mark.parametrize("named", ["likelihood", "maximum-entropy"])
+def test_an_estimator_that_is_named_is_used_compiled_or_not(named: str) -> None:
+    settings = SettingsVersion(1, ReconstructionSettings(estimator=named))
+    assert settings.for_live_frames(4, ready=lambda name, m: False) == settings

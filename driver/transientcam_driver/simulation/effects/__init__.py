@@ -15,7 +15,6 @@ from transientcam_driver.simulation.effects.conditions import (
 from transientcam_driver.simulation.effects.dark_current import DarkCurrentElectrons
 from transientcam_driver.simulation.effects.distortion import Distortion
 from transientcam_driver.simulation.effects.effect import Effect
-from transientcam_driver.simulation.effects.glimpses import Facts, Glimpse
 from transientcam_driver.simulation.effects.gloss import Gloss
 from transientcam_driver.simulation.effects.interreflection import DiffuseInterreflection
 from transientcam_driver.simulation.effects.lens_scatter import LensScatter
@@ -73,6 +72,4 @@ __all__ = [
     "Call",
     "Conditions",
     "Effect",
-    "Facts",
-    "Glimpse",
 ]

@@ -3,14 +3,15 @@
 ``paths`` follows rays and mirrors, ``still`` traces what stands still and the areas of its pixels,
 ``moving`` what moves, by ``bundle``s of lines and the ``coverage`` of pixels, as ``layers``;
 ``radiosity`` is diffuse interreflection, ``measured`` reads responses from files. ``facts`` leaves
-effects out to see what they are worth; ``transport`` puts together what is called for.
+effects out to see what they are worth; ``transport`` puts together what is called for, and
+``shared`` keeps it for the next camera.
 """
 
 from transientcam_driver.simulation.light.measured import load_responses
+from transientcam_driver.simulation.light.shared import shared_scenery
 from transientcam_driver.simulation.light.transport import (
     GivenScenery,
     Scenery,
-    SurfaceScenery,
     View,
     Views,
     Wanted,
@@ -19,9 +20,9 @@ from transientcam_driver.simulation.light.transport import (
 __all__ = [
     "GivenScenery",
     "Scenery",
-    "SurfaceScenery",
     "View",
     "Views",
     "Wanted",
     "load_responses",
+    "shared_scenery",
 ]

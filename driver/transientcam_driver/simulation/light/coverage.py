@@ -93,7 +93,7 @@ def single(values: NDArray[np.floating]) -> Plane:
 def covered(inside: Plane, *, rooted: bool = True) -> tuple[Plane, Plane]:
     """Share of each pixel (H, W) where a function is above 0, and its mean square root there.
 
-    The function is taken as linear within a pixel; the share is then exact. NaN is nowhere. Without
+    The function is taken as linear within a pixel, about its mean; NaN is nowhere. Without
     ``rooted`` the second plane is the first.
     """
     positive = inside > 0
@@ -101,8 +101,13 @@ def covered(inside: Plane, *, rooted: bool = True) -> tuple[Plane, Plane]:
     root = np.sqrt(np.maximum(inside, np.float32(0))) if rooted else share
     near = np.flatnonzero(_at_border(positive))
     if near.size:
-        value = inside.ravel()[near]
-        down, right = _slopes(inside, near, value)
+        flat = inside.ravel()
+        value = flat[near]
+        (down, bend), (right, more) = (
+            _slope(value - flat[before], flat[after] - value)
+            for before, after in _neighbours(inside.shape, near)
+        )
+        value += (bend + more) / 24  # its mean over the pixel
         if rooted:
             width = np.sqrt(down * down + right * right)
             high = np.maximum(value + width / 2, np.float32(1e-9))
@@ -125,23 +130,56 @@ def _at_border(positive: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return border
 
 
-def _slopes(plane: Plane, at: NDArray[np.intp], value: Plane) -> tuple[Plane, Plane]:
-    """Sizes of the differences to the nearer neighbours down and right, 0 where there are none."""
-    height, width = plane.shape
-    flat = plane.ravel()
+def shared(one: Plane, other: Plane) -> Plane:
+    """Share of each pixel (H, W) that lies in both of two shapes, given the share in either.
+
+    Two borders in one pixel are mostly nearly parallel, as of a surface and of its own shadow: the
+    shares then overlap as far as they can, or not at all if the borders face each other. Across
+    each other they overlap by their product.
+    """
+    both = one * other
+    at = np.flatnonzero((one > 0) & (one < 1) & (other > 0) & (other < 1))
+    if not at.size:
+        return both
+    neighbours = _neighbours(one.shape, at)
+    slopes = [[p.ravel()[to] - p.ravel()[of] for of, to in neighbours] for p in (one, other)]
+    (x, y), (u, v) = slopes
+    size = np.sqrt((x * x + y * y) * (u * u + v * v))
+    cosine = (x * u + y * v) / np.maximum(size, np.float32(1e-9))
+    first, second = one.ravel()[at], other.ravel()[at]
+    across = first * second
+    along = np.where(cosine > 0, np.minimum(first, second), np.maximum(first + second - 1, 0))
+    both.ravel()[at] = across + cosine * cosine * (along - across)
+    return both
+
+
+_Pairs = tuple[tuple[NDArray[np.intp], NDArray[np.intp]], tuple[NDArray[np.intp], NDArray[np.intp]]]
+
+
+def _neighbours(shape: tuple[int, ...], at: NDArray[np.intp]) -> _Pairs:
+    """Return the pixels above and below, and left and right, of some pixels, by index.
+
+    Beyond the edge, the neighbour on the other side stands for the one that is not there.
+    """
+    height, width = shape
     row, column = np.divmod(at, width)
-    # beyond the edge, the neighbour on the other side stands for the one that is not there
     up = np.where(row > 0, at - width, at + width * (height > 1))
     down = np.where(row < height - 1, at + width, at - width * (height > 1))
     left = np.where(column > 0, at - 1, at + (width > 1))
     right = np.where(column < width - 1, at + 1, at - (width > 1))
-    slopes = [
-        np.fmin(np.abs(value - flat[one]), np.abs(value - flat[other]))
-        for one, other in ((up, down), (left, right))
-    ]
-    for slope in slopes:
-        slope[np.isnan(slope)] = 0
-    return slopes[0], slopes[1]
+    return (up, down), (left, right)
+
+
+def _slope(before: Plane, after: Plane) -> tuple[Plane, Plane]:
+    """Size of a slope and its change, given the differences to both neighbours.
+
+    About an extremum, or beside pixels that have no value, it is the smaller difference.
+    """
+    even = before * after > 0
+    smaller = np.fmin(np.abs(before), np.abs(after))
+    slope = np.where(even, np.abs(before + after) / 2, smaller)
+    slope[np.isnan(slope)] = 0
+    return slope, np.where(even, after - before, np.float32(0))
 
 
 def _half_plane(value: Plane, steep: Plane, gentle: Plane) -> Plane:

@@ -113,10 +113,11 @@ class Ends:
                 sent = sent + highlight(
                     self.still, light, ends, np.stack(normal, axis=-1).astype(np.float64)
                 )
-            on, segments = _ways(light, self.point)
+            on, shown, segments = _ways(light, self.point, cover)
             if not on.size:
                 continue
             length_m, irradiance = self._irradiance(light, normal, on)
+            irradiance *= shown
             for mirror in light.mirrors:
                 irradiance *= np.float32(mirror.reflectivity)
             for segment in segments:
@@ -181,30 +182,34 @@ class Ends:
 
 
 def _ways(
-    light: ImageLight, point: tuple[Plane, Plane, Plane]
-) -> tuple[NDArray[np.intp], list[Segment]]:
-    """Return the points that a chain of mirrors shows the light to, and its ways to them."""
+    light: ImageLight, point: tuple[Plane, Plane, Plane], cover: Cover
+) -> tuple[NDArray[np.intp], Plane, list[Segment]]:
+    """Return the points that a chain of mirrors shows the light to, and its ways to them.
+
+    The second is the share of the pixel around each point to which it does.
+    """
     on = np.arange(len(point[0]))
+    shown = np.ones(len(on), dtype=np.float32)
     segments: list[Segment] = []
     start, last = point, None
     for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
         way = _from(image_m, start)
         cross = crossing(mirror.shape, image_m, way)
         shows = cross.between(np.float32(0), np.float32(1))
-        shows &= np.minimum.reduce(cross.inside) > 0
         shows &= sum(w * np.float32(n) for w, n in zip(way, mirror.mirror.normal, strict=True)) > 0
-        kept = np.flatnonzero(shows)
-        on = on[kept]
+        if not (shows & (np.minimum.reduce(cross.inside) > 0)).any():
+            return on[:0], shown[:0], []
+        shown = shown * cover(cross, on, shows)
+        kept = np.flatnonzero(shown)
+        on, shown = on[kept], shown[kept]
         segments = [each.of(kept) for each in segments]
         x, y, z = (w[kept] for w in way)
         at = cross.at[kept]
         segments.append(Segment(image_m, (x, y, z), at, last))
         start = _moved(image_m, (x * at, y * at, z * at))
         last = mirror
-        if not kept.size:
-            return on, []
     lamp = light.positions_m[-1]
-    return on, [*segments, Segment(lamp, _from(lamp, start), np.float32(0), last)]
+    return on, shown, [*segments, Segment(lamp, _from(lamp, start), np.float32(0), last)]
 
 
 def _from(apex: Points, point: tuple[Plane, ...]) -> tuple[Plane, Plane, Plane]:

@@ -3,13 +3,12 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.effects import Glimpse
-from transientcam_driver.simulation.effects.glimpses import Values
+from transientcam_driver.simulation.effects.glimpses import Glimpse, Values
 from transientcam_driver.simulation.imperfections import PINHOLE
 from transientcam_driver.simulation.light.exchange import Exchange
 from transientcam_driver.simulation.light.paths import Lit, light_rays
@@ -25,6 +24,7 @@ _TIMES = 8  # of the longest period, at which a moving scene is judged
 _WITHIN = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))  # of a pixel
 _FREQUENCIES = 8  # judged at most; the highest one always
 _ROUNDING = 1e-9
+_KEPT = 32  # changes by effects, for the last few sequences
 _ROUGH_PATCHES = 6  # a side, to estimate interreflection
 _ROUGH_ERROR = 1.5  # by which that may be too low
 
@@ -68,7 +68,8 @@ class SceneFacts:
         if scene.moves:
             period_s = max(each.period_s for surface in scene.surfaces for each in surface.motions)
             self._times_s = tuple((k + 0.5) / _TIMES * period_s for k in range(_TIMES))
-        self._found: dict[tuple[str, tuple[float, ...], float], tuple[Values, ...]] = {}
+        self._found = lru_cache(maxsize=_KEPT)(self._changes)
+        self._left_out: dict[str, list[list[_Seen]]] = {}
 
     @property
     def glimpses(self) -> tuple[Glimpse, ...]:
@@ -87,10 +88,7 @@ class SceneFacts:
         self, effect: str, frequencies_hz: tuple[float, ...], *, during_s: float = 0.0
     ) -> tuple[Values, ...]:
         """Return how far leaving out an effect moves each pixel's moments, at most, by time."""
-        key = effect, frequencies_hz, during_s if effect == "motion" else 0.0
-        if key not in self._found:
-            self._found[key] = self._changes(effect, _some(frequencies_hz), during_s)
-        return self._found[key]
+        return self._found(effect, _some(frequencies_hz), during_s if effect == "motion" else 0.0)
 
     def further_bounces(self, tolerance: float) -> int:
         """Return how often light goes from surface to surface until less than this is left."""
@@ -134,7 +132,13 @@ class SceneFacts:
             ),
         }
         happens, others = variants[effect]
-        return self._apart(others(), frequencies_hz) if happens else ()
+        if not happens:
+            return ()
+        if effect == "motion":  # which depends on the sequence
+            return self._apart(others(), frequencies_hz)
+        if effect not in self._left_out:
+            self._left_out[effect] = others()
+        return self._apart(self._left_out[effect], frequencies_hz)
 
     @cached_property
     def _seen(self) -> list[_Seen]:

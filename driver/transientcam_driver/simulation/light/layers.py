@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.light.bundle import Region, inside
-from transientcam_driver.simulation.light.coverage import Plane
+from transientcam_driver.simulation.light.coverage import Plane, shared
 from transientcam_driver.simulation.light.paths import Lit, scatter_of, sparse_image
 from transientcam_driver.simulation.light.still import StillLight
 from transientcam_driver.simulation.responses import Scatter, SparseResponses
@@ -60,7 +60,6 @@ class MovingResponses:
         self.scene = scene
         self._still = still
         self._found: dict[float, NDArray[np.complex64]] = {}
-        self._shadows = shadows
         self._shape = still.height, still.width
         only = np.concatenate([np.zeros(0, np.intp), *(each.pixel for each in layers if each.last)])
         self._layers = tuple(each if each.last else _without(each, only) for each in layers)
@@ -68,6 +67,13 @@ class MovingResponses:
         for each in self._layers:
             np.subtract.at(self._uncovered, each.pixel, each.share)
         np.maximum(self._uncovered, 0, out=self._uncovered)  # what rounding leaves
+        self._shadows = tuple(self._uncovered_part(each) for each in shadows)
+
+    def _uncovered_part(self, shadow: Shadow) -> Shadow:
+        """Return a shadow by its share of what of each pixel is not covered."""
+        seen = self._uncovered.reshape(self._shape)[shadow.region]
+        left = shared(seen, shadow.left) / np.maximum(seen, np.float32(1e-9))
+        return Shadow(shadow.chain, shadow.region, left)
 
     @property
     def kind(self) -> Literal["sparse", "dense"]:

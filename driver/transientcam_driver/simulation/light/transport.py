@@ -2,15 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Protocol
+from functools import cached_property, lru_cache
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.effects import CALLED_ABOVE, Facts, Glimpse
+from transientcam_driver.simulation.effects import CALLED_ABOVE
 from transientcam_driver.simulation.effects.distortion import Distortion
-from transientcam_driver.simulation.effects.glimpses import Noise
+from transientcam_driver.simulation.effects.glimpses import Facts, Glimpse, Noise
 from transientcam_driver.simulation.effects.gloss import Gloss
 from transientcam_driver.simulation.effects.interreflection import DiffuseInterreflection
 from transientcam_driver.simulation.effects.mirror_paths import MirrorPaths
@@ -34,6 +34,9 @@ from transientcam_driver.simulation.responses import Responses
 from transientcam_driver.simulation.scene.scene import Scene
 
 Values = NDArray[np.float64]
+KEPT_PIXELS: Final = 40_000
+"""Of sensors for which more is kept of a scene than what is shown: 1 KiB a pixel and view."""
+_STILL_VIEWS: Final = 3  # for sequences that alternate
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,6 +178,9 @@ class SurfaceScenery:
         self._scene = scene
         self._camera = scene.camera
         self._size = {"width": width, "height": height}
+        self._still_views = lru_cache(_STILL_VIEWS if width * height <= KEPT_PIXELS else 1)(
+            self._traced
+        )
 
     @property
     def moves(self) -> bool:
@@ -212,6 +218,10 @@ class SurfaceScenery:
 
     def view(self, wanted: Wanted) -> Views:
         """Trace a still scene once; of a moving one what moves, for each time."""
+        # what moves is remembered by its views, which belong to one camera
+        return self._traced(wanted) if self.moves else self._still_views(wanted)
+
+    def _traced(self, wanted: Wanted) -> Views:
         scene = self._with(wanted)
         effects = wanted.effects
         still = StillLight(

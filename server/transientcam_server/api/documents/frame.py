@@ -40,6 +40,8 @@ class FrameDocument(Document):
     calibration_id: str
     reconstruction_id: int
     """Counts the settings of the reconstruction; those that it was computed with."""
+    estimator: str
+    """What its range, direct and indirect light are taken from."""
     device_time_s: float
     """Start of the first exposure, by the camera's clock."""
     host_time_s: float

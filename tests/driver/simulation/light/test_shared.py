@@ -1,0 +1,52 @@
+"""Cameras in front of the same scene share what was found of its light, and nothing else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from transientcam_driver import Sequence, open_camera
+from transientcam_driver.clock import VirtualClock
+from transientcam_driver.simulation.build import find_scene
+from transientcam_driver.simulation.light.shared import shared_scenery
+
+SIZE = {"width": 40, "height": 30}
+
+
+def test_scenes_that_differ_in_nothing_that_light_depends_on_are_one() -> None:
+    scene = find_scene("mirrors")
+    one = shared_scenery(scene, **SIZE)
+    assert shared_scenery(replace(scene, seed=9, effects={"shot-noise": "off"}), **SIZE) is one
+    assert shared_scenery(find_scene("mirrors"), **SIZE) is one
+
+
+@pytest.mark.parametrize("size", [{"width": 41, "height": 30}, {"width": 640, "height": 480}])
+def test_another_sensor_sees_another_view(size: dict[str, int]) -> None:
+    scene = find_scene("mirrors")
+    assert shared_scenery(scene, **size) is not shared_scenery(scene, **SIZE)
+
+
+def test_a_surface_that_lies_elsewhere_is_another_scene() -> None:
+    scene = find_scene("mirrors")
+    fewer = replace(scene, surfaces=scene.surfaces[1:])
+    assert shared_scenery(fewer, **SIZE) is not shared_scenery(scene, **SIZE)
+
+
+def test_large_sensors_share_nothing() -> None:
+    scene = find_scene("mirrors")
+    large = {"width": 640, "height": 480}
+    assert shared_scenery(scene, **large) is not shared_scenery(scene, **large)
+
+
+def test_images_do_not_depend_on_what_other_cameras_did_before() -> None:
+    def images(*before: Sequence) -> list[np.ndarray]:
+        with open_camera("sim:mirrors?seed=3", clock=VirtualClock()) as camera:
+            for sequence in before:
+                camera.configure(sequence)
+            camera.configure(Sequence(harmonics=2))
+            camera.start()
+            return list(camera.read_frame().images)
+
+    first = images()
+    assert np.array_equal(first, images(Sequence(harmonics=5), Sequence(exposure_s=1e-4)))
+    assert np.array_equal(first, images())

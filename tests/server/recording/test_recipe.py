@@ -1,0 +1,30 @@
+"""Recorded frames are computed with what was recorded beside them."""
+
+from dataclasses import asdict
+from typing import Any
+
+import pytest
+
+import transientcam_moments as tm
+from tests.server.recording.made import header
+from transientcam_server.imaging.recipe import SettingsVersion
+from transientcam_server.recording.recipe import recorded_recipe, recorded_sensor
+from transientcam_server.settings import ReconstructionSettings
+
+SENSOR = tm.noise.Sensor(gain_e_per_dn=8.0, full_well_e=33e3, read_noise_e=21.0, dark_dn=50.0)
+
+
+def test_the_noise_is_that_of_the_recorded_sensor() -> None:
+    recorded = header(camera={"sensor": asdict(SENSOR)})
+    recipe = recorded_recipe(recorded, SettingsVersion(0, ReconstructionSettings()))
+    assert recipe.sensor == SENSOR
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [None, 12, {}, {"gain_e_per_dn": 0.0}, {"bits": 12.5}, {"dark_dn": float("nan")}],
+)
+def test_a_file_without_a_sensor_or_with_an_impossible_one_has_none(changes: Any) -> None:
+    sensor = asdict(SENSOR) | changes if changes and isinstance(changes, dict) else changes
+    camera = {} if changes == {} else {"sensor": sensor}
+    assert recorded_sensor(header(camera=camera)) is None
