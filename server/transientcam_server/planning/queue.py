@@ -85,9 +85,10 @@ class PlanningQueue:
         async with self._one_at_a_time:
             if self._closing:
                 raise _closing()
-            self._work = asyncio.ensure_future(self._workers.run_long(compute, *arguments))
+            work = asyncio.ensure_future(self._workers.run_long(compute, *arguments))
+            self._work = work
             try:
-                value, _ = await self._work
+                value, _ = await work
             except asyncio.CancelledError:
                 if self._closing:
                     raise _closing() from None

@@ -40,7 +40,7 @@ def test_one_plan_is_computed_at_a_time() -> None:
     async def three() -> None:
         held = Held()
         queue = PlanningQueue(Workers(held, count=8))
-        plans = [asyncio.create_task(queue.run(lambda: None)) for _ in range(3)]
+        plans = [asyncio.create_task(queue.run(int)) for _ in range(3)]
         for k, plan in enumerate(plans):
             await turns()
             assert len(held.submitted) == k + 1
@@ -54,13 +54,13 @@ def test_a_plan_that_is_given_up_lets_the_next_one_go_on() -> None:
     async def two() -> None:
         held = Held()
         queue = PlanningQueue(Workers(held, count=8))
-        first, second = (asyncio.create_task(queue.run(lambda: None)) for _ in range(2))
+        first, second = (asyncio.create_task(queue.run(int)) for _ in range(2))
         await turns()
         first.cancel()
         await turns()
         assert len(held.submitted) == 2
-        held.submitted[1].set_result(("second", 0.0))
-        assert await second == "second"
+        held.submitted[1].set_result((2, 0.0))
+        assert await second == 2
 
     asyncio.run(two())
 
@@ -110,7 +110,7 @@ def test_the_end_does_not_wait_for_what_is_computed() -> None:
 
         async def ask() -> None:
             async with queue.place_of("a"):
-                await queue.run(lambda: None)
+                await queue.run(int)
 
         asking = [asyncio.create_task(ask()) for _ in range(MOST_OF_ONE + 1)]
         await turns()
