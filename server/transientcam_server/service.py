@@ -50,13 +50,8 @@ from transientcam_server.imaging.lens import Intrinsics, known_intrinsics
 from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.imaging.recipe import SettingsVersion, require_harmonics
 from transientcam_server.imaging.workers import Workers
-from transientcam_server.planning import (
-    WATCHED_SHARE,
-    FrontCache,
-    Looks,
-    Planner,
-    PlanningQueue,
-)
+from transientcam_server.planning import FrontCache, Looks, Planner
+from transientcam_server.planning.queue import WATCHED_SHARE, PlanningQueue
 from transientcam_server.recording import Header, Library, RecordingOptions, ReplayCamera
 from transientcam_server.recording.frames import RecordedFramesCache
 from transientcam_server.settings import ReconstructionSettings, Settings

@@ -11,17 +11,14 @@ from transientcam_server.planning.looks import Looks
 from transientcam_server.planning.plan import Plan
 from transientcam_server.planning.planner import Planner
 from transientcam_server.planning.prediction import Predictor
-from transientcam_server.planning.queue import WATCHED_SHARE, PlanningQueue
 from transientcam_server.planning.scene import SceneStatistics, uniform_scene
 
 __all__ = [
-    "WATCHED_SHARE",
     "FrontCache",
     "Goal",
     "Looks",
     "Plan",
     "Planner",
-    "PlanningQueue",
     "Predictor",
     "SceneStatistics",
     "uniform_scene",
