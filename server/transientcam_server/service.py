@@ -51,6 +51,7 @@ from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.imaging.recipe import SettingsVersion, require_estimator, suited
 from transientcam_server.imaging.workers import Workers
 from transientcam_server.planning import FrontCache, Looks, Planner
+from transientcam_server.planning.queue import WATCHED_SHARE, PlanningQueue
 from transientcam_server.recording import Header, Library, RecordingOptions, ReplayCamera
 from transientcam_server.recording.frames import RecordedFramesCache
 from transientcam_server.settings import ReconstructionSettings, Settings
@@ -103,7 +104,13 @@ class Service:
         self.workers = Workers(self._executor, count=settings.workers)
         self._sensor = sensor = sensor_of(camera, settings.sensor)
         reconstruction = suited(settings.reconstruction, camera.capabilities.sampling)
-        self.planner = Planner(camera.capabilities, sensor, reconstruction)
+        self.planner = Planner(
+            camera.capabilities,
+            sensor,
+            reconstruction,
+            share=lambda: WATCHED_SHARE if self.watched else 1.0,
+        )
+        self.planning = PlanningQueue(self.workers)
         kept = CalibrationStore(settings.calibrations, given=settings.calibration)
         self.pipeline = Pipeline(
             camera,
@@ -115,8 +122,10 @@ class Service:
         )
         simulated = camera.simulation is not None
         twin = partial(twin_of, camera, settings.camera) if simulated else None
-        self.looks = Looks(self.planner, self.workers, twin)
-        self.fronts = FrontCache(self.planner, self.workers, self.looks, simulated=simulated)
+        self.looks = Looks(self.planner, self.workers, self.planning, twin)
+        self.fronts = FrontCache(
+            self.planner, self.workers, self.planning, self.looks, simulated=simulated
+        )
         self._loop: asyncio.AbstractEventLoop | None = None
         self._light = LightGuard(unserved_s=settings.limits.unserved_s)
         self.acquisition = Acquisition(camera, report=self._from_acquisition, light=self._light)
@@ -170,6 +179,7 @@ class Service:
     async def close_streams(self) -> None:
         """Tell every stream that it ends, and give those that listen the time to hear it."""
         self.planner.close()
+        await self.planning.close()
         self.hub.close()
         self.jobs.cancel_all()
         with contextlib.suppress(TimeoutError):

@@ -36,11 +36,14 @@ def problem_response(problem: Problem, *, instance: str | None = None) -> Respon
     """Return a problem as an HTTP answer."""
     document = problem_document(problem, instance=instance)
     identifier = request_id.get()
+    headers = {"Cache-Control": "no-store"}
+    if "retry_after_s" in problem.extensions:
+        headers["Retry-After"] = str(problem.extensions["retry_after_s"])
     return JSONResponse(
         document if identifier is None else document | {"request_id": identifier},
         status_code=problem.kind.status,
         media_type=PROBLEM_MEDIA_TYPE,
-        headers={"Cache-Control": "no-store"},
+        headers=headers,
     )
 
 

@@ -6,10 +6,13 @@ from typing import Any, Final
 from uvicorn.protocols.utils import ClientDisconnected
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame, Opcode
+from websockets.http11 import Response
 from websockets.protocol import State
 from websockets.server import ServerProtocol
+from websockets.typing import StatusLike
 
 from transientcam import wire
+from transientcam_server.api.middleware.security import SECURITY_HEADERS
 from transientcam_server.daemon.rate_limit import BURST_S, RateLimiter
 from transientcam_server.daemon.stalls import StallTimer
 from transientcam_server.errors import Problem, kinds
@@ -24,7 +27,16 @@ LINGER_S: Final = 1.0
 
 
 class Conversation(ServerProtocol):
-    """RFC 6455 as `websockets` has it; a close within a message in parts is a close."""
+    """RFC 6455 as `websockets` has it; a close within a message in parts is a close.
+
+    What is refused before there is a stream carries the security headers of any other answer.
+    """
+
+    def reject(self, status: StatusLike, text: str) -> Response:
+        """Return the answer to a handshake that fails."""
+        response = super().reject(status, text)
+        response.headers.update(SECURITY_HEADERS)
+        return response
 
     def recv_frame(self, frame: Frame) -> None:
         """Process a frame; Sec. 7.1.5: what was begun before a close is dropped."""

@@ -258,6 +258,13 @@ TOO_MANY_ANSWERS: Final = ProblemKind(
     "As many bytes are on their way to clients as limits.answers_bytes allows, or to this address "
     "as limits.answers_bytes_per_address does. Read what was answered, then try again.",
 )
+PLANNING_BUSY: Final = ProblemKind(
+    "planning-busy",
+    503,
+    "Too many requests for plans",
+    "One plan is computed at a time, and few requests wait for one: `limit` states how many. Try "
+    "again when one of them was answered.",
+)
 TOO_LARGE: Final = ProblemKind(
     "too-large",
     413,

@@ -12,6 +12,7 @@ from transientcam_server.imaging.workers import Workers
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.looks import Looks
 from transientcam_server.planning.planner import Planner, range_error
+from transientcam_server.planning.queue import PlanningQueue
 
 KEPT_S: Final = 10.0
 _WIDE: Final = 1e9  # a target that every sequence reaches: it only requests the prediction
@@ -32,6 +33,7 @@ class FrontCache:
         self,
         planner: Planner,
         workers: Workers,
+        queue: PlanningQueue,
         looks: Looks,
         *,
         simulated: bool,
@@ -39,6 +41,7 @@ class FrontCache:
     ) -> None:
         self._planner = planner
         self._workers = workers
+        self._queue = queue
         self._looks = looks
         self._simulated = simulated
         self._clock = clock
@@ -79,8 +82,7 @@ class FrontCache:
             range_std_m=_WIDE if by == "range_std_m" else None,
             bound_width=_WIDE if by == "bound_width" else None,
         )
-        document, _ = await self._workers.run_long(self._planner.tradeoff_document, goal, scene)
-        return document
+        return await self._queue.run(self._planner.tradeoff_document, goal, scene)
 
     async def _current(self, frame: Frame) -> dict[str, Any]:
         found = await frame.reconstruction("returns")

@@ -94,7 +94,7 @@ def look_at(
     ambient_dn_per_s
         Light that is not the camera's; None takes it from the mean of the images.
     go_on
-        Called with the name of each stage; whatever it raises ends the look.
+        Called with the name of the stage before each frame; whatever it raises ends the look.
 
     Raises
     ------
@@ -107,15 +107,14 @@ def look_at(
     capabilities = camera.capabilities
 
     def captured(sequence: Sequence, frames: int, stage: str) -> Looked:
-        go_on(stage)
         applied = camera.configure(capabilities.nearest(sequence))
         recipe = Recipe(applied, settings, float(sensor.highest_dn), sensor=sensor)
         camera.start()
         try:
-            taken = [
-                camera.read_frame(timeout_s=_SPARE_S + 4 / applied.frame_rate_hz)
-                for _ in range(frames)
-            ]
+            taken = []
+            for _ in range(frames):
+                go_on(stage)
+                taken.append(camera.read_frame(timeout_s=_SPARE_S + 4 / applied.frame_rate_hz))
         finally:
             camera.stop()
         return Looked(recipe, taken)

@@ -11,6 +11,7 @@ from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.workers import Workers
 from transientcam_server.planning.look import LookedThrough, look_of_frame
 from transientcam_server.planning.planner import Planner
+from transientcam_server.planning.queue import PlanningQueue
 from transientcam_server.planning.scene import SceneStatistics
 
 KEPT_S: Final = 10.0
@@ -29,12 +30,14 @@ class Looks:
         self,
         planner: Planner,
         workers: Workers,
+        queue: PlanningQueue,
         twin: Twin | None,
         *,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._planner = planner
         self._workers = workers
+        self._queue = queue
         self._twin = twin
         self._clock = clock
         self._kept: tuple[Sequence, float | None, float, SceneStatistics] | None = None
@@ -59,7 +62,7 @@ class Looks:
         async with self._looking:
             kept = self._kept
             if kept is None or kept[:2] != (base, ambient_dn_per_s) or self._clock() > kept[2]:
-                scene, _ = await self._workers.run_long(self._look, base, ambient_dn_per_s, go_on)
+                scene = await self._queue.run(self._look, base, ambient_dn_per_s, go_on)
                 kept = self._kept = (base, ambient_dn_per_s, self._clock() + KEPT_S, scene)
             return kept[3]
 

@@ -16,6 +16,7 @@ from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.look import LookedThrough, look_at
 from transientcam_server.planning.plan import Plan, in_a_sentence, plan
 from transientcam_server.planning.prediction import Predictor
+from transientcam_server.planning.queue import Rest
 from transientcam_server.planning.scene import SceneStatistics
 from transientcam_server.planning.search import Search
 from transientcam_server.planning.timing import ReconstructionTimer
@@ -33,13 +34,21 @@ class Planner:
         Whose noise its images have.
     settings
         Of the reconstruction.
+    share
+        Returns the share of one processor that this may take now; it rests in between.
     """
 
     def __init__(
-        self, capabilities: Capabilities, sensor: tm.noise.Sensor, settings: ReconstructionSettings
+        self,
+        capabilities: Capabilities,
+        sensor: tm.noise.Sensor,
+        settings: ReconstructionSettings,
+        *,
+        share: Callable[[], float] = lambda: 1.0,
     ) -> None:
         self._capabilities = capabilities
         self._sensor = sensor
+        self._share = share
         self._closing = threading.Event()
         self.reconstruct_with(settings)
 
@@ -57,9 +66,10 @@ class Planner:
         go_on: Callable[[str], None] = lambda stage: None,
     ) -> SceneStatistics:
         """Look at the scene before a camera; see `look_at`."""
+        pause = self._pause()
 
         def checked(stage: str) -> None:
-            self._go_on()
+            pause()
             go_on(stage)
 
         return look_at(
@@ -118,15 +128,24 @@ class Planner:
     def _predictor(
         self, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
     ) -> Predictor:
+        pause = self._pause()
+
         def checked() -> None:
-            self._go_on()
+            pause()
             go_on()
 
         return Predictor(scene, self._sensor, self._settings, go_on=checked)
 
-    def _go_on(self) -> None:
-        if self._closing.is_set():
-            raise Problem(kinds.SHUTTING_DOWN, "The service is shutting down.")
+    def _pause(self) -> Callable[[], None]:
+        """Return what work on this thread calls in between: it rests, or ends the work."""
+        rest = Rest(self._share, self._closing.wait)
+
+        def pause() -> None:
+            rest()
+            if self._closing.is_set():
+                raise Problem(kinds.SHUTTING_DOWN, "The service is shutting down.")
+
+        return pause
 
 
 def range_error(found: tm.Reconstruction, truth: Truth) -> dict[str, float] | None:

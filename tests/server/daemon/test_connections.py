@@ -346,11 +346,23 @@ def test_trailers_are_no_headers(plain: Served) -> None:
     assert b"smuggled" not in answers
 
 
+HANDSHAKE = (
+    b"GET %s HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Version: %s\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+)
+
+
 @pytest.mark.parametrize(
     ("request_bytes", "line"),
     [
         (b"\x16\x03\x01\r\n\r\n", b"HTTP/1.1 400 Bad Request"),
         (b"GET /" + b"a" * 5000, b"HTTP/1.1 431 Request Header Fields Too Large"),
+        (HANDSHAKE % (b"/api/v1/stream", b"99"), b"HTTP/1.1 400 Bad Request"),
+        (HANDSHAKE % (b"/nothing", b"13"), b"HTTP/1.1 403 Forbidden"),
+        (
+            b"GET /livez HTTP/1.1\r\nHost: localhost\r\nHost: a\r\nConnection: close\r\n\r\n",
+            b"HTTP/1.1 400 Bad Request",
+        ),
     ],
 )
 def test_refusals_of_the_connection_are_like_any_other_answer(

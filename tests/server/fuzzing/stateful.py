@@ -1,8 +1,10 @@
 """Requests that follow from answers: what was made is read, changed, stopped, deleted, read again.
 
-``python -m tests.server.fuzzing.stateful URL`` prints, as JSON, how often each operation answered
-with which status, and whatever is wrong: an answer that is not one that the OpenAPI document has,
-something deleted that can still be had, something made that cannot.
+``python -m tests.server.fuzzing.stateful URL [PATHS TEXT]`` prints, as JSON, how often each
+operation answered with which status, and whatever is wrong: an answer that is not one that the
+OpenAPI document has, something deleted that can still be had, something made that cannot. With a
+regular expression of paths and a text it leaves those out, and ends with the first story in which
+something is wrong that contains the text.
 """
 
 import collections
@@ -21,6 +23,7 @@ from schemathesis.config import SchemathesisConfig
 from schemathesis.core.failures import FailureGroup
 
 CONFIG: Final = Path(__file__).with_name("schemathesis.toml")
+ENDLESS: Final = "mjpeg"
 STORIES: Final = 30
 STORY: Final = settings(
     max_examples=2,  # the first one is always the shortest
@@ -45,14 +48,14 @@ def clear(client: httpx.Client) -> None:
         client.delete(f"calibrations/{each['id']}")
 
 
-def tell(url: str) -> dict[str, Any]:
+def tell(url: str, left_out: str = ENDLESS, until: str | None = None) -> dict[str, Any]:
     """Tell stories to a daemon, and return how often what was answered and what was wrong."""
     answers: collections.Counter[str] = collections.Counter()
     wrong: list[str] = []
     config = SchemathesisConfig.from_path(CONFIG)
     schema = schemathesis.openapi.from_url(f"{url}/openapi.json", config=config)
     # the links are schemathesis's own: it reads them off the names of parameters and of fields
-    workflow: Any = schema.exclude(path_regex="mjpeg").as_state_machine()
+    workflow: Any = schema.exclude(path_regex=left_out).as_state_machine()
 
     class Stories(workflow):  # type: ignore[misc]  # its class is made while it runs
         def validate_response(self, response: Any, case: Any, **kwargs: Any) -> None:
@@ -69,8 +72,10 @@ def tell(url: str) -> dict[str, Any]:
             with contextlib.suppress(FlakyStrategyDefinition):
                 run_state_machine_as_test(seed(number)(Stories), settings=STORY)
             clear(client)
+            if until is not None and any(until in each for each in wrong):
+                break
     return {"answers": dict(sorted(answers.items())), "wrong": wrong}
 
 
 if __name__ == "__main__":
-    sys.stdout.write(json.dumps(tell(sys.argv[1]), indent=1))
+    sys.stdout.write(json.dumps(tell(*sys.argv[1:4]), indent=1))

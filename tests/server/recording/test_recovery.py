@@ -23,39 +23,51 @@ from transientcam_server.recording.recovery import recover_all, unfinished
 KILLS = 20
 
 
-def kill_in_mid_recording(path: Path, *, after_frames: int) -> int:
+def kill_in_mid_recording(
+    writers: "subprocess.Popen[bytes]", path: Path, *, after_frames: int
+) -> int:
     """Kill a writer that has written so many frames; return how many it acknowledged."""
-    with subprocess.Popen(
-        [sys.executable, "-m", "tests.server.recording.killed", str(path)],
-        stdout=subprocess.PIPE,
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-    ) as writer:
-        assert writer.stdout is not None
-        acknowledged = 0
-        while acknowledged < after_frames:
-            acknowledged = int(writer.stdout.readline())
-        assert lock.is_taken(path.with_name(path.name + ".part"))
-        writer.kill()  # wherever it is in the frame after
-        for line in writer.stdout:
+    assert writers.stdin is not None
+    assert writers.stdout is not None
+    writers.stdin.write(f"{path}\n".encode())
+    writers.stdin.flush()
+    acknowledged, process = 0, 0
+    while acknowledged < after_frames or not process:  # which of both is first is open
+        line = writers.stdout.readline()
+        if line.startswith(b"process "):
+            process = int(line.split()[1])
+        else:
             acknowledged = int(line)
+    assert lock.is_taken(path.with_name(path.name + ".part"))
+    os.kill(process, signal.SIGKILL)  # wherever it is in the frame after
+    while not (line := writers.stdout.readline()).startswith(b"ended"):
+        acknowledged = int(line)
+    assert line == b"ended by %d\n" % signal.SIGKILL
     return acknowledged
 
 
 @pytest.mark.timeout(240)
 def test_no_acknowledged_frame_is_lost_when_the_writer_is_killed(tmp_path: Path) -> None:
     random_number = random.Random(6)
-    for kill in range(KILLS):
-        path = tmp_path / f"{kill}.h5"
-        acknowledged = kill_in_mid_recording(path, after_frames=random_number.randint(1, 120))
-        assert not path.exists()
+    with subprocess.Popen(
+        [sys.executable, "-m", "tests.server.recording.killed"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])},
+    ) as writers:
+        for kill in range(KILLS):
+            path = tmp_path / f"{kill}.h5"
+            after_frames = random_number.randint(1, 120)
+            acknowledged = kill_in_mid_recording(writers, path, after_frames=after_frames)
+            assert not path.exists()
 
-        assert recover(path.with_name(path.name + ".part")) == path
-        with Recording(path) as recording:
-            assert acknowledged <= recording.frames
-            for index in (0, acknowledged // 2, recording.frames - 1):
-                assert_same(recording.frame(index), frame(index % 64))
-        path.unlink()
+            assert recover(path.with_name(path.name + ".part")) == path
+            with Recording(path) as recording:
+                assert acknowledged <= recording.frames
+                for index in (0, acknowledged // 2, recording.frames - 1):
+                    assert_same(recording.frame(index), frame(index % 64))
+            path.unlink()
 
 
 def test_a_recovered_recording_is_whole_and_opens_with_anything(tmp_path: Path) -> None:

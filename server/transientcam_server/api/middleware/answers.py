@@ -79,7 +79,6 @@ class AnswerLimit:
             await self._app({**scope, _ANSWER: answer}, receive, answer.send)
         except _NoRoom as refusal:
             response = problem_response(refusal.problem, instance=scope["path"])
-            response.headers["Retry-After"] = "1"
             await response(scope, receive, send)
         finally:
             answer.end()
@@ -150,4 +149,4 @@ class _Answer:
 
 
 def _problem(what: str, limit: int) -> Problem:
-    return Problem(kinds.TOO_MANY_ANSWERS, f"{what}, of {limit}.", limit=limit)
+    return Problem(kinds.TOO_MANY_ANSWERS, f"{what}, of {limit}.", limit=limit, retry_after_s=1)

@@ -95,6 +95,8 @@ class OriginCheck:
             await _answer(response, scope, receive, send)
 
     def _problem(self, scope: Scope, headers: Headers) -> Problem | None:
+        if len(headers.getlist("host")) > 1:  # RFC 9112, 3.2: which of them is meant?
+            return Problem(kinds.BAD_REQUEST, "There are several Host headers.", field="Host")
         host = headers.get("host", "").lower()
         if not self._is_ours(_name(host)):
             detail = "The Host header names no host that is served here."

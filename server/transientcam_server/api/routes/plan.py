@@ -32,6 +32,7 @@ _ASK_EVERY_S: Final = 0.5
         kinds.TARGET_UNREACHABLE,
         kinds.NO_FRAME_YET,
         kinds.SHUTTING_DOWN,
+        kinds.PLANNING_BUSY,
     ),
 )
 @needs(Role.VIEWER, lease=False)
@@ -60,16 +61,21 @@ async def make_plan(service: ServiceOf, request: PlanRequest, http: Request) -> 
         if left.is_set():
             raise _left()
 
-    task = asyncio.ensure_future(_planned(service, request, goal, go_on))
-    try:
-        while not task.done():
-            await asyncio.wait({task}, timeout=_ASK_EVERY_S)
-            if await http.is_disconnected():
-                raise _left()
-        return PlanDocument.model_validate(task.result())
-    finally:
-        left.set()
-        task.cancel()
+    async with service.planning.place_of(_address(http)):
+        task = asyncio.ensure_future(_planned(service, request, goal, go_on))
+        try:
+            while not task.done():
+                await asyncio.wait({task}, timeout=_ASK_EVERY_S)
+                if await http.is_disconnected():
+                    raise _left()
+            return PlanDocument.model_validate(task.result())
+        finally:
+            left.set()
+            task.cancel()
+
+
+def _address(http: Request) -> str:
+    return "" if http.client is None else http.client.host
 
 
 def _left() -> Problem:
@@ -81,27 +87,32 @@ async def _planned(
     service: Service, request: PlanRequest, goal: Goal, go_on: Callable[[], None]
 ) -> dict[str, Any]:
     scene = await _scene(service, request, goal.base, go_on)
-    made, _ = await service.workers.run_long(service.planner.plan_document, goal, scene, go_on)
-    return made
+    return await service.planning.run(service.planner.plan_document, goal, scene, go_on)
 
 
 @router.get(
     "/tradeoff",
     summary="What accuracy costs on this scene",
     responses=documented(
-        kinds.INVALID_REQUEST, kinds.TARGET_UNREACHABLE, kinds.NO_FRAME_YET, kinds.SHUTTING_DOWN
+        kinds.INVALID_REQUEST,
+        kinds.TARGET_UNREACHABLE,
+        kinds.NO_FRAME_YET,
+        kinds.SHUTTING_DOWN,
+        kinds.PLANNING_BUSY,
     ),
 )
 async def read_tradeoff(
     service: ServiceOf,
+    http: Request,
     by: Annotated[
         Literal["range_error_m", "range_std_m", "bound_width"],
         Query(description="the accuracy that capture time is held against"),
     ] = "range_error_m",
 ) -> TradeoffDocument:
     """Return the Pareto front for the scene, its lines, and where the current frame stands."""
-    frame = await service.hub.newest(after=0, wait_s=_FRAME_WITHIN_S)
-    return TradeoffDocument.model_validate(await service.fronts.of(frame, by))
+    async with service.planning.place_of(_address(http)):
+        frame = await service.hub.newest(after=0, wait_s=_FRAME_WITHIN_S)
+        return TradeoffDocument.model_validate(await service.fronts.of(frame, by))
 
 
 async def _scene(
