@@ -1,8 +1,9 @@
-"""How far apart two returns have to be for a camera: the Cramer-Rao bound, and one frame.
+"""How far apart two returns have to be for a camera: bounds, estimators, and one frame.
 
-Run it with ``python -m benchmarks.cameras [--write]``; with ``--write`` both go into
-docs/cameras.md. The bound is arithmetic; the frame is of the emulated TOFcam660, with noise of a
-known seed, so that neither depends on the machine.
+Run it with ``python -m benchmarks.cameras [--write] [--cost]``; with ``--write`` all go into
+docs/cameras.md. The bound is arithmetic; moments have noise of a known seed, and so has the frame
+of the emulated TOFcam660, so that none depends on the machine. ``--cost`` times the measurement of
+moments instead, which does.
 """
 
 import argparse
@@ -14,6 +15,8 @@ import numpy as np
 from rich.console import Console
 
 import transientcam_moments as tm
+from benchmarks import camera_estimates
+from benchmarks.camera_estimates import FIRST_M, NOISE, RATIO
 from benchmarks.tables import Table
 from transientcam_driver import Sequence, SubPhases, open_camera
 from transientcam_driver.tofcam660.image import FULL_SCALE_DN
@@ -22,11 +25,6 @@ from transientcam_server.settings import ReconstructionSettings
 
 PAGE: Final = Path(__file__).parents[1] / "docs" / "cameras.md"
 SEPARATIONS_M: Final = (0.3, 0.6, 1.2, 2.4, 5.0)
-RATIO: Final = 0.5
-"""Of the second return's weight to the first one's."""
-NOISE: Final = 0.01
-"""Standard deviation of each real part of a moment, over b_0."""
-FIRST_M: Final = 2.0
 HALL: Final = "tofcam660:emulated?scene=hall&settle_s=0&seed=1"
 _MARKS: Final = ("<!-- resolution: begin -->", "<!-- resolution: end -->")
 
@@ -111,7 +109,13 @@ def main() -> None:
     """Print the table, or write it into docs/cameras.md."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.cameras", description=__doc__)
     parser.add_argument("--write", action="store_true", help=f"write it into docs/{PAGE.name}")
+    parser.add_argument("--cost", action="store_true", help="time the measurement of moments")
     arguments = parser.parse_args()
+    if arguments.cost:
+        Console(width=140).print(camera_estimates.cost())
+        return
+    estimates = camera_estimates.table()
+    estimates.show(Console(width=140))
     made = table()
     made.notes.append("")
     made.notes.append(frame_of_hall())
@@ -120,7 +124,7 @@ def main() -> None:
         text = PAGE.read_text(encoding="utf-8")
         before, rest = text.split(_MARKS[0])
         _, after = rest.split(_MARKS[1])
-        body = made.markdown().replace("## ", "### ", 1)
+        body = "\n".join(each.markdown().replace("## ", "### ", 1) for each in (estimates, made))
         written = "Written by `python -m benchmarks.cameras --write`; no machine has a part in it."
         page = f"{before}{_MARKS[0]}\n{body}\n{written}\n{_MARKS[1]}{after}"
         PAGE.write_text(page, encoding="utf-8")

@@ -47,6 +47,7 @@ from transientcam_driver.opening import open_camera
 from transientcam_driver.plugin import CameraName, CameraPlugin, FoundCamera
 from transientcam_driver.protocol import Status
 from transientcam_driver.receiving import Counters, RawFrame
+from transientcam_driver.sampling import Sampling
 from transientcam_driver.sequence import ImageLabel, Sequence, SubPhases
 from transientcam_driver.simulation import SceneInfo, list_scenes
 from transientcam_driver.triggered import TriggeredCamera, TriggeredDevice
@@ -85,6 +86,7 @@ __all__ = [
     "PluginError",
     "ProtocolError",
     "RawFrame",
+    "Sampling",
     "SceneError",
     "SceneInfo",
     "Sequence",

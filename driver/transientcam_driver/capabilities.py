@@ -1,10 +1,11 @@
 """What a camera can do, and a sequence as it applies it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from transientcam_driver.errors import SequenceError
+from transientcam_driver.sampling import Sampling
 from transientcam_driver.sequence import (
     DERIVED_FIELDS,
     ImageLabel,
@@ -73,6 +74,9 @@ class Capabilities:
         Of a sequence.
     schemes, zeroths, take_orders
         What a sequence can ask for.
+    sampling
+        Which multiples of the base frequency it measures, and at which phases: all sequences have
+        these. With multiples of its own, ``max_harmonics`` is how many they are.
     phase_offsets
         Whether the phases of a sequence can be shifted together.
     delay_s
@@ -109,6 +113,7 @@ class Capabilities:
     schemes: tuple[Scheme, ...] = ("none",)
     zeroths: tuple[Zeroth, ...] = ("estimated",)
     take_orders: tuple[TakeOrder, ...] = ("sequential",)
+    sampling: Sampling = field(default_factory=Sampling)
     phase_offsets: bool = False
     delay_s: float = 0.0
     fifo_bytes: int = 0
@@ -127,15 +132,17 @@ class Capabilities:
         SequenceError
             Naming the field, its value and the limit.
         """
-        f_hz, m = sequence.base_frequency_hz, sequence.harmonics
+        sequence = self._sampled(sequence)
+        f_hz, m, highest = sequence.base_frequency_hz, sequence.harmonics, sequence.multiples[-1]
         if m > self.max_harmonics:
             raise SequenceError("harmonics", m, f"at most {self.max_harmonics} on this camera")
         if f_hz < self.min_frequency_hz:
             raise SequenceError("base_frequency_hz", f_hz, f"at least {self.min_frequency_hz:g} Hz")
-        if self.tuning_word(f_hz) * m > self.tuning_word(self.max_frequency_hz):
+        if self.tuning_word(f_hz) * highest > self.tuning_word(self.max_frequency_hz):
+            stay = f"{m} harmonics have" if highest == m else f"the multiple {highest} has"
             limit = (
-                f"at most {self.max_frequency_hz / m:g} Hz: "
-                f"{m} harmonics have to stay below {self.max_frequency_hz:g} Hz"
+                f"at most {self.max_frequency_hz / highest:g} Hz: "
+                f"{stay} to stay below {self.max_frequency_hz:g} Hz"
             )
             raise SequenceError("base_frequency_hz", f_hz, limit)
         if not self.min_exposure_s <= sequence.exposure_s <= self.max_exposure_s:
@@ -162,8 +169,9 @@ class Capabilities:
 
     def nearest(self, sequence: Sequence) -> Sequence:
         """Return the nearest sequence to the one given that this camera can do."""
-        harmonics = min(sequence.harmonics, self.max_harmonics)
-        highest_hz = self.frequency_hz(self.tuning_word(self.max_frequency_hz) // harmonics)
+        harmonics = len(self.sampling.multiples) or min(sequence.harmonics, self.max_harmonics)
+        highest = self.sampling.multiples_of(harmonics)[-1]
+        highest_hz = self.frequency_hz(self.tuning_word(self.max_frequency_hz) // highest)
         sub_phases, schemes, zeroths = sequence.sub_phases, self.schemes, self.zeroths
         scheme = sub_phases.scheme if sub_phases.scheme in schemes else schemes[0]
         order = sequence.take_order if sequence.take_order in self.take_orders else "sequential"
@@ -177,6 +185,7 @@ class Capabilities:
             exposure_s=_clamped(sequence.exposure_s, self.min_exposure_s, self.max_exposure_s),
             sub_phases=SubPhases(scheme, min(sub_phases.n, self.max_sub_phases)),
             take_order=order,
+            sampling=self.sampling,
         )
         most_takes = min(self.max_takes, self.max_images // nearest.images_per_take)
         return replace(nearest, takes=min(sequence.takes, most_takes))
@@ -208,7 +217,7 @@ class Capabilities:
         self.validate(sequence)
         return self.describe(
             replace(
-                sequence,
+                self._sampled(sequence),
                 base_frequency_hz=self.frequency_hz(self.tuning_word(sequence.base_frequency_hz)),
                 exposure_s=self.exposure_grid_s(sequence.exposure_s),
             ),
@@ -231,6 +240,13 @@ class Capabilities:
             low_frequency_hz=self.low_frequency_hz,
             delay_s=self.delay_s,
         )
+
+    def _sampled(self, sequence: Sequence) -> Sequence:
+        """Return a sequence with the camera's own sampling, which it may leave open or state."""
+        if sequence.sampling not in (Sampling(), self.sampling):
+            limit = f"{self.sampling.to_document()} on this camera, or absent"
+            raise SequenceError("sampling", sequence.sampling.to_document(), limit)
+        return replace(sequence, sampling=self.sampling)
 
     def frequency_hz(self, tuning_word: int) -> float:
         """Frequency the synthesiser makes from a tuning word."""

@@ -3,17 +3,15 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from numbers import Integral, Real
 from typing import Any, Literal, get_args
 
 from transientcam_driver.errors import SequenceError
+from transientcam_driver.sampling import MAX_HARMONICS, Sampling
+from transientcam_driver.sequence_fields import integer, known_keys, one_of, positive
 
 SPEED_OF_LIGHT_M_S = 299_792_458.0
 LOW_FREQUENCY_HZ = 0.9e6
 """Where the zeroth moment is measured when the sensor cannot go unmodulated (Sec. 4.3)."""
-MAX_HARMONICS = 32
-PHASE_STEPS_RAD = (0.0, math.pi / 2, math.pi, 3 * math.pi / 2)
-"""Four-bucket sampling."""
 
 Zeroth = Literal["low-frequency", "on-off", "estimated"]
 Scheme = Literal["arccos", "harmonic-cancellation", "none"]
@@ -46,8 +44,8 @@ class SubPhases:
     n: int = 8
 
     def __post_init__(self) -> None:
-        _one_of("sub_phases.scheme", self.scheme, get_args(Scheme))
-        _integer("sub_phases.n", self.n, "an integer from 1 to 255", least=1, most=255)
+        one_of("sub_phases.scheme", self.scheme, get_args(Scheme))
+        integer("sub_phases.n", self.n, "an integer from 1 to 255", least=1, most=255)
         if self.scheme == "none":
             object.__setattr__(self, "n", 1)
 
@@ -78,7 +76,7 @@ class SubPhases:
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> "SubPhases":
         """Build from ``{"scheme", "n"}``; what is absent keeps its default."""
-        _known_keys("sub_phases", document, {"scheme", "n"})
+        known_keys("sub_phases", document, {"scheme", "n"})
         return cls(**document)
 
 
@@ -114,12 +112,12 @@ class Sequence:
     Attributes
     ----------
     base_frequency_hz
-        f; measured are f, 2f, ..., ``harmonics`` times f.
+        f; measured are f, 2f, ..., ``harmonics`` times f, unless ``sampling`` has other multiples.
     harmonics
-        m, from 1 to 32.
+        m, from 1 to 32: how many frequencies there are.
     zeroth
-        Where the zeroth moment comes from (Sec. 4.3): four images at 0.9 MHz, two unmodulated
-        ones with the light on and off, or none (it is then estimated).
+        Where the zeroth moment comes from (Sec. 4.3): an image of each phase at 0.9 MHz, two
+        unmodulated ones with the light on and off, or none (it is then estimated).
     exposure_s
         Of one image.
     takes
@@ -142,32 +140,44 @@ class Sequence:
     sub_phases: SubPhases = field(default_factory=SubPhases)
     take_order: TakeOrder = "sequential"
     phase_offset_rad: float = 0.0
+    sampling: Sampling = field(default_factory=Sampling)
 
     def __post_init__(self) -> None:
-        _positive("base_frequency_hz", self.base_frequency_hz, "a number of hertz above 0")
-        _integer(
+        positive("base_frequency_hz", self.base_frequency_hz, "a number of hertz above 0")
+        integer(
             "harmonics",
             self.harmonics,
             f"an integer from 1 to {MAX_HARMONICS}",
             least=1,
             most=MAX_HARMONICS,
         )
-        _one_of("zeroth", self.zeroth, get_args(Zeroth))
-        _positive("exposure_s", self.exposure_s, "a number of seconds above 0")
-        _integer("takes", self.takes, "an integer of at least 1", least=1, most=None)
-        _one_of("take_order", self.take_order, get_args(TakeOrder))
+        one_of("zeroth", self.zeroth, get_args(Zeroth))
+        positive("exposure_s", self.exposure_s, "a number of seconds above 0")
+        integer("takes", self.takes, "an integer of at least 1", least=1, most=None)
+        one_of("take_order", self.take_order, get_args(TakeOrder))
         if not 0 <= self.phase_offset_rad < 2 * math.pi:
             raise SequenceError("phase_offset_rad", self.phase_offset_rad, "from 0 to a turn")
         if not isinstance(self.sub_phases, SubPhases):
             raise SequenceError("sub_phases", self.sub_phases, "an object {scheme, n}")
+        if not isinstance(self.sampling, Sampling):
+            raise SequenceError("sampling", self.sampling, "an object {multiples, phases_rad}")
+        if self.harmonics != len(self.multiples):
+            limit = f"{len(self.multiples)}: as many as the multiples {list(self.multiples)}"
+            raise SequenceError("harmonics", self.harmonics, limit)
         object.__setattr__(self, "base_frequency_hz", float(self.base_frequency_hz))
         object.__setattr__(self, "exposure_s", float(self.exposure_s))
 
     @property
+    def multiples(self) -> tuple[int, ...]:
+        """Which multiples of the base frequency are measured, ascending."""
+        return self.sampling.multiples_of(self.harmonics)
+
+    @property
     def images_per_take(self) -> int:
         """How many images one take holds."""
-        zeroth = {"low-frequency": len(PHASE_STEPS_RAD), "on-off": 2, "estimated": 0}
-        return zeroth[self.zeroth] + len(PHASE_STEPS_RAD) * self.harmonics
+        phases = len(self.sampling.phases_rad)
+        zeroth = {"low-frequency": phases, "on-off": 2, "estimated": 0}
+        return zeroth[self.zeroth] + phases * self.harmonics
 
     @property
     def images(self) -> int:
@@ -186,12 +196,13 @@ class Sequence:
         whether takes follow one another as a whole or image by image.
         """
         of_a_take: list[tuple[int, float, float, bool]] = []
-        phases_rad = [self.phase_offset_rad + phase_rad for phase_rad in PHASE_STEPS_RAD]
+        steps_rad = self.sampling.phases_rad
+        phases_rad = [self.phase_offset_rad + phase_rad for phase_rad in steps_rad]
         if self.zeroth == "on-off":
             of_a_take += [(0, 0.0, 0.0, True), (0, 0.0, 0.0, False)]
         elif self.zeroth == "low-frequency":
             of_a_take += [(0, low_frequency_hz, phase_rad, True) for phase_rad in phases_rad]
-        for j in range(1, self.harmonics + 1):
+        for j in self.multiples:
             frequency_hz = j * self.base_frequency_hz
             of_a_take += [(j, frequency_hz, phase_rad, True) for phase_rad in phases_rad]
         order = [(take, image) for take in range(self.takes) for image in of_a_take]
@@ -228,8 +239,13 @@ class Sequence:
         return SPEED_OF_LIGHT_M_S / (2 * self.base_frequency_hz)
 
     def to_document(self) -> dict[str, Any]:
-        """Return the sequence as the JSON document of the REST interface."""
-        return {
+        """Return the sequence as the JSON document of the REST interface.
+
+        It has ``sampling`` only where that is not the usual one.
+        """
+        unusual = self.sampling != Sampling()
+        sampling = {"sampling": self.sampling.to_document()} if unusual else {}
+        return sampling | {
             "base_frequency_hz": self.base_frequency_hz,
             "harmonics": self.harmonics,
             "zeroth": self.zeroth,
@@ -252,38 +268,10 @@ class Sequence:
             Naming the field, its value and the limit.
         """
         known = {each.name for each in fields(cls)} - DRIVER_FIELDS
-        _known_keys("", document, known | READ_ONLY_FIELDS)
+        known_keys("", document, known | READ_ONLY_FIELDS)
         given = {name: value for name, value in document.items() if name in known}
         if "sub_phases" in given:
             given["sub_phases"] = SubPhases.from_document(given["sub_phases"])
+        if "sampling" in given:
+            given["sampling"] = Sampling.from_document(given["sampling"])
         return cls(**given)
-
-
-def _known_keys(prefix: str, document: object, known: set[str] | frozenset[str]) -> None:
-    if not isinstance(document, Mapping):
-        raise SequenceError(prefix or "sequence", document, "an object")
-    for key in document:
-        if key not in known:
-            name = f"{prefix}.{key}" if prefix else str(key)
-            raise SequenceError(
-                name, document[key], f"absent; known are {', '.join(sorted(known))}"
-            )
-
-
-def _positive(name: str, value: object, limit: str) -> None:
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise SequenceError(name, value, limit)
-    if not 0 < float(value) < math.inf:
-        raise SequenceError(name, value, limit)
-
-
-def _integer(name: str, value: object, limit: str, *, least: int, most: int | None) -> None:
-    if isinstance(value, bool) or not isinstance(value, Integral):
-        raise SequenceError(name, value, limit)
-    if not least <= int(value) <= (math.inf if most is None else most):
-        raise SequenceError(name, value, limit)
-
-
-def _one_of(name: str, value: object, allowed: tuple[str, ...]) -> None:
-    if not isinstance(value, str) or value not in allowed:
-        raise SequenceError(name, value, f"one of {', '.join(allowed)}")

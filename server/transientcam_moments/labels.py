@@ -9,10 +9,15 @@ import numpy as np
 
 from transientcam_moments._arrays import MAX_HARMONICS, Array
 from transientcam_moments.errors import ParameterError, ShapeError
+from transientcam_moments.phase_steps import (
+    FOUR_PHASES_RAD,
+    LEAST_PHASES,
+    SAME_PHASE_RAD,
+    is_four_bucket,
+    phase_weights,
+)
 from transientcam_moments.reconstruction import Settings
 
-STEPS: Final = 4
-_STEP_WEIGHTS: Final = np.array([1, 1j, -1, -1j])
 _SAME_FREQUENCY: Final = 1e-6  # relative
 
 
@@ -24,7 +29,7 @@ class Labels:
     harmonic : integer array, shape (N,)
         Modulated at this multiple of the base frequency; 0 for images of the zeroth moment.
     phase_rad : array, shape (N,)
-        Phase step of the modulation: 0, pi / 2, pi or 3 pi / 2.
+        Phase of the modulation: 0, pi / 2, pi and 3 pi / 2, or any three or more.
     frequency_hz : array, shape (N,), optional
         Of the modulation; 0 where nothing is modulated. The base frequency follows from it.
     illumination : boolean array, shape (N,), optional
@@ -37,13 +42,14 @@ class Labels:
     ShapeError
         When the labels are not of one length.
     ParameterError
-        When the images are not one of each phase step of every harmonic 1 .. m in every take, and
-        four, two or none of the zeroth moment, or when the frequencies are not multiples of one.
+        When the images of all multiples and takes are not at the same three or more phases, and
+        those of the zeroth moment neither at these, nor two, nor none, or when the frequencies
+        are not multiples of one.
 
     Notes
     -----
-    Sec. 3.1 and 4.3: b_0 is measured by four phase steps at a low frequency, by an image with and
-    one without light, or not at all.
+    Sec. 3.1 and 4.3: b_0 is measured at a low frequency, by an image with and one without light,
+    or not at all. Row k of everything here belongs to `multiples` k, row 0 to b_0.
     """
 
     def __init__(
@@ -68,8 +74,20 @@ class Labels:
 
     @property
     def harmonics(self) -> int:
-        """Order m."""
-        return int(self.harmonic.max())
+        """How many frequencies there are beside that of b_0: the order m, of consecutive ones."""
+        return len(self.multiples)
+
+    @cached_property
+    def multiples(self) -> tuple[int, ...]:
+        """Which multiples of the base frequency there are, ascending."""
+        return tuple(int(each) for each in np.unique(self.harmonic[self.harmonic > 0]))
+
+    @cached_property
+    def phases_rad(self) -> tuple[float, ...]:
+        """Phases of the images of each frequency, from 0 to a turn, ascending."""
+        first = (self.harmonic == self.multiples[0]) & (self.take == self.take[0])
+        found = np.sort(self._turned[first])
+        return FOUR_PHASES_RAD if is_four_bucket(found) else tuple(found.tolist())
 
     @property
     def takes(self) -> int:
@@ -79,20 +97,23 @@ class Labels:
     @property
     def zeroth(self) -> str:
         """How b_0 was measured: "low-frequency", "on-off" or "estimated"."""
-        images = int(np.count_nonzero(self.harmonic == 0)) // self.takes
-        return {STEPS: "low-frequency", 2: "on-off", 0: "estimated"}[images]
+        of_zeroth = self.harmonic == 0
+        if not of_zeroth.any():
+            return "estimated"
+        return "low-frequency" if self.illumination[of_zeroth].all() else "on-off"
 
     @property
     def base_frequency_hz(self) -> float | None:
         """f; None where no frequencies are given."""
         if self.frequency_hz is None:
             return None
-        return float(self.frequency_hz[self.harmonic == 1][0])
+        lowest = self.multiples[0]
+        return float(self.frequency_hz[self.harmonic == lowest][0]) / lowest
 
     @cached_property
     def order(self) -> Array:
         """Places (N,) of the images in the order that `measure` takes them in."""
-        return np.lexsort((self._steps, ~self.illumination, self.harmonic, self.take))
+        return np.lexsort((self._turned, ~self.illumination, self.harmonic, self.take))
 
     def in_order(self, images: Any) -> Any:
         """Return images (N, ...) in the order that `measure` takes them in.
@@ -120,7 +141,11 @@ class Labels:
         all weights of one that was not measured are 0.
         """
         weights = np.zeros((self.harmonics + 1, len(self.harmonic)), dtype=np.complex128)
-        weights[self.harmonic, np.arange(len(self.harmonic))] = _STEP_WEIGHTS[self._steps]
+        for row, j in enumerate((0, *self.multiples)):
+            for take in np.unique(self.take):
+                here = (self.harmonic == j) & (self.take == take)
+                if j or self.zeroth == "low-frequency":
+                    weights[row, here] = phase_weights(self.phase_rad[here])
         if self.zeroth == "on-off":
             weights[0] = np.where(self.harmonic == 0, np.where(self.illumination, 2.0, -2.0), 0.0)
         return weights / self.takes
@@ -144,6 +169,8 @@ class Labels:
             "zeroth": self.zeroth,
             "takes": self.takes,
             "base_frequency_hz": self.base_frequency_hz,
+            "multiples": self.multiples,
+            "phases_rad": self.phases_rad,
         }
         known = {name: value for name, value in found.items() if value is not None}
         for name, value in known.items():
@@ -153,37 +180,45 @@ class Labels:
         return replace(given, **known)
 
     @cached_property
-    def _steps(self) -> Array:
-        """Phase steps (N,) as integers 0 to 3."""
-        steps = np.rint(self.phase_rad / (np.pi / 2))
-        if not np.allclose(self.phase_rad, steps * (np.pi / 2), atol=1e-6):
-            wrong = self.phase_rad[~np.isclose(self.phase_rad, steps * (np.pi / 2), atol=1e-6)]
-            raise ParameterError("phase_rad", float(wrong[0]), "0, pi / 2, pi or 3 pi / 2")
-        return steps.astype(np.int64) % STEPS
+    def _turned(self) -> Array:
+        """Phases (N,) from 0 to a turn; those that rounding put just below a turn are 0."""
+        turned = np.mod(self.phase_rad, 2 * np.pi)
+        return np.where(turned > 2 * np.pi - SAME_PHASE_RAD, 0.0, turned)
 
     def _require_a_capture(self) -> None:
-        m = self.harmonics if self.harmonic.size else 0
-        if not 1 <= m <= MAX_HARMONICS or self.harmonic.min() < 0:
+        known = (self.harmonic >= 0) & (self.harmonic <= MAX_HARMONICS)
+        if not known.all() or not self.multiples:
             raise ParameterError("harmonic", self.harmonic.tolist(), "0 .. m, with m from 1 to 32")
-        lit = self.illumination
+        if len(self.phases_rad) < LEAST_PHASES:
+            self._refuse(self.multiples[0], self.take[0])
         for take in np.unique(self.take):
-            for j in range(m + 1):
+            for j in (0, *self.multiples):
                 here = (self.take == take) & (self.harmonic == j)
-                steps, on = sorted(self._steps[here]), sorted(lit[here])
-                four = steps == list(range(STEPS)) and all(on)
-                if not four and not (j == 0 and (not steps or on == [False, True])):
-                    place = f"of harmonic {j} in take {int(take)}"
-                    shown = np.degrees(self.phase_rad[here]).tolist(), lit[here].tolist()
-                    raise ParameterError(
-                        f"phase_rad {place}, in degrees, and illumination",
-                        shown,
-                        "0, 90, 180 and 270 degrees once each with the light on"
-                        + ("; one with and one without light; or none" if j == 0 else ""),
-                    )
+                lit = sorted(self.illumination[here])
+                sampled = all(lit) and self._at_the_same_phases(here)
+                if not sampled and not (j == 0 and lit in ([], [False, True])):
+                    self._refuse(j, take)
         zeroths = {int(np.sum((self.take == t) & (self.harmonic == 0))) for t in self.take}
         if len(zeroths) > 1:
             raise ParameterError("harmonic", self.harmonic.tolist(), "the same images in each take")
         self._require_multiples()
+
+    def _at_the_same_phases(self, here: Array) -> bool:
+        found = np.sort(self._turned[here])
+        return len(found) == len(self.phases_rad) and np.allclose(
+            found, self.phases_rad, rtol=0, atol=SAME_PHASE_RAD
+        )
+
+    def _refuse(self, harmonic: int, take: int) -> None:
+        here = (self.take == take) & (self.harmonic == harmonic)
+        degrees = np.round(np.degrees(self.phases_rad), 3).tolist()
+        wanted = degrees if len(degrees) >= LEAST_PHASES else "three or more phases"
+        raise ParameterError(
+            f"phase_rad of harmonic {harmonic} in take {int(take)}, in degrees, and illumination",
+            (np.degrees(self.phase_rad[here]).tolist(), self.illumination[here].tolist()),
+            f"{wanted} once each with the light on"
+            + ("; one with and one without light; or none" if harmonic == 0 else ""),
+        )
 
     def _require_multiples(self) -> None:
         base_hz = self.base_frequency_hz

@@ -7,7 +7,14 @@ from html import escape
 
 import numpy as np
 
-from transientcam_moments._arrays import Array, chosen, in_range, in_turn, namespace
+from transientcam_moments._arrays import (
+    MAX_HARMONICS,
+    Array,
+    chosen,
+    in_range,
+    in_turn,
+    namespace,
+)
 from transientcam_moments._kernels.one_pass import Planes
 from transientcam_moments._kernels.parallel import Spread, at_once
 from transientcam_moments._shown import map_html
@@ -26,6 +33,7 @@ from transientcam_moments.merging import merge_returns
 from transientcam_moments.noise.moments import MomentNoise, moment_noise, smoothed_of
 from transientcam_moments.noise.sensor import Sensor
 from transientcam_moments.peaks import Peaks, peaks
+from transientcam_moments.phase_steps import FOUR_PHASES_RAD, phase_weights
 from transientcam_moments.pisarenko import (
     DIRECT_THRESHOLD,
     Returns,
@@ -65,6 +73,12 @@ class Settings:
         not measured are "estimated".
     takes : int, optional
         Captures in the images, averaged without outliers. Raw images need it.
+    multiples : tuple of int, optional
+        Which multiples of the base frequency were measured, ascending; 1 to m, when left out. Only
+        "likelihood" serves others.
+    phases_rad : tuple of float, optional
+        Of the raw images of each frequency, in their order, three or more: 0, 90, 180 and 270
+        degrees, when left out.
     epsilon : float
         Least uniform part relative to b_0 (Sec. 4.3), 0 <= epsilon < 1.
     keep : {"harmonics", "brightness"}
@@ -94,6 +108,8 @@ class Settings:
     base_frequency_hz: float | None = None
     zeroth: str | None = None
     takes: int | None = None
+    multiples: tuple[int, ...] | None = None
+    phases_rad: tuple[float, ...] | None = None
     epsilon: float = EPSILON
     keep: str = "harmonics"
     smoothing_sigma_px: float = SIGMA_PX
@@ -116,6 +132,9 @@ class Settings:
             for field in ("zeroth", "takes"):
                 if getattr(self, field) is None:
                     raise ParameterError(field, None, "stated, for the noise of a sensor")
+        phase_weights(self.sampled_rad)
+        if self.multiples is not None and not _ascending(self.multiples):
+            raise ParameterError("multiples", self.multiples, "ascending, from 1 to 32")
         in_range("epsilon", self.epsilon, 0.0, float(np.nextafter(1.0, 0.0)), "0 <= epsilon < 1")
         chosen("keep", self.keep, ("harmonics", "brightness"))
         in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
@@ -127,6 +146,22 @@ class Settings:
     def least_harmonics(self) -> int:
         """The smallest m that the estimator gives a range of."""
         return TECHNIQUES[self.estimator].least_harmonics
+
+    @property
+    def sampled_rad(self) -> tuple[float, ...]:
+        """Phases of the raw images of each frequency."""
+        return FOUR_PHASES_RAD if self.phases_rad is None else self.phases_rad
+
+    @property
+    def consecutive(self) -> bool:
+        """Whether the multiples are 1 to m, as the trigonometric moment problem needs."""
+        return self.multiples is None or self.multiples[-1] == len(self.multiples)
+
+
+def _ascending(multiples: tuple[int, ...]) -> bool:
+    """Return whether there are multiples, each larger than the one before."""
+    inside = bool(multiples) and multiples[0] >= 1 and multiples[-1] <= MAX_HARMONICS
+    return inside and list(multiples) == sorted(set(multiples))
 
 
 _SHOWN = ("smoothed", "flags", "coefficients", "returns", "range_m")
@@ -161,7 +196,14 @@ class Reconstruction:
         What is taken out of the moments once they are smoothed.
     spread : callable, optional
         How the likelihood uses several threads, as `kernels.over` returns it.
+
+    Raises
+    ------
+    ParameterError
+        When the settings have other multiples than 1 to m, which `reconstruct` serves.
     """
+
+    _of_any_multiples = False
 
     def __init__(
         self,
@@ -176,6 +218,8 @@ class Reconstruction:
         correction: HarmonicCorrection | None = None,
         spread: Spread = at_once,
     ) -> None:
+        if not (settings.consecutive or self._of_any_multiples):
+            raise ParameterError("multiples", settings.multiples, "1 to m")
         self.settings = settings
         self._correction = correction
         self._spread = spread
@@ -353,11 +397,17 @@ class Reconstruction:
             calibration=np.ones(moments.shape[0]) if gains is None else gains,
             zeroth=zeroth,
             takes=takes,
+            phases_rad=self.settings.sampled_rad,
         )
-        brightness = moments[0].real
+        brightness = self._least_brightness
         if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
             return smoothed_of(noise_of, brightness, self.settings.smoothing_sigma_px)
         return noise_of(brightness)
+
+    @property
+    def _least_brightness(self) -> Array:
+        """What is known of b_0: how bright an image is, and so how noisy."""
+        return self.smoothed[0].real
 
     @cached_property
     def likelihood(self) -> Likelihood:

@@ -16,8 +16,10 @@ from transientcam_moments.bad_pixels import Replacement, checked_mask, fill_bad_
 from transientcam_moments.calibration import calibrate, inverse_gains
 from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.four_bucket import harmonics_of, measure, saturated, takes_first
+from transientcam_moments.gapped import GappedReconstruction
 from transientcam_moments.harmonics import HarmonicCorrection, checked_waveform, matters
 from transientcam_moments.labels import Labels
+from transientcam_moments.phase_steps import is_four_bucket
 from transientcam_moments.ranging import range_m
 from transientcam_moments.reconstruction import PassedReconstruction, Reconstruction, Settings
 from transientcam_moments.repair import Repair, repair
@@ -65,6 +67,9 @@ class Reconstructor:
             waveform = checked_waveform(waveform)
             if calibration is None:
                 raise ParameterError("calibration", None, "given, for the phases of the waveform")
+            if not self.settings.consecutive:
+                limit = "1 to m, for a waveform to be taken out"
+                raise ParameterError("multiples", self.settings.multiples, limit)
         self._waveform = waveform if waveform is not None and matters(waveform) else None
         self._lock = threading.Lock()
         self._prepared: dict[tuple[Any, ...], OnePass] = {}
@@ -112,7 +117,7 @@ class Reconstructor:
             moments = data if self._bad is None else fill_bad_pixels(data, self._bad)
             return self._of_moments(self._calibrated(moments), saturated_pixels, None, spread)
         zeroth, count = self._require_labels()
-        takes = takes_first(data, count)
+        takes = takes_first(data, count, len(self.settings.sampled_rad))
         repaired = self._repaired(takes, previous)
         if repaired is not None:
             takes = repaired.images
@@ -153,6 +158,16 @@ class Reconstructor:
         repaired: Repair | None = None,
     ) -> Reconstruction:
         """Go on from calibrated moments."""
+        if not self.settings.consecutive:
+            return GappedReconstruction(
+                moments,
+                self.settings,
+                saturated_pixels,
+                bad_pixels=self._bad,
+                kept=kept,
+                calibration=self._calibration,
+                spread=spread,
+            )
         one_pass = self._pass_of_moments(moments)
         correction = self._correction(moments)
         if one_pass is None:
@@ -207,8 +222,11 @@ class Reconstructor:
         """Return the images after repair; None for other arrays than NumPy's, or by the settings.
 
         What to do depends on the values, which are not known yet where JAX traces a function.
+        Without opposite phases there are no sums to tell spoilt images by.
         """
         if self.settings.spoilt_images == "keep" or not isinstance(takes, np.ndarray):
+            return None
+        if not is_four_bucket(self.settings.sampled_rad):
             return None
         zeroth, count = self._require_labels()
         before = None
@@ -228,7 +246,8 @@ class Reconstructor:
         if self._bad is not None:
             average = fill_bad_pixels(average, self._bad)
         zeroth, _ = self._require_labels()
-        return self._calibrated(measure(average, zeroth=zeroth)), kept
+        moments = measure(average, zeroth=zeroth, phases_rad=self.settings.sampled_rad)
+        return self._calibrated(moments), kept
 
     def _calibrated(self, moments: Array) -> Array:
         return moments if self._calibration is None else calibrate(moments, self._calibration)
@@ -237,11 +256,13 @@ class Reconstructor:
     # The compiled pass serves NumPy arrays in single precision, of 64 pixels or more and an order
     # whose kernel "reconstruct" is compiled, where moments keep their harmonics and the range is
     # Pisarenko's, or that of the likelihood, which follows from the pass's moments. It begins with
-    # the raw images of one take of uint16, as wide as its smoothing needs, or else (several takes,
-    # other images, moments) behind the smoothing. All else goes stage by stage, each computed when
-    # it is first read.
+    # the raw images of one take of uint16 at four phases, as wide as its smoothing needs, or else
+    # (several takes, other images, moments) behind the smoothing. All else goes stage by stage,
+    # each computed when it is first read.
 
     def _pass_of_images(self, takes: Array, zeroth: str) -> OnePass | None:
+        if not is_four_bucket(self.settings.sampled_rad):
+            return None
         m = harmonics_of(takes.shape[1], zeroth)
         shape = tuple(takes.shape[2:])
         raw = isinstance(takes, np.ndarray) and takes.dtype == np.uint16 and takes.shape[0] == 1
@@ -254,7 +275,7 @@ class Reconstructor:
         return self._pass(moments.shape[0] - 1, moments.shape[1:])
 
     def _pass(self, m: int, shape: tuple[int, ...]) -> OnePass | None:
-        usual = self.settings.keep == "harmonics"
+        usual = self.settings.keep == "harmonics" and self.settings.consecutive
         usual = usual and self.settings.estimator in _BY_THE_PASS
         prepare = _kernels.lookup("reconstruct", m, math.prod(shape))
         masked = self._bad is None or np.shape(self._bad) == shape
@@ -298,10 +319,12 @@ class Reconstructor:
         if not mask.any() or mask.all():
             return np.flatnonzero(mask), None
         replacement = Replacement(mask)
-        zeroth = self.settings.zeroth
+        zeroth, phases_rad = self.settings.zeroth, self.settings.sampled_rad
         if zeroth is None:  # moments, whose bad pixels are replaced already
             return replacement.places, None
-        return replacement.places, lambda raw: measure(replacement.values(raw), zeroth=zeroth)
+        return replacement.places, lambda raw: measure(
+            replacement.values(raw), zeroth=zeroth, phases_rad=phases_rad
+        )
 
 
 def reconstruct(

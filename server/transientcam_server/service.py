@@ -48,7 +48,7 @@ from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.history import History
 from transientcam_server.imaging.lens import Intrinsics, known_intrinsics
 from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.recipe import SettingsVersion, require_harmonics
+from transientcam_server.imaging.recipe import SettingsVersion, require_estimator, suited
 from transientcam_server.imaging.workers import Workers
 from transientcam_server.planning import FrontCache, Looks, Planner
 from transientcam_server.recording import Header, Library, RecordingOptions, ReplayCamera
@@ -102,11 +102,12 @@ class Service:
         )
         self.workers = Workers(self._executor, count=settings.workers)
         self._sensor = sensor = sensor_of(camera, settings.sensor)
-        self.planner = Planner(camera.capabilities, sensor, settings.reconstruction)
+        reconstruction = suited(settings.reconstruction, camera.capabilities.sampling)
+        self.planner = Planner(camera.capabilities, sensor, reconstruction)
         kept = CalibrationStore(settings.calibrations, given=settings.calibration)
         self.pipeline = Pipeline(
             camera,
-            settings.reconstruction,
+            reconstruction,
             self.workers,
             sensor=sensor,
             calibration=_calibration(camera, settings, kept),
@@ -274,9 +275,9 @@ class Service:
         Raises
         ------
         Problem
-            ``estimator-misfit`` where the estimator needs more harmonics than there are.
+            ``estimator-misfit`` where the estimator needs other frequencies than there are.
         """
-        require_harmonics(settings, self.applied.sequence.harmonics, field="estimator")
+        require_estimator(settings, self.applied.sequence, field="estimator")
         before = self.pipeline.reconstruction
         now = self.pipeline.reconstruction = before.followed_by(settings)
         if now is not before:

@@ -14,6 +14,8 @@ from transientcam.conformance import Device
 from transientcam.conformance.device import API
 from transientcam.wire import LEASE_HEADER
 
+CAMERA = "sim:wall?noise=off"  # the scene that is rendered quickest
+
 
 @dataclass(frozen=True)
 class Breakable:
@@ -28,7 +30,7 @@ def breakable_daemon(recordings: Path, **settings: Any) -> Iterator[Breakable]:
     """Run a daemon with a simulated camera that can be broken."""
     breaker = Breaker()
     kept = {"directory": recordings, "min_free_bytes": 0}
-    with serving(prepare=breaker.install, recordings=kept, **settings) as served:
+    with serving(CAMERA, prepare=breaker.install, recordings=kept, **settings) as served:
         served.start_all_workers()  # or a test would be taken to have left them behind
         yield Breakable(served, breaker)
 

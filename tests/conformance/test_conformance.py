@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
@@ -10,6 +11,7 @@ import pytest
 from tests.conformance.breaking import NOTHING, Breaking
 from tests.conformance.broken_promises import API, BROKEN, BROKEN_WITH_TOKENS
 from tests.conformance.conftest import Breakable, breakable_daemon
+from tests.serving import serving
 from transientcam.cli import run as command
 from transientcam.conformance import (
     CHECKS,
@@ -18,6 +20,7 @@ from transientcam.conformance import (
     Device,
     Report,
     chosen,
+    recording,
     run,
 )
 from transientcam.conformance.rate import Rate, measured_rate
@@ -58,10 +61,22 @@ def test_the_daemon_keeps_every_promise(daemon: Breakable) -> None:
     assert not held
 
 
+@contextmanager
+def replayed_here(file: Path) -> Iterator[str]:
+    """Replay a recording in this process, which starts sooner than another one."""
+    with serving(f"recording:{file}?loop=on") as served:
+        yield served.url
+
+
 @pytest.mark.parametrize(("name", "breaking", "word"), BROKEN, ids=[each[0] for each in BROKEN])
 def test_a_broken_promise_fails_its_check(
-    breakable: Breakable, name: str, breaking: Breaking, word: str
+    breakable: Breakable,
+    name: str,
+    breaking: Breaking,
+    word: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(recording, "replayed", replayed_here)
     breakable.breaker.current = breaking
     # some things take their time also where they are broken
     timeout_s = LONG_S if BY_NAME[name].group in ("routes", "sizes") else SHORT_S

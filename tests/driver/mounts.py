@@ -61,7 +61,7 @@ class PyusbMount:
 
     def __init__(self) -> None:
         self._clock = VirtualClock(start_s=1000.0, unix_s=1.7e9)
-        scene = without_noise(find_scene("mirrors"))
+        scene = without_noise(find_scene("wall"))
         self._device, _ = build(scene, width=163, height=120, seed=1, clock=self._clock)
         self._bus = _ShortOfMemory([self._device])
         self._opened = ExitStack()

@@ -103,7 +103,7 @@ def reconnect(mount: Mount, camera: Camera) -> None:
 @cache
 def reference(sequence: Sequence) -> NDArray[np.uint16]:
     """The frame of the noiseless scene, from a camera of its own."""
-    with open_camera("sim:mirrors?noise=off", clock=VirtualClock()) as camera:
+    with open_camera("sim:wall?noise=off", clock=VirtualClock()) as camera:
         camera.configure(sequence)
         camera.start()
         return camera.read_frame().images

@@ -149,6 +149,17 @@ class Device:
         """Skip the check unless the camera is simulated."""
         skip_unless(self.camera["simulated"], "the camera is a real one: nothing can be broken")
 
+    def require_product(self, name: str) -> None:
+        """Skip the check unless frames of this camera have a product."""
+        products = [each["name"] for each in self.read(f"{API}/info")["products"]]
+        skip_unless(name in products, f"frames of this camera have no {name}")
+
+    @property
+    def fixed_harmonics(self) -> int | None:
+        """How many frequencies there are where the camera has no choice; None where it has."""
+        sampling = self.camera["capabilities"].get("sampling", {})  # older ones do not state it
+        return len(sampling.get("multiples", ())) or None
+
     def wait_until(self, happened: Callable[[], bool], what: str) -> None:
         """Wait until ``happened`` returns true; a promise is broken if it does not in time."""
         end_s = time.monotonic() + self.timeout_s

@@ -38,6 +38,7 @@ def a_message_over_16_mib_arrives_whole(device: Device) -> None:
 
 def an_answer_without_measure_is_refused(device: Device) -> None:
     """A request for too many times of flight is refused with 422, naming the limit."""
+    device.require_product("transient")
     with device.capturing():
         params = {"bins": 10**9, "wait_s": 10.0}
         response = device.send("GET", f"{API}/frames/latest/transient", params=params)
@@ -45,6 +46,7 @@ def an_answer_without_measure_is_refused(device: Device) -> None:
 
 
 def _expect_transient(device: Device, size_bytes: int) -> None:
+    device.require_product("transient")
     capabilities = device.camera["capabilities"]
     pixels = capabilities["width"] * capabilities["height"]
     bins = math.ceil(size_bytes / (4 * pixels)) + 1
@@ -64,7 +66,7 @@ def _expect_transient(device: Device, size_bytes: int) -> None:
 def _large(device: Device, size_bytes: int) -> Iterator[Conversation]:
     """Stream raw images at a sequence with so many that a frame is large."""
     with device.control(), device.capturing(), device.stream("flags") as stream:
-        large = device.accepted(_sequence(device.camera["capabilities"], size_bytes))
+        large = device.accepted(_sequence(device, size_bytes))
         applied = device.document(device.send("PUT", f"{API}/sequence", json=large))
         skip_unless(
             applied["capture_s"] < _LONGEST_CAPTURE_S,
@@ -75,20 +77,23 @@ def _large(device: Device, size_bytes: int) -> Iterator[Conversation]:
         yield stream
 
 
-def _sequence(capabilities: dict[str, Any], size_bytes: int) -> dict[str, Any]:
+def _sequence(device: Device, size_bytes: int) -> dict[str, Any]:
+    capabilities, fixed = device.camera["capabilities"], device.fixed_harmonics
     images = math.ceil(size_bytes / (2 * capabilities["width"] * capabilities["height"])) + 1
-    harmonics = min(capabilities["max_harmonics"], 8)
-    takes = math.ceil(images / (4 * harmonics))
+    harmonics = fixed or min(capabilities["max_harmonics"], 8)
+    phases = len(capabilities["sampling"]["phases_rad"]) if fixed else 4
+    takes = math.ceil(images / (phases * harmonics))
     skip_unless(
         takes <= capabilities["max_takes"],
         f"this camera makes no frame of {size_bytes // MIB} MiB",
     )
+    half_hz = capabilities["max_frequency_hz"] / harmonics / 2.0
     return {
         "harmonics": harmonics,
         "takes": takes,
         "zeroth": "estimated",
         "exposure_s": capabilities["min_exposure_s"],
-        "base_frequency_hz": capabilities["max_frequency_hz"] / harmonics / 2.0,
+        "base_frequency_hz": capabilities["min_frequency_hz"] if fixed else half_hz,
     }
 
 

@@ -17,7 +17,7 @@ _ATTEMPTS: Final = 3
 _MORE_THAN_BUFFERS_BYTES: Final = (24 * 1024 * 1024, 96 * 1024 * 1024)
 """Between a daemon and its client; a proxy on the way has buffers of its own."""
 _SMALL_BYTES: Final = 400 * 1024
-_LARGE: Final = ("raw", "coefficients", "moments", "brightness", "direct", "indirect", "range")
+_LARGE: Final = ("raw", "moments", "returns", "pointcloud", "direct", "indirect", "range")
 
 
 def drops_are_told(device: Device) -> None:

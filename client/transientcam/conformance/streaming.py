@@ -26,7 +26,7 @@ def a_handshake_without_the_subprotocol_is_refused(device: Device) -> None:
 
 def the_greeting_says_what_frames_look_like(device: Device) -> None:
     """Every channel of the hello has product, unit, axes, dtype and shape, and frames agree."""
-    products = ("range", "flags", "coefficients", "raw")
+    products = ("range", "flags", "moments", "raw")
     with device.capturing(), device.stream(*products) as stream:
         channels = {each.channel: each for each in stream.channels}
         equal([each.product for each in stream.channels], list(products), "the channels' products")
@@ -43,7 +43,7 @@ def the_greeting_says_what_frames_look_like(device: Device) -> None:
 
 def the_products_of_a_frame_come_together(device: Device) -> None:
     """The products of one frame are separate messages, in the order of the channels."""
-    products = ("flags", "range", "brightness")
+    products = ("flags", "range", "direct")
     with device.capturing(), device.stream(*products) as stream:
         frames = [stream.frame() for _ in range(2 * len(products))]
         equal([each.product for each in frames], [*products, *products], "the order of products")
@@ -113,8 +113,11 @@ def a_change_of_the_sequence_is_told(device: Device) -> None:
     """A changed sequence is announced to every stream, with the channels from then on."""
     with device.control(), device.capturing(), device.stream("moments") as stream:
         present = device.sequence
-        other = 2 if present["harmonics"] != 2 else 3
-        changed = device.accepted(present | {"harmonics": other, "zeroth": "estimated"})
+        other = device.fixed_harmonics or (2 if present["harmonics"] != 2 else 3)
+        changes = {"harmonics": other, "zeroth": "estimated"}
+        if device.fixed_harmonics:
+            changes = {"takes": present["takes"] + 1}
+        changed = device.accepted(present | changes)
         applied = device.document(device.send("PUT", f"{API}/sequence", json=changed))
         stream.notice("sequence-changed")
         equal(stream.channels[0].shape[0], other + 1, "the moments in the notice")

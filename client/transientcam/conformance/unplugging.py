@@ -24,7 +24,7 @@ def a_lost_camera_refuses_and_remembers(device: Device) -> None:
     """Changes are refused with camera-lost; frames captured before can still be read."""
     with _simulated(device) as stream, _unplugged(device):
         stream.notice("camera-lost")
-        body = {"harmonics": 2}
+        body = {"takes": 2}
         device.refusal(device.send("PUT", f"{API}/sequence", json=body), 503, "camera-lost")
         device.read(f"{API}/frames/latest")
 

@@ -108,7 +108,8 @@ def capture_calibration(
         raise SequenceError("takes", takes, "at least 2 for a calibration")
     before = camera.applied.sequence
     single = replace(before, takes=1, take_order="sequential")
-    in_the_dark = replace(single, harmonics=1, zeroth="on-off")
+    fewest = len(single.sampling.multiples) or 1
+    in_the_dark = replace(single, harmonics=fewest, zeroth="on-off")
     with_dark = "on-off" in camera.capabilities.zeroths
     sweep = PhaseSweep.beside(takes) if camera.capabilities.phase_offsets else None
     before_sweep = takes * (1 + with_dark)

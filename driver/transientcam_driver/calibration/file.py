@@ -65,6 +65,7 @@ class CalibrationSubject:
             ("height", capabilities.height, self.height),
             ("base_frequency_hz", sequence.base_frequency_hz, measured.base_frequency_hz),
             ("harmonics", sequence.harmonics, measured.harmonics),
+            ("sampling", sequence.sampling.to_document(), measured.sampling.to_document()),
             ("zeroth", sequence.zeroth, measured.zeroth),
             ("exposure_s", sequence.exposure_s, measured.exposure_s),
             ("sub_phases.scheme", sequence.sub_phases.scheme, measured.sub_phases.scheme),

@@ -1,15 +1,16 @@
 """The plug-in ``tofcam660``: an ESPROS TOFcam660 on the network, or its emulation."""
 
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
 from typing import Any, Final, get_args
 
 from transientcam_driver.camera import Camera
 from transientcam_driver.clock import Clock
 from transientcam_driver.entries.sim import SCENE_OPTIONS, SimulatedScene
-from transientcam_driver.errors import CameraError, SpecError
+from transientcam_driver.errors import CameraError, SequenceError, SpecError
 from transientcam_driver.plugin import CameraName, CameraPlugin, FoundCamera
+from transientcam_driver.sampling import MAX_HARMONICS, Sampling
 from transientcam_driver.simulation.tofcam660 import build_tofcam660
 from transientcam_driver.tofcam660 import FULL, DeviceOptions, Region, Tofcam660
 from transientcam_driver.tofcam660.control import ControlConnection
@@ -30,6 +31,7 @@ _EMULATED_ANSWER_S: Final = 60.0
 _OPTIONS: Final = {
     "data": "tcp or udp: what images travel over; auto is tcp where the firmware has it",
     "region": "LEFT,TOP,RIGHT,BOTTOM: the part of the sensor that is read; TOP is 240 - BOTTOM",
+    "multiples": "J,J,...: which multiples of the base frequency are measured, 1 to m without it",
     "settle_s": f"time for each change of the frequency, {SETTLE_S:g} s without it",
     "answer_s": "longest time for an answer",
     "image_s": "longest time for an image",
@@ -50,6 +52,7 @@ def device_options(name: CameraName) -> DeviceOptions:
     return DeviceOptions(
         data_over=data_over,
         region=_region(name),
+        multiples=_multiples(name),
         settle_s=name.number("settle_s", SETTLE_S, least=0.0, most=10.0),
         answer_s=name.number(
             "answer_s", _EMULATED_ANSWER_S if emulated else 1.0, least=0.01, most=600.0
@@ -69,6 +72,18 @@ def _region(name: CameraName) -> Region:
             return region
     limit = "LEFT,TOP,RIGHT,BOTTOM within 320 x 240 pixels, with TOP = 240 - BOTTOM"
     raise name.refused("region", limit)
+
+
+def _multiples(name: CameraName) -> tuple[int, ...]:
+    text = name.options.get("multiples")
+    if text is None:
+        return ()
+    parts = text.split(",")
+    if all(each.isascii() and each.isdigit() and len(each) < 4 for each in parts):
+        with suppress(SequenceError):
+            return Sampling(tuple(map(int, parts))).multiples
+    limit = f"integers from 1 to {MAX_HARMONICS}, ascending, without a common factor: 2,3"
+    raise name.refused("multiples", limit)
 
 
 def simulated_scene(name: CameraName) -> SimulatedScene:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from transientcam_driver.capabilities import AppliedSequence, Capabilities
 from transientcam_driver.errors import CameraError, DeviceRefused, ProtocolError
-from transientcam_driver.sequence import MAX_HARMONICS, SPEED_OF_LIGHT_M_S, ImageLabel
+from transientcam_driver.sampling import MAX_HARMONICS, Sampling
+from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S, ImageLabel
 from transientcam_driver.tofcam660.control import ControlConnection
 from transientcam_driver.tofcam660.image import dcs_images, image_bytes
 from transientcam_driver.tofcam660.images import ImageConnection, TcpImages, UdpImages
@@ -64,6 +65,8 @@ class DeviceOptions:
         Time for each change of the frequency.
     answer_s, image_s
         Time for an answer, and for an image.
+    multiples
+        Which multiples of the base frequency are measured; 1 to m where it is empty.
     control_port, data_port, udp_port
         Of the camera for commands and images over TCP; and of this machine, for those over UDP.
     """
@@ -73,6 +76,7 @@ class DeviceOptions:
     settle_s: float = SETTLE_S
     answer_s: float = 1.0
     image_s: float = 1.0
+    multiples: tuple[int, ...] = ()
     control_port: int = CONTROL_PORT
     data_port: int = DATA_PORT
     udp_port: int = DATA_PORT
@@ -278,7 +282,8 @@ class Tofcam660:
             min_frequency_hz=MIN_FREQUENCY_HZ,
             max_frequency_hz=MAX_FREQUENCY_HZ,
             low_frequency_hz=MIN_FREQUENCY_HZ,
-            max_harmonics=MAX_HARMONICS,
+            max_harmonics=len(self._options.multiples) or MAX_HARMONICS,
+            sampling=Sampling(self._options.multiples),
             min_exposure_s=1e-6,
             max_exposure_s=_LONGEST_US / 1e6,
             exposure_step_s=1e-6,

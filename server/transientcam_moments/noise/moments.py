@@ -1,7 +1,7 @@
 """From a sensor to the covariance of calibrated moments."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -20,6 +20,7 @@ from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.four_bucket import ZEROTH_IMAGES
 from transientcam_moments.noise.sensor import Sensor
+from transientcam_moments.phase_steps import FOUR_PHASES_RAD, phase_noise
 from transientcam_moments.smoothing import SIGMA_PX, gaussian_taps, smooth
 
 
@@ -65,6 +66,7 @@ def moment_noise(
     zeroth: str,
     takes: int = 1,
     ambient: Array | float = 0.0,
+    phases_rad: Sequence[float] = FOUR_PHASES_RAD,
 ) -> MomentNoise:
     """Return the noise of the calibrated moments of a capture.
 
@@ -83,6 +85,8 @@ def moment_noise(
         Captures that are averaged.
     ambient : array, shape (...), or float
         Light that is not modulated, in DN an image.
+    phases_rad : sequence of float
+        Of the images of each frequency.
 
     Returns
     -------
@@ -102,7 +106,8 @@ def moment_noise(
     imaginary part of the four-bucket phasor have the same variance and no correlation, and it is
     the same for all frequencies. Divided by G it grows by 1 / |G|^2. The modulus that stands for
     b_0 at the low frequency varies like one component; 2 (on - off) is twice a difference of an
-    image with b_0 / 2 and one without.
+    image with b_0 / 2 and one without. At other phases than the four the same holds of the mean
+    of both parts and over all phases of the signal.
     """
     chosen("zeroth", zeroth, tuple(ZEROTH_IMAGES))
     if takes < 1:
@@ -117,7 +122,8 @@ def moment_noise(
     if gain.ndim == 1:
         size = size.reshape((-1,) + (1,) * light.ndim)
     # signal(theta) + signal(theta + 180 degrees) = b_0 + 2 ambient
-    phasor = 2 * sensor.image_variance((light + 2 * ambient) / 2) + xp.zeros_like(light)
+    mean = sensor.image_variance((light + 2 * ambient) / 2)
+    phasor = phase_noise(phases_rad) * mean + xp.zeros_like(light)
     planes = [phasor / size[j] for j in range(gain.shape[0])]
     if zeroth == "on-off":
         on, off = sensor.image_variance(light / 2 + ambient), sensor.image_variance(ambient)

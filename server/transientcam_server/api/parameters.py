@@ -5,6 +5,7 @@ of frequencies, it is the limit while those stay as they are.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, Literal
 
@@ -13,6 +14,8 @@ from pydantic import BaseModel
 from transientcam_driver import Capabilities, Sequence, SequenceError
 from transientcam_server.api.documents.camera import AcquisitionRequest
 from transientcam_server.api.documents.sequence import SequenceDocument, SubPhasesDocument
+from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging.recipe import require_estimator
 from transientcam_server.settings import (
     HistorySettings,
     ReconstructionSettings,
@@ -84,7 +87,8 @@ def of_sequence(
         for m in range(1, capabilities.max_harmonics + 1)
         if m == sequence.harmonics or accepts(lambda: replace(sequence, harmonics=m))  # noqa: B023 - called now
     )
-    word = capabilities.tuning_word(capabilities.max_frequency_hz) // sequence.harmonics
+    least_harmonics = len(capabilities.sampling.multiples) or least_harmonics
+    word = capabilities.tuning_word(capabilities.max_frequency_hz) // sequence.multiples[-1]
     ranges: dict[str, tuple[float, float]] = {
         "base_frequency_hz": (capabilities.min_frequency_hz, capabilities.frequency_hz(word)),
         "harmonics": (least_harmonics, most_harmonics),
@@ -112,7 +116,7 @@ def of_sequence(
         ),
     }
     described = {
-        **_described(SequenceDocument, leave_out=("sub_phases",)),
+        **_described(SequenceDocument, leave_out=("sub_phases", "sampling")),
         **{f"sub_phases.{key}": each for key, each in _described(SubPhasesDocument).items()},
     }
     document = sequence.to_document()
@@ -134,21 +138,27 @@ def of_sequence(
         )
 
 
-def of_reconstruction(settings: ReconstructionSettings, *, harmonics: int) -> Iterator[Parameter]:
-    """Describe the settings of the reconstruction, while there are so many harmonics."""
+def of_reconstruction(settings: ReconstructionSettings, sequence: Sequence) -> Iterator[Parameter]:
+    """Describe the settings of the reconstruction, for the frequencies of a sequence."""
     described = _of_model(
         "reconstruction", "/api/v1/reconstruction", ReconstructionSettings, settings.model_dump()
     )
     for each in described:
         if each.name == "reconstruction.estimator" and each.allowed is not None:
-            allowed = tuple(
-                estimator
-                for estimator in each.allowed
-                if settings.model_copy(update={"estimator": estimator}).least_harmonics <= harmonics
-            )
-            yield replace(each, allowed=allowed)
+            yield replace(each, allowed=tuple(_estimators(settings, each.allowed, sequence)))
         else:
             yield each
+
+
+def _estimators(
+    settings: ReconstructionSettings, names: Iterable[object], sequence: Sequence
+) -> Iterator[object]:
+    """Yield the estimators that go with a sequence."""
+    for name in names:
+        with suppress(Problem):
+            changed = settings.model_copy(update={"estimator": name})
+            require_estimator(changed, sequence, field="estimator")
+            yield name
 
 
 def of_acquisition(*, running: bool) -> Iterator[Parameter]:

@@ -184,15 +184,15 @@ def _reconstruct_recording(
 ) -> None:
     """Reconstruct every frame of a recording, continuing an interrupted run."""
     from transientcam_server.offline import BatchOptions, reconstruct_recording
-    from transientcam_server.offline.recording import DEFAULT_PRODUCTS, KNOWN_PRODUCTS
+    from transientcam_server.offline.recording import KNOWN_PRODUCTS, default_products
     from transientcam_server.recording import Recording
 
-    names = tuple(dict.fromkeys(products or DEFAULT_PRODUCTS))
-    for name in names:
+    for name in products or ():
         if name not in KNOWN_PRODUCTS:
             known = ", ".join(KNOWN_PRODUCTS)
             raise typer.BadParameter(f"{name!r} is none of {known}", param_hint="--product")
     with Recording(recording) as opened, progress_bar("reconstructing") as advance:
+        names = tuple(dict.fromkeys(products or default_products(opened.header.applied)))
         settings = _settings({**opened.header.reconstruction, **changes})
         options = BatchOptions(names, settings, bins)
         before = reconstruct_recording(opened, output, options, progress=advance)

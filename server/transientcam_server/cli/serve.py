@@ -93,7 +93,7 @@ def serve(
         with open_camera(settings.camera) as opened:
             start_with(opened, settings.sequence)
             # NumPy serves until the compiled kernels are ready
-            first = opened.applied.sequence.harmonics
+            first = opened.applied.sequence.multiples[-1]
             orders = tuple(dict.fromkeys((first, 3, 4, 8)))
             compiling = tm.kernels.compile_in_background(orders)
             leave(compiling)

@@ -66,14 +66,17 @@ def load_calibration(path: Path) -> Calibration:
 
 def evaluate(capture: CalibrationCapture) -> Calibration:
     """Compute gains and bad pixels from the images of a measurement (Sec. 4.2)."""
-    zeroth = capture.sequence.zeroth
+    zeroth, phases_rad = capture.sequence.zeroth, capture.sequence.sampling.phases_rad
     nominal = nominal_gains(capture.sequence)
     bad = tm.find_bad_pixels(
         dark=capture.dark,
         dark_deviation=capture.dark_deviation,
-        brightness=_brightness(tm.measure(capture.images, zeroth=zeroth), nominal),
+        brightness=_brightness(
+            tm.measure(capture.images, zeroth=zeroth, phases_rad=phases_rad), nominal
+        ),
     )
-    measured = tm.measure(tm.fill_bad_pixels(capture.images, bad), zeroth=zeroth)
+    filled = tm.fill_bad_pixels(capture.images, bad)
+    measured = tm.measure(filled, zeroth=zeroth, phases_rad=phases_rad)
     measured[0] = _brightness(measured, nominal)
     # a brightness stays in digital numbers, as with nominal gains
     gains = tm.calibration_of(measured) * np.complex64(nominal[0])
@@ -88,7 +91,8 @@ def calibration_id(gains: Gains | None) -> str:
 def nominal_gains(sequence: Sequence, *, delay_s: float = 0.0) -> _Array:
     """Return the gains (m + 1,) that sub-phases and a delay give an ideal modulation.
 
-    ``delay_s`` is what the light takes inside of the camera: a phase of 2 pi j f delay_s. The
+    ``delay_s`` is what the light takes inside of the camera: a phase of 2 pi j f delay_s at the
+    multiple j. The
     zeroth moment, a modulus or a difference, has none.
     """
     gains: _Array = tm.nominal_calibration(
@@ -97,7 +101,7 @@ def nominal_gains(sequence: Sequence, *, delay_s: float = 0.0) -> _Array:
         sequence.sub_phases.weights,
         zeroth=sequence.zeroth,
     )
-    turns = sequence.base_frequency_hz * delay_s * np.arange(sequence.harmonics + 1)
+    turns = sequence.base_frequency_hz * delay_s * np.array((0, *sequence.multiples))
     return gains * np.exp(2j * np.pi * turns) if delay_s else gains
 
 

@@ -61,7 +61,7 @@ def moment_columns(
     nominal = {"long_name": "nominal gain: what sub-phases and delay give an ideal modulation"}
     measured = {"long_name": "measured gain"}
     columns = {
-        "moment": Column(("moment",), np.arange(sequence.harmonics + 1, dtype=np.int32)),
+        "moment": Column(("moment",), np.array((0, *sequence.multiples), dtype=np.int32)),
         "weight": Column(
             ("moment", "image"),
             how.weight,

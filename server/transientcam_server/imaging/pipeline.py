@@ -19,6 +19,7 @@ from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.lens import Intrinsics
 from transientcam_server.imaging.products import PRODUCTS, Product
 from transientcam_server.imaging.recipe import Recipe, SettingsVersion
+from transientcam_server.imaging.requirements import unmet
 from transientcam_server.imaging.workers import Workers
 from transientcam_server.settings import ReconstructionSettings
 
@@ -88,12 +89,12 @@ class Pipeline:
             return "only a simulated camera knows the true range"
         if product.of_noise and self._sensor is None:
             return "the noise of this camera's sensor is not known"
-        return None
+        return unmet(product, self._capabilities.sampling, self._capabilities.zeroths)
 
     def frame(self, raw: RawFrame, applied: AppliedSequence) -> Frame:
         """Return the next frame, counted from 1."""
         self._frames += 1
-        version = self.reconstruction.for_live_frames(applied.sequence.harmonics)
+        version = self.reconstruction.for_live_frames(applied.sequence)
         recipe = Recipe(
             applied,
             version.settings,

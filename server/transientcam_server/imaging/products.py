@@ -1,8 +1,8 @@
 """The registry of products: what clients can ask of a frame, and how each follows from it.
 
-A product names the one input it is computed from: ``raw`` images, the simulated ``truth``, or a
-stage of the reconstruction (`transientcam_server.imaging.stages`). The functions here are pure,
-so any worker may run them.
+A product names the one input it is computed from: ``raw`` images, the simulated ``truth``, the
+``accuracy`` of the range, or a stage of the reconstruction (`transientcam_server.imaging.stages`).
+The functions here are pure, so any worker may run them.
 """
 
 from collections.abc import Callable
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam import wire
 from transientcam_driver import AppliedSequence, RawFrame, Truth
+from transientcam_server.imaging.accuracy import RangeAccuracy
 from transientcam_server.imaging.labelling import image_columns, in_words, moment_columns
 from transientcam_server.imaging.noise import moment_noise
 from transientcam_server.imaging.recipe import Recipe
@@ -47,7 +48,7 @@ class Product:
     description
         Name, unit and axes, as the wire contract has them.
     needs
-        Its input: ``raw``, ``truth`` or the name of a stage.
+        Its input: ``raw``, ``truth``, ``accuracy`` or the name of a stage.
     compute
         Called as ``compute(recipe, input, view)``, on a worker. A product over time is computed
         for the crop of the view alone, any other one whole.
@@ -55,6 +56,10 @@ class Product:
         Whether it is evaluated at times of flight that the request names.
     of_row
         Whether it is one row of the picture, which the request may name.
+    of_toeplitz
+        Whether it needs the moments of consecutive multiples of one frequency, 0 to m.
+    of_brightness
+        Whether it needs b_0, which is measured, or else estimated from such moments.
     reads
         Attributes of its input that a product over time is computed from; it may be computed for
         long, and the rest of the frame need not stay for that.
@@ -75,6 +80,8 @@ class Product:
     over_time: bool = False
     of_row: bool = False
     of_noise: bool = False
+    of_toeplitz: bool = False
+    of_brightness: bool = False
     reads: tuple[str, ...] = ()
     steps: Steps | None = None
     fields: Callable[[Recipe, RawFrame, View], dict[str, Any]] = _no_fields
@@ -203,6 +210,16 @@ def _property(name: str) -> Callable[[Recipe, tm.Reconstruction, View], _Array]:
     return read
 
 
+def _error(name: str) -> Callable[[Recipe, RangeAccuracy, View], _Array]:
+    """Return a computation that reads one of the errors of the range."""
+
+    def read(recipe: Recipe, accuracy: RangeAccuracy, view: View) -> _Array:
+        array: _Array = getattr(accuracy, name)
+        return array
+
+    return read
+
+
 def _images(recipe: Recipe, raw: RawFrame, view: View) -> _Array:
     return raw.images
 
@@ -213,6 +230,13 @@ def _true_range(recipe: Recipe, truth: Truth, view: View) -> _Array:
 
 def _labels(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
     return {"labels": [asdict(label) | {"kind": label.kind} for label in raw.labels]}
+
+
+def _frequencies(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
+    """Return which multiple of the base frequency each plane is of, and that frequency."""
+    multiples = (0, *recipe.applied.sequence.multiples)
+    f_hz = recipe.base_frequency_hz
+    return {"multiples": list(multiples), "frequencies_hz": [j * f_hz for j in multiples]}
 
 
 def _evaluation(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
@@ -248,15 +272,29 @@ PRODUCTS: Final[dict[str, Product]] = {
         Product(_WIRE["range"], "returns", _property("range_m"), steps=_MILLIMETRES),
         Product(_WIRE["direct"], "returns", _property("direct")),
         Product(_WIRE["indirect"], "returns", _property("indirect")),
-        Product(_WIRE["uniform"], "returns", _property("uniform")),
-        Product(_WIRE["brightness"], "light", _property("brightness")),
-        Product(_WIRE["validity"], "light", _property("validity"), steps=Steps(1e4, "1e-4")),
+        Product(_WIRE["uniform"], "returns", _property("uniform"), of_brightness=True),
+        Product(_WIRE["brightness"], "light", _property("brightness"), of_brightness=True),
         Product(
-            _WIRE["range_std"],
-            "likelihood",
-            _property("range_std_m"),
-            of_noise=True,
-            steps=_MILLIMETRES,
+            _WIRE["validity"],
+            "light",
+            _property("validity"),
+            of_toeplitz=True,
+            steps=Steps(1e4, "1e-4"),
+        ),
+        *(
+            Product(
+                _WIRE[name],
+                "accuracy",
+                _error(part),
+                of_noise=True,
+                of_toeplitz=True,
+                steps=_MILLIMETRES,
+            )
+            for name, part in (
+                ("range_std", "std_m"),
+                ("range_bias", "bias_m"),
+                ("range_error", "error_m"),
+            )
         ),
         Product(
             _WIRE["reduced_chi_square"],
@@ -266,26 +304,40 @@ PRODUCTS: Final[dict[str, Product]] = {
             steps=Steps(1e2, "1e-2"),
         ),
         Product(_WIRE["flags"], "light", _property("flags")),
-        Product(_WIRE["coefficients"], "coefficients", _coefficient_planes),
-        Product(_WIRE["moments"], "moments", _property("moments")),
+        Product(_WIRE["coefficients"], "coefficients", _coefficient_planes, of_toeplitz=True),
+        Product(_WIRE["moments"], "moments", _property("moments"), fields=_frequencies),
         Product(_WIRE["raw"], "raw", _images, fields=_labels, archive=_evaluation),
-        Product(_WIRE["transient"], "coefficients", _transient, over_time=True, reads=_POLYNOMIAL),
+        Product(
+            _WIRE["transient"],
+            "coefficients",
+            _transient,
+            over_time=True,
+            of_toeplitz=True,
+            reads=_POLYNOMIAL,
+        ),
         Product(
             _WIRE["density_std"],
             "moments",
             _density_std,
             over_time=True,
             of_noise=True,
+            of_toeplitz=True,
             reads=("smoothed",),
         ),
         Product(
-            _WIRE["cumulative"], "coefficients", _cumulative, over_time=True, reads=_POLYNOMIAL
+            _WIRE["cumulative"],
+            "coefficients",
+            _cumulative,
+            over_time=True,
+            of_toeplitz=True,
+            reads=_POLYNOMIAL,
         ),
         Product(
             _WIRE["streak"],
             "coefficients",
             _streak,
             over_time=True,
+            of_toeplitz=True,
             reads=_POLYNOMIAL,
             of_row=True,
             steps=Steps(1e-7, "1e7 DN/s"),
@@ -296,6 +348,7 @@ PRODUCTS: Final[dict[str, Product]] = {
             "moments",
             _bounds,
             over_time=True,
+            of_toeplitz=True,
             reads=("moments",),
             fields=_radius,
         ),

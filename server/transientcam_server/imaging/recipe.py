@@ -1,5 +1,6 @@
 """How images become moments and moments become returns."""
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -9,13 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_driver import AppliedSequence, RawFrame
+from transientcam_driver import AppliedSequence, RawFrame, Sampling, Sequence
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import Gains, nominal_gains
 from transientcam_server.imaging.lens import ASSUMED_FIELD_OF_VIEW_DEG, Intrinsics
 from transientcam_server.settings import ReconstructionSettings
 
+_log = logging.getLogger(__name__)
+OF_ANY_MULTIPLES: Final = "likelihood"
+"""The estimator that does without consecutive multiples of one frequency."""
 _UNTIL_COMPILED: Final = "pisarenko"
 """In NumPy as in compiled lanes fast enough for a camera of 163 x 120 pixels."""
 
@@ -34,16 +38,16 @@ class SettingsVersion:
     settings: ReconstructionSettings
 
     def for_live_frames(
-        self, harmonics: int, *, ready: Callable[[str, int], bool] = tm.kernels.ready
+        self, sequence: Sequence, *, ready: Callable[[str, int], bool] = tm.kernels.ready
     ) -> "SettingsVersion":
         """Return these settings with an estimator that keeps up with a camera now.
 
         ``automatic`` is the likelihood where ``ready`` says that its kernel of this order is
-        compiled, and Pisarenko's returns elsewhere.
+        compiled, and Pisarenko's returns elsewhere, if the multiples are consecutive.
         """
-        if self.settings.estimator != "automatic":
+        if self.settings.estimator != "automatic" or not sequence.sampling.consecutive:
             return self
-        now = "likelihood" if ready("likelihood", harmonics) else _UNTIL_COMPILED
+        now = "likelihood" if ready("likelihood", sequence.harmonics) else _UNTIL_COMPILED
         return replace(self, settings=self.settings.model_copy(update={"estimator": now}))
 
     def followed_by(self, settings: ReconstructionSettings) -> "SettingsVersion":
@@ -55,8 +59,8 @@ class SettingsVersion:
         return self.settings.model_dump() | {"reconstruction_id": self.id}
 
 
-def require_harmonics(settings: ReconstructionSettings, harmonics: int, *, field: str) -> None:
-    """Refuse an estimator and a number of harmonics that do not go together.
+def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, field: str) -> None:
+    """Refuse an estimator and a sequence that do not go together.
 
     Parameters
     ----------
@@ -68,7 +72,16 @@ def require_harmonics(settings: ReconstructionSettings, harmonics: int, *, field
     Problem
         ``estimator-misfit``.
     """
-    least = settings.least_harmonics
+    if not sequence.sampling.consecutive and settings.technique != OF_ANY_MULTIPLES:
+        raise Problem(
+            kinds.ESTIMATOR_MISFIT,
+            f"The estimator {settings.estimator} needs consecutive multiples of one frequency, and "
+            f"this camera measures the multiples {listed(sequence.multiples)}.",
+            field="estimator",
+            value=settings.estimator,
+            limit=OF_ANY_MULTIPLES,
+        )
+    least, harmonics = settings.least_harmonics, sequence.harmonics
     if harmonics >= least:
         return
     raise Problem(
@@ -80,6 +93,25 @@ def require_harmonics(settings: ReconstructionSettings, harmonics: int, *, field
         if field == "harmonics"
         else f"one that does with {harmonics} harmonics",
     )
+
+
+def suited(settings: ReconstructionSettings, sampling: Sampling) -> ReconstructionSettings:
+    """Return settings with an estimator that goes with the frequencies of a camera."""
+    if sampling.consecutive or settings.technique == OF_ANY_MULTIPLES:
+        return settings
+    _log.warning(
+        "the camera measures the multiples %s, which %s cannot serve: the estimator is %s",
+        listed(sampling.multiples),
+        settings.estimator,
+        OF_ANY_MULTIPLES,
+    )
+    return settings.model_copy(update={"estimator": OF_ANY_MULTIPLES})
+
+
+def listed(multiples: tuple[int, ...]) -> str:
+    """Return multiples in words: "2, 10 and 15"."""
+    *first, last = map(str, multiples)
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 @dataclass(frozen=True)
@@ -153,6 +185,8 @@ class Recipe:
             base_frequency_hz=sequence.base_frequency_hz,
             zeroth=sequence.zeroth,
             takes=sequence.takes,
+            multiples=sequence.multiples,
+            phases_rad=sequence.sampling.phases_rad,
             full_scale=self.full_scale,
             sensor=self.sensor,
         )

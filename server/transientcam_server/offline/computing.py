@@ -15,6 +15,7 @@ from transientcam_driver import RawFrame
 from transientcam_server.imaging.meta import frame_meta
 from transientcam_server.imaging.products import PRODUCTS, Product
 from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.imaging.requirements import unmet
 from transientcam_server.imaging.stages import FIRST, Computed, compute
 from transientcam_server.imaging.view import DEFAULT_BINS, Crop, View, evenly
 
@@ -102,13 +103,17 @@ class ComputedFrame:
         Raises
         ------
         ParameterError
-            If there is no such product, or it has no times or rows.
+            If there is no such product, or not of these frequencies, or it has no times or rows.
         Problem
             If region or decimation do not fit the frame.
         MomentsError
             If the estimator of the settings cannot work with this sequence.
         """
         product = known_product(name)
+        sequence = self.recipe.applied.sequence
+        reason = unmet(product, sequence.sampling, {sequence.zeroth})
+        if reason is not None:
+            raise ParameterError("name", name, f"another product: {reason}")
         view = self._view(product, time_s, bins, y, region, decimation)
         given = self.raw_frame if product.needs == "raw" else self._found(product.needs)
         array = product.compute(self.recipe, given, view)

@@ -12,11 +12,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver import RawFrame
+from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_server.errors.exceptions import InputError
 from transientcam_server.imaging.labelling import Column
 from transientcam_server.imaging.products import PRODUCTS, Product
 from transientcam_server.imaging.recipe import SettingsVersion
+from transientcam_server.imaging.requirements import unmet
 from transientcam_server.offline.computing import KNOWN, ComputedFrame
 from transientcam_server.offline.formats import SINKS, Block, Content, Row, sink_of, write
 from transientcam_server.recording import swmr
@@ -31,6 +32,12 @@ HDF5_SUFFIXES: Final = (".h5", ".hdf5")
 _DESCRIBED: Final = ("units", "long_name")
 _SERIES: Final = ("device_time_s", "host_time_s", "frame")
 Progress = Callable[[int, int], None]
+
+
+def default_products(applied: AppliedSequence) -> tuple[str, ...]:
+    """Return those of `DEFAULT_PRODUCTS` that frames of a sequence have."""
+    given = applied.sequence.sampling, {applied.sequence.zeroth}
+    return tuple(name for name in DEFAULT_PRODUCTS if unmet(PRODUCTS[name], *given) is None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -62,6 +62,27 @@ class Family:
         )
 
 
+def require_plannable(capabilities: Capabilities) -> None:
+    """Refuse a camera whose captures are not predicted.
+
+    Raises
+    ------
+    Problem
+        ``target-unreachable``, for other multiples than 1 to m or another number of phases than 4.
+    """
+    sampling = capabilities.sampling
+    if sampling.consecutive and len(sampling.phases_rad) == 4:
+        return
+    raise Problem(
+        kinds.TARGET_UNREACHABLE,
+        "Plans are made for consecutive multiples of one frequency at four phases alone, and this "
+        "camera has a sampling of its own.",
+        field="sampling",
+        value=sampling.to_document(),
+        best=None,
+    )
+
+
 def families(goal: Goal, predictor: Predictor, capabilities: Capabilities) -> list[Family]:
     """Return what the camera can run that saturates nothing and is not ambiguous.
 
@@ -70,6 +91,7 @@ def families(goal: Goal, predictor: Predictor, capabilities: Capabilities) -> li
     Problem
         ``target-unreachable`` where there is nothing, with the reason.
     """
+    require_plannable(capabilities)
     longest_s = min(predictor.longest_exposure_s() * FILLED, capabilities.max_exposure_s)
     exposures_s = _exposures(goal, capabilities, longest_s)
     if not exposures_s:

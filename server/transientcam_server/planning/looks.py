@@ -55,6 +55,7 @@ class Looks:
         Problem
             ``target-unreachable`` where the scene has no light, or too much.
         """
+        self._planner.require_possible()
         async with self._looking:
             kept = self._kept
             if kept is None or kept[:2] != (base, ambient_dn_per_s) or self._clock() > kept[2]:
@@ -70,6 +71,7 @@ class Looks:
         Problem
             ``target-unreachable`` where the frame shows no light.
         """
+        self._planner.require_possible()
         found = await frame.reconstruction("moments")
         scene, _ = await self._workers.run_long(
             look_of_frame, frame.recipe, found, frame.raw, ambient_dn_per_s

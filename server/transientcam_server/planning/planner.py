@@ -11,7 +11,7 @@ import transientcam_moments as tm
 from transientcam_driver import Capabilities, Sequence, Truth
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.planning.families import Family, families
+from transientcam_server.planning.families import Family, families, require_plannable
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.look import LookedThrough, look_at
 from transientcam_server.planning.plan import Plan, in_a_sentence, plan
@@ -70,6 +70,10 @@ class Planner:
             ambient_dn_per_s=ambient_dn_per_s,
             go_on=checked,
         )
+
+    def require_possible(self) -> None:
+        """Refuse a camera whose captures are not predicted (Problem ``target-unreachable``)."""
+        require_plannable(self._capabilities)
 
     def plan(
         self, goal: Goal, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None

@@ -74,7 +74,7 @@ class RecordedFrames:
         """
         number = len(await self.host_time_s()) if name == LATEST else int(name)
         reconstruction = self._reconstruction(settings).for_live_frames(
-            self._header.applied.sequence.harmonics
+            self._header.applied.sequence
         )
         key = number, reconstruction.id, reconstruction.settings.estimator
         task = self._frames.get(key)

@@ -17,7 +17,7 @@ from transientcam_driver.simulation.device.faults import Fault
 
 
 def main() -> None:
-    scene = without_noise(find_scene("mirrors"))
+    scene = without_noise(find_scene("wall"))
     device, _ = build(scene, width=163, height=120, seed=1, clock=RealClock())
     mount = UsbfsMount(device, Path(sys.argv[1]))
 

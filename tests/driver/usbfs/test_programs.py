@@ -25,6 +25,13 @@ def usb_camera() -> Iterator[EmulatedCamera]:
         yield camera
 
 
+@pytest.fixture(scope="module")
+def idle_camera() -> Iterator[EmulatedCamera]:
+    """One for all tests that only look at it."""
+    with emulated_camera() as camera:
+        yield camera
+
+
 @contextmanager
 def daemon(camera: EmulatedCamera) -> Iterator[tuple[str, "subprocess.Popen[str]"]]:
     """``transientcam serve --camera usb`` as a user would start it, without the compiler."""
@@ -96,13 +103,13 @@ def test_the_light_goes_off_when_the_program_dies(usb_camera: EmulatedCamera) ->
         time.sleep(0.05)
 
 
-def test_lsusb_reads_every_descriptor_without_complaint(usb_camera: EmulatedCamera) -> None:
+def test_lsusb_reads_every_descriptor_without_complaint(idle_camera: EmulatedCamera) -> None:
     lsusb = shutil.which("lsusb", path=os.environ.get("PATH", "") + ":/usr/sbin:/sbin")
     if lsusb is None:
         skip_or_fail("lsusb missing: apt install usbutils")
     listed = subprocess.run(
         [str(lsusb), "-v", "-d", "1209:0001"],
-        env=usb_camera.environment,
+        env=idle_camera.environment,
         capture_output=True,
         text=True,
         timeout=60,
@@ -138,10 +145,11 @@ def test_lsusb_reads_every_descriptor_without_complaint(usb_camera: EmulatedCame
         assert said in words, listed.stdout
 
 
-def test_devices_lists_the_camera_on_the_bus(usb_camera: EmulatedCamera) -> None:
+def test_devices_lists_the_camera_on_the_bus(idle_camera: EmulatedCamera) -> None:
+    program = "from transientcam.cli import main; main()"
     listed = subprocess.run(
-        [sys.executable, "-c", "from transientcam.cli import main; main()", "devices"],
-        env=usb_camera.environment | {"COLUMNS": "200"},
+        [sys.executable, "-c", program, "devices", "--no-network"],
+        env=idle_camera.environment | {"COLUMNS": "200"},
         capture_output=True,
         text=True,
         timeout=60,

@@ -5,19 +5,21 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.server.camera.plug_in import block, install
-from tests.serving import serving
+from tests.serving import Served, serving
 from transientcam import Camera
 from transientcam.cli import run as command
-from transientcam.conformance import Device, chosen
+from transientcam.conformance import Device, Report, chosen
 from transientcam.conformance import run as check
 from transientcam.errors import ProblemError
 from transientcam_driver import CameraNotFound, SpecError, open_camera
 from transientcam_driver.contract import CLAUSES, Bench, Clause, ContractSkipped
 
 DISTANCE_M = 2.5
+FAR_M = 12.5
 # the others record, replay, or wait for long; they do not depend on the camera
 GROUPS = ("parameters", "tags")
 
@@ -28,6 +30,11 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         patch.syspath_prepend(str(install(tmp_path_factory.mktemp("plug-in"))))
         yield
         sys.modules.pop("wall_camera", None)
+
+
+def check_groups(daemon: Served, *groups: str) -> Report:
+    with Device(daemon.url, timeout_s=20.0) as device:
+        return check(device, chosen(groups, quick=True))
 
 
 @pytest.fixture
@@ -86,12 +93,89 @@ def test_its_daemon_measures_the_distance_and_passes_the_checks(wall: Path) -> N
             with pytest.raises(ProblemError, match="only a simulated camera knows the true range"):
                 client.frame("truth")
             absent = {each["name"]: each["reason"] for each in client.info["absent_products"]}
-        with Device(daemon.url, timeout_s=20.0) as device:
-            report = check(device, chosen(GROUPS, quick=True))
+        report = check_groups(daemon, *GROUPS)
 
     assert frame.array == pytest.approx(DISTANCE_M, abs=2e-3)
     assert absent == {"truth": "only a simulated camera knows the true range"}
     assert not report.failed, [(each.check.name, each.reason) for each in report.failed]
+
+
+@pytest.fixture(scope="module")
+def fixed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    """A daemon with the camera of 16, 80 and 120 MHz, beyond the period of 16 MHz."""
+    directory = tmp_path_factory.mktemp("fixed")
+    (directory / "wall.txt").write_text(str(FAR_M))
+    kept = {"directory": directory, "min_free_bytes": 0}
+    with serving(f"wall:{directory / 'wall.txt'}?frequencies=fixed", recordings=kept) as daemon:
+        daemon.start_all_workers()
+        yield daemon
+
+
+def test_fixed_frequencies_measure_the_distance(fixed: Served) -> None:
+    with Camera(fixed.url, timeout_s=60.0) as client:
+        sequence, frame = client.sequence, client.frame("range")
+        moments = client.frame("moments")
+        report = check_groups(fixed, *GROUPS)
+
+    assert frame.array == pytest.approx(FAR_M, abs=2e-3)
+    assert sequence["images"] == 9
+    assert sequence["sampling"]["multiples"] == [2, 10, 15]
+    assert moments.frequencies_hz == (0, 16e6, 80e6, 120e6)
+    turns = np.angle(moments.array[1:]) / (2 * np.pi)
+    expected = np.array([16e6, 80e6, 120e6]) * 2 * FAR_M / 299_792_458.0
+    apart = (turns - expected[:, None, None] + 0.5) % 1 - 0.5
+    assert np.abs(apart).max() < 1e-3
+    assert not report.failed, [(each.check.name, each.reason) for each in report.failed]
+
+
+def test_what_they_cannot_give_is_absent_with_the_reason(fixed: Served) -> None:
+    with Camera(fixed.url, timeout_s=60.0) as client:
+        absent = {each["name"]: each["reason"] for each in client.info["absent_products"]}
+        with client.stream("validity") as frames, pytest.raises(ProblemError, match="2, 10 and 15"):
+            next(iter(frames))
+        with pytest.raises(ProblemError, match="multiples 2, 10 and 15"):
+            client.reconstruction = {"estimator": "pisarenko"}
+        estimator = client.reconstruction["estimator"]
+
+    with Device(fixed.url, timeout_s=20.0) as device:
+        refused = device.send("POST", "/api/v1/plan", json={"target": {"range_error_m": 0.01}})
+        problem = device.refusal(refused, 409, "target-unreachable")
+        pixel = device.send("GET", "/api/v1/frames/latest/pixel", params={"x": 1, "y": 1})
+        device.refusal(pixel, 409, "estimator-misfit")
+
+    assert problem["field"] == "sampling"
+    of_toeplitz = {"validity", "coefficients", "transient", "density_std", "cumulative", "streak"}
+    assert set(absent) == of_toeplitz | {"bounds", "brightness", "uniform", "truth"}
+    assert "needs consecutive multiples of one frequency" in absent["transient"]
+    assert "needs a zeroth moment" in absent["brightness"]
+    assert estimator == "likelihood"
+
+
+def test_their_recordings_are_reconstructed_and_replayed(
+    fixed: Served, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with Camera(fixed.url, timeout_s=60.0) as client:
+        client.frame("flags")  # there is a frame to begin with
+        recording = client.stop_recording(client.record(history_s=60.0)["id"])["id"]
+        path = f"/api/v1/recordings/{recording}/frames/1/range"
+        with Device(fixed.url, timeout_s=60.0) as device:
+            recorded = device.frame(path)
+            file = device.send("GET", f"/api/v1/recordings/{recording}/file").content
+    copy = fixed.settings.recordings.directory / "copy.h5"
+    copy.write_bytes(file)
+    with serving(f"recording:{copy}") as replay, Camera(replay.url, timeout_s=60.0) as client:
+        replayed = client.frame("range")
+    products = copy.with_name("products.npz")
+    again = ["reconstruct", str(copy), "-o", str(copy.with_name("again.npz"))]
+    assert command(["reconstruct", str(copy), "-o", str(products)]) == 0
+
+    with np.load(products) as computed:
+        assert computed["range"] == pytest.approx(FAR_M, abs=2e-3)
+        assert not {"validity", "brightness"} & set(computed)
+    assert command([*again, "--product", "validity"]) == 1
+    assert "2, 10 and 15" in capsys.readouterr().err
+    assert recorded.array == pytest.approx(FAR_M, abs=2e-3)
+    assert replayed.array == pytest.approx(FAR_M, abs=2e-3)
 
 
 def test_the_example_is_short() -> None:

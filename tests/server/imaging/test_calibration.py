@@ -21,10 +21,12 @@ from transientcam_driver import (
     Camera,
     ImageLabel,
     RawFrame,
+    Sampling,
     Sequence,
     capture_calibration,
     open_camera,
 )
+from transientcam_driver.simulation.device.prototype import prototype
 from transientcam_server.imaging.calibration import (
     NOMINAL_ID,
     Calibration,
@@ -41,6 +43,7 @@ _Array = NDArray[Any]
 SHAPE = (10, 12)
 DARK_DN = 64.0
 SEQUENCE = Sequence(harmonics=3, takes=1)
+PROTOTYPE = prototype(serial="SIM-ideal-0", width=SHAPE[1], height=SHAPE[0], bits=16)
 UNSMOOTHED = ReconstructionSettings(smoothing_px=0.0)
 
 
@@ -91,11 +94,12 @@ def capture_of(sensor: Sensor, sequence: Sequence) -> CalibrationCapture:
 def reconstruction(
     images: _Array, sequence: Sequence, calibration: Calibration | None
 ) -> tm.Reconstruction:
-    with open_camera("sim:mirrors") as camera:
-        applied = camera.validate(sequence)
     frame = RawFrame(0, 1, images, sequence.labels, 0.0, 0.0, 0.1, 30.0, 0)
     recipe = Recipe(
-        applied, UNSMOOTHED, 65535.0, None if calibration is None else calibration.gains
+        PROTOTYPE.apply(sequence),
+        UNSMOOTHED,
+        65535.0,
+        None if calibration is None else calibration.gains,
     )
     found: tm.Reconstruction = recipe.reconstruct(frame)
     return found
@@ -116,6 +120,26 @@ def test_a_pattern_of_gain_and_phase_is_removed(zeroth: Any) -> None:
     assert np.abs(found.range_m - expected_m).max() < 1e-3
     assert np.abs(nominal.range_m - expected_m).max() > 0.1
     assert calibration.gains.bad_pixels == 0
+
+
+def test_so_it_is_at_three_phases_of_any_multiples(tmp_path: Path) -> None:
+    sampling = Sampling((2, 5, 7), (0.0, 2 * np.pi / 3, 4 * np.pi / 3))
+    sensor, sequence = Sensor(), replace(SEQUENCE, base_frequency_hz=8e6, sampling=sampling)
+    capture_of(sensor, sequence).save(tmp_path / "calibration.npz")
+    calibration = load_calibration(tmp_path / "calibration.npz")
+    b0 = np.linspace(300, 900, 120).reshape(SHAPE)
+    delay_s = np.linspace(2e-9, 100e-9, 120).reshape(SHAPE)
+    applied = replace(PROTOTYPE, sampling=sampling).apply(sequence)
+    images = sensor.images(sequence, b0, delay_s)
+    frame = RawFrame(0, 1, images, sequence.labels, 0.0, 0.0, 0.1, 30.0, 0)
+    settings = UNSMOOTHED.model_copy(update={"estimator": "likelihood"})
+
+    found = Recipe(applied, settings, 65535.0, calibration.gains).reconstruct(frame)
+
+    assert calibration.capture.sequence == sequence
+    assert np.abs(found.range_m - tm.SPEED_OF_LIGHT_M_S * delay_s / 2).max() < 1e-3
+    misfit = calibration.capture.misfit(PROTOTYPE.apply(SEQUENCE), PROTOTYPE)
+    assert misfit is not None
 
 
 @pytest.mark.parametrize("zeroth", ["low-frequency", "on-off"])
@@ -252,7 +276,7 @@ def test_without_outliers_none_is_left_out() -> None:
 def test_both_orders_of_takes_give_the_same_moments() -> None:
     found = []
     for take_order in ("sequential", "interleaved"):
-        with open_camera("sim:mirrors?noise=off") as camera:
+        with open_camera("sim:wall?noise=off") as camera:
             document = {"takes": 3, "take_order": take_order, "exposure_s": 0.5e-3}
             camera.configure(Sequence.from_document(document))
             camera.start()
@@ -295,7 +319,7 @@ def test_the_calibration_of_another_camera_is_refused_at_once(calibrated: Path) 
 
 
 def test_frames_without_a_calibration_say_nominal() -> None:
-    with serving() as daemon, httpx.Client(base_url=daemon.url, timeout=60) as http:
+    with serving("sim:wall") as daemon, httpx.Client(base_url=daemon.url, timeout=60) as http:
         meta = http.get("/api/v1/frames/latest", params={"wait_s": 10}).json()
 
     assert meta["calibration_id"] == NOMINAL_ID

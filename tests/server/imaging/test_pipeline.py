@@ -14,7 +14,7 @@ import pytest
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import without_lanes
 from transientcam import wire
-from transientcam_driver import Camera, RawFrame, open_camera
+from transientcam_driver import Camera, RawFrame, Sampling, Sequence, open_camera
 from transientcam_moments._kernels.registry import REGISTRY, Key
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging import frame as module
@@ -22,7 +22,7 @@ from transientcam_server.imaging import stages
 from transientcam_server.imaging.encodings.encoding import MSGPACK, NPY, Encoding
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.recipe import SettingsVersion
+from transientcam_server.imaging.recipe import SettingsVersion, suited
 from transientcam_server.imaging.view import View
 from transientcam_server.imaging.workers import Workers
 from transientcam_server.settings import ReconstructionSettings
@@ -318,7 +318,7 @@ def test_an_unknown_product_is_answered_with_the_known_ones(camera: Camera, raw:
         with pytest.raises(Problem) as caught:
             pipeline.product("x" * 1000)
         # the sensor is not known here
-        of_noise = {"density_std", "range_std", "reduced_chi_square"}
+        of_noise = {"density_std", "range_bias", "range_error", "range_std", "reduced_chi_square"}
         assert caught.value.extensions["known"] == sorted(set(wire.PRODUCTS) - of_noise)
         assert len(str(caught.value.extensions["value"])) < 100
 
@@ -346,4 +346,14 @@ def test_frames_are_those_of_pisarenko_until_the_likelihood_is_compiled_and_say_
 @pytest.mark.parametrize("named", ["likelihood", "maximum-entropy"])
 def test_an_estimator_that_is_named_is_used_compiled_or_not(named: str) -> None:
     settings = SettingsVersion(1, ReconstructionSettings(estimator=named))
-    assert settings.for_live_frames(4, ready=lambda name, m: False) == settings
+    assert settings.for_live_frames(Sequence(harmonics=4), ready=lambda name, m: False) == settings
+
+
+def test_frequencies_with_gaps_are_the_likelihoods_compiled_or_not() -> None:
+    settings = SettingsVersion(1, ReconstructionSettings())
+    gapped = Sequence(harmonics=2, sampling=Sampling((2, 3)))
+
+    found = settings.for_live_frames(gapped, ready=lambda name, m: False)
+
+    assert found.settings.technique == "likelihood"
+    assert suited(settings.settings, gapped.sampling) == settings.settings

@@ -5,17 +5,17 @@ import { endsOf, marksOf, nearest, placeOf, sameSequence, standingOf } from "../
 import { goalWords } from "../../src/views/accuracy/words";
 
 const choice = (capture_s: number, median: number): Choice =>
-  ({ capture_s, sequence: { takes: capture_s }, predicted: { range_std_m: { median, low: 0.9 * median, high: 1.1 * median, p90: 2 * median } } }) as unknown as Choice;
+  ({ capture_s, sequence: { takes: capture_s }, predicted: { range_error_m: { median, low: 0.9 * median, high: 1.1 * median, p90: 2 * median } } }) as unknown as Choice;
 const TRADEOFF = {
   front: [choice(0.05, 0.04), choice(5, 0.0004)],
-  current: { capture_s: 0.09, meta: { predicted_range_std_m: { median: 0.011 } } },
+  current: { capture_s: 0.09, meta: { accuracy: { range_error_m: 0.011 } } },
 } as unknown as Tradeoff;
 
 describe("the plot of accuracy against time", () => {
   test("holds the front with its uncertainty and where the camera stands", () => {
-    const ends = endsOf(TRADEOFF, { capture_s: 20, range_std_m: 0.2 });
-    for (const [capture_s, range_std_m] of [[0.05, 0.044], [5, 0.00036], [20, 0.2]]) {
-      const { x, y } = placeOf(ends, capture_s, range_std_m);
+    const ends = endsOf(TRADEOFF, { capture_s: 20, range_error_m: 0.2 });
+    for (const [capture_s, range_error_m] of [[0.05, 0.044], [5, 0.00036], [20, 0.2]]) {
+      const { x, y } = placeOf(ends, capture_s, range_error_m);
       expect(Math.min(x, y)).toBeGreaterThan(0);
       expect(Math.max(x, y)).toBeLessThan(1);
     }
@@ -31,16 +31,17 @@ describe("the plot of accuracy against time", () => {
 
 describe("where the camera stands", () => {
   const meta = (sequence_id: number, median: number | null): FrameMeta =>
-    ({ sequence_id, predicted_range_std_m: median === null ? null : { median, p90: 1 } }) as unknown as FrameMeta;
+    ({ sequence_id, accuracy: median === null ? null : { range_error_m: median } }) as unknown as FrameMeta;
   const sequence = { sequence_id: 2, capture_s: 0.2 } as AppliedSequence;
 
   test("is told by the newest frame of the sequence in use", () => {
-    expect(standingOf(meta(2, 0.005), sequence, TRADEOFF)).toEqual({ capture_s: 0.2, range_std_m: 0.005 });
+    expect(standingOf(meta(2, 0.005), sequence, TRADEOFF)).toEqual({ capture_s: 0.2, range_error_m: 0.005 });
   });
 
   test("is that of the prediction's own frame where the newest does not tell or is of another sequence", () => {
-    for (const newest of [null, meta(1, 0.005), meta(2, null)]) {
-      expect(standingOf(newest, sequence, TRADEOFF)).toEqual({ capture_s: 0.09, range_std_m: 0.011 });
+    const oneFrequency = { sequence_id: 2, accuracy: { range_error_m: null } } as unknown as FrameMeta;
+    for (const newest of [null, meta(1, 0.005), meta(2, null), oneFrequency]) {
+      expect(standingOf(newest, sequence, TRADEOFF)).toEqual({ capture_s: 0.09, range_error_m: 0.011 });
     }
   });
 });

@@ -7,7 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.sequence import PHASE_STEPS_RAD, ImageLabel, Sequence, SubPhases
+from transientcam_driver.sampling import FOUR_PHASES_RAD
+from transientcam_driver.sequence import ImageLabel, Sequence, SubPhases
 from transientcam_driver.simulation.switchable_world import SwitchableWorld
 from transientcam_driver.simulation.world import World
 from transientcam_driver.tofcam660.wire import SATURATED, ZERO_DN
@@ -60,7 +61,7 @@ class DifferentialPixels:
         world, sequence = self._world(frequency_hz, exposure_s)
         highest = world.sensor.highest_dn
         images = []
-        for index, phase_rad in enumerate(PHASE_STEPS_RAD):
+        for index, phase_rad in enumerate(FOUR_PHASES_RAD):
             late_rad = phase_rad - 2 * np.pi * frequency_hz * delay_s
             taps = [
                 self._tap(world, sequence, index, late_rad + opposite, device_time_s)

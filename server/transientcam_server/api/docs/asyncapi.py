@@ -179,6 +179,16 @@ def _frame() -> _Schema:
             "meta": _reference("schemas", "meta"),
             "encode_s": {"type": "number"},
             "labels": {"type": "array", "items": {"type": "object"}, "description": "raw alone"},
+            "multiples": {
+                "type": "array",
+                "items": {"type": "integer"},
+                "description": "moments alone",
+            },
+            "frequencies_hz": {
+                "type": "array",
+                "items": {"type": "number"},
+                "description": "moments alone",
+            },
             "encoding": {"type": "string", "enum": list(wire.ENCODINGS)},
             **_encoding_fields(),
             "approximate": {"type": "boolean"},

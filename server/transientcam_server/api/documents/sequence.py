@@ -16,6 +16,15 @@ class SubPhasesDocument(Document):
     """How many parts."""
 
 
+class SamplingDocument(Document):
+    """Which frequencies are measured and at which phases, where a camera has no choice."""
+
+    multiples: list[int] = Field(default_factory=list)
+    """Of the base frequency; empty for 1 to m."""
+    phases_rad: list[float]
+    """Of the images of each frequency."""
+
+
 class SequenceDocument(Document):
     """What the camera captures for one transient image; what is absent keeps its default."""
 
@@ -32,6 +41,9 @@ class SequenceDocument(Document):
     take_order: Literal["sequential", "interleaved"] = "sequential"
     """Whether takes follow one another as a whole, or image by image."""
     sub_phases: SubPhasesDocument = SubPhasesDocument()
+    sampling: SamplingDocument | None = None
+    """The camera's own, as its capabilities state it; null for the multiples 1 to m at four phases.
+    No request has to name it."""
 
 
 class AppliedDocument(SequenceDocument):

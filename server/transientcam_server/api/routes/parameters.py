@@ -52,7 +52,7 @@ async def read_parameters(service: ServiceOf) -> ParametersDocument:
             least_harmonics=settings.least_harmonics,
             access="read-only" if fixed else "read-write",
         ),
-        *parameters.of_reconstruction(settings, harmonics=sequence.harmonics),
+        *parameters.of_reconstruction(settings, sequence),
         *parameters.of_acquisition(running=service.acquisition.status().running),
         *parameters.of_history(service.settings.history),
         *parameters.of_recordings(service.settings.recordings),

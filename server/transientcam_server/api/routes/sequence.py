@@ -15,7 +15,7 @@ from transientcam_server.api.documents.sequence import AppliedDocument, Sequence
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import SequenceConflict
-from transientcam_server.imaging.recipe import require_harmonics
+from transientcam_server.imaging.recipe import require_estimator
 from transientcam_server.service import Service
 
 router = APIRouter(tags=["sequence"])
@@ -119,7 +119,7 @@ async def _configure(service: Service, wanted: Sequence, if_match: str | None) -
     while True:
         etags.require(if_match, _tag(running), otherwise=kinds.SEQUENCE_CHANGED)
         settings = service.pipeline.reconstruction.settings
-        require_harmonics(settings, wanted.harmonics, field="harmonics")
+        require_estimator(settings, wanted, field="harmonics")
         expected = None if if_match is None else running.epoch
         try:
             return await asyncio.wrap_future(

@@ -1,0 +1,138 @@
+"""What follows from moments whose frequencies are not 1 to m times one: few returns, no density."""
+
+from functools import cached_property
+from typing import NoReturn
+
+import numpy as np
+
+from transientcam_moments._arrays import Array, namespace
+from transientcam_moments.errors import ParameterError
+from transientcam_moments.flags import Flags
+from transientcam_moments.levinson import Coefficients
+from transientcam_moments.likelihood import MODEL_ERROR, Likelihood
+from transientcam_moments.likelihood.choice import MOST_RETURNS
+from transientcam_moments.likelihood.estimate import assumed_noise, fitted
+from transientcam_moments.noise.moments import MomentNoise
+from transientcam_moments.peaks import Peaks
+from transientcam_moments.pisarenko import Returns, Separation
+from transientcam_moments.reconstruction import Reconstruction
+from transientcam_moments.smoothing import smooth
+
+
+class GappedReconstruction(Reconstruction):
+    """A reconstruction of moments b_0 and b_j of any multiples j of the base frequency.
+
+    Plane k of the moments belongs to the k-th of (0, *settings.multiples). Without all multiples
+    from 1 to m there is no Toeplitz matrix: nothing is biased, validity is NaN, and coefficients,
+    peaks and all densities raise ParameterError. Range and returns are those of `likelihood`, the
+    one estimator for such moments. Where b_0 was not measured, its plane is 0 and the brightness
+    is the light of the returns that were found.
+    """
+
+    _of_any_multiples = True
+
+    @cached_property
+    def smoothed(self) -> Array:
+        """Moments (K + 1, ...) smoothed over pixels; b_0 is 0 where it was not measured."""
+        moments = self.measured
+        if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
+            moments = smooth(moments, self.settings.smoothing_sigma_px)
+        return moments
+
+    @cached_property
+    def eigenvalue(self) -> Array:
+        """NaN: there is no Toeplitz matrix."""
+        xp = namespace(self.smoothed)
+        return xp.full(self.smoothed.shape[1:], np.nan, dtype=self.smoothed.real.dtype)
+
+    @cached_property
+    def validity(self) -> Array:
+        """NaN: there is no Toeplitz matrix."""
+        return self.eigenvalue
+
+    @cached_property
+    def _biased(self) -> tuple[Array, Array]:
+        return self.smoothed, namespace(self.smoothed).zeros(self.smoothed.shape[1:], dtype=bool)
+
+    @property
+    def corrected_pixels(self) -> None:
+        """None: no harmonics of the modulation are taken out."""
+        return None
+
+    @property
+    def _has_zeroth(self) -> bool:
+        return self.settings.zeroth != "estimated"
+
+    @property
+    def _least_brightness(self) -> Array:
+        """b_0, or else the largest of the moments, none of which exceeds it."""
+        if self._has_zeroth:
+            return self.smoothed[0].real
+        return abs(self.smoothed[1:]).max(axis=0)
+
+    @cached_property
+    def _flags_of_moments(self) -> Array:
+        xp = namespace(self.smoothed)
+        size = abs(self.smoothed)
+        finite = xp.isfinite(size).all(axis=0)
+        dark = finite & ~(self._least_brightness > self.settings.minimum_brightness)
+        found = xp.where(finite, 0, int(Flags.NON_FINITE))
+        for flag, where in (
+            (Flags.NO_SIGNAL, dark),
+            (Flags.SATURATED, self._saturated),
+            (Flags.REPLACED, self._bad),
+        ):
+            if where is not None:
+                found = found | xp.where(xp.asarray(where), int(flag), 0)
+        return found.astype(xp.uint8)
+
+    @cached_property
+    def likelihood(self) -> Likelihood:
+        """Few returns, or one with a tail, with what they are worth."""
+        multiples = self.settings.multiples or ()
+        planes = self.smoothed if self._has_zeroth else self.smoothed[1:]
+        noise, error = assumed_noise(planes), 0.0
+        if self.noise is not None:
+            noise, error = MomentNoise(self.noise.variance[-len(planes) :]), MODEL_ERROR
+        measured = (0, *multiples) if self._has_zeroth else multiples
+        most = min(MOST_RETURNS, len(multiples))
+        return fitted(planes, noise, self._spread, measured, most, model_error=error)
+
+    @cached_property
+    def returns(self) -> Returns:
+        """Sharp returns and the tail of the likelihood, in as many slots as there are multiples."""
+        found = self.likelihood
+        xp = namespace(found.weight)
+        missing = len(self.smoothed) - 1 - len(found.weight)
+        empty = xp.zeros((missing, *found.weight.shape[1:]), dtype=found.weight.dtype)
+        return Returns(
+            xp.concatenate([found.phase_rad, empty + np.nan]),
+            xp.concatenate([found.weight, empty]),
+            found.tail,
+            found.count,
+        )
+
+    @cached_property
+    def _separation(self) -> Separation:
+        if self.settings.estimator != "likelihood":
+            limit = f"likelihood, for the multiples {self.settings.multiples}"
+            raise ParameterError("estimator", self.settings.estimator, limit)
+        return super()._separation
+
+    @cached_property
+    def brightness(self) -> Array:
+        """b_0 as it was measured, or else the light of all returns."""
+        return self.smoothed[0].real if self._has_zeroth else self.direct + self.indirect
+
+    @cached_property
+    def coefficients(self) -> Coefficients:
+        """Raises ParameterError."""
+        self._refuse("coefficients of a density")
+
+    @cached_property
+    def peaks(self) -> Peaks:
+        """Raises ParameterError."""
+        self._refuse("peaks of a density")
+
+    def _refuse(self, what: str) -> NoReturn:
+        raise ParameterError("multiples", self.settings.multiples, f"1 to m, for {what}")
