@@ -32,6 +32,7 @@ _LIBRARY_THREADS = (
     "transientcam-compile",
     "transientcam-lane",
     "AnyIO worker",
+    "uvloop_",
 )
 
 

@@ -24,10 +24,10 @@ from transientcam_driver import Camera, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.camera.source import sensor_of
 from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging.ranging import ranges_m
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.planning import Goal, Planner, SceneStatistics
 from transientcam_server.planning.choice import Choice
-from transientcam_server.planning.estimation import ranges_m
 from transientcam_server.planning.measures import pixel_errors
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Generic, TypeVar, overload
 
 from transientcam.frame import Frame
-from transientcam.requests import Calibrations, Jobs, Request, changes, frames, recordings
+from transientcam.requests import Calibrations, Jobs, Request, changes, frames, planning, recordings
 from transientcam.requests.frames import Part, Which
 from transientcam.transport import parse_address
 
@@ -47,6 +47,47 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
     def validate(self, settings: Mapping[str, Any]) -> _Document:
         """Return what a sequence would really be set to, without setting it."""
         return self._ask(changes.validate_sequence(settings))
+
+    def plan(
+        self,
+        target: Mapping[str, float] | None = None,
+        *,
+        budget: Mapping[str, float] | None = None,
+        fixed: Mapping[str, Any] | None = None,
+        estimator: str | None = None,
+    ) -> _Document:
+        """Return the sequence and estimator for a target, or the best within a budget.
+
+        Nothing is changed: ``sequence`` of the answer is what `configure` takes, and ``predicted``
+        has noise, bias and the error that both make. It takes seconds; an abandoned call ends the
+        work. ::
+
+            camera.plan({"range_error_m": 0.005}, budget={"capture_s": 0.2})
+
+        Parameters
+        ----------
+        target
+            What has to be reached: ``range_error_m`` (noise and bias), ``range_std_m``,
+            ``separation_m``, ``bound_width``.
+        budget
+            What may be spent: ``capture_s``, ``frame_rate_hz``, ``computing_share``.
+        fixed
+            Fields of the sequence that must stay as given here.
+        estimator
+            The only one to plan with.
+
+        Raises
+        ------
+        ProblemError
+            ``target-unreachable`` where nothing reaches the target; it says what limits.
+        """
+        return self._ask(
+            planning.plan(target=target, budget=budget, fixed=fixed, estimator=estimator)
+        )
+
+    def tradeoff(self, by: str = "range_error_m") -> _Document:
+        """Return what accuracy costs in time: the sequences that no other beats, in ``front``."""
+        return self._ask(planning.tradeoff(by))
 
     @property
     def calibrations(self) -> Calibrations[_Document, _Bytes]:

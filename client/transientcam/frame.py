@@ -40,6 +40,19 @@ class PredictedStd(TypedDict):
     """Share of the pixels where the noise model holds; that of the others is a rough figure."""
 
 
+class RangeAccuracy(TypedDict):
+    """Predicted errors of a frame's range: those in m of the median pixel that has one."""
+
+    range_error_m: float | None
+    """Noise and bias together, root sum of squares; None where one frequency knows no bias."""
+    range_std_m: float | None
+    """Standard deviation that the sensor's noise gives."""
+    range_bias_m: float | None
+    """How far it is off for good, as far as the frame shows it."""
+    outlier_share: float | None
+    """Share of the ranges that are off by more than five times `range_error_m`."""
+
+
 class FrameMeta(TypedDict):
     """Metadata of a frame, the same for all its products."""
 
@@ -82,6 +95,8 @@ class FrameMeta(TypedDict):
     pixels: PixelCounts | None
     predicted_range_std_m: PredictedStd | None
     """None until the range of this frame was computed."""
+    accuracy: NotRequired[RangeAccuracy | None]
+    """None until one of range_std, range_bias, range_error was; absent from older daemons."""
     region: list[int]
     """The pixels of the frame that the array holds: column and row of the first, width, height."""
     decimation: int

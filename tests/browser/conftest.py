@@ -3,11 +3,13 @@
 import os
 import shutil
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import httpx
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, sync_playwright
 
@@ -17,9 +19,16 @@ from tests.serving import Served, serving
 _PATIENCE_MS = 20_000
 expect.set_options(timeout=_PATIENCE_MS)
 
+MIRRORS = "sim:mirrors?noise=off"
+
 _ROOT = Path(__file__).resolve().parents[2]
 _SOURCES = _ROOT / "client" / "dashboard"
 _BUILT = _ROOT / "server" / "transientcam_server" / "static" / "index.html"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Name the marker of modules whose tests share a daemon."""
+    config.addinivalue_line("markers", "shared_daemon: the module's tests share one daemon")
 
 
 @pytest.fixture(scope="session")
@@ -77,18 +86,67 @@ class Watch:
 @pytest.fixture
 def camera() -> str:
     """A camera whose frames are all alike, so that a picture has to stay the same by itself."""
-    return "sim:mirrors?noise=off"
+    return MIRRORS
 
 
-@pytest.fixture
-def served(camera: str, tmp_path: Path) -> Iterator[Served]:
+@contextmanager
+def _storing_in(directory: Path, camera: str) -> Iterator[Served]:
     """A daemon that keeps what it stores where nobody else does."""
     stored: dict[str, Any] = {
-        "recordings": {"directory": tmp_path / "recordings", "min_free_bytes": 0},
-        "calibrations": {"directory": tmp_path / "calibrations"},
+        "recordings": {"directory": directory / "recordings", "min_free_bytes": 0},
+        "calibrations": {"directory": directory / "calibrations"},
     }
     with serving(camera, **stored) as daemon:
         yield daemon
+
+
+# of every module, so that its threads are there before any test and none seems left behind
+@pytest.fixture(scope="module", autouse=True)
+def shared_daemon(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Served | None]:
+    """One daemon for all tests of a module that is marked `shared_daemon`."""
+    if request.node.get_closest_marker("shared_daemon") is None:
+        yield None
+        return
+    with _storing_in(tmp_path_factory.mktemp("daemon"), MIRRORS) as daemon:
+        daemon.start_all_workers()
+        yield daemon
+
+
+@pytest.fixture
+def served(shared_daemon: Served | None, camera: str, tmp_path: Path) -> Iterator[Served]:
+    """A daemon; where tests share one, its camera and sequence are as it began with."""
+    if shared_daemon is None:
+        with _storing_in(tmp_path, camera) as own:
+            yield own
+        return
+    daemon = shared_daemon
+    began_with = httpx.get(f"{daemon.url}/api/v1/sequence").raise_for_status().json()
+    put(daemon, "acquisition", {"running": True})
+    yield daemon
+    if (
+        httpx.get(f"{daemon.url}/api/v1/sequence").json()["sequence_id"]
+        != began_with["sequence_id"]
+    ):
+        put(daemon, "sequence", {name: began_with[name] for name in SEQUENCE_FIELDS})
+
+
+# what is set of a sequence; the rest of its document follows from it
+SEQUENCE_FIELDS = (
+    "base_frequency_hz",
+    "harmonics",
+    "zeroth",
+    "exposure_s",
+    "takes",
+    "take_order",
+    "sub_phases",
+)
+
+
+def put(served: Served, path: str, document: dict[str, Any]) -> None:
+    """Set something of a daemon."""
+    httpx.put(f"{served.url}/api/v1/{path}", json=document).raise_for_status()
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 import base64
 import io
+import re
 from typing import Any
 
 import matplotlib
@@ -9,6 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Locator, Page
+
+# The words of a camera whose frames come; on a laden machine they may come slowly.
+LIVE = re.compile("^Live")
 
 # A canvas by way of a 2D copy: one of WebGL can be read only in the task that drew it.
 _READ_CANVAS = """
@@ -116,6 +120,24 @@ def text(page: Page, panel: str, name: str) -> str:
     return (shown or "").replace("\u202f", " ").replace("\u2212", "-")
 
 
+# what the page paints below and above a scale
+BEYOND = {
+    "viridis": ((0x1C, 0x00, 0x29), (0xFF, 0xFB, 0xD5)),
+    "cividis": ((0x00, 0x09, 0x14), (0xFF, 0xFA, 0xC9)),
+    "gray": ((0x0B, 0x2A, 0x55), (0xFF, 0xC9, 0xB0)),
+    "coolwarm": ((0x1A, 0x23, 0x70), (0x6B, 0x00, 0x19)),
+}
+
+
+def map_colours(values: NDArray[Any], low: float, high: float, name: str) -> NDArray[np.uint8]:
+    """RGBA of a map, (..., 4): as `colours`, with colours of their own beyond the limits."""
+    painted = colours(values, low, high, name)
+    under, over = BEYOND[name]
+    painted[values.astype(np.float64) < low] = (*under, 255)
+    painted[values.astype(np.float64) > high] = (*over, 255)
+    return painted
+
+
 def colours(values: NDArray[Any], low: float, high: float, name: str) -> NDArray[np.uint8]:
     """RGBA that matplotlib gives the values, (..., 4); clear where there is no value."""
     places = np.clip((values.astype(np.float64) - low) / (high - low), 0.0, 1.0)
@@ -126,6 +148,12 @@ def colours(values: NDArray[Any], low: float, high: float, name: str) -> NDArray
     return painted
 
 
+def choose_from(place: Page | Locator, menu: str, action: str) -> None:
+    """Choose an entry of a menu by the menu's name and its own."""
+    place.get_by_role("button", name=menu).click()
+    place.get_by_role("menuitem", name=action, exact=True).click()
+
+
 def choose(page: Page, panel: str, action: str) -> None:
     """Choose from the menu of a panel."""
-    page.locator(f".panel-{panel} .action-menu").select_option(label=action)
+    choose_from(page.locator(f".panel-{panel}"), f"Panel {panel}", action)

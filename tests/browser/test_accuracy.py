@@ -43,8 +43,13 @@ def test_a_point_of_the_front_is_chosen_and_applied(page: Page, served: Served) 
     page.mouse.click(plot["x"] + x, plot["y"] + y)
     points.nth(len(front) // 2).focus()
     panel = ".panel-accuracy"
-    median = wanted["predicted"]["range_std_m"]["median"]
-    assert number(text(page, panel, "choice_range_std_m")) == pytest.approx(median, rel=5e-3)
+    predicted = wanted["predicted"]
+    for name, expected in (
+        ("range_error_m", predicted["range_error_m"]["median"]),
+        ("range_std_m", predicted["range_std_m"]["median"]),
+        ("range_bias_m", predicted["range_bias_m"]),
+    ):
+        assert number(text(page, panel, f"choice_{name}")) == pytest.approx(expected, rel=5e-3)
     capture_s = number(text(page, panel, "choice_capture_s"))
     assert capture_s == pytest.approx(wanted["capture_s"], rel=5e-3)
     page.keyboard.press("ArrowRight")
@@ -70,12 +75,12 @@ def test_a_target_is_planned_for_or_refused_in_words(
     choose(page, "response", "Accuracy against time")
     plan = page.get_by_role("button", name="Plan")
     expect(plan).to_be_disabled()
-    page.get_by_label("Deviation at most").fill("8")
+    page.get_by_label("Error at most").fill("8")
     plan.click()
     page.locator("[data-field=choice]").wait_for(timeout=PATIENCE_MS)
-    assert number(text(page, ".panel-accuracy", "choice_range_std_m")) <= 8e-3
+    assert number(text(page, ".panel-accuracy", "choice_range_error_m")) <= 8e-3
     watch.refusals_expected = True
-    page.get_by_label("Deviation at most").fill("1e-9")
+    page.get_by_label("Error at most").fill("1e-9")
     page.get_by_label("Frames at least").fill("20")
     plan.click()
     status = page.locator("p.refusal[data-field=accuracy-status]")

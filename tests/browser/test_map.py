@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
 from tests.browser.dashboard import (
-    colours,
     map_canvas,
+    map_colours,
     map_pixels,
     open_page,
     point_at,
@@ -18,9 +18,11 @@ from tests.browser.dashboard import (
 )
 from tests.serving import Served
 
-NAMES = {"viridis": "viridis", "cividis": "cividis", "inferno": "inferno", "grey": "gray"}
+pytestmark = pytest.mark.shared_daemon
+
+NAMES = {"viridis": "viridis", "cividis": "cividis", "grey": "gray", "coolwarm": "coolwarm"}
 # The page's maps are straight lines between every fifteenth colour of matplotlib's.
-TOLERANCE = {"viridis": 6, "inferno": 6, "cividis": 12, "grey": 1}
+TOLERANCE = {"viridis": 6, "cividis": 12, "grey": 1, "coolwarm": 6}
 
 
 def stop(served: Served) -> int:
@@ -50,7 +52,7 @@ def test_each_map_has_the_colours_of_the_values_the_daemon_serves(
         str(canvas.get_attribute(f"data-{key}")) for key in ("low", "high", "colours")
     )
     painted = map_pixels(page).astype(int)
-    expected = colours(product(served, name.lower()), float(low), float(high), NAMES[chosen])
+    expected = map_colours(product(served, name.lower()), float(low), float(high), NAMES[chosen])
 
     assert painted.shape == (120, 163, 4)
     np.testing.assert_allclose(painted, expected, atol=TOLERANCE[chosen])
@@ -67,7 +69,7 @@ def test_the_limits_hold_nearly_all_values_and_say_so_in_metres(page: Page, serv
     inside = np.mean((values >= low) & (values <= high))
     assert inside > 0.97
     assert high - low < 3 * (np.nanpercentile(values, 99) - np.nanpercentile(values, 1))
-    bar = page.locator(".colour-bar")
+    bar = page.locator(".panel-map .colour-bar")
     expect(bar).to_have_attribute("aria-label", f"Colour scale from {low:.1f} to {high:.1f}\u202fm")
 
 
@@ -90,7 +92,7 @@ def test_limits_and_colours_that_were_set_stay_across_a_reload(page: Page, serve
     page.locator(".panel-map").get_by_label("Colours").select_option("cividis")
     open_page(page)
     shows_frame(page, stop(served))
-    expected = colours(product(served, "range"), 1.0, 5.0, "cividis")
+    expected = map_colours(product(served, "range"), 1.0, 5.0, "cividis")
     np.testing.assert_allclose(map_pixels(page).astype(int), expected, atol=TOLERANCE["cividis"])
 
 

@@ -3,8 +3,10 @@ import re
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.dashboard import open_page, point_at
+from tests.browser.dashboard import choose_from, open_page, point_at
 from tests.browser.test_transient import F_HZ
+
+pytestmark = pytest.mark.shared_daemon
 
 PAGE_MENU = "Page: layout, colours, help"
 
@@ -13,7 +15,7 @@ def test_an_address_shows_what_it_says(page: Page) -> None:
     page.goto("/?debug#map=direct&pixel=81,20&time_ns=11.74&view=response")
     expect(page.locator("[data-view]")).to_have_count(1)
     expect(page.locator(".panel-response h2")).to_have_text("Impulse response of pixel 81, 20")
-    page.get_by_label("Panel response").select_option(label="Show all panels")
+    choose_from(page, "Panel response", "Show all panels")
     expect(page.locator(".panel-transient [data-field=time]")).to_have_text("11.74\u202fns")
     expect(page.get_by_role("tab", name="Direct", exact=True)).to_have_attribute(
         "aria-selected", "true"
@@ -39,7 +41,7 @@ def test_the_list_of_keys_opens_and_closes(page: Page) -> None:
     expect(dialog).to_contain_text("play or pause the light")
     page.keyboard.press("Escape")
     expect(dialog).to_have_count(0)
-    page.get_by_label(PAGE_MENU).select_option(label="Keys (?)")
+    choose_from(page, PAGE_MENU, "Keys (?)")
     expect(dialog).to_be_visible()
     dialog.get_by_role("button", name="Close").click()
     expect(dialog).to_have_count(0)
@@ -66,13 +68,13 @@ def test_light_and_dark_are_chosen_and_stay(page: Page) -> None:
     root, ground = page.locator("html"), "getComputedStyle(document.body).backgroundColor"
     expect(root).to_have_attribute("data-theme", "light")
     light = page.evaluate(ground)
-    page.get_by_label(PAGE_MENU).select_option(label="Dark")
+    choose_from(page, PAGE_MENU, "Dark")
     expect(root).to_have_attribute("data-theme", "dark")
     dark = page.evaluate(ground)
     assert dark != light
     page.reload()
     expect(root).to_have_attribute("data-theme", "dark")
-    page.get_by_label(PAGE_MENU).select_option(label="As the system")
+    choose_from(page, PAGE_MENU, "As the system")
     expect(root).to_have_attribute("data-theme", "light")
     page.emulate_media(color_scheme="dark", reduced_motion="reduce")
     expect(root).to_have_attribute("data-theme", "dark")
@@ -83,7 +85,7 @@ def test_light_and_dark_are_chosen_and_stay(page: Page) -> None:
 def test_no_layout_hangs_over_the_edge(page: Page, layout: str, width: int) -> None:
     page.set_viewport_size({"width": width, "height": 800})
     open_page(page)
-    page.get_by_label(PAGE_MENU).select_option(label=layout)
+    choose_from(page, PAGE_MENU, layout)
     page.locator(".panel-transient").wait_for()
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     unnamed = page.evaluate(

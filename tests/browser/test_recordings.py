@@ -10,7 +10,16 @@ from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import Watch
-from tests.browser.dashboard import choose, colours, map_canvas, map_pixels, open_page, point_at
+from tests.browser.dashboard import (
+    LIVE,
+    choose,
+    choose_from,
+    map_canvas,
+    map_colours,
+    map_pixels,
+    open_page,
+    point_at,
+)
 from tests.serving import Served
 
 PANEL = ".panel-recordings"
@@ -75,7 +84,7 @@ def test_a_recording_is_started_watched_and_stopped(page: Page, served: Served) 
     assert (reported["state"], reported["reason"]) == ("complete", "stopped")
     expect(row.locator("[data-field=frames]")).to_have_text(f"{reported['frames']} frames")
     expect(row.locator("[data-field=size]")).to_have_text(re.compile(r"^\d+(\.\d+)?\u202f[kM]B$"))
-    expect(page.locator(".toast").last).to_have_text("The recording stopped.")
+    expect(page.locator(".toast", has_text="The recording stopped.")).to_be_visible()
 
 
 def test_what_just_happened_is_saved(page: Page, served: Served) -> None:
@@ -95,7 +104,7 @@ def test_a_recording_is_annotated_downloaded_and_deleted(
     url = f"{served.url}/api/v1/recordings/{recording}"
     show(page)
     row = page.locator(f"{PANEL} [data-recording]")
-    row.get_by_label("More of corner").select_option(label="Notes…")
+    choose_from(row, "More of corner", "Notes…")
     dialog = page.get_by_role("dialog", name="Notes on corner")
     dialog.get_by_label("Name of line 1").fill("sample")
     dialog.get_by_label("Text of line 1").fill("white paint")
@@ -109,11 +118,11 @@ def test_a_recording_is_annotated_downloaded_and_deleted(
         row.get_by_role("button", name="Download corner").click()
     assert download.value.suggested_filename == f"{recording}.h5"
     assert Path(download.value.path()).read_bytes() == httpx.get(f"{url}/file").content
-    row.get_by_label("More of corner").select_option(label="Delete…")
+    choose_from(row, "More of corner", "Delete…")
     confirm = page.get_by_role("dialog", name="Delete this recording?")
     confirm.get_by_role("button", name="Keep").click()
     assert httpx.get(url).status_code == 200
-    row.get_by_label("More of corner").select_option(label="Delete…")
+    choose_from(row, "More of corner", "Delete…")
     confirm.get_by_role("button", name="Delete").click()
     expect(row).to_have_count(0)
     assert httpx.get(url).status_code == 404
@@ -125,16 +134,17 @@ def test_all_views_show_the_frame_that_is_scrubbed_to(page: Page, served: Served
     choose(page, "sequence", "Recordings")
     point_at(page, "map", 40, 50, click=True)
     page.get_by_role("button", name="Play corner").click()
-    shows_recorded(page, 1)
     expect(page.locator("[data-field=state]")).to_have_text("Replay")
     slider = page.get_by_label("Frame of the recording")
     slider.focus()
+    page.keyboard.press("Home")
+    shows_recorded(page, 1)
     for frame in (2, 3, 4):
         page.keyboard.press("ArrowRight")
         shows_recorded(page, frame)
         canvas = map_canvas(page)
         low, high = (float(str(canvas.get_attribute(f"data-{end}"))) for end in ("low", "high"))
-        expected = colours(recorded(served, recording, frame, "range"), low, high, "viridis")
+        expected = map_colours(recorded(served, recording, frame, "range"), low, high, "viridis")
         np.testing.assert_allclose(map_pixels(page).astype(int), expected, atol=6)
     expect(page.locator("[data-field=replay-frame]")).to_have_text("4")
     # what the views show of light and of the pixel is of this frame, too
@@ -153,7 +163,7 @@ def test_all_views_show_the_frame_that_is_scrubbed_to(page: Page, served: Served
     )
     page.get_by_role("button", name="Back to live").click()
     expect(page.locator(".replay")).to_have_count(0)
-    expect(page.locator("[data-field=state]")).to_have_text("Live")
+    expect(page.locator("[data-field=state]")).to_have_text(LIVE)
     newest = httpx.get(f"{served.url}/api/v1/frames/latest").json()["frame"]
     page.wait_for_function(
         "(newest) => document.querySelector('.panel-map .stage canvas').dataset.frame > newest",
@@ -165,9 +175,6 @@ def test_a_recording_plays_by_itself_to_its_end(page: Page, served: Served) -> N
     record(served, frames=6)
     show(page)
     page.get_by_role("button", name="Play corner").click()
-    shows_recorded(page, 1)
-    page.get_by_label("Speed of the recording").select_option("0.5")
-    page.keyboard.press("p")
     shows_recorded(page, 6)
     expect(page.get_by_role("button", name="Play the recording")).to_be_visible()
     page.keyboard.press("[")
@@ -180,6 +187,8 @@ def test_a_recorded_frame_is_computed_with_the_present_settings(page: Page, serv
     recording = record(served, frames=2)
     show(page)
     page.get_by_role("button", name="Play corner").click()
+    page.get_by_label("Frame of the recording").focus()
+    page.keyboard.press("Home")
     shows_recorded(page, 1)
     page.get_by_label("Computed with").select_option(label="present settings")
     httpx.put(
@@ -201,9 +210,11 @@ def test_an_address_shows_a_recorded_frame(page: Page, served: Served, watch: Wa
     page.goto(f"/?debug#map=direct&recording={recording}&frame=3")
     shows_recorded(page, 3)
     page.get_by_role("button", name="One frame on").click()
-    expect(page).to_have_url(re.compile(rf"#map=direct&recording={recording}&frame=4$"))
+    expect(page).to_have_url(
+        re.compile(rf"#map=direct&pixel=\d+,\d+&recording={recording}&frame=4$")
+    )
     page.get_by_role("button", name="Back to live").click()
-    expect(page).to_have_url(re.compile(r"#map=direct$"))
+    expect(page).to_have_url(re.compile(r"#map=direct&pixel=\d+,\d+$"))
     watch.refusals_expected = True
     page.evaluate("() => { location.hash = '#recording=gone'; }")
     expect(page.locator("[data-banner=message]")).to_contain_text("cannot be shown")

@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import Watch
-from tests.browser.dashboard import choose, open_page, shows_frame
+from tests.browser.dashboard import LIVE, choose, choose_from, open_page, shows_frame
 from tests.browser.test_map import product, stop
 from tests.serving import Served
 
@@ -59,7 +59,7 @@ def test_settings_that_somebody_else_changed_meanwhile_are_not_overwritten(
     panel.get_by_label("Bias").fill("0.01")
     url = f"{served.url}/api/v1/reconstruction"
     httpx.put(url, json={"smoothing_px": 3.0}).raise_for_status()
-    expect(page.locator(".toast").last).to_contain_text("settings of the reconstruction changed")
+    expect(page.locator(".toast", has_text="of the reconstruction changed")).to_be_visible()
     watch.refusals_expected = True
     panel.get_by_role("button", name="Apply").click()
     expect(panel.locator("[data-field=reconstruction-status]")).to_have_class(re.compile("refusal"))
@@ -89,7 +89,7 @@ class TestCalibrations:
         row = panel.locator("[data-calibration]").last
         expect(row).to_contain_text("after warm-up")
         expect(row).to_contain_text("in use")
-        expect(page.locator("[data-field=state]")).to_have_text("Live")
+        expect(page.locator("[data-field=state]")).to_have_text(LIVE)
         listed = httpx.get(f"{served.url}/api/v1/calibrations").json()
         assert listed["active"] == listed["calibrations"][0]["id"]
         page.wait_for_function(
@@ -164,7 +164,7 @@ class TestCalibrations:
         download.value.save_as(exported)
         assert exported.read_bytes() == httpx.get(f"{url}/{identity}/file").content
         row = panel.locator(f"[data-calibration='{identity}']")
-        row.get_by_label("More of bench").select_option(label="Delete…")
+        choose_from(row, "More of bench", "Delete…")
         confirm = page.get_by_role("dialog", name="Delete this calibration?")
         confirm.get_by_role("button", name="Delete").click()
         expect(row).to_have_count(0)

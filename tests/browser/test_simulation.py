@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.dashboard import choose, map_pixels, open_page
+from tests.browser.dashboard import LIVE, choose, map_pixels, open_page
 from tests.serving import Served
 
 PATIENCE_MS = 60_000
@@ -68,7 +68,7 @@ def test_the_cable_is_pulled_and_plugged_in_again(page: Page, served: Served) ->
     expect(page.locator("[data-field=state]")).to_have_text("Camera lost")
     expect(panel.get_by_role("button", name="Unplug")).to_be_disabled()
     panel.get_by_role("button", name="Plug in").click()
-    expect(page.locator("[data-field=state]")).to_have_text("Live")
+    expect(page.locator("[data-field=state]")).to_have_text(LIVE)
     expect(panel.get_by_role("button", name="Unplug")).to_be_enabled()
 
 

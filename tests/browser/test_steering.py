@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.conftest import Watch
-from tests.browser.dashboard import open_page, shows_frame
+from tests.browser.dashboard import LIVE, choose_from, open_page, shows_frame
 from tests.serving import Served, serving
 from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
 
@@ -58,7 +58,8 @@ def test_while_somebody_else_steers_controls_say_who_and_wait(page: Page, served
     expect(page.locator("[data-field=control]")).to_have_text(
         re.compile(r"^the night shift \d+ s$")
     )
-    expect(page.locator(".toast").last).to_contain_text("the night shift has taken control.")
+    told = page.locator(".toast", has_text="the night shift has taken control.")
+    expect(told).to_be_visible()
     lease(served, "DELETE", lease_id=granted["lease_id"])
     expect(edit).to_be_enabled()
 
@@ -183,7 +184,7 @@ def test_a_service_that_asks_for_a_token_is_shown_one(page_of_guarded: Any) -> N
     show_token(page, "tc_mistyped")
     expect(dialog).to_contain_text("does not know this token")
     show_token(page, tokens[Role.OPERATOR])
-    expect(page.locator("[data-field=state]")).to_have_text("Live")
+    expect(page.locator("[data-field=state]")).to_have_text(LIVE)
     page.locator(".panel-map canvas[data-frame]").wait_for()
     assert tokens[Role.OPERATOR] not in page.url
     page.get_by_role("button", name="Stop", exact=True).click()
@@ -192,7 +193,7 @@ def test_a_service_that_asks_for_a_token_is_shown_one(page_of_guarded: Any) -> N
     page.reload()
     page.locator(".panel-map canvas[data-frame]").wait_for()
     assert page.evaluate("() => Object.values(localStorage).join()").find("tc_") == -1
-    page.get_by_label("Page: layout, colours, help").select_option(label="Forget the token")
+    choose_from(page, "Page: layout, colours, help", "Forget the token")
     expect(page.locator("[data-field=state]")).to_have_text("Not let in")
     expect(page.locator("[data-banner=token]")).to_be_visible()
     assert page.evaluate("() => Object.values(sessionStorage).join()") == ""
@@ -206,7 +207,13 @@ def test_a_viewer_looks_and_is_told_what_it_may_not(page_of_guarded: Any) -> Non
     stop = page.get_by_role("button", name="Stop", exact=True)
     expect(stop).to_be_disabled()
     expect(stop).to_have_attribute("title", "The token viewer is a viewer's")
-    page.get_by_label("Page: layout, colours, help").select_option(label="Token…")
+    button = page.locator("[data-field=control]")
+    expect(button).to_have_text("View only")
+    button.click()
+    control_dialog = page.get_by_role("dialog", name="Control")
+    expect(control_dialog.get_by_role("button", name="Take control")).to_be_disabled()
+    control_dialog.get_by_role("button", name="Close").click()
+    choose_from(page, "Page: layout, colours, help", "Token…")
     dialog = page.get_by_role("dialog", name="Authentication required")
     expect(dialog.locator("[data-field=caller]")).to_contain_text("knows this page as viewer")
     # with another one it may at once
@@ -235,4 +242,4 @@ def test_a_token_that_is_revoked_is_asked_for_again(page_of_guarded: Any) -> Non
     expect(page.get_by_role("dialog", name="Authentication required")).to_be_visible()
     expect(page.locator("[data-field=state]")).to_have_text("Not let in")
     show_token(page, tokens[Role.VIEWER])
-    expect(page.locator("[data-field=state]")).to_have_text("Live")
+    expect(page.locator("[data-field=state]")).to_have_text(LIVE)

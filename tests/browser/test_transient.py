@@ -27,6 +27,8 @@ from tests.browser.dashboard import (
 from tests.serving import Served
 from transientcam.wire.codec import pack_with_array
 
+pytestmark = pytest.mark.shared_daemon
+
 F_HZ = 23e6
 LEAST_VALIDITY = 4e-3
 PHASES_RAD = (0.0, 0.7, 1.9, 3.3, 4.4, 6.1)

@@ -76,6 +76,16 @@ _CALLS: dict[
         lambda c: c.validate({"takes": 2}),
         ("POST", "sequence/validate", "", {"takes": 2}),
     ),
+    "plan": (
+        lambda c: c.plan({"range_error_m": 0.005}, estimator="likelihood"),
+        lambda c: c.plan({"range_error_m": 0.005}, estimator="likelihood"),
+        ("POST", "plan", "", {"target": {"range_error_m": 0.005}, "estimator": "likelihood"}),
+    ),
+    "tradeoff": (
+        lambda c: c.tradeoff(),
+        lambda c: c.tradeoff(),
+        ("GET", "tradeoff", "by=range_error_m", None),
+    ),
     "reconstruction": (
         lambda c: c.reconstruction,
         lambda c: c.reconstruction(),

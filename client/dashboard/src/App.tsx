@@ -8,7 +8,6 @@ import { ReplayBar } from "./views/replay/ReplayBar";
 import { Banner } from "./views/status/Banner";
 import { ControlDialog } from "./views/status/ControlDialog";
 import { StatusBar } from "./views/status/StatusBar";
-import { Toasts } from "./views/status/Toasts";
 import { TokenDialog } from "./views/status/TokenDialog";
 import { Arrangement } from "./views/Arrangement";
 
@@ -29,7 +28,6 @@ export function App({ onRetry }: { onRetry: () => void }) {
       <Banner onRetry={onRetry} />
       <Arrangement />
       <ReplayBar />
-      <Toasts />
       <Help />
       <ControlDialog />
       <TokenDialog />

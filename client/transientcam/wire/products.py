@@ -50,7 +50,21 @@ PRODUCTS: Final[dict[str, Product]] = {
             "m",
             _IMAGE,
             "<f4",
-            "standard deviation of the range of the likelihood estimate; NaN without one",
+            "standard deviation that the noise of the sensor gives the range; NaN without one",
+        ),
+        Product(
+            "range_bias",
+            "m",
+            _IMAGE,
+            "<f4",
+            "how far the range is off for good, as far as the frame shows it; NaN if m = 1",
+        ),
+        Product(
+            "range_error",
+            "m",
+            _IMAGE,
+            "<f4",
+            "noise and bias of the range together: root sum of squares; NaN if m = 1",
         ),
         Product(
             "reduced_chi_square",

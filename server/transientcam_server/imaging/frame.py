@@ -24,6 +24,7 @@ from transientcam.frame import FrameMeta
 from transientcam_driver import RawFrame, Truth
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging.accuracy import RangeAccuracy, range_accuracy
 from transientcam_server.imaging.bands import STREAMED_BYTES, Banded, computed
 from transientcam_server.imaging.encodings.encoding import Encoding
 from transientcam_server.imaging.meta import frame_meta
@@ -82,6 +83,7 @@ class Frame:
         self._run = workers.run_long if past else workers.run
         self._truth = truth
         self._computed = Computed()
+        self._accuracy: RangeAccuracy | None = None
         self._reconstruct_s: float | None = None
         self._stages: dict[str, asyncio.Future[tm.Reconstruction]] = {}
         self._requested: set[str] = set()
@@ -115,7 +117,14 @@ class Frame:
 
     def meta(self) -> dict[str, Any]:
         """Return what is known of the frame, as the wire contract has it."""
-        return frame_meta(self.number, self.raw, self.recipe, self._computed, self._reconstruct_s)
+        return frame_meta(
+            self.number,
+            self.raw,
+            self.recipe,
+            self._computed,
+            self._reconstruct_s,
+            self._accuracy,
+        )
 
     # -- the first hop: stages of the reconstruction -------------------------------------------
 
@@ -132,6 +141,13 @@ class Frame:
     async def truth(self) -> Truth:
         """Return the ground truth of the simulated scene at the time of the capture."""
         return await self._once("truth", self._compute_truth, self._whole)
+
+    async def accuracy(self) -> RangeAccuracy:
+        """Return noise and bias of the range; it takes several reconstructions.
+
+        Only for cameras whose sensor is known.
+        """
+        return await self._once("accuracy", self._compute_accuracy, self._whole)
 
     async def with_moments(self, compute: Callable[..., _T], *arguments: Any) -> _T:
         """Return what ``compute(recipe, reconstruction, meta, *arguments)`` gives on a worker.
@@ -182,10 +198,18 @@ class Frame:
         truth, _ = await self._run(self._truth, middle_s)
         return truth
 
+    async def _compute_accuracy(self) -> RangeAccuracy:
+        found = await self.reconstruction("returns")
+        accuracy, _ = await self._workers.run_long(range_accuracy, self.recipe, found)
+        self._accuracy = accuracy
+        return accuracy
+
     async def _input(self, product: Product) -> Any:
         """Return what a product is computed from."""
         if product.needs in STAGES:
             return await self.reconstruction(product.needs)
+        if product.needs == "accuracy":
+            return await self.accuracy()
         return self.raw if product.needs == "raw" else await self.truth()
 
     # -- the second hop: arrays and bytes ------------------------------------------------------

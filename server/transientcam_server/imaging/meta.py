@@ -3,13 +3,19 @@
 from typing import Any
 
 from transientcam_driver import RawFrame
+from transientcam_server.imaging.accuracy import RangeAccuracy
 from transientcam_server.imaging.calibration import calibration_id
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.imaging.stages import Computed
 
 
 def frame_meta(
-    number: int, raw: RawFrame, recipe: Recipe, computed: Computed, reconstruct_s: float | None
+    number: int,
+    raw: RawFrame,
+    recipe: Recipe,
+    computed: Computed,
+    reconstruct_s: float | None,
+    accuracy: RangeAccuracy | None = None,
 ) -> dict[str, Any]:
     """Return the metadata of a frame, as far as it was computed; `FrameMeta` of the client."""
     sequence, found = recipe.applied.sequence, computed.reconstruction
@@ -42,4 +48,5 @@ def frame_meta(
         "corrected_pixels": None if found is None else found.corrected_pixels,
         "pixels": computed.pixels,
         "predicted_range_std_m": computed.range_noise,
+        "accuracy": None if accuracy is None else accuracy.to_document(),
     }

@@ -1,5 +1,6 @@
 """The noise of frames: of their moments and of their range, and what it does not explain."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -56,6 +57,20 @@ def moment_noise(recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoi
         np.asarray(found.smoothed[0].real),
         recipe.settings.smoothing_px,
     )
+
+
+def typical_deviation(values: _Array) -> _Array:
+    """Return the deviation (P) between captures (D, P), which outliers do not blow up.
+
+    It is the typical difference of two captures, as the deviation of the normal variable that has
+    the same (decision 0521); NaN where there are not two.
+    """
+    first, second = np.triu_indices(len(values), 1)
+    apart = np.abs(values[first] - values[second])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of pixels without two
+        deviation: _Array = np.nanmedian(apart, axis=0) / (np.sqrt(2) * MEDIAN_OF_NORMAL)
+    return deviation
 
 
 def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:

@@ -1,8 +1,8 @@
 """The registry of products: what clients can ask of a frame, and how each follows from it.
 
-A product names the one input it is computed from: ``raw`` images, the simulated ``truth``, or a
-stage of the reconstruction (`transientcam_server.imaging.stages`). The functions here are pure,
-so any worker may run them.
+A product names the one input it is computed from: ``raw`` images, the simulated ``truth``, the
+``accuracy`` of the range, or a stage of the reconstruction (`transientcam_server.imaging.stages`).
+The functions here are pure, so any worker may run them.
 """
 
 from collections.abc import Callable
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam import wire
 from transientcam_driver import AppliedSequence, RawFrame, Truth
+from transientcam_server.imaging.accuracy import RangeAccuracy
 from transientcam_server.imaging.labelling import image_columns, in_words, moment_columns
 from transientcam_server.imaging.noise import moment_noise
 from transientcam_server.imaging.recipe import Recipe
@@ -47,7 +48,7 @@ class Product:
     description
         Name, unit and axes, as the wire contract has them.
     needs
-        Its input: ``raw``, ``truth`` or the name of a stage.
+        Its input: ``raw``, ``truth``, ``accuracy`` or the name of a stage.
     compute
         Called as ``compute(recipe, input, view)``, on a worker. A product over time is computed
         for the crop of the view alone, any other one whole.
@@ -209,6 +210,16 @@ def _property(name: str) -> Callable[[Recipe, tm.Reconstruction, View], _Array]:
     return read
 
 
+def _error(name: str) -> Callable[[Recipe, RangeAccuracy, View], _Array]:
+    """Return a computation that reads one of the errors of the range."""
+
+    def read(recipe: Recipe, accuracy: RangeAccuracy, view: View) -> _Array:
+        array: _Array = getattr(accuracy, name)
+        return array
+
+    return read
+
+
 def _images(recipe: Recipe, raw: RawFrame, view: View) -> _Array:
     return raw.images
 
@@ -270,12 +281,20 @@ PRODUCTS: Final[dict[str, Product]] = {
             of_toeplitz=True,
             steps=Steps(1e4, "1e-4"),
         ),
-        Product(
-            _WIRE["range_std"],
-            "likelihood",
-            _property("range_std_m"),
-            of_noise=True,
-            steps=_MILLIMETRES,
+        *(
+            Product(
+                _WIRE[name],
+                "accuracy",
+                _error(part),
+                of_noise=True,
+                of_toeplitz=True,
+                steps=_MILLIMETRES,
+            )
+            for name, part in (
+                ("range_std", "std_m"),
+                ("range_bias", "bias_m"),
+                ("range_error", "error_m"),
+            )
         ),
         Product(
             _WIRE["reduced_chi_square"],

@@ -1,4 +1,4 @@
-"""Ranges of moments that have no frame: of a look at a scene, and of drawn ones."""
+"""The estimators that are planned with, and the range of the direct return by several of them."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-import transientcam_moments as tm
+from transientcam_server.imaging.ranging import ranges_m
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
@@ -17,48 +17,6 @@ ESTIMATORS: Final = (*SEARCHED, "pisarenko")
 """All that can be predicted."""
 MOST_HARMONICS: Final[Mapping[str, int]] = MappingProxyType({"single-frequency": 1})
 """More harmonics than these do nothing for an estimator."""
-
-
-def ranges_m(
-    b: _Array,
-    variance: _Array,
-    estimator: str,
-    base_frequency_hz: float,
-    settings: ReconstructionSettings,
-    *,
-    zeroth: str = "estimated",
-) -> _Array:
-    """Return the range (...) that an estimator gives of smoothed moments (m + 1, ...).
-
-    Parameters
-    ----------
-    b
-        Moments in any unit.
-    variance
-        (m + 1, ...) of their parts, in the square of that unit.
-    settings
-        Biasing and threshold; the estimator is the one given.
-    """
-    if estimator == "single-frequency":
-        phase = np.remainder(np.angle(b[1]), 2 * np.pi)
-    elif estimator == "pisarenko":
-        phase = tm.separate(tm.pisarenko(b), settings.return_threshold).phase_rad
-    elif estimator == "likelihood":
-        noise = tm.noise.MomentNoise(_of_zeroth(variance, zeroth))
-        phase = tm.likelihood(b, noise).separate(settings.return_threshold).phase_rad
-    else:
-        plain = settings.model_copy(
-            update={"smoothing_px": 0.0, "minimum_brightness_dn": 0.0, "estimator": estimator}
-        )
-        phase = tm.reconstruct(b, plain.for_moments(zeroth=zeroth)).phase_rad
-    return np.asarray(tm.range_m(phase, base_frequency_hz), dtype=float)
-
-
-def _of_zeroth(variance: _Array, zeroth: str) -> _Array:
-    """Return the variance with none of b_0 where that is not measured."""
-    if zeroth != "estimated":
-        return variance
-    return np.concatenate([np.zeros_like(variance[:1]), variance[1:]])
 
 
 def direct_range(

@@ -84,6 +84,7 @@ class FrontCache:
 
     async def _current(self, frame: Frame) -> dict[str, Any]:
         found = await frame.reconstruction("returns")
+        await frame.accuracy()  # for its metadata
         applied: AppliedSequence = frame.recipe.applied
         error = None
         if self._simulated:

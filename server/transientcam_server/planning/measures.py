@@ -6,11 +6,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_server.imaging.noise import MEDIAN_OF_NORMAL
+from transientcam_server.imaging.accuracy import OUTLIER_DEVIATIONS
+from transientcam_server.imaging.noise import typical_deviation
 
 _Array = NDArray[Any]
-OUTLIER_DEVIATIONS: Final = 5.0
-"""A range further off than so many times the error of the median pixel is an outlier."""
 _LEAST_ERROR_M: Final = 1e-6
 
 
@@ -59,9 +58,7 @@ def pixel_errors(
     count = np.isfinite(range_m).sum(axis=0)
     enough = count >= 2
     known = np.where(enough, range_m, 0.0)
-    first, second = np.triu_indices(len(range_m), 1)
-    apart = np.abs(known[first] - known[second])
-    std_m = np.nanmedian(apart, axis=0) / (np.sqrt(2) * MEDIAN_OF_NORMAL)
+    std_m = typical_deviation(known)
     centre_m = np.nanmedian(known, axis=0)
     bias_m = np.hypot(centre_m - true_m, uncertainty_m)
     std_m = np.where(enough, std_m, np.inf)

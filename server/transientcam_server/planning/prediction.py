@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_server.imaging.noise import MEDIAN_OF_NORMAL
-from transientcam_server.planning.estimation import MOST_HARMONICS, ranges_m
+from transientcam_server.imaging.ranging import ranges_m
+from transientcam_server.planning.estimation import MOST_HARMONICS
 from transientcam_server.planning.measures import PixelErrors, pixel_errors
 from transientcam_server.planning.resolving import Resolving
 from transientcam_server.planning.scene import SceneStatistics

@@ -318,7 +318,7 @@ def test_an_unknown_product_is_answered_with_the_known_ones(camera: Camera, raw:
         with pytest.raises(Problem) as caught:
             pipeline.product("x" * 1000)
         # the sensor is not known here
-        of_noise = {"density_std", "range_std", "reduced_chi_square"}
+        of_noise = {"density_std", "range_bias", "range_error", "range_std", "reduced_chi_square"}
         assert caught.value.extensions["known"] == sorted(set(wire.PRODUCTS) - of_noise)
         assert len(str(caught.value.extensions["value"])) < 100
 

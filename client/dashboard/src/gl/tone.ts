@@ -5,6 +5,8 @@
  * that is shown as the brightest colour.
  */
 
+import type { Scale } from "../ui/scale";
+
 export type ToneKind = "linear" | "root" | "logarithmic";
 
 export const TONES: readonly ToneKind[] = ["linear", "root", "logarithmic"];
@@ -33,6 +35,11 @@ export function toned(kind: ToneKind, share: number): number {
 
 /** Place on the colour map from which light over a still scene has its full colour. */
 export const FULL_LIGHT = 0.18;
+
+/** The tone as a scale that a colour bar can show, in units of `white`. */
+export function scaleOf(kind: ToneKind, white: number): Scale {
+  return { low: kind === "logarithmic" ? white / 10 ** DECADES : 0, high: white, kind };
+}
 
 /** Share of its colour that light at `place` adds to the still scene behind it: GLSL's smoothstep. */
 export function strength(place: number): number {

@@ -125,7 +125,7 @@ export class Api {
   }
 
   /** The quickest sequence that reaches the target, or the most accurate within the budget. */
-  plan(goal: { target: { range_std_m?: number }; budget: { frame_rate_hz?: number } }, signal: AbortSignal): Promise<Plan> {
+  plan(goal: { target: { range_error_m?: number }; budget: { frame_rate_hz?: number } }, signal: AbortSignal): Promise<Plan> {
     return this.#json("POST", "/plan", { body: goal, signal }) as Promise<Plan>;
   }
 

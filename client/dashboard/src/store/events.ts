@@ -18,13 +18,34 @@ export interface Happening {
 /** Only so many are kept. */
 const MOST = 100;
 
+/** How long what comes in bursts is told by one happening. */
+const BURST_S = 30;
+
 export class Events {
   readonly all = signal<readonly Happening[]>([]);
   readonly #now_s: () => number;
+  readonly #bursts = new Map<string, { readonly number: number; count: number }>();
   #number = 0;
 
   constructor(now_s: () => number = () => Date.now() / 1000) {
     this.#now_s = now_s;
+  }
+
+  /**
+   * Tells of something that comes in bursts: what comes within `BURST_S` of the first is told by the same happening.
+   *
+   * `words` makes the sentence of how many there were.
+   */
+  tally(kind: string, count: number, words: (count: number) => string, tone: EventTone): void {
+    const burst = this.#bursts.get(kind);
+    const happening = burst && this.all.peek().find(({ number }) => number === burst.number);
+    if (burst === undefined || happening === undefined || this.#now_s() - happening.at_s > BURST_S) {
+      this.tell(words(count), tone);
+      this.#bursts.set(kind, { number: this.#number, count });
+      return;
+    }
+    burst.count += count;
+    this.all.value = this.all.peek().map((each) => (each === happening ? { ...each, words: words(burst.count) } : each));
   }
 
   tell(words: string, tone: EventTone = "plain"): void {
@@ -47,11 +68,21 @@ export const END_REASONS: Readonly<Record<string, string | undefined>> = {
   interrupted: "was interrupted",
 };
 
+/** Images that did not arrive, as a sentence. */
+export function lossWords(count: number): string {
+  return `${grouped(count)} ${count === 1 ? "image" : "images"} did not arrive intact from the camera: its connection, or the service's machine, was too busy.`;
+}
+
+/** Why the camera was lost, without saying once more that it was. */
+export function lossReason(reason: string): string {
+  return reason.replace(/^the camera was lost: /i, "");
+}
+
 /** A notice as a sentence; null for those that are shown otherwise. */
 export function inWords(notice: Notice): { words: string; tone: EventTone } | null {
   switch (notice.kind) {
     case "camera-lost":
-      return { words: notice.reason ? `The camera was lost: ${notice.reason}` : "The camera was lost.", tone: "bad" };
+      return { words: notice.reason ? `The camera was lost: ${lossReason(notice.reason)}` : "The camera was lost.", tone: "bad" };
     case "camera-back":
       return { words: "The camera is back.", tone: "good" };
     case "light-held":

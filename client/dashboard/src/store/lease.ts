@@ -130,6 +130,8 @@ export class Lease {
     if (this.#orphaned) {
       this.#orphaned = false;
       this.lost.value = held ? `${holder} has taken over control.` : "This page's control has lapsed.";
+    } else if (!held && this.control.peek().kind === "other") {
+      this.lost.value = null; // whoever took control gave it back
     }
     if (!held) this.control.value = { kind: "nobody" };
     else this.control.value = { kind: this.#api.credentials.leaseId.peek() === null ? "other" : "us", holder: holder ?? "Somebody", expires_s };

@@ -3,7 +3,10 @@ import { effect } from "@preact/signals";
 
 import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
+import { isLayout, type Layout } from "../views/layout";
+import { COLOUR_MAPS, type ColourMapName } from "../ui/colourMaps";
 import { RequestError } from "./api";
+import { isLimits, type LookChoice } from "./looks";
 import type { Pixel } from "./pixel";
 import type { Store } from "./store";
 
@@ -16,6 +19,10 @@ export interface Place {
   /** The recording that is shown, by its id, and which frame of it. */
   readonly recording?: string;
   readonly frame?: number;
+  /** Where the views stand. */
+  readonly layout?: Layout;
+  /** Colours, scale and limits of maps, by their products; only of those that were chosen. */
+  readonly looks?: Readonly<Record<string, LookChoice>>;
 }
 
 /** What an address says; parts that make no sense are as if they were not there. */
@@ -27,6 +34,8 @@ export function placeOf(hash: string): Place {
   const view = said.get("view");
   const recording = said.get("recording");
   const frame = said.get("frame");
+  const layout = layoutOf(said.get("layout") ?? "");
+  const looks = looksOf(said.getAll("look"));
   return {
     ...(MAP_PRODUCTS.some(({ product }) => product === map) ? { map: map as string } : {}),
     ...(pixel === null ? {} : { pixel: { x: Number(pixel[1]), y: Number(pixel[2]) } }),
@@ -34,11 +43,52 @@ export function placeOf(hash: string): Place {
     ...((VIEW_NAMES as readonly (string | null)[]).includes(view) ? { view: view as string } : {}),
     ...(recording !== null && /^[A-Za-z0-9][\w-]{0,199}$/.test(recording) ? { recording } : {}),
     ...(recording !== null && frame !== null && /^\d{1,12}$/.test(frame) ? { frame: Number(frame) } : {}),
+    ...(layout === null ? {} : { layout }),
+    ...(Object.keys(looks).length === 0 ? {} : { looks }),
   };
 }
 
+/** A layout as "2:map.1,transient.1/1:response.2": each row's share, then its views with theirs. */
+function layoutOf(text: string): Layout | null {
+  const rows = text.split("/").map((row) => {
+    const [share, slots = ""] = row.split(":");
+    return { share: Number(share), slots: slots.split(",").map((slot) => ({ view: slot.split(".")[0], share: Number(slot.slice(slot.indexOf(".") + 1)) })) };
+  });
+  return isLayout(rows, VIEW_NAMES) ? rows : null;
+}
+
+function layoutText(layout: Layout): string {
+  const short = (share: number): string => String(Number(share.toPrecision(3)));
+  return layout.map(({ share, slots }) => `${short(share)}:${slots.map((slot) => `${slot.view}.${short(slot.share)}`).join(",")}`).join("/");
+}
+
+/** Looks as "range,viridis,linear,1,3": product, colours, scale, and limits where these were set. */
+function looksOf(texts: readonly string[]): Record<string, LookChoice> {
+  const looks: Record<string, LookChoice> = {};
+  for (const text of texts) {
+    const [product, colours, kind, ...ends] = text.split(",");
+    const limits = ends.length === 2 ? { low: Number(ends[0]), high: Number(ends[1]) } : null;
+    const known = MAP_PRODUCTS.some((each) => each.product === product) && (COLOUR_MAPS as readonly string[]).includes(colours);
+    if (known && (kind === "linear" || kind === "logarithmic") && isLimits(limits)) looks[product] = { colours: colours as ColourMapName, kind, limits };
+  }
+  return looks;
+}
+
+function lookText(product: string, { colours, kind, limits }: LookChoice): string {
+  const ends = limits === null ? [] : [limits.low, limits.high].map((end) => Number(end.toPrecision(6)));
+  return [product, colours, kind, ...ends].join(",");
+}
+
+/** The whole address of what is shown, with layout, colours, scales and limits, to be given to somebody else. */
+export function linkTo(target: Window, store: Store): string {
+  const looks = Object.fromEntries([...store.looks.all].filter(([, look]) => look.chosen).map(([product, look]) => [product, look.choice]));
+  const whole = new URL(target.location.href);
+  whole.hash = hashOf({ ...placeNow(store), layout: store.layout.peek(), looks });
+  return whole.href;
+}
+
 /** The address of a place; "" for nothing in particular. */
-export function hashOf({ map, pixel, time_ns, view, recording, frame }: Place): string {
+export function hashOf({ map, pixel, time_ns, view, recording, frame, layout, looks = {} }: Place): string {
   const parts = [
     map === undefined ? "" : `map=${map}`,
     pixel === undefined ? "" : `pixel=${pixel.x},${pixel.y}`,
@@ -46,6 +96,8 @@ export function hashOf({ map, pixel, time_ns, view, recording, frame }: Place): 
     view === undefined ? "" : `view=${view}`,
     recording === undefined ? "" : `recording=${recording}`,
     recording === undefined || frame === undefined ? "" : `frame=${frame}`,
+    layout === undefined ? "" : `layout=${layoutText(layout)}`,
+    ...Object.entries(looks).map(([product, look]) => `look=${lookText(product, look)}`),
   ].filter((part) => part !== "");
   return parts.length === 0 ? "" : `#${parts.join("&")}`;
 }
@@ -62,19 +114,7 @@ export function keepAddress(target: Window, store: Store): void {
   });
   let timer: ReturnType<typeof setTimeout> | undefined;
   effect(() => {
-    const pixel = store.selected.value;
-    const playing = store.player.playing.value;
-    const view = store.alone.value;
-    const time_s = playing ? 0 : store.player.time_s.value;
-    const recording = store.replay.recording.value?.id;
-    const frame = store.replay.playing.value ? undefined : store.replay.frame.value;
-    const hash = hashOf({
-      map: store.mapProduct.value,
-      ...(pixel === null ? {} : { pixel }),
-      ...(time_s === 0 ? {} : { time_ns: time_s * 1e9 }),
-      ...(view === null ? {} : { view }),
-      ...(recording === undefined ? {} : { recording, ...(frame === undefined ? {} : { frame }) }),
-    });
+    const hash = hashOf(placeNow(store));
     clearTimeout(timer);
     // A time that waits for its period must not be forgotten meanwhile.
     if (store.sequence.value === null) return;
@@ -86,9 +126,27 @@ export function keepAddress(target: Window, store: Store): void {
   });
 }
 
-function go(store: Store, { map, pixel, time_ns, view, recording, frame }: Place): void {
+/** What is looked at now, as far as the address follows it. */
+function placeNow(store: Store): Place {
+  const pixel = store.selected.value;
+  const view = store.alone.value;
+  const time_s = store.player.playing.value ? 0 : store.player.time_s.value;
+  const recording = store.replay.recording.value?.id;
+  const frame = store.replay.playing.value ? undefined : store.replay.frame.value;
+  return {
+    map: store.mapProduct.value,
+    ...(pixel === null ? {} : { pixel }),
+    ...(time_s === 0 ? {} : { time_ns: time_s * 1e9 }),
+    ...(view === null ? {} : { view }),
+    ...(recording === undefined ? {} : { recording, ...(frame === undefined ? {} : { frame }) }),
+  };
+}
+
+function go(store: Store, { map, pixel, time_ns, view, recording, frame, layout, looks = {} }: Place): void {
   if (recording === undefined) store.replay.leave();
   else void open(store, recording, frame);
+  if (layout !== undefined) store.layout.value = layout;
+  for (const [product, choice] of Object.entries(looks)) store.looks.of(product).choice = choice;
   if (map !== undefined) store.mapProduct.value = map;
   if (pixel !== undefined) store.selected.value = pixel;
   if (view !== undefined) store.alone.value = view;

@@ -3,6 +3,9 @@ import { computed, signal, type ReadonlySignal } from "@preact/signals";
 /** Nanoseconds of flight that pass in a second of watching. */
 export const SPEEDS_NS = [0.5, 1, 2, 5, 10, 20] as const;
 
+/** An arrival as near as this, in shares of the period, is where the light is already. */
+const NEAR = 1e-3;
+
 /** Which moment of the flight is looked at, and how it moves on. */
 export class Player {
   /** Share of the period that has passed, 0 to 1: it keeps its meaning when the base frequency changes. */
@@ -10,6 +13,10 @@ export class Player {
   readonly playing = signal(false);
   readonly speed_ns = signal<number>(5);
   readonly time_s: ReadonlySignal<number>;
+  /** The part of the period in which there is light, in shares of it: what plays passes over the rest. */
+  readonly lit = signal<{ readonly first: number; readonly last: number } | null>(null);
+  /** When most light arrives in the whole picture, in shares of the period, in their order. */
+  readonly arrivals = signal<readonly number[]>([]);
   readonly phase_rad = computed(() => 2 * Math.PI * this.turn.value);
 
   /** `period_s` is 1/f of what is streamed: the time after which the flight repeats. */
@@ -21,6 +28,8 @@ export class Player {
   advance(elapsed_s: number): boolean {
     if (!this.playing.peek()) return false;
     this.step(elapsed_s * this.speed_ns.peek() * 1e-9);
+    const [lit, turn] = [this.lit.peek(), this.turn.peek()];
+    if (lit !== null && (turn < lit.first || turn > lit.last)) this.turn.value = lit.first;
     return true;
   }
 
@@ -28,6 +37,16 @@ export class Player {
   step(flight_s: number): void {
     const turn = this.turn.peek() + flight_s / this.period_s.peek();
     this.turn.value = turn - Math.floor(turn);
+  }
+
+  /** Goes to the next time at which light arrives, or to the one before, around the period at either end. */
+  jump(forward: boolean): void {
+    const [arrivals, turn] = [this.arrivals.peek(), this.turn.peek()];
+    const after = arrivals.find((each) => each > turn + NEAR);
+    const before = arrivals.findLast((each) => each < turn - NEAR);
+    const found = forward ? (after ?? arrivals[0]) : (before ?? arrivals.at(-1));
+    this.playing.value = false;
+    if (found !== undefined) this.turn.value = found;
   }
 
   seek(turn: number): void {

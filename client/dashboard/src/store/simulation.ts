@@ -28,6 +28,16 @@ export class Simulation {
     }
   }
 
+  /** Reads the world anew; what it calls for, which takes the service longer, only where that was asked for before. */
+  async follow(): Promise<void> {
+    if (this.explanation.peek() !== null) return this.refresh();
+    try {
+      this.world.value = await this.#api.simulation();
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error; // read again with the next change
+    }
+  }
+
   /** Puts the camera before another scene; effects that were chosen stay chosen. */
   async stage(scene: string): Promise<void> {
     await this.#api.setSimulation({ scene });

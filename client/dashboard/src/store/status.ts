@@ -15,6 +15,34 @@ const RATE_FRAMES = 64;
 const RATE_FEWEST = 3;
 const RATE_WINDOW_S = 3;
 
+/** How frames come; null where it is not known. */
+export interface Flow {
+  readonly rate_hz: number | null;
+  readonly latency_s: number | null;
+  /** When the last one was drawn, by the page's clock. */
+  readonly last_s: number | null;
+}
+
+/** Share of the sequence's rate below which frames come too seldom, and when they come too late to steer by. */
+const LEAST_SHARE = 0.3;
+const LATE_S = 1.5;
+/** Frames of another clock may seem to be older than this. */
+export const CREDIBLE_LATENCY_S = 30;
+/** How long no frame may come, besides the time of some. */
+const SILENCE_S = 3;
+
+/** What is wrong with the flow of frames of a sequence of `expected_hz`, in words; null where nothing is. */
+export function flowTrouble({ rate_hz, latency_s, last_s }: Flow, expected_hz: number | null, now_s: number): string | null {
+  const period_s = expected_hz === null ? 0 : 1 / expected_hz;
+  const silent_s = last_s === null ? 0 : now_s - last_s;
+  if (silent_s > SILENCE_S + 3 * period_s) return `No frame has come for ${Math.round(silent_s)} s.`;
+  if (rate_hz !== null && expected_hz !== null && rate_hz < LEAST_SHARE * expected_hz) {
+    return `${rate_hz.toFixed(1)} of ${expected_hz.toFixed(1)} frames a second are shown: the service, the network or this browser is too slow.`;
+  }
+  if (latency_s !== null && latency_s > LATE_S && latency_s < CREDIBLE_LATENCY_S) return `Frames are shown ${latency_s.toFixed(1)} s after they were captured.`;
+  return null;
+}
+
 /** What the page knows of connection, camera and the flow of frames. Times are of this page's clock. */
 export class Status {
   readonly connection = signal<Connection>({ kind: "connecting" });
@@ -39,6 +67,9 @@ export class Status {
   readonly dropped = computed(() => Math.max(0, ...this.#drops.value.values()));
   /** What is on screen is not what the camera sees now. */
   readonly stale = computed(() => this.connection.value.kind !== "open" || this.cameraLoss.value !== null);
+  /** How frames come, as far as it is known. */
+  readonly flow = computed((): Flow => ({ rate_hz: this.rate_hz.value, latency_s: this.latency_s.value, last_s: this.#last_s.value }));
+  readonly #last_s = signal<number | null>(null);
   #arrivals: number[] = [];
 
   /** A new session with the service: it counts anew. */
@@ -71,6 +102,7 @@ export class Status {
     const shown = this.newest.peek();
     if (shown?.frame === meta.frame) return;
     this.newest.value = meta;
+    this.#last_s.value = now_s;
     // Frames that were on their way when the camera went tell nothing of how fast it is; neither does the first,
     // which may be old.
     if (this.cameraLoss.peek() !== null || shown === null) return;
@@ -93,6 +125,7 @@ export class Status {
 
   #forgetRate(): void {
     this.#arrivals = [];
+    this.#last_s.value = null;
     this.rate_hz.value = null;
     this.latency_s.value = null;
   }

@@ -10,9 +10,12 @@ import { Credentials } from "./credentials";
 import { Events } from "./events";
 import { Frames } from "./frames";
 import { Lease } from "./lease";
+import { Looks } from "./looks";
+import { Measures } from "./measures";
+import { Noises } from "./noise";
 import type { Pixel } from "./pixel";
 import { Player } from "./player";
-import { browserShelf, oneOf, remembered, sessionShelf, type Shelf } from "./settings";
+import { aNumber, browserShelf, oneOf, remembered, sessionShelf, type Shelf } from "./settings";
 import { isLayout, OVERVIEW, type Layout } from "../views/layout";
 import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
@@ -22,6 +25,7 @@ import { Replay } from "./replay";
 import { Simulation } from "./simulation";
 import { Status } from "./status";
 import { Details } from "./details";
+import { Viewport } from "./viewport";
 import { Theme } from "../ui/theme";
 
 /** All that the page knows. Views read and set it; what fills it is no concern of theirs. */
@@ -52,6 +56,10 @@ export class Store {
   readonly held = signal(false);
   /** The pixel whose impulse response is shown. */
   readonly selected = signal<Pixel | null>(null);
+  /** Which part of the picture is shown. */
+  readonly viewport = new Viewport();
+  /** Pixels that are kept, and a region. */
+  readonly measures = new Measures();
   /** The pixel under the pointer, in whichever view. */
   readonly pointed = signal<Pixel | null>(null);
   /** Time after which a flight repeats, by the frame on screen. */
@@ -65,6 +73,12 @@ export class Store {
   /** What only the service knows of the selected pixel. */
   readonly details: Details;
   readonly theme: Theme;
+  /** How much pixels scatter from frame to frame. */
+  readonly noises = new Noises(this.frames);
+  /** Horizontal field of view, used where the service does not know where its camera looks. */
+  readonly field_deg: Signal<number>;
+  /** How maps are shown. */
+  readonly looks: Looks;
   /** The product that the map view shows. */
   readonly mapProduct: Signal<string>;
   /** Whether the list of keys is open. */
@@ -94,9 +108,16 @@ export class Store {
     };
     this.details = new Details(api);
     this.mapProduct = remembered(shelf, "map.product", "range", oneOf(MAP_PRODUCTS.map(({ product }) => product)));
+    this.field_deg = remembered(shelf, "points.field_deg", 45, isField);
+    this.looks = new Looks(this.frames, this.noises, shelf);
     this.layout = remembered<Layout>(shelf, "layout", OVERVIEW, (value): value is Layout => isLayout(value, VIEW_NAMES));
     this.theme = new Theme(shelf, systemScheme());
   }
+}
+
+/** Whether a value is a field of view that a camera may have, in degrees. */
+export function isField(value: unknown): value is number {
+  return aNumber(value) && value >= 5 && value <= 150;
 }
 
 /** Whether the system is dark, as the browser tells; null outside of one. */

@@ -2,7 +2,7 @@
 import { effect } from "@preact/signals";
 
 import { kindOf, LIVE, RequestError } from "../store/api";
-import { inWords } from "../store/events";
+import { inWords, lossWords } from "../store/events";
 import { frameOf } from "../store/frames";
 import type { Store } from "../store/store";
 import type { AnimationLoop } from "../ui/animation";
@@ -164,22 +164,25 @@ export class StreamClient {
   #notice(notice: Notice): void {
     const { status } = this.#store;
     const told = inWords(notice);
-    if (told !== null) this.#store.events.tell(told.words, told.tone);
+    // A calibration sets the sequence anew although it stays as it is.
+    const unchanged = notice.kind === "sequence-changed" && sameSequence(notice.sequence, this.#store.sequence.peek());
+    if (told !== null && !unchanged) this.#store.events.tell(told.words, told.tone);
     switch (notice.kind) {
       case "dropped":
         status.dropNotice(notice.channel, notice.total);
         break;
       case "lost-images":
         status.lostImages.value += notice.count;
+        this.#store.events.tally("lost-images", notice.count, lossWords, "plain");
         break;
       case "camera-lost":
         status.cameraIs("lost", this.#now_s(), notice.reason);
-        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.refresh();
+        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();
         break;
       case "camera-back":
         status.cameraIs("streaming", this.#now_s());
         void this.#readCamera();
-        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.refresh();
+        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();
         break;
       case "sequence-changed":
         this.#takeSequence(notice.sequence);
@@ -197,7 +200,7 @@ export class StreamClient {
         if (this.#store.calibrations.document.peek() !== null) void this.#store.calibrations.refresh();
         break;
       case "simulation-changed":
-        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.refresh();
+        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();
         break;
       case "recording-started":
       case "recording-stopped":
@@ -225,6 +228,7 @@ export class StreamClient {
 
   #takeCamera(document: CameraDocument): void {
     this.#store.camera.value = document;
+    if (document.simulated && this.#store.simulation.world.peek() === null) void this.#store.simulation.follow();
     this.#store.status.cameraIs(document.state, this.#now_s(), document.reason);
   }
 
@@ -268,6 +272,11 @@ export class StreamClient {
     });
     this.#loop.wake();
   }
+}
+
+/** Whether two sequences measure with the same; each time one is set it gets another number. */
+function sameSequence(one: AppliedSequence, other: AppliedSequence | null): boolean {
+  return other !== null && JSON.stringify({ ...one, sequence_id: 0 }) === JSON.stringify({ ...other, sequence_id: 0 });
 }
 
 interface Errand {

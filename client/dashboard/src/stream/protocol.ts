@@ -37,8 +37,8 @@ export interface FrameMeta {
   readonly temperature_c: number;
   readonly lost_images: number;
   readonly pixels: Readonly<Record<string, number>> | null;
-  /** Standard deviation that the sensor's noise gives the range, in m; null until the range was computed. */
-  readonly predicted_range_std_m?: { readonly median: number; readonly p90: number } | null;
+  /** Errors of the range that the frame knows of, in m; null until range_error was computed, and of bias where m = 1. */
+  readonly accuracy?: { readonly range_error_m: number | null } | null;
 }
 
 /** A sequence as it was really set, with the figures that follow from it. */
@@ -127,7 +127,11 @@ export interface Choice {
   /** Computing time of one frame. */
   readonly reconstruct_s: number;
   readonly predicted: {
-    readonly range_std_m: { readonly median: number; readonly low: number; readonly high: number; readonly p90: number };
+    /** Noise and bias together, and the interval of what is measured. */
+    readonly range_error_m: { readonly median: number; readonly low: number; readonly high: number; readonly p90: number };
+    readonly range_std_m: { readonly median: number };
+    readonly range_bias_m: number;
+    readonly outlier_share: number;
   };
 }
 

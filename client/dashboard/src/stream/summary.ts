@@ -21,7 +21,7 @@ const MAP_SAMPLES = 4096;
 const LIGHT_SAMPLES = 600;
 export const ARRIVAL_TIMES = 192;
 
-/** The 1st and 99th percentile of the numbers among `values`, from at most `MAP_SAMPLES` of them. */
+/** The 2nd and 98th percentile of the numbers among `values`, from at most `MAP_SAMPLES` of them. */
 export function summariseMap(values: ArrayLike<number>): MapSummary {
   const stride = Math.max(1, Math.floor(values.length / MAP_SAMPLES));
   const sample: number[] = [];
@@ -32,7 +32,7 @@ export function summariseMap(values: ArrayLike<number>): MapSummary {
   if (sample.length === 0) return { low: NaN, high: NaN, valid: 0 };
   const sorted = Float64Array.from(sample).sort();
   const quantile = (q: number): number => sorted[Math.round(q * (sorted.length - 1))];
-  return { low: quantile(0.01), high: quantile(0.99), valid: sample.length / seen };
+  return { low: quantile(0.02), high: quantile(0.98), valid: sample.length / seen };
 }
 
 /** Brightness and arrival times of the light in a frame, from a sample of its pixels. */

@@ -1,3 +1,7 @@
+import { useId, useRef } from "preact/hooks";
+
+import { placeBeside } from "./popover";
+
 export interface Action {
   readonly text: string;
   readonly run: () => void;
@@ -8,33 +12,97 @@ export interface ActionGroup {
   readonly actions: readonly Action[];
 }
 
-/** Things to do, behind one small button: the browser's own list, so that keys, touch and readers know it. */
+/**
+ * Things to do, behind one small button: a menu after the WAI-ARIA pattern "menu button".
+ *
+ * Nothing runs before an entry is pressed: arrow keys only move between them.
+ */
 export function ActionMenu({ label, groups }: { label: string; groups: readonly ActionGroup[] }) {
+  const button = useRef<HTMLButtonElement>(null);
+  const menu = useRef<HTMLDivElement>(null);
+  const id = useId();
   const filled = groups.filter(({ actions }) => actions.length > 0);
+  const entries = (): HTMLElement[] => [...(menu.current?.querySelectorAll<HTMLElement>("[role=menuitem]") ?? [])];
+
+  const open = (): void => {
+    if (menu.current === null || button.current === null || menu.current.matches(":popover-open")) return;
+    menu.current.showPopover();
+    placeBeside(menu.current, button.current);
+    entries()[0]?.focus();
+  };
+  const onButtonKey = (event: KeyboardEvent): void => {
+    if (event.key !== "ArrowDown" && event.key !== "ArrowUp") return;
+    event.preventDefault();
+    event.stopPropagation();
+    open();
+    if (event.key === "ArrowUp") entries().at(-1)?.focus();
+  };
+  const onMenuKey = (event: KeyboardEvent): void => {
+    event.stopPropagation(); // keys of the page would move the light
+    if (event.key === "Tab") menu.current?.hidePopover();
+    const all = entries();
+    const next = neighbour(all.map((entry) => entry.textContent ?? ""), all.indexOf(document.activeElement as HTMLElement), event.key);
+    if (next === null) return;
+    event.preventDefault();
+    all[next]?.focus();
+  };
   return (
-    <select
-      class="action-menu"
-      aria-label={label}
-      title={label}
-      value=""
-      onChange={(event) => {
-        const [group, action] = event.currentTarget.value.split(".").map(Number);
-        event.currentTarget.value = "";
-        filled[group].actions[action].run();
-      }}
-    >
-      <option value="" disabled hidden>
+    <>
+      <button ref={button} type="button" class="action-menu" aria-label={label} title={label} aria-haspopup="menu" aria-controls={id} popovertarget={id} popovertargetaction="toggle" onKeyDown={onButtonKey}>
         ⋯
-      </option>
-      {filled.map(({ title, actions }, group) => (
-        <optgroup key={title} label={title}>
-          {actions.map(({ text }, action) => (
-            <option key={text} value={`${group}.${action}`}>
-              {text}
-            </option>
-          ))}
-        </optgroup>
-      ))}
-    </select>
+      </button>
+      <div
+        ref={menu}
+        id={id}
+        class="menu"
+        role="menu"
+        aria-label={label}
+        popover="auto"
+        onKeyDown={onMenuKey}
+        onToggle={(event) => {
+          if (event.newState !== "open" || button.current === null) return;
+          placeBeside(event.currentTarget, button.current);
+          if (!event.currentTarget.contains(document.activeElement)) entries()[0]?.focus();
+        }}
+      >
+        {filled.map(({ title, actions }) => (
+          <div key={title} class="menu-group" role="group" aria-label={title}>
+            <p class="menu-title" aria-hidden="true">
+              {title}
+            </p>
+            {actions.map(({ text, run }) => (
+              <button
+                key={text}
+                type="button"
+                role="menuitem"
+                tabIndex={-1}
+                onClick={() => {
+                  menu.current?.hidePopover();
+                  run();
+                }}
+              >
+                {text}
+              </button>
+            ))}
+          </div>
+        ))}
+      </div>
+    </>
   );
+}
+
+/** Which entry a key leads to from entry `at`, of those with these `texts`; null for keys that lead nowhere. */
+export function neighbour(texts: readonly string[], at: number, key: string): number | null {
+  const count = texts.length;
+  if (key === "ArrowDown") return (at + 1) % count;
+  if (key === "ArrowUp") return (Math.max(0, at) - 1 + count) % count;
+  if (key === "Home") return 0;
+  if (key === "End") return count - 1;
+  if (key.length !== 1 || key === " ") return null;
+  // A letter leads to the next entry that begins with it.
+  for (let step = 1; step <= count; step++) {
+    const next = (at + step) % count;
+    if (texts[next].toLowerCase().startsWith(key.toLowerCase())) return next;
+  }
+  return null;
 }

@@ -26,6 +26,22 @@ export function Help() {
           <dd>in a picture: move the selected pixel</dd>
         </div>
         <div>
+          <dt>wheel, + −</dt>
+          <dd>in a picture: zoom all pictures; a double click shows them whole</dd>
+        </div>
+        <div>
+          <dt>
+            <kbd>Shift</kbd> + click, <kbd>Enter</kbd>
+          </dt>
+          <dd>in a picture: pin a pixel as A, B or C</dd>
+        </div>
+        <div>
+          <dt>
+            <kbd>Shift</kbd> + drag, <kbd>R</kbd>
+          </dt>
+          <dd>in a picture: measure a region; Escape removes it and the pins</dd>
+        </div>
+        <div>
           <dt>arrows, + −</dt>
           <dd>in the points: turn, come nearer, go</dd>
         </div>

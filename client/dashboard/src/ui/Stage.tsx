@@ -1,9 +1,12 @@
-import { computed } from "@preact/signals";
 import type { ComponentChildren } from "preact";
-import { useMemo } from "preact/hooks";
+import { useEffect, useMemo, useRef } from "preact/hooks";
+import { computed } from "@preact/signals";
 
+import { regionOf } from "../store/measures";
 import type { Pixel } from "../store/pixel";
 import { useStore } from "../store/store";
+import { placeIn, WHOLE, type Point } from "../store/viewport";
+import { Marks } from "./Marks";
 
 interface StageProps {
   /** Size of the picture in pixels of the sensor. */
@@ -14,55 +17,141 @@ interface StageProps {
   readonly children: ComponentChildren;
 }
 
+/** How far a pointer may move in CSS px and still click. */
+const CLICK_PX = 4;
+/** One notch of a wheel, 100 units, and one press of a key. */
+const ZOOM_PER_UNIT = 1.002;
+const KEY_ZOOM = 1.25;
+
+interface Drag {
+  readonly kind: "pan" | "region";
+  readonly from: Pixel;
+  last: PointerEvent;
+  moved: boolean;
+}
+
 /**
- * A picture of the sensor that fits its panel, with a crosshair.
+ * A picture of the sensor that fits its panel, with a crosshair; all stages show the same part of it.
  *
- * Pointing at it sets the pointed pixel, a click or tap selects one, for all views alike; with the stage
- * focused, Shift and the arrow keys move the selected pixel.
+ * Pointing at it sets the pointed pixel, a click or tap selects one, for all views alike; the wheel zooms, dragging
+ * moves what is zoomed, a double click shows it whole again. With Shift a click pins a pixel and dragging marks a
+ * region. With the stage focused, Shift and the arrow keys move the selected pixel, + and − zoom, Enter pins it, R
+ * marks a region around it and Escape takes regions and pins away.
  */
 export function Stage({ width, height, label, children }: StageProps) {
   const store = useStore();
+  const { viewport, measures } = store;
+  const picture = useRef<HTMLDivElement>(null);
+  const drag = useRef<Drag | null>(null);
 
-  const pixelAt = (event: PointerEvent): Pixel => {
-    const box = (event.currentTarget as HTMLElement).getBoundingClientRect();
+  const shareAt = (event: MouseEvent): Point => {
+    const box = (picture.current as HTMLElement).getBoundingClientRect();
+    return { x: (event.clientX - box.left) / box.width, y: (event.clientY - box.top) / box.height };
+  };
+  const pixelAt = (event: MouseEvent): Pixel => {
+    const place = placeIn(viewport.view.peek(), shareAt(event));
     const clamp = (value: number, end: number): number => Math.min(end - 1, Math.max(0, Math.floor(value)));
-    return {
-      x: clamp(((event.clientX - box.left) / box.width) * width, width),
-      y: clamp(((event.clientY - box.top) / box.height) * height, height),
+    return { x: clamp(place.x * width, width), y: clamp(place.y * height, height) };
+  };
+
+  useEffect(() => {
+    const target = picture.current;
+    // Not by onWheel: the page would scroll meanwhile.
+    const onWheel = (event: WheelEvent): void => {
+      event.preventDefault();
+      viewport.zoomAt(shareAt(event), ZOOM_PER_UNIT ** -event.deltaY);
     };
+    target?.addEventListener("wheel", onWheel, { passive: false });
+    return () => {
+      target?.removeEventListener("wheel", onWheel);
+    };
+  }, [viewport]);
+
+  const onPointerDown = (event: PointerEvent): void => {
+    if (event.button !== 0) return;
+    drag.current = { kind: event.shiftKey ? "region" : "pan", from: pixelAt(event), last: event, moved: false };
+    picture.current?.setPointerCapture(event.pointerId);
+  };
+  const onPointerMove = (event: PointerEvent): void => {
+    moveDrag(event);
+    store.pointed.value = pixelAt(event); // after the picture was moved under the pointer
+  };
+  const moveDrag = (event: PointerEvent): void => {
+    const now = drag.current;
+    if (now === null) return;
+    now.moved ||= Math.hypot(event.clientX - now.last.clientX, event.clientY - now.last.clientY) > CLICK_PX;
+    if (!now.moved) return;
+    if (now.kind === "region") {
+      measures.region.value = regionOf(now.from, pixelAt(event));
+    } else {
+      const [before, after] = [shareAt(now.last), shareAt(event)];
+      viewport.pan({ x: after.x - before.x, y: after.y - before.y });
+      now.last = event;
+    }
+  };
+  const onPointerUp = (event: PointerEvent): void => {
+    const ended = drag.current;
+    drag.current = null;
+    if (ended === null || ended.moved) return;
+    if (ended.kind === "region") measures.pin(pixelAt(event));
+    else store.selected.value = pixelAt(event);
   };
 
   const onKeyDown = (event: KeyboardEvent): void => {
-    const step = ARROWS[event.key];
-    if (step === undefined || !event.shiftKey) return;
+    const from = store.selected.peek() ?? { x: width >> 1, y: height >> 1 };
+    const centre: Point = { x: 0.5, y: 0.5 };
+    const step = event.shiftKey ? ARROWS[event.key] : undefined;
+    if (step !== undefined) {
+      store.selected.value = { x: Math.min(width - 1, Math.max(0, from.x + step[0])), y: Math.min(height - 1, Math.max(0, from.y + step[1])) };
+    } else if (event.key === "+") viewport.zoomAt(centre, KEY_ZOOM);
+    else if (event.key === "-") viewport.zoomAt(centre, 1 / KEY_ZOOM);
+    else if (event.key === "Enter") measures.pin(from);
+    else if (event.key === "r") measures.toggleRegion(from, width, height);
+    else if (event.key === "Escape") [measures.region.value, measures.pins.value] = [null, []];
+    else return;
     event.preventDefault();
     event.stopPropagation();
-    const from = store.selected.peek() ?? { x: width >> 1, y: height >> 1 };
-    store.selected.value = {
-      x: Math.min(width - 1, Math.max(0, from.x + step[0])),
-      y: Math.min(height - 1, Math.max(0, from.y + step[1])),
-    };
   };
 
+  const style = useMemo(
+    () =>
+      computed(() => {
+        const { zoom, left, top } = viewport.view.value;
+        return zoom === 1 ? undefined : { transform: `scale(${zoom}) translate(${-100 * left}%, ${-100 * top}%)` };
+      }),
+    [viewport],
+  );
+  const zoomed = viewport.view.value !== WHOLE;
   return (
     <div class="stage" style={{ "--aspect": width / height }}>
       <div
+        ref={picture}
         class="stage-picture"
         role="application"
         aria-roledescription="sensor image"
         aria-label={`${label}. Click a pixel, or press Shift and an arrow key, to show its impulse response.`}
         tabIndex={0}
-        onPointerMove={(event) => (store.pointed.value = pixelAt(event))}
+        data-zoomed={zoomed}
+        onPointerMove={onPointerMove}
         onPointerLeave={() => (store.pointed.value = null)}
-        onPointerDown={(event) => {
-          if (event.button === 0) store.selected.value = pixelAt(event);
+        onPointerDown={onPointerDown}
+        onPointerUp={onPointerUp}
+        onPointerCancel={() => (drag.current = null)}
+        onDblClick={() => {
+          viewport.reset();
         }}
         onKeyDown={onKeyDown}
       >
-        {children}
-        <Mark of="selected" width={width} height={height} />
-        <Mark of="pointed" width={width} height={height} />
+        <div class="stage-zoom" style={style.value}>
+          {children}
+        </div>
+        <Marks width={width} height={height} />
       </div>
+      {zoomed && (
+        <button type="button" class="stage-whole" title="Show the whole picture (double click)" onClick={() => viewport.reset()}>
+          {Number(viewport.view.value.zoom.toPrecision(2))} ×
+        </button>
+      )}
     </div>
   );
 }
@@ -73,30 +162,3 @@ const ARROWS: Readonly<Record<string, readonly [number, number] | undefined>> = 
   ArrowUp: [0, -1],
   ArrowDown: [0, 1],
 };
-
-/** The crosshair of the pointed or the selected pixel; moves without rendering anything else. */
-function Mark({ of, width, height }: { of: "selected" | "pointed"; width: number; height: number }) {
-  const store = useStore();
-  const style = useMemo(
-    () =>
-      computed(() => {
-        const pixel = store[of].value;
-        if (pixel === null) return null;
-        return {
-          "--x": `${(100 * (pixel.x + 0.5)) / width}%`,
-          "--y": `${(100 * (pixel.y + 0.5)) / height}%`,
-          "--w": `${100 / width}%`,
-          "--h": `${100 / height}%`,
-        };
-      }),
-    [store, of, width, height],
-  );
-  if (style.value === null) return null;
-  return (
-    <div class={`mark mark-${of}`} style={style.value} aria-hidden="true">
-      <i class="mark-column" />
-      <i class="mark-row" />
-      <i class="mark-pixel" />
-    </div>
-  );
-}

@@ -34,7 +34,7 @@ export function Steer({ onClick, title, primary = false, danger = false, disable
 export function Obstacle() {
   const { caller, obstacle, asksForControl, asksForToken } = useStore();
   if (obstacle.value === null) return null;
-  const [way, asks] = caller.obstacle.value === null ? ["Control…", asksForControl] : ["Token…", asksForToken];
+  const [way, asks] = caller.obstacle.value === null ? ["Take control…", asksForControl] : ["Token…", asksForToken];
   return (
     <p class="obstacle" role="status">
       {obstacle.value}: you can look, but not change this.{" "}

@@ -4,7 +4,8 @@
  * Viridis, inferno and cividis are perceptually uniform and read by colour-blind eyes; they are given by
  * every fifteenth entry of the tables published with matplotlib (public domain, CC0; cividis after
  * Nuñez, Anderton, Renslow 2018) and joined by straight lines, which stays within 11/255 of the original
- * (viridis and inferno within 5/255).
+ * (viridis and inferno within 5/255). Coolwarm (after Moreland 2009) diverges: it is for values whose zero
+ * means something.
  */
 
 const STOPS = {
@@ -15,7 +16,18 @@ const STOPS = {
   inferno:
     "000004 0a0722 1e0c45 380962 510e6c 69166e 801f6c 982766 b0315b c63d4d d94d3d e9612b f47918 fa9407 fcb014 f8cd37 f2ea69 fcffa4",
   grey: "000000 ffffff",
+  coolwarm:
+    "3b4cc0 4c66d6 5f7fe8 7396f5 88abfd 9dbdff b1cbfc c4d5f3 d5dbe5 e4d9d2 f0cdbb f6bea4 f7aa8c f39475 e97a5f dc5d4a ca3b37 b40426",
 } as const;
+
+/** Colours of what lies below and above a scale: told from its ends, without outshining the picture. */
+const BEYOND: Readonly<Record<keyof typeof STOPS, readonly [under: string, over: string]>> = {
+  viridis: ["1c0029", "fffbd5"],
+  cividis: ["000914", "fffac9"],
+  inferno: ["07334d", "ffffff"],
+  grey: ["0b2a55", "ffc9b0"],
+  coolwarm: ["1a2370", "6b0019"],
+};
 
 export type ColourMapName = keyof typeof STOPS;
 
@@ -52,6 +64,15 @@ export function colourTable(name: ColourMapName): ColourTable {
     tables.set(name, table);
   }
   return table;
+}
+
+/** The colours of what lies beyond a scale, as RGBA bytes in one number (little endian, as all browsers are). */
+export function beyond(name: ColourMapName): { readonly under: number; readonly over: number } {
+  const [under, over] = BEYOND[name].map((hex) => {
+    const rgb = parseInt(hex, 16);
+    return (0xff000000 | ((rgb & 0xff) << 16) | (rgb & 0xff00) | (rgb >> 16)) >>> 0;
+  });
+  return { under, over };
 }
 
 /** The entry for a value at `fraction` of the way from a scale's low to its high end. */

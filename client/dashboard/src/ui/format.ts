@@ -47,6 +47,13 @@ export function significant(value: number | null | undefined, digits: number, un
   return withUnit(value.toFixed(decimals).replace("-", "−"), unit);
 }
 
+/** A standard deviation behind its value: "± 11 mm"; "" where none is known. */
+export function deviation(std: number | null | undefined, unit: string): string {
+  if (std === null || std === undefined || !Number.isFinite(std)) return "";
+  // Digital numbers take no prefix.
+  return `±\u202f${unit === "m" || unit === "s" ? engineering(std, unit, 2) : significant(std, 2, unit)}`;
+}
+
 /** A whole number with its thousands apart. */
 export function grouped(value: number): string {
   return Math.round(value).toString().replace(/\B(?=(\d{3})+$)/g, THIN_SPACE);

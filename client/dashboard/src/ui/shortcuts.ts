@@ -39,6 +39,8 @@ export const SHORTCUTS: readonly Shortcut[] = [
   { keys: ["ArrowLeft"], shown: "←", words: "back by 0.1 ns, with Shift by 1 ns", run: (store, { shiftKey }) => { scrub(store, shiftKey ? -LONG_STEP_S : -STEP_S); } },
   { keys: ["ArrowRight"], shown: "→", words: "on by 0.1 ns, with Shift by 1 ns", run: (store, { shiftKey }) => { scrub(store, shiftKey ? LONG_STEP_S : STEP_S); } },
   { keys: ["Home"], shown: "Home", words: "to the start of the flight", run: ({ player }) => { player.seek(0); } },
+  { keys: ["n"], shown: "N", words: "to the next arrival of light", run: ({ player }) => { player.jump(true); } },
+  { keys: ["b"], shown: "B", words: "to the arrival before", run: ({ player }) => { player.jump(false); } },
   { keys: [","], shown: ",", words: "slower", run: (store) => { speedUp(store, -1); } },
   { keys: ["."], shown: ".", words: "faster", run: (store) => { speedUp(store, 1); } },
   { keys: ["h"], shown: "H", words: "hold the frame, or let it go", run: ({ held }) => { held.value = !held.peek(); } },
@@ -62,16 +64,24 @@ function nextLayout({ layout, alone }: Store): void {
 
 /** Keys for the whole page; the answer takes them away again. */
 export function shortcuts(target: Window, store: Store): () => void {
+  /** The button that was pressed by pointer and has the focus since; keys that come after are not meant for it. */
+  let clicked: Element | null = null;
+  const onClick = (event: MouseEvent): void => {
+    clicked = event.detail > 0 && event.target instanceof Element ? event.target.closest("button") : null;
+  };
   const onKeyDown = (event: KeyboardEvent): void => {
+    if (event.key === "Tab") clicked = null;
     if (event.ctrlKey || event.metaKey || event.altKey || typesText(event.target)) return;
     const shortcut = SHORTCUTS.find(({ keys }) => keys.includes(event.key));
-    // A focused button is pressed by the space bar already.
-    if (shortcut === undefined || (event.key === " " && event.target instanceof HTMLButtonElement)) return;
+    // A button that was reached by keys is pressed by the space bar already.
+    if (shortcut === undefined || (event.key === " " && event.target instanceof HTMLButtonElement && event.target !== clicked)) return;
     event.preventDefault();
     shortcut.run(store, event);
   };
+  target.addEventListener("click", onClick, true);
   target.addEventListener("keydown", onKeyDown);
   return () => {
+    target.removeEventListener("click", onClick, true);
     target.removeEventListener("keydown", onKeyDown);
   };
 }

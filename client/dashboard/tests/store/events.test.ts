@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import { Events, inWords } from "../../src/store/events";
+import { Events, inWords, lossWords } from "../../src/store/events";
 import type { AppliedSequence, Notice } from "../../src/stream/protocol";
 
 const words = (notice: Record<string, unknown>): string | undefined => inWords({ type: "notice", ...notice } as unknown as Notice)?.words;
@@ -36,4 +36,27 @@ describe("what happened", () => {
     expect(words({ kind: "dropped", channel: 0, count: 1, total: 1 })).toBeUndefined();
     expect(words({ kind: "eclipse" })).toBeUndefined();
   });
+});
+
+describe("images that were lost", () => {
+  test("are told of once a burst, with how many there were", () => {
+    let now_s = 100;
+    const events = new Events(() => now_s);
+    events.tally("lost-images", 3, lossWords, "plain");
+    now_s += 5;
+    events.tell("something else");
+    events.tally("lost-images", 2, lossWords, "plain");
+    expect(events.all.value.map(({ words: told }) => told)).toEqual([lossWords(5), "something else"]);
+    expect(lossWords(5)).toMatch(/^5 images did not arrive intact/);
+    now_s += 60;
+    events.tally("lost-images", 1, lossWords, "plain");
+    expect(events.all.value.at(-1)?.words).toMatch(/^1 image did/);
+    expect(events.all.value).toHaveLength(3);
+  });
+});
+
+test("a lost camera is told of once, although its reason says so too", () => {
+  const reason = "the camera was lost: HEARTBEAT: No such device";
+  expect(words({ kind: "camera-lost", reason })).toBe("The camera was lost: HEARTBEAT: No such device");
+  expect(words({ kind: "camera-lost", reason: "pulled" })).toBe("The camera was lost: pulled");
 });

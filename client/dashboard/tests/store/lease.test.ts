@@ -115,6 +115,16 @@ describe("the lease", () => {
     expect(desk.api.credentials.leaseId.value).toBeNull();
   });
 
+  test("that was taken over and given back again is lost no more", async () => {
+    await desk.lease.take("bench 2", false);
+    desk.grant("the night shift", 30);
+    await desk.lease.look();
+    desk.held = null;
+    await desk.lease.look();
+    expect(desk.lease.control.value).toEqual({ kind: "nobody" });
+    expect(desk.lease.lost.value).toBeNull();
+  });
+
   test("that a change was refused for is looked at anew", async () => {
     await desk.lease.take("bench 2", false);
     desk.held = null;

@@ -17,6 +17,22 @@ describe("an address", () => {
     expect(placeOf("#recording=x&frame=-2")).toEqual({ recording: "x" });
   });
 
+  test("that is handed on says the layout, and the looks that were chosen", () => {
+    const place = {
+      layout: [{ share: 2, slots: [{ view: "map", share: 1 }, { view: "transient", share: 0.5 }] }, { share: 1, slots: [{ view: "response", share: 1 }] }],
+      looks: { range: { colours: "cividis", kind: "linear", limits: { low: 1, high: 3.5 } }, direct: { colours: "grey", kind: "logarithmic", limits: null } },
+    } as const;
+    expect(hashOf(place)).toBe("#layout=2:map.1,transient.0.5/1:response.1&look=range,cividis,linear,1,3.5&look=direct,grey,logarithmic");
+    expect(placeOf(hashOf(place))).toEqual(place);
+  });
+
+  test.each(["#layout=1:secret.1", "#layout=:,/", "#layout=1:map.-1", "#look=range,neon,linear", "#look=range,viridis,linear,3,1", "#look=secret,viridis,linear", "#look=,"])(
+    "with a layout or a look that makes no sense says nothing: %s",
+    (hash) => {
+      expect(placeOf(hash)).toEqual({});
+    },
+  );
+
   test("of nothing is empty", () => {
     expect(hashOf({})).toBe("");
     expect(placeOf("")).toEqual({});

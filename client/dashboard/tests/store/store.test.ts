@@ -62,6 +62,33 @@ describe("the player", () => {
     expect(player.phase_rad.value).toBeCloseTo(Math.PI / 4, 9);
   });
 
+  test("plays only while there is light, and is moved by hand to any time", () => {
+    player.seek(0);
+    player.playing.value = true;
+    player.lit.value = { first: 0.25, last: 0.5 };
+    player.advance(0.001);
+    expect(player.turn.value).toBe(0.25);
+    player.seek(0.4999);
+    player.advance(0.01);
+    expect(player.turn.value).toBe(0.25);
+    player.seek(0.9);
+    expect(player.turn.value).toBe(0.9);
+    [player.playing.value, player.lit.value] = [false, null];
+  });
+
+  test("jumps between the arrivals of light, around the period", () => {
+    player.arrivals.value = [0.2, 0.6];
+    player.seek(0.3);
+    const turns = [true, true, false, false].map((forward) => {
+      player.jump(forward);
+      return player.turn.value;
+    });
+    expect(turns).toEqual([0.6, 0.2, 0.6, 0.2]);
+    player.arrivals.value = [];
+    player.jump(true);
+    expect(player.turn.value).toBe(0.2);
+  });
+
   test("steps back over the start to the end", () => {
     player.seek(0);
     player.step(-1e-9);

@@ -4,7 +4,7 @@ import { Api } from "../../src/store/api";
 import type { RecordingDocument } from "../../src/store/documents";
 import { Store } from "../../src/store/store";
 import { StreamClient, type WorkerPort } from "../../src/stream/client";
-import type { FrameMeta, FrameMessage, Hello } from "../../src/stream/protocol";
+import type { AppliedSequence, FrameMeta, FrameMessage, Hello } from "../../src/stream/protocol";
 import { type FrameReport, summarised } from "../../src/stream/summary";
 import type { Command, Report } from "../../src/stream/worker";
 import { AnimationLoop } from "../../src/ui/animation";
@@ -181,6 +181,19 @@ describe("between worker and store", () => {
   test("notices become what happened", () => {
     page.receives({ type: "message", message: { type: "notice", kind: "lease-changed", change: "granted", holder: "bench 2" } });
     page.receives({ type: "message", message: { type: "notice", kind: "lost-images", count: 2 } });
-    expect(page.store.events.all.value.map(({ words }) => words)).toEqual(["bench 2 has taken control."]);
+    expect(page.store.events.all.value.map(({ words }) => words)).toEqual([
+      "bench 2 has taken control.",
+      expect.stringMatching(/^2 images did not arrive intact/),
+    ]);
+  });
+
+  test("a sequence that was set anew and is what it was is no news", () => {
+    const sequence = { sequence_id: 1, harmonics: 4, base_frequency_hz: 23e6, exposure_s: 1e-3, images: 20 };
+    const changed = (change: object): void => page.receives({ type: "message", message: { type: "notice", kind: "sequence-changed", sequence: { ...sequence, ...change } as unknown as AppliedSequence } });
+    changed({});
+    changed({ sequence_id: 2 });
+    expect(page.store.events.all.value).toHaveLength(1);
+    changed({ sequence_id: 3, harmonics: 5 });
+    expect(page.store.events.all.value).toHaveLength(2);
   });
 });

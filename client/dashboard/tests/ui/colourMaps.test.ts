@@ -12,9 +12,13 @@ function lightness(rgb: ArrayLike<number>): number {
   return y > 0.008856 ? 116 * Math.cbrt(y) - 16 : 903.3 * y;
 }
 
-describe.each(COLOUR_MAPS)("%s", (name) => {
+const coloursOf = (name: (typeof COLOUR_MAPS)[number]): Uint8ClampedArray[] => {
   const table = colourTable(name);
-  const colours = Array.from({ length: LEVELS }, (_, level) => table.slice(4 * level, 4 * level + 4));
+  return Array.from({ length: LEVELS }, (_, level) => table.slice(4 * level, 4 * level + 4));
+};
+
+describe.each(COLOUR_MAPS.filter((name) => name !== "coolwarm"))("%s", (name) => {
+  const colours = coloursOf(name);
 
   test("gets lighter from end to end, so that it reads without seeing colour", () => {
     const values = colours.map(lightness);
@@ -24,6 +28,11 @@ describe.each(COLOUR_MAPS)("%s", (name) => {
     expect(values[LEVELS - 1] - values[0]).toBeGreaterThan(70);
   });
 
+});
+
+describe.each(COLOUR_MAPS)("%s", (name) => {
+  const colours = coloursOf(name);
+
   test("has no steps, and covers what is behind it", () => {
     colours.slice(1).forEach((colour, level) => {
       const jump = Math.max(...[0, 1, 2].map((channel) => Math.abs(colour[channel] - colours[level][channel])));
@@ -31,6 +40,13 @@ describe.each(COLOUR_MAPS)("%s", (name) => {
       expect(colour[3]).toBe(255);
     });
   });
+});
+
+test("coolwarm is lightest in its middle and gets darker evenly towards both ends", () => {
+  const values = coloursOf("coolwarm").map(lightness);
+  for (let level = 1; level < 120; level++) expect(values[level]).toBeGreaterThan(values[level - 1] - 0.35);
+  for (let level = 137; level < LEVELS; level++) expect(values[level]).toBeLessThan(values[level - 1] + 0.35);
+  expect(values[128] - Math.max(values[0], values[255])).toBeGreaterThan(35);
 });
 
 test("viridis has the colours it is known by", () => {

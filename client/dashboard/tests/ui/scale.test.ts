@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import { autoLimits, fraction, type Scale, ticks, valueAt } from "../../src/ui/scale";
+import { autoLimits, fraction, histogram, type Scale, symmetric, ticks, valueAt } from "../../src/ui/scale";
 
 const linear: Scale = { low: 2, high: 6, kind: "linear" };
 const logarithmic: Scale = { low: 1, high: 1000, kind: "logarithmic" };
@@ -21,7 +21,7 @@ describe("a place on a scale", () => {
     expect(fraction(logarithmic, NaN)).toBeNaN();
   });
 
-  test.each([linear, logarithmic, { low: 0, high: 50, kind: "logarithmic" } as const])(
+  test.each([linear, logarithmic, { low: 1, high: 9, kind: "root" } as const, { low: 0, high: 50, kind: "logarithmic" } as const])(
     "leads back to its value on %o",
     (scale) => {
       for (const place of [0, 0.2, 0.7, 1]) expect(fraction(scale, valueAt(scale, place))).toBeCloseTo(place, 9);
@@ -42,6 +42,10 @@ describe("ticks", () => {
   test("of a logarithmic scale are powers of ten, with 2 and 5 where there is room", () => {
     expect(ticks(logarithmic, 6)).toEqual([1, 10, 100, 1000]);
     expect(ticks({ low: 1, high: 50, kind: "logarithmic" }, 6)).toEqual([1, 2, 5, 10, 20, 50]);
+  });
+
+  test("of a logarithmic scale within one decade are still some", () => {
+    expect(ticks({ low: 1.4, high: 3, kind: "logarithmic" }, 6)).toEqual([1.5, 2, 2.5, 3]);
   });
 
   test("of an empty scale are none", () => {
@@ -82,4 +86,16 @@ describe("limits that follow the data", () => {
     expect(low).toBeLessThan(3);
     expect(high).toBeGreaterThan(3);
   });
+});
+
+test("limits of what is signed lie evenly around zero", () => {
+  expect(symmetric({ low: -0.02, high: 0.3 })).toEqual({ low: -0.3, high: 0.3 });
+  expect(symmetric({ low: -4, high: -1 })).toEqual({ low: -4, high: 4 });
+});
+
+test("a histogram counts every value once, those beyond the ends in the outermost bins, and no NaN", () => {
+  const counts = histogram([2, 2.1, 3.9, 6, 5.99, -100, 100, NaN], linear, 4);
+  expect([...counts]).toEqual([3, 1, 0, 3]);
+  // with a margin of half the scale on either side
+  expect([...histogram([0, 2, 4, 6, 8], linear, 4, -0.5, 1.5)]).toEqual([1, 1, 1, 2]);
 });

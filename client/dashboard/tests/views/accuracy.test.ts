@@ -2,19 +2,20 @@ import { describe, expect, test } from "vitest";
 
 import type { AppliedSequence, Choice, FrameMeta, Tradeoff } from "../../src/stream/protocol";
 import { endsOf, marksOf, nearest, placeOf, sameSequence, standingOf } from "../../src/views/accuracy/place";
+import { goalWords } from "../../src/views/accuracy/words";
 
 const choice = (capture_s: number, median: number): Choice =>
-  ({ capture_s, sequence: { takes: capture_s }, predicted: { range_std_m: { median, low: 0.9 * median, high: 1.1 * median, p90: 2 * median } } }) as unknown as Choice;
+  ({ capture_s, sequence: { takes: capture_s }, predicted: { range_error_m: { median, low: 0.9 * median, high: 1.1 * median, p90: 2 * median } } }) as unknown as Choice;
 const TRADEOFF = {
   front: [choice(0.05, 0.04), choice(5, 0.0004)],
-  current: { capture_s: 0.09, meta: { predicted_range_std_m: { median: 0.011 } } },
+  current: { capture_s: 0.09, meta: { accuracy: { range_error_m: 0.011 } } },
 } as unknown as Tradeoff;
 
 describe("the plot of accuracy against time", () => {
   test("holds the front with its uncertainty and where the camera stands", () => {
-    const ends = endsOf(TRADEOFF, { capture_s: 20, range_std_m: 0.2 });
-    for (const [capture_s, range_std_m] of [[0.05, 0.044], [5, 0.00036], [20, 0.2]]) {
-      const { x, y } = placeOf(ends, capture_s, range_std_m);
+    const ends = endsOf(TRADEOFF, { capture_s: 20, range_error_m: 0.2 });
+    for (const [capture_s, range_error_m] of [[0.05, 0.044], [5, 0.00036], [20, 0.2]]) {
+      const { x, y } = placeOf(ends, capture_s, range_error_m);
       expect(Math.min(x, y)).toBeGreaterThan(0);
       expect(Math.max(x, y)).toBeLessThan(1);
     }
@@ -30,16 +31,17 @@ describe("the plot of accuracy against time", () => {
 
 describe("where the camera stands", () => {
   const meta = (sequence_id: number, median: number | null): FrameMeta =>
-    ({ sequence_id, predicted_range_std_m: median === null ? null : { median, p90: 1 } }) as unknown as FrameMeta;
+    ({ sequence_id, accuracy: median === null ? null : { range_error_m: median } }) as unknown as FrameMeta;
   const sequence = { sequence_id: 2, capture_s: 0.2 } as AppliedSequence;
 
   test("is told by the newest frame of the sequence in use", () => {
-    expect(standingOf(meta(2, 0.005), sequence, TRADEOFF)).toEqual({ capture_s: 0.2, range_std_m: 0.005 });
+    expect(standingOf(meta(2, 0.005), sequence, TRADEOFF)).toEqual({ capture_s: 0.2, range_error_m: 0.005 });
   });
 
   test("is that of the prediction's own frame where the newest does not tell or is of another sequence", () => {
-    for (const newest of [null, meta(1, 0.005), meta(2, null)]) {
-      expect(standingOf(newest, sequence, TRADEOFF)).toEqual({ capture_s: 0.09, range_std_m: 0.011 });
+    const oneFrequency = { sequence_id: 2, accuracy: { range_error_m: null } } as unknown as FrameMeta;
+    for (const newest of [null, meta(1, 0.005), meta(2, null), oneFrequency]) {
+      expect(standingOf(newest, sequence, TRADEOFF)).toEqual({ capture_s: 0.09, range_error_m: 0.011 });
     }
   });
 });
@@ -56,4 +58,11 @@ test("a click means the nearest point within reach", () => {
   expect(nearest(points, 13, 41)).toBeNull();
   expect(nearest(points, 200, 10)).toBeNull();
   expect(nearest([], 0, 0)).toBeNull();
+});
+
+test("a goal that cannot be reached is refused in the names and units of the form", () => {
+  const detail = "This cannot be reached on this scene: frame_rate_hz = 30. The best frame_rate_hz is 19.94.";
+  expect(goalWords({ detail })).toBe("This cannot be reached on this scene: frame rate of 30.0\u202fHz. The best frame rate is 19.9\u202fHz.");
+  const other = "This cannot be reached on this scene: range_std_m = 0.0001. The best range_std_m is 2.5e-04.";
+  expect(goalWords({ detail: other })).toBe("This cannot be reached on this scene: deviation of the range of 100\u202fµm. The best deviation of the range is 250\u202fµm.");
 });

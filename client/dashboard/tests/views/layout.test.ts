@@ -38,7 +38,7 @@ describe("a layout", () => {
 
   test("takes a view beside another in half of its width, and below it in a row of its own", () => {
     const two = closed(closed(OVERVIEW, "sequence"), "response");
-    expect(beside(two, "map", "response")?.[0].slots.map(({ share }) => share)).toEqual([0.5, 0.5, 1]);
+    expect(beside(two, "map", "response")?.[0].slots.map(({ share }) => share)).toEqual([1, 1, 3]);
     expect(below(two, "map", "response")?.map(({ slots }) => slots.length)).toEqual([2, 1]);
   });
 

@@ -4,7 +4,7 @@ import { FLAGS, gravest } from "../../src/ui/flags";
 import { countFlags, paintFlags } from "../../src/views/validity/reasons";
 
 test("every bit has one flag", () => {
-  expect(FLAGS.map(({ bit }) => bit).sort((a, b) => a - b)).toEqual([1, 2, 4, 8, 16, 32, 64]);
+  expect(FLAGS.map(({ bit }) => bit).sort((a, b) => a - b)).toEqual([1, 2, 4, 8, 16, 32, 64, 128]);
 });
 
 test("a pixel with several flags is shown by the gravest and counted for each", () => {

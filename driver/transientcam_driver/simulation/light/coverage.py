@@ -39,6 +39,14 @@ class Crossing:
         between &= self.at < far * (1 - _TOUCHING)
         return between
 
+    def holds(self, t: float) -> NDArray[np.bool_]:
+        """Whether the points at t are inside the shape, which rectangles have no inside for."""
+        if self._length is None:
+            return np.zeros(self.at.shape, dtype=bool)
+        away = (self.at - np.float32(t)) * self._length
+        within: NDArray[np.bool_] = away * away < self.inside[0]
+        return within
+
     def entered(self, root: Plane) -> Plane:
         """Return the t at which lines enter, given the square root of ``inside`` for ellipsoids."""
         return self.at if self._length is None else single(self.at - root / self._length)
@@ -130,7 +138,7 @@ def _at_border(positive: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return border
 
 
-def shared(one: Plane, other: Plane) -> Plane:
+def overlapped(one: Plane, other: Plane) -> Plane:
     """Share of each pixel (H, W) that lies in both of two shapes, given the share in either.
 
     Two borders in one pixel are mostly nearly parallel, as of a surface and of its own shadow: the

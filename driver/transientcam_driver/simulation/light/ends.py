@@ -161,6 +161,9 @@ class Ends:
             met = between & (np.minimum.reduce(cross.inside) > 0)
             if not met.any():
                 continue
+            # a point inside a surface stands for those beside it that are seen in its pixel
+            outside = ~cross.holds(1.0)
+            between, met = between & outside, met & outside
             clear *= 1 - (cover(cross, on, between) if index in movers else met)
         return clear
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.light.bundle import Region, inside
-from transientcam_driver.simulation.light.coverage import Plane, shared
+from transientcam_driver.simulation.light.coverage import Plane, overlapped, single
 from transientcam_driver.simulation.light.paths import Lit, scatter_of, sparse_image
 from transientcam_driver.simulation.light.still import StillLight
 from transientcam_driver.simulation.responses import Scatter, SparseResponses
@@ -17,7 +17,7 @@ from transientcam_driver.simulation.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """Pixels, by index, that show something that moves, and by which share; some of them often.
+    """Pixels, by index, each once, that show something that moves, and by which share.
 
     ``lit`` is the light of one ray a pixel, or of several: for each place in a pixel, all pixels.
     ``last``: it takes the place of all other layers, too.
@@ -65,15 +65,15 @@ class MovingResponses:
         self._layers = tuple(each if each.last else _without(each, only) for each in layers)
         self._uncovered = np.ones(still.height * still.width, dtype=np.float32)
         for each in self._layers:
-            np.subtract.at(self._uncovered, each.pixel, each.share)
+            self._uncovered[each.pixel] -= each.share
         np.maximum(self._uncovered, 0, out=self._uncovered)  # what rounding leaves
         self._shadows = tuple(self._uncovered_part(each) for each in shadows)
 
     def _uncovered_part(self, shadow: Shadow) -> Shadow:
         """Return a shadow by its share of what of each pixel is not covered."""
         seen = self._uncovered.reshape(self._shape)[shadow.region]
-        left = shared(seen, shadow.left) / np.maximum(seen, np.float32(1e-9))
-        return Shadow(shadow.chain, shadow.region, left)
+        left = overlapped(seen, shadow.left) / np.maximum(seen, np.float32(1e-9))
+        return Shadow(shadow.chain, shadow.region, single(left))
 
     @property
     def kind(self) -> Literal["sparse", "dense"]:
@@ -106,7 +106,7 @@ class MovingResponses:
         for layer in self._layers:
             rows, columns = np.divmod(layer.pixel, self._shape[1])
             at = rows - region[0].start, columns - region[1].start
-            np.add.at(moments, at, self._of_layer(layer, frequency_hz))
+            moments[at] += self._of_layer(layer, frequency_hz)
         return moments
 
     def _of_layer(self, layer: Layer, frequency_hz: float) -> NDArray[np.complex64]:
@@ -162,7 +162,7 @@ class MovingResponses:
         reflectance = self._still.reflectance * self._uncovered
         for layer in self._layers:
             of_pixels = layer.lit.reflectance.reshape(-1, len(layer.pixel)).mean(axis=0)
-            np.add.at(reflectance, layer.pixel, (layer.share * of_pixels).astype(np.float32))
+            reflectance[layer.pixel] += (layer.share * of_pixels).astype(np.float32)
         return reflectance.reshape(self._shape)
 
     @cached_property

@@ -18,15 +18,22 @@ from transientcam_driver.simulation.light.bundle import (
     overlap,
     union,
 )
-from transientcam_driver.simulation.light.coverage import Crossing, Plane, covered, crossing
+from transientcam_driver.simulation.light.coverage import (
+    Crossing,
+    Plane,
+    covered,
+    crossing,
+    overlapped,
+)
 from transientcam_driver.simulation.light.ends import Ends
 from transientcam_driver.simulation.light.layers import Layer, MovingResponses, Shadow
 from transientcam_driver.simulation.light.paths import ImageLight, image_lights, light_rays
-from transientcam_driver.simulation.light.still import StillLight
+from transientcam_driver.simulation.light.still import StillLight, grown
 from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene
 
-_SIDE_IN_MIRRORS = 2  # rays a side of pixels that show something that moves in a mirror
+_RAYS_IN_MIRRORS = 16  # into pixels that show something that moves in a mirror
+_TINY = np.float32(1e-9)
 _AWAY = np.array([0.0, 0.0, -1e6])  # where surfaces that move are put while the rest is traced
 
 
@@ -84,7 +91,7 @@ class MovingLight:
         """Impulse responses at a time."""
         scene = self.scene.at(time_s)
         seen = self._visible([each for k in self._movers if (each := self._cover(scene, k))])
-        layers = [self._lit(scene, seen)] if seen else []
+        layers = self._lit(scene, seen) if seen else []
         if mirrored := self._seen_in_mirrors(scene):
             layers.append(mirrored)
         shadows = [shadow for k in range(len(self._chains)) if (shadow := self._shadow(scene, k))]
@@ -107,11 +114,15 @@ class MovingLight:
     def _share(self, cross: Crossing, *, rooted: bool = False) -> tuple[Plane, Plane]:
         """Share of each pixel that a shape covers; with the mean root that says where, if asked."""
         if not self._soft:
-            shares = [(each > 0).astype(np.float32) for each in cross.inside]
+            shares = [self._above(each) for each in cross.inside]
             root = np.sqrt(np.maximum(cross.inside[0], 0)) if rooted else shares[0]
             return _product(shares), root
         parts = [covered(each, rooted=rooted) for each in cross.inside]
         return _product([share for share, _root in parts]), parts[0][1]
+
+    def _above(self, values: Plane) -> Plane:
+        """Share of each pixel where values are above 0."""
+        return covered(values, rooted=False)[0] if self._soft else (values > 0).astype(np.float32)
 
     def _visible(self, seen: list[_Seen]) -> list[_Seen]:
         """Take from each share what nearer surfaces that move cover of it."""
@@ -122,12 +133,13 @@ class MovingLight:
                 if both is None:
                     continue
                 mine, its = inside(both, one.region), inside(both, other.region)
-                nearer = one.at_m[mine] <= other.at_m[its]
-                share[its] *= 1 - one.share[mine] * nearer
-                left[k][mine] *= 1 - other.share[its] * ~nearer
+                hidden = overlapped(one.share[mine], other.share[its])
+                nearer = self._above(other.at_m[its] - one.at_m[mine])
+                share[its] *= 1 - nearer * hidden / np.maximum(other.share[its], _TINY)
+                left[k][mine] *= 1 - (1 - nearer) * hidden / np.maximum(one.share[mine], _TINY)
         return [replace(each, share=share) for each, share in zip(seen, left, strict=True)]
 
-    def _lit(self, scene: Scene, seen: list[_Seen]) -> Layer:
+    def _lit(self, scene: Scene, seen: list[_Seen]) -> list[Layer]:
         """Light the parts of surfaces that are seen, all at once."""
         region = union([each.region for each in seen])
         places = [np.nonzero(each.share) for each in seen]
@@ -159,7 +171,15 @@ class MovingLight:
         lit = Ends(self.still.scene, scene.surfaces, owner, (x, y, z), at_m).lit(
             self._lights, eye=self._sight.apex, movers=self._movers, cover=cover
         )
-        return Layer(region, rows * self.still.width + columns, share, lit)
+        pixel = rows * self.still.width + columns
+        ends = np.cumsum([len(place[0]) for place in places])
+        parts = [
+            slice(int(start), int(end)) for start, end in zip([0, *ends[:-1]], ends, strict=True)
+        ]
+        return [
+            Layer(each.region, pixel[of], share[of], lit.part(of))
+            for each, of in zip(seen, parts, strict=True)
+        ]
 
     def _shadow(self, scene: Scene, chain: int) -> Shadow | None:
         """Share of the light by a chain of mirrors that is left on what stands still."""
@@ -184,7 +204,7 @@ class MovingLight:
         return Shadow(chain, whole, left)
 
     def _seen_in_mirrors(self, scene: Scene) -> Layer | None:
-        """Follow again the rays that meet something that moves behind a mirror, four a pixel."""
+        """Follow several rays a pixel that meet something that moves behind a mirror."""
         over = np.zeros((self.still.height, self.still.width), dtype=bool)
         for bundle in self._mirrored:
             for index in self._movers:
@@ -194,10 +214,13 @@ class MovingLight:
                     way, near, far = bundle.within(region)
                     cross = crossing(shape, bundle.apex, way)
                     over[region] |= (self._share(cross)[0] > 0) & cross.between(near, far)
+        mixed = np.zeros_like(over)
+        mixed.ravel()[self.still.mixed] = True
+        over |= grown(over) & mixed  # pixels that a mirror fills in part
         pixel = np.flatnonzero(over)
         if not pixel.size:
             return None
-        rays = self.still.rays_in(pixel, _SIDE_IN_MIRRORS) if self._soft else self.still.rays[pixel]
+        rays = self.still.rays_in(pixel, _RAYS_IN_MIRRORS) if self._soft else self.still.rays[pixel]
         rows, columns = np.nonzero(over)
         region = (
             slice(int(rows.min()), int(rows.max()) + 1),
@@ -208,9 +231,8 @@ class MovingLight:
 
     def _light_segments(self, chain: int, light: ImageLight) -> list[Bundle]:
         """Ways of light to what stands still, where it arrives, one bundle a segment."""
-        lit = self.still.lit
         shape = self.still.height, self.still.width
-        on = lit.weight[chain] > 0
+        on, point = self.still.lit_by(chain)
         if not on.any():
             return []
         return [
@@ -221,7 +243,7 @@ class MovingLight:
                 near=near.reshape(shape) if np.ndim(near) else near,
                 far=1.0,
             )
-            for apex, start, near in _segments(light, lit.point)
+            for apex, start, near in _segments(light, point)
         ]
 
 

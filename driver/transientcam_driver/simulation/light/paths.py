@@ -88,6 +88,17 @@ class Lit:
                 phasors *= scatter.transfer(frequency_hz)
         return phasors
 
+    def part(self, of: slice) -> "Lit":
+        """Return the light of some of the rays."""
+        return Lit(
+            self.surface[of],
+            self.point[of],
+            self.distance_m[of],
+            self.reflectance[of],
+            self.delay_s[:, of],
+            self.weight[:, of],
+        )
+
     def scatter(self, scene: Scene) -> Scatter | None:
         """Spread of each ray's light inside the surface it ends on; None if no surface has any."""
         return scatter_of(scene, self.surface)

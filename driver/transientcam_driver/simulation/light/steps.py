@@ -1,6 +1,7 @@
 """A moving scene between the times at which it is computed."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -10,15 +11,20 @@ from numpy.typing import NDArray
 from transientcam_driver.simulation.light.bundle import Region, union
 from transientcam_driver.simulation.light.coverage import single
 from transientcam_driver.simulation.light.layers import MovingResponses
+from transientcam_driver.simulation.scene.motion import Motion
 from transientcam_driver.simulation.scene.scene import Scene
 
-_PIXELS = 1.0
-"""That the fastest surface moves from one time to the next. In between, light is interpolated: a
-silhouette that crosses a pixel does so at an even rate, and range is continuous."""
+_PIXELS = 0.5
+"""That the fastest surface moves from one time to the next, at most. In between, light is
+interpolated: at a pixel's width edges would be off by a quarter of their contrast."""
+_BLOCK = 8  # of the shortest steps: in each block they are as long as its speeds allow
+_WORTH = 2  # images in a step, from which on interpolation is cheaper than each image by itself
 
 
 class Steps:
     """Light at any time from the light at multiples of a step.
+
+    Steps are longer while everything is slower than it ever gets, and depend on the time alone.
 
     Parameters
     ----------
@@ -29,7 +35,7 @@ class Steps:
     pixel_rad
         Angle of a pixel.
     every_s
-        Time between images: where a step is shorter, each image has its own light.
+        Time between images: where steps are shorter, each image has its own light.
     """
 
     def __init__(
@@ -41,33 +47,59 @@ class Steps:
         every_s: float = 0.0,
     ) -> None:
         self._every_s = every_s
-        self._scene = scene
         self._at = at
-        self.step_s = _step_s(scene, pixel_rad)
-        self._kept: dict[int, MovingResponses] = {}
+        self._paths = _paths(scene, pixel_rad)
+        self.step_s = min((path.step_s for path in self._paths), default=1.0)
+        self._kept: dict[float, MovingResponses] = {}
+        self._block: tuple[int, float] = (-1, 0.0)
 
     def at(self, time_s: float) -> "MovingResponses | Between":
         """Return the light at a time."""
-        step = int(np.floor(time_s / self.step_s + 1e-9))
-        share = time_s / self.step_s - step
-        if self.step_s <= self._every_s or self._jumps(step):
+        block = int(np.floor(time_s / (_BLOCK * self.step_s)))
+        if block != self._block[0]:
+            self._block = block, self._farthest(block)
+        farthest = self._block[1]
+        count = min(_BLOCK, max(1, int(np.ceil(_BLOCK * farthest - 1e-6))))
+        step_s = _BLOCK * self.step_s / count
+        if step_s < _WORTH * self._every_s or farthest > 1 + 1e-6:
             return self._at(time_s)
-        return Between(self._of(step), self._of(step + 1), min(1.0, max(0.0, share)))
+        step = int(np.floor(time_s / step_s))
+        return Between(
+            self._of(step * step_s), self._of((step + 1) * step_s), time_s / step_s - step
+        )
 
-    def _of(self, step: int) -> MovingResponses:
-        if step not in self._kept:
-            self._kept = {k: v for k, v in self._kept.items() if abs(k - step) <= 1}
-            self._kept[step] = self._at(step * self.step_s)
-        return self._kept[step]
+    def _farthest(self, block: int) -> float:
+        """Farthest that anything moves in one of the shortest steps of a block.
 
-    def _jumps(self, step: int) -> bool:
-        """Whether a path starts again within a step."""
-        motions = [motion for surface in self._scene.surfaces for motion in surface.motions]
-        for motion in motions:
-            first, second = (motion.offset_m((step + k) * self.step_s) for k in (0, 1))
-            if np.linalg.norm(second - first) > 1.01 * motion.speed_m_s * self.step_s:
-                return True
-        return False
+        In units of what it may; more than that where a path starts again.
+        """
+        times_s = [(block * _BLOCK + k) * self.step_s for k in range(_BLOCK + 1)]
+        return max((path.farthest(times_s) for path in self._paths), default=0.0)
+
+    def _of(self, time_s: float) -> MovingResponses:
+        if time_s not in self._kept:
+            latest = sorted(self._kept)[-1:]
+            self._kept = {k: self._kept[k] for k in latest}
+            self._kept[time_s] = self._at(time_s)
+        return self._kept[time_s]
+
+
+@dataclass(frozen=True, slots=True)
+class _Path:
+    """The motions of a surface, and how far it may move within a step."""
+
+    motions: tuple[Motion, ...]
+    most_m: float
+
+    @property
+    def step_s(self) -> float:
+        """Longest step at its highest speed."""
+        return self.most_m / sum(motion.speed_m_s for motion in self.motions)
+
+    def farthest(self, times_s: list[float]) -> float:
+        """Longest way between successive times, over the one that is allowed."""
+        places = np.array([sum(m.offset_m(t) for m in self.motions) for t in times_s])
+        return float(np.linalg.norm(np.diff(places, axis=0), axis=-1).max() / self.most_m)
 
 
 class Between:
@@ -113,13 +145,16 @@ class Between:
         return max(self._parts, key=lambda part: part[0])[1]
 
 
-def _step_s(scene: Scene, pixel_rad: float) -> float:
-    """Longest time in which nothing moves by more than ``_PIXELS``."""
+def _paths(scene: Scene, pixel_rad: float) -> tuple[_Path, ...]:
+    """Return the paths of moving surfaces; of those with the same motions the closest one's."""
     assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
-    steps_s = []
+    most_m: dict[tuple[int, ...], _Path] = {}
     for surface in scene.surfaces:
-        speed_m_s = sum(motion.speed_m_s for motion in surface.motions)
-        if speed_m_s:
-            away_m = np.linalg.norm(surface.shape.extent() - scene.camera.position_m, axis=-1)
-            steps_s.append(_PIXELS * pixel_rad * max(float(away_m.min()), 1e-3) / speed_m_s)
-    return min(steps_s, default=1.0)
+        if not sum(motion.speed_m_s for motion in surface.motions):
+            continue
+        away_m = np.linalg.norm(surface.shape.extent() - scene.camera.position_m, axis=-1)
+        path = _Path(surface.motions, _PIXELS * pixel_rad * max(float(away_m.min()), 1e-3))
+        same = tuple(id(motion) for motion in surface.motions)
+        if same not in most_m or path.most_m < most_m[same].most_m:
+            most_m[same] = path
+    return tuple(most_m.values())

@@ -20,8 +20,9 @@ from transientcam_driver.simulation.responses import Scatter, SparseResponses
 from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene
 
-_SIDE = 4
-"""Rays a side of a pixel that light differs in."""
+_RAYS = 32
+"""Into a pixel that light differs in."""
+_GOLDEN = (5**0.5 - 1) / 2
 _DIFFERS_ABOVE = 0.25  # of the noise
 
 
@@ -63,11 +64,16 @@ class StillLight:
         middle = self.height // 2 * self.width + self.width // 2
         return float(np.arccos(np.clip(self.rays[middle] @ self.rays[middle - 1], -1, 1)))
 
-    def rays_in(self, pixel: NDArray[np.intp], side: int = _SIDE) -> Points:
-        """Return rays, so many a side, in some pixels: for each place in a pixel, all pixels."""
+    def rays_in(self, pixel: NDArray[np.intp], count: int = _RAYS) -> Points:
+        """Return rays, so many each, in some pixels: for each place in a pixel, all pixels.
+
+        Places are a lattice by the golden ratio, no two in one row or column: an edge along the
+        pixels, as of most things that are built, is resolved as finely as others.
+        """
         rows, columns = np.divmod(pixel, self.width)
-        offsets = (2 * np.arange(side) + 1) / (2 * side) - 0.5
-        down, right = (grid.reshape(-1, 1) for grid in np.meshgrid(offsets, offsets))
+        place = np.arange(count)[:, None]
+        right = (place + 0.5) / count - 0.5
+        down = (place * _GOLDEN + 0.5 / count) % 1.0 - 0.5
         size = {"width": self.width, "height": self.height}
         return rays_through(self._camera, (columns + right).ravel(), (rows + down).ravel(), **size)
 
@@ -84,6 +90,21 @@ class StillLight:
     def fine(self) -> Lit:
         """Light of several rays in each of the pixels ``mixed``."""
         return light_rays(self.scene, self.rays_in(self.mixed))
+
+    def lit_by(self, chain: int) -> tuple[NDArray[np.bool_], Points]:
+        """Return which pixels (H W) a chain of mirrors lights, and a point (H W, 3) that it does.
+
+        Of pixels that it lights in part, one where one of several rays ends.
+        """
+        on, point = self.lit.weight[chain] > 0, self.lit.point
+        if self.mixed.size:
+            fine = self.fine.weight[chain].reshape(-1, len(self.mixed)) > 0
+            more = np.flatnonzero(fine.any(axis=0) & ~on[self.mixed])
+            of_ray = fine[:, more].argmax(axis=0) * len(self.mixed) + more
+            on, point = on.copy(), point.copy()
+            on[self.mixed[more]] = True
+            point[self.mixed[more]] = self.fine.point[of_ray]
+        return on, point
 
     def phasors(self, frequency_hz: float) -> tuple[NDArray[np.complex64], NDArray[np.complex64]]:
         """Moments (K, H, W) by chain of mirrors, and (H, W) in all."""
@@ -186,14 +207,14 @@ class StillLight:
             for plane in planes:
                 bend = np.abs(np.diff(np.moveaxis(plane, axis, 0), 2, axis=0))
                 of[1:-1] |= bend > np.moveaxis(limit, axis, 0)[1:-1]
-        return _grown(differs).ravel()
+        return grown(differs).ravel()
 
 
-def _grown(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def grown(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Mark the neighbours too, whose corners an edge may cut."""
-    grown = marked.copy()
-    grown[1:] |= marked[:-1]
-    grown[:-1] |= marked[1:]
-    grown[:, 1:] |= marked[:, :-1]
-    grown[:, :-1] |= marked[:, 1:]
-    return grown
+    more = marked.copy()
+    more[1:] |= marked[:-1]
+    more[:-1] |= marked[1:]
+    more[:, 1:] |= marked[:, :-1]
+    more[:, :-1] |= marked[:, 1:]
+    return more

@@ -31,6 +31,19 @@ class PredictedStdDocument(Document):
     """Share of the pixels where the noise model holds; that of the others is a rough figure."""
 
 
+class RangeAccuracyDocument(Document):
+    """Predicted errors of a frame's range: those in m of the median pixel that has one."""
+
+    range_error_m: float | None = None
+    """Noise and bias together, root sum of squares; null where one frequency knows no bias."""
+    range_std_m: float | None = None
+    """Standard deviation that the noise of the sensor gives."""
+    range_bias_m: float | None = None
+    """How far it is off for good, as far as the frame shows it; more takes do not reduce it."""
+    outlier_share: float | None = None
+    """Share of the ranges that are off by more than five times `range_error_m`."""
+
+
 class FrameDocument(Document):
     """What is known of a frame, whatever product of it is fetched."""
 
@@ -75,6 +88,8 @@ class FrameDocument(Document):
     """Null until something was computed."""
     predicted_range_std_m: PredictedStdDocument | None = None
     """Null until the range was computed."""
+    accuracy: RangeAccuracyDocument | None = None
+    """Null until one of the products range_std, range_bias and range_error was computed."""
 
 
 class HistoryDocument(Document):

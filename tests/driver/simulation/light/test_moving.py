@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.build import find_scene
+from transientcam_driver.simulation.light.layers import MovingResponses
 from transientcam_driver.simulation.light.moving import MovingLight, still_scene
 from transientcam_driver.simulation.light.paths import light_rays
 from transientcam_driver.simulation.light.rays import camera_rays, rays_through
@@ -131,6 +132,50 @@ def test_a_silhouette_crosses_a_pixel_without_jumps() -> None:
     change = np.abs(np.diff(frames, axis=0)) / frames.max()
     # an eighth of a pixel at a time: that much of the contrast, and a little more at corners
     assert change.max() < 0.16
+
+
+def test_light_between_two_steps_is_close_to_the_light_at_that_time() -> None:
+    scene = with_a_moving(BALL, ASIDE, period_s=2.0)
+    light = moving(scene, soft=True)
+    steps = Steps(scene, light.at, pixel_rad=light.still.pixel_rad)
+
+    for part in (0.2, 0.5, 0.7):
+        time_s = (40 + part) * steps.step_s
+        exact = light.at(time_s).moments(69e6)
+        error = np.abs(steps.at(time_s).moments(69e6) - exact) / np.abs(exact).max()
+        assert error.max() < 0.05
+        assert np.mean(error > 0.01) < 0.009  # of steps by a whole pixel: 0.011 to 0.014
+
+
+def test_steps_are_long_while_everything_is_slow() -> None:
+    path_m = v(0, 0, 0, 0.5, 0, 0, 0.55, 0, 0).reshape(3, 3)  # ten times as slow in the end
+    scene = with_a_moving(BALL, path_m, period_s=2.0)
+    light = moving(scene, soft=True)
+    made: list[float] = []
+
+    def at(time_s: float) -> MovingResponses:
+        made.append(time_s)
+        return light.at(time_s)
+
+    steps = Steps(scene, at, pixel_rad=light.still.pixel_rad)
+    counts = []
+    for start_s in (0.3, 1.3):
+        made.clear()
+        for time_s in np.linspace(start_s, start_s + 24 * steps.step_s, 97):
+            steps.at(float(time_s))
+        counts.append(len(made))
+
+    assert counts[0] == pytest.approx(25, abs=1)
+    assert counts[1] <= 6
+
+
+def test_fast_motion_is_computed_for_each_image() -> None:
+    scene = with_a_moving(BALL, ASIDE, period_s=2.0)
+    light = moving(scene, soft=True)
+    every_s = Steps(scene, light.at, pixel_rad=light.still.pixel_rad).step_s * 0.7
+    steps = Steps(scene, light.at, pixel_rad=light.still.pixel_rad, every_s=every_s)
+
+    assert isinstance(steps.at(0.7), MovingResponses)
 
 
 def test_a_path_that_starts_again_is_not_interpolated() -> None:

@@ -47,16 +47,30 @@ SCENES = {
 def test_pixels_that_an_edge_crosses_are_the_mean_over_their_area(name: str) -> None:
     of = SCENES[name]
     still = StillLight(of, width=WIDTH, height=HEIGHT, noise=NOISE, highest_hz=69e6)
-    every = light_rays(of, still.rays_in(np.arange(WIDTH * HEIGHT), 4))
+    every = light_rays(of, still.rays_in(np.arange(WIDTH * HEIGHT)))
 
     assert 0 < still.mixed.size < 0.35 * WIDTH * HEIGHT
     for frequency_hz in (0.0, 69e6):
-        expected = every.moments(frequency_hz, None).reshape(16, HEIGHT, WIDTH).mean(axis=0)
+        expected = every.moments(frequency_hz, None).reshape(-1, HEIGHT, WIDTH).mean(axis=0)
         deviation = NOISE.deviation(np.abs(expected), 0.0)
         error = np.abs(still.phasors(frequency_hz)[1] - expected) / deviation
         assert error.max() < 0.5
         centres = still.lit.moments(frequency_hz, None).reshape(HEIGHT, WIDTH)
         assert (np.abs(centres - expected) / deviation).max() > 5
+
+
+def test_edges_along_a_pixel_are_resolved_as_finely_as_it_has_rays() -> None:
+    still = StillLight(scene(WALL), width=WIDTH, height=HEIGHT)
+
+    rays = still.rays_in(np.array([HEIGHT // 2 * WIDTH + WIDTH // 2]))
+
+    count = len(rays)
+    wide = 2 * np.tan(np.radians(20)) / WIDTH  # of a pixel, on a plane 1 m away
+    for axis in (0, 2):
+        places = np.sort(rays[:, axis] / rays[:, 1]) / wide
+        gaps = np.diff(places)
+        assert gaps.max() < 2.7 / count  # a lattice has three gaps, of the golden ratio's powers
+        assert places[-1] - places[0] > 1 - 3 / count
 
 
 def test_a_wall_needs_one_ray_a_pixel() -> None:

@@ -1,6 +1,7 @@
 """The built-in scenes, and what the camera sees of scenes that users compose."""
 
 import math
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,13 @@ BUILT_IN = [info.name for info in list_scenes() if info.name != "measured"]
 LOW_FREQUENCY_HZ = {"hall": 7e6}  # of scenes made for cameras of low frequencies
 
 
-def world(name: str, *, effects: dict[str, str] | None = None) -> World:
+@cache
+def world(name: str) -> World:
+    """Return one that several tests look at."""
+    return new_world(name)
+
+
+def new_world(name: str, *, effects: dict[str, str] | None = None) -> World:
     scene = find_scene(name)
     scene.effects.update(effects or {})
     built = world_of(scene, width=163, height=120, readout_s=4e-3)
@@ -82,7 +89,7 @@ def test_the_corners_walls_meet_where_the_file_says() -> None:
 
 def test_most_of_the_right_wall_is_lit_by_the_left_one_only() -> None:
     built = world("corner-left")
-    direct = world("corner-left", effects={"interreflection": "off"}).truth().brightness
+    direct = new_world("corner-left", effects={"interreflection": "off"}).truth().brightness
     whole = built.truth().brightness
 
     assert (direct[:, :80] > 0).all()
@@ -133,7 +140,7 @@ def test_the_visitor_comes_waves_and_goes() -> None:
 
 
 def test_a_moving_scene_depends_on_the_devices_time_alone() -> None:
-    first, second = world("visitor"), world("visitor")
+    first, second = new_world("visitor"), world("visitor")
     label = Sequence().labels[5]
     second.image(label, number=1, device_time_s=2.0)  # one more than the first
 
@@ -145,8 +152,8 @@ def test_a_moving_scene_depends_on_the_devices_time_alone() -> None:
 
 def test_without_motion_during_the_sequence_all_images_see_the_scene_at_its_first() -> None:
     quiet = {"shot-noise": "off", "read-noise": "off", "mixed-pixels": "off"}
-    frozen = world("visitor", effects=quiet | {"motion": "off"})
-    moving = world("visitor", effects=quiet | {"motion": "on"})
+    frozen = new_world("visitor", effects=quiet | {"motion": "off"})
+    moving = new_world("visitor", effects=quiet | {"motion": "on"})
     period_s = 0.00192 + 4e-3
     labels = Sequence().labels
     at = {"number": 0, "device_time_s": 9.0}

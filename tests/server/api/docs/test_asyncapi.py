@@ -80,20 +80,17 @@ def test_what_the_daemon_sends_is_as_described(served: Served) -> None:
     chosen = sorted(everything, key=lambda each: each["encoding"] == "f32")[
         : wire.MAX_SUBSCRIPTIONS
     ]
-    seen = set()
+    missing = {(each["product"], each["encoding"]) for each in chosen}
     with streaming(served.stream_url) as client:
         client.send({"type": "subscribe", "v": 1, "subscriptions": chosen})
-        for _ in range(wire.MAX_SUBSCRIPTIONS + 3):
+        while missing:  # some take long, and quick ones come again and again meanwhile
             message = unpacked(client.connection.recv(timeout=30.0))
             check(message["type"], message)
-            seen.add((message["type"], message.get("product"), message.get("encoding")))
+            missing.discard((message.get("product"), message.get("encoding", "f32")))
         client.send({"type": "dance"})
         while (message := unpacked(client.connection.recv(timeout=30.0)))["type"] != "error":
             pass
         check("error", message)
-
-    assert ("frame", "range", "u16") in seen
-    assert ("frame", "coefficients", "reflection16") in seen
 
 
 def test_what_clients_send_is_as_described() -> None:

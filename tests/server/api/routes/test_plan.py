@@ -1,14 +1,19 @@
 """Planning over REST: recommendations, refusals, and the front of the scene that is seen."""
 
-from collections.abc import Iterator
+import json
+import threading
+from collections.abc import Callable, Iterator
+from http.client import HTTPConnection
 from importlib import import_module
 from typing import Any
+from urllib.parse import urlsplit
 
 import httpx
 import pytest
 
 from tests.server.contract import hold_to_contract
 from tests.serving import Served, serving
+from transientcam_server.errors.exceptions import Problem
 
 FIXED = {"base_frequency_hz": 23e6, "harmonics": 3}
 SCENE = {"brightness_dn_per_s": 8e5, "returns": [{"range_m": 1.5}, {"range_m": 3.0, "weight": 0.5}]}
@@ -132,6 +137,55 @@ def test_the_front_falls_and_the_current_frame_says_where_it_stands(
     assert current["meta"]["predicted_range_std_m"]["median"] == pytest.approx(
         current["range_error_m"]["median"] / 0.6745, rel=0.5
     )
+    accuracy = current["meta"]["accuracy"]
+    assert 0 < accuracy["range_bias_m"] <= accuracy["range_error_m"] < 0.2
+    assert 0 <= accuracy["outlier_share"] < 0.5
+
+
+def test_a_client_that_leaves_ends_the_work(
+    noisy: httpx.Client, noisy_daemon: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    began, ended, pause = threading.Event(), threading.Event(), threading.Event()
+
+    def endless(goal: object, scene: object, go_on: Callable[[], None]) -> None:
+        began.set()
+        try:
+            while True:
+                go_on()
+                pause.wait(0.01)
+        except Problem:
+            ended.set()
+            raise
+
+    monkeypatch.setattr(noisy_daemon.service.planner, "plan_document", endless)
+    client = HTTPConnection(urlsplit(noisy_daemon.url).netloc)
+    body = json.dumps({"target": {"range_error_m": 0.01}, "scene": SCENE})
+    client.request("POST", "/api/v1/plan", body, {"content-type": "application/json"})
+    assert began.wait(60)
+
+    client.close()
+
+    assert ended.wait(60)
+
+
+def test_errors_of_the_range_cost_nothing_until_a_client_requests_them(
+    noisy: httpx.Client,
+) -> None:
+    noisy.put("/api/v1/acquisition", json={"running": False})
+    try:
+        before, asked, after = (
+            json.loads(noisy.get(f"/api/v1/frames/latest/{name}.npy").headers["transientcam-meta"])
+            for name in ("range", "range_error", "range")
+        )
+    finally:
+        noisy.put("/api/v1/acquisition", json={"running": True})
+
+    assert before["frame"] == asked["frame"] == after["frame"]
+    assert before["accuracy"] is None
+    errors = asked["accuracy"]
+    assert errors["range_std_m"] < errors["range_error_m"] < 0.2
+    assert 0 <= errors["outlier_share"] < 0.5
+    assert after["accuracy"] == errors
 
 
 def test_a_frames_metadata_predict_its_range(noisy: httpx.Client) -> None:

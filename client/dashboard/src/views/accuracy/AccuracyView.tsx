@@ -12,11 +12,12 @@ import { Fact } from "../sequence/Figures";
 import { ZEROTH_NAMES } from "../sequence/words";
 import { FrontPlot } from "./FrontPlot";
 import { standingOf } from "./place";
+import { goalWords } from "./words";
 
 /** What accuracy costs in time on the scene before the camera, and the way to a better sequence. */
 export function AccuracyView() {
   const store = useStore();
-  useProducts(["range"]); // its frames tell how well the camera does now
+  useProducts(["range_error"]); // its frames tell how well the camera does now
   const tradeoff = useSignal<Tradeoff | null>(null);
   const chosen = useSignal<Choice | null>(null);
   const busy = useSignal<string | null>(null);
@@ -40,7 +41,7 @@ export function AccuracyView() {
     } catch (error) {
       if (abort.current.signal.aborted) return;
       if (!(error instanceof RequestError)) throw error;
-      refusal.value = error.message;
+      refusal.value = goalWords(error.problem);
     } finally {
       busy.value = null;
     }
@@ -51,6 +52,7 @@ export function AccuracyView() {
     });
   const plan = (goal: Parameters<typeof store.api.plan>[0]): Promise<void> =>
     ask("Looking for the best sequence…", async (signal) => {
+      chosen.value = null; // it would seem to answer this question
       chosen.value = await store.api.plan(goal, signal);
     });
   const apply = (choice: Choice): Promise<void> =>
@@ -72,7 +74,7 @@ export function AccuracyView() {
         {tradeoff.value === null ? (
           <p class="accuracy-empty quiet">Predict shows what each sequence would give on the scene before the camera: it takes the service some seconds.</p>
         ) : (
-          <FrontPlot tradeoff={tradeoff.value} now={standingOf(store.frames.of("range").value?.meta ?? null, store.sequence.value, tradeoff.value)} chosen={chosen.value} onChoose={(choice) => (chosen.value = choice)} />
+          <FrontPlot tradeoff={tradeoff.value} now={standingOf(store.frames.of("range_error").value?.meta ?? null, store.sequence.value, tradeoff.value)} chosen={chosen.value} onChoose={(choice) => (chosen.value = choice)} />
         )}
         <div class="accuracy-side">
           <GoalForm disabled={busy.value !== null} onGoal={(goal) => void plan(goal)} />
@@ -88,7 +90,7 @@ export function AccuracyView() {
 
 interface GoalFormProps {
   readonly disabled: boolean;
-  readonly onGoal: (goal: { target: { range_std_m?: number }; budget: { frame_rate_hz?: number } }) => void;
+  readonly onGoal: (goal: { target: { range_error_m?: number }; budget: { frame_rate_hz?: number } }) => void;
 }
 
 /** A target, a budget, or both. */
@@ -113,12 +115,12 @@ function GoalForm({ disabled, onGoal }: GoalFormProps) {
         event.preventDefault();
         const [error, rate] = wanted;
         onGoal({
-          target: error === null ? {} : { range_std_m: error * 1e-3 },
+          target: error === null ? {} : { range_error_m: error * 1e-3 },
           budget: rate === null ? {} : { frame_rate_hz: rate },
         });
       }}
     >
-      {field("Deviation at most", "mm", error_mm, "range_std_mm")}
+      {field("Error at most", "mm", error_mm, "range_error_mm")}
       {field("Frames at least", "Hz", rate_hz, "frame_rate_hz")}
       <button type="submit" disabled={disabled || !sensible}>
         Plan
@@ -129,11 +131,14 @@ function GoalForm({ disabled, onGoal }: GoalFormProps) {
 
 function ChoiceFacts({ choice, disabled, onApply }: { choice: Choice; disabled: boolean; onApply: (choice: Choice) => void }) {
   const { sequence, predicted } = choice;
-  const { median, low, high } = predicted.range_std_m;
+  const { median, low, high } = predicted.range_error_m;
   return (
     <div class="choice-facts" data-field="choice">
       <dl class="facts">
-        <Fact name="Deviation of the range" value={`${engineering(median, "m")} (${engineering(low, "m")} to ${engineering(high, "m")})`} field="choice_range_std_m" />
+        <Fact name="Error of the range" value={`${engineering(median, "m")} (${engineering(low, "m")} to ${engineering(high, "m")})`} field="choice_range_error_m" />
+        <Fact name="of that noise" value={engineering(predicted.range_std_m.median, "m")} field="choice_range_std_m" />
+        <Fact name="of that bias" value={engineering(predicted.range_bias_m, "m")} field="choice_range_bias_m" />
+        <Fact name="Outliers" value={fixed(100 * predicted.outlier_share, 1, "%")} field="choice_outlier_share" />
         <Fact name="Capture time" value={engineering(choice.capture_s, "s")} field="choice_capture_s" />
         <Fact name="Frame rate" value={fixed(choice.frame_rate_hz, 1, "Hz")} field="choice_frame_rate_hz" />
         <Fact name="Harmonics m" value={String(sequence.harmonics)} field="choice_harmonics" />

@@ -28,19 +28,19 @@ export function FrontPlot({ tradeoff, now, chosen, onChoose }: FrontPlotProps) {
   const inner = { width: width - MARGIN.left - MARGIN.right, height: height - MARGIN.top - MARGIN.bottom };
   const x = (place: number): number => MARGIN.left + place * inner.width;
   const y = (place: number): number => MARGIN.top + (1 - place) * inner.height;
-  const at = (capture_s: number, range_std_m: number): { x: number; y: number } => {
-    const place = placeOf(ends, capture_s, range_std_m);
+  const at = (capture_s: number, range_error_m: number): { x: number; y: number } => {
+    const place = placeOf(ends, capture_s, range_error_m);
     return { x: x(place.x), y: y(place.y) };
   };
   const within = (place: { x: number; y: number }): { x: number; y: number } => ({
     x: Math.min(x(1), Math.max(x(0), place.x)),
     y: Math.min(y(0), Math.max(y(1), place.y)),
   });
-  const points = tradeoff.front.map((choice) => ({ choice, ...at(choice.capture_s, choice.predicted.range_std_m.median) }));
+  const points = tradeoff.front.map((choice) => ({ choice, ...at(choice.capture_s, choice.predicted.range_error_m.median) }));
   // One point is reached by Tab, the others from there by arrow keys.
   const reached = tradeoff.front.find((choice) => sameSequence(choice, chosen)) ?? tradeoff.front[0];
-  const planned = chosen !== null && !tradeoff.front.some((choice) => sameSequence(choice, chosen)) ? at(chosen.capture_s, chosen.predicted.range_std_m.median) : null;
-  const here = now === null ? null : within(at(now.capture_s, now.range_std_m));
+  const planned = chosen !== null && !tradeoff.front.some((choice) => sameSequence(choice, chosen)) ? at(chosen.capture_s, chosen.predicted.range_error_m.median) : null;
+  const here = now === null ? null : within(at(now.capture_s, now.range_error_m));
   return (
     <div class="front" ref={box}>
       {width > 0 && inner.height > 0 && (
@@ -76,11 +76,11 @@ export function FrontPlot({ tradeoff, now, chosen, onChoose }: FrontPlotProps) {
             time of one capture
           </text>
           <text class="front-axis" x={MARGIN.left + 6} y={MARGIN.top + 8}>
-            deviation of the range
+            error of the range: noise and bias
           </text>
           <path class="front-line" d={points.map((point, n) => `${n === 0 ? "M" : "L"}${point.x} ${point.y}`).join("")} />
           {points.map(({ choice, ...point }) => {
-            const { low, high, median } = choice.predicted.range_std_m;
+            const { low, high, median } = choice.predicted.range_error_m;
             const words = `${engineering(choice.capture_s, "s")}, ${engineering(median, "m")}, m = ${choice.sequence.harmonics}`;
             return (
               <g

@@ -9,7 +9,7 @@ export interface Ends {
 
 export interface Standing {
   readonly capture_s: number;
-  readonly range_std_m: number;
+  readonly range_error_m: number;
 }
 
 /** Room around what is shown, as a factor. */
@@ -18,25 +18,25 @@ const ROOM = 1.25;
 /** Scales, in s and m, that hold the front and where the camera stands now. */
 export function endsOf({ front }: Tradeoff, now: Standing | null): Ends {
   const times = [...(now === null ? [] : [now.capture_s]), ...front.map(({ capture_s }) => capture_s)];
-  const errors = front.flatMap(({ predicted }) => [predicted.range_std_m.low, predicted.range_std_m.high, predicted.range_std_m.median]);
-  if (now !== null) errors.push(now.range_std_m);
+  const errors = front.flatMap(({ predicted }) => [predicted.range_error_m.low, predicted.range_error_m.high, predicted.range_error_m.median]);
+  if (now !== null) errors.push(now.range_error_m);
   const scale = (values: readonly number[]): Scale => ({ low: Math.min(...values) / ROOM, high: Math.max(...values) * ROOM, kind: "logarithmic" });
   return { time: scale(times), error: scale(errors) };
 }
 
 /** Where the camera stands: by the frame on screen, or by that which the front was predicted with; null if neither tells. */
 export function standingOf(meta: FrameMeta | null, sequence: AppliedSequence | null, { current }: Pick<Tradeoff, "current">): Standing | null {
-  const live = meta?.predicted_range_std_m?.median;
-  if (live !== undefined && sequence !== null && sequence.sequence_id === meta?.sequence_id) {
-    return { capture_s: sequence.capture_s, range_std_m: live };
+  const live = meta?.accuracy?.range_error_m ?? null;
+  if (live !== null && sequence !== null && sequence.sequence_id === meta?.sequence_id) {
+    return { capture_s: sequence.capture_s, range_error_m: live };
   }
-  const then = current.meta.predicted_range_std_m?.median;
-  return then === undefined ? null : { capture_s: current.capture_s, range_std_m: then };
+  const then = current.meta.accuracy?.range_error_m ?? null;
+  return then === null ? null : { capture_s: current.capture_s, range_error_m: then };
 }
 
 /** Place of a choice, 0 to 1 from the left and from the bottom. */
-export function placeOf({ time, error }: Ends, capture_s: number, range_std_m: number): { x: number; y: number } {
-  return { x: fraction(time, capture_s), y: fraction(error, range_std_m) };
+export function placeOf({ time, error }: Ends, capture_s: number, range_error_m: number): { x: number; y: number } {
+  return { x: fraction(time, capture_s), y: fraction(error, range_error_m) };
 }
 
 /** Round numbers along a scale. */

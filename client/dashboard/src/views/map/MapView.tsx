@@ -1,44 +1,35 @@
-import { computed, useComputed, type ReadonlySignal } from "@preact/signals";
+import { computed, type ReadonlySignal } from "@preact/signals";
 import type { RefObject } from "preact";
 import { useMemo, useRef } from "preact/hooks";
 
-import type { Frame } from "../../store/frames";
-import type { Pixel } from "../../store/pixel";
+import type { Look } from "../../store/looks";
 import { useStore } from "../../store/store";
-import { COLOUR_MAPS } from "../../ui/colourMaps";
-import { Choice, Tabs, Toggle } from "../../ui/controls";
+import { ColourBar } from "../../ui/ColourBar";
+import { ColourChoice } from "../../ui/ColourChoice";
+import { Tabs, Toggle } from "../../ui/controls";
 import { saveNumbers, savePicture } from "../../ui/download";
-import { fixed, NOTHING } from "../../ui/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
+import { LimitFields } from "../../ui/LimitFields";
+import { paint } from "../../ui/paint";
 import { Panel } from "../../ui/Panel";
 import { Stage } from "../../ui/Stage";
-import { AMPLITUDE, MAP_PRODUCTS, type MapProduct } from "./catalogue";
-import { ColourBar } from "./ColourBar";
-import { LimitFields } from "./LimitFields";
-import { MapLook } from "./limits";
-import { paint } from "./paint";
+import { AMPLITUDE, MAP_PRODUCTS } from "./catalogue";
+import { Measured } from "./Measured";
+import { Readout, valueAtPixel } from "./Readout";
 
-/** Value of a frame at a pixel; NaN without a frame, a pixel or a value. */
-function valueOf(frame: Frame | null, pixel: Pixel | null): number {
-  if (frame === null || pixel === null) return NaN;
-  const [height, width] = frame.shape;
-  return pixel.x < width && pixel.y < height ? frame.values[pixel.y * width + pixel.x] : NaN;
-}
-
-/** A map of one number a pixel: range, or one of the lights. */
+/** A map of one number a pixel: range, one of the lights, or how sure these are. */
 export function MapView() {
   const store = useStore();
   const choice = store.mapProduct;
   const shown = MAP_PRODUCTS.find(({ product }) => product === choice.value) ?? MAP_PRODUCTS[0];
-  const frame = store.frames.of(shown.product);
-  const look = useMemo(() => new MapLook(shown, frame, store.shelf), [shown, frame, store]);
+  const look = store.looks.of(shown.product);
   const canvas = useRef<HTMLCanvasElement>(null);
   return (
     <Panel
       name="map"
       downloads={[
-        { text: "Picture (PNG)", run: () => { savePicture(`${shown.product}-${frame.peek()?.meta.frame ?? 0}`, canvas.current); } },
-        { text: `${shown.name} in ${shown.unit} (NPY)`, run: () => { saveNumbers(frame.peek()); } },
+        { text: "Picture (PNG)", run: () => { savePicture(`${shown.product}-${look.frame.peek()?.meta.frame ?? 0}`, canvas.current); } },
+        { text: `${shown.name} in ${shown.unit} (NPY)`, run: () => { saveNumbers(look.frame.peek()); } },
       ]} // prettier-ignore
       title={
         <Tabs
@@ -48,111 +39,94 @@ export function MapView() {
           onChange={(product) => (choice.value = product)}
         />
       }
-      tools={
-        <>
-          <Toggle
-            pressed={look.kind.value === "logarithmic"}
-            title="Logarithmic scale"
-            onToggle={() => (look.kind.value = look.kind.peek() === "linear" ? "logarithmic" : "linear")}
-          >
-            log
-          </Toggle>
-          <Choice
-            label="Colours"
-            value={look.colours.value}
-            options={COLOUR_MAPS.map((name) => ({ value: name, text: name }))}
-            onChange={(name) => (look.colours.value = name)}
-          />
-        </>
-      }
     >
-      <Map key={shown.product} shown={shown} frame={frame} look={look} canvas={canvas} />
+      <Map look={look} canvas={canvas} />
     </Panel>
   );
 }
 
 interface MapProps {
-  readonly shown: MapProduct;
-  readonly frame: ReadonlySignal<Frame | null>;
-  readonly look: MapLook;
+  readonly look: Look;
   readonly canvas: RefObject<HTMLCanvasElement | null>;
 }
 
-function Map({ shown, frame, look, canvas }: MapProps) {
+/** Nothing but the figures is keyed by the product: another map must not take the focus from the picture. */
+function Map({ look, canvas }: MapProps) {
   const store = useStore();
-  useProducts([shown.product, AMPLITUDE]);
-  const size = useComputed(() => {
-    const [height, width] = frame.value?.shape ?? [120, 163];
-    return `${width}x${height}`;
-  });
+  const { product: shown, frame } = look;
+  useProducts([shown.scatterOf ?? shown.product, AMPLITUDE]);
+  const { size, waiting, marked } = useMemo(() => signalsOf(look, computed(() => store.pointed.value ?? store.selected.value)), [look, store]);
   const [width, height] = size.value.split("x").map(Number);
-  const looked = useMemo(() => computed(() => store.pointed.value ?? store.selected.value), [store]);
-  const marked = useMemo(() => computed(() => valueOf(frame.value, looked.value)), [frame, looked]);
 
   useDrawing(() => {
     const newest = frame.value;
     const scale = look.scale.value;
     const colours = look.colours.value;
     const target = canvas.current;
-    if (newest === null || target === null) return;
+    const context = target?.getContext("2d");
+    if (target === null || !context) return;
+    if (newest === null) {
+      // What the map before showed is not this one's.
+      context.clearRect(0, 0, target.width, target.height);
+      delete target.dataset["frame"];
+      delete target.dataset["product"];
+      return;
+    }
     const [rows, columns] = newest.shape;
-    const context = target.getContext("2d");
-    if (context === null) return;
     if (target.width !== columns || target.height !== rows) [target.width, target.height] = [columns, rows];
     const image = context.createImageData(columns, rows);
     paint(newest.values, scale, colours, image.data);
     context.putImageData(image, 0, 0);
     // What the picture shows, for tests and for scripts that read the page.
-    Object.assign(target.dataset, { frame: newest.meta.frame, low: scale.low, high: scale.high, colours });
-  }, [frame, look]);
+    Object.assign(target.dataset, { product: shown.product, frame: newest.meta.frame, low: scale.low, high: scale.high, colours });
+  }, [look]);
 
   return (
     <>
-      <Stage width={width} height={height} label={`${shown.name} map`}>
-        <canvas ref={canvas} data-product={shown.product} />
-        {useComputed(() => frame.value === null).value && <p class="stage-empty">Waiting for the first frame</p>}
-      </Stage>
+      <div class="picture">
+        <Stage width={width} height={height} label={`${shown.name} map`}>
+          <canvas ref={canvas} />
+          {waiting.value && <p class="stage-empty">Waiting for the first frame</p>}
+        </Stage>
+        <ColourBar
+          scale={look.scale.value}
+          colours={look.colours.value}
+          unit={shown.unit}
+          values={frame}
+          marked={marked}
+          onLimit={(limits) => {
+            store.looks.limit(look, limits);
+          }}
+        />
+      </div>
       <footer class="panel-foot">
-        <ColourBar scale={look.scale.value} colours={look.colours.value} unit={shown.unit} marked={marked} />
         <div class="panel-row">
-          <Readout shown={shown} frame={frame} looked={looked} marked={marked} />
-          <LimitFields look={look} unit={shown.unit} />
+          <Readout key={shown.product} look={look} />
+          <div class="panel-tools">
+            <LimitFields key={`${shown.product} limits`} look={look} looks={store.looks} />
+            <Toggle
+              pressed={look.kind.value === "logarithmic"}
+              title="Logarithmic scale"
+              onToggle={() => (look.kind.value = look.kind.peek() === "linear" ? "logarithmic" : "linear")}
+            >
+              log
+            </Toggle>
+            <ColourChoice colours={look.colours} />
+          </div>
         </div>
+        <Measured look={look} />
       </footer>
     </>
   );
 }
 
-interface ReadoutProps {
-  readonly shown: MapProduct;
-  readonly frame: ReadonlySignal<Frame | null>;
-  readonly looked: ReadonlySignal<Pixel | null>;
-  readonly marked: ReadonlySignal<number>;
-}
-
-/** The value under the pointer, and how much light it rests on. */
-function Readout({ shown, frame, looked, marked }: ReadoutProps) {
-  const store = useStore();
-  const amplitude = store.frames.of(AMPLITUDE);
-  const place = useComputed(() => (looked.value === null ? "" : `${looked.value.x}, ${looked.value.y}`));
-  const value = useComputed(() => fixed(marked.value, shown.decimals, shown.unit));
-  const light = useComputed(() => fixed(valueOf(amplitude.value, looked.value), 0, amplitude.value?.unit ?? ""));
-  const number = useComputed(() => frame.value?.meta.frame ?? "");
-  if (place.value === "") return <p class="readout quiet">Point at the picture to read it.</p>;
-  return (
-    <p class="readout" data-frame={number} aria-live="off">
-      <output class="readout-value" data-field="value">
-        {value}
-      </output>
-      {shown.product !== AMPLITUDE && (
-        <span>
-          <span class="quiet">light</span> <span data-field="amplitude">{light}</span>
-        </span>
-      )}
-      <span class="quiet">
-        pixel <span data-field="pixel">{place}</span>
-      </span>
-      {value.value === NOTHING && <span class="quiet">no value here</span>}
-    </p>
-  );
+function signalsOf({ frame }: Look, looked: ReadonlySignal<{ x: number; y: number } | null>) {
+  return {
+    size: computed(() => {
+      const [height, width] = frame.value?.shape ?? [120, 163];
+      return `${width}x${height}`;
+    }),
+    waiting: computed(() => frame.value === null),
+    marked: computed(() => valueAtPixel(frame.value, looked.value)),
+  };
 }

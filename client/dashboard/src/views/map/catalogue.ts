@@ -1,7 +1,7 @@
 import type { ColourMapName } from "../../ui/colourMaps";
 import type { ScaleKind } from "../../ui/scale";
 
-/** A product that is one number a pixel, and how it is shown unless somebody chose otherwise. */
+/** A map of one number a pixel, and how it is shown unless somebody chose otherwise. */
 export interface MapProduct {
   readonly product: string;
   readonly name: string;
@@ -10,6 +10,10 @@ export interface MapProduct {
   readonly colours: ColourMapName;
   readonly scale: ScaleKind;
   readonly decimals: number;
+  /** Zero means something: limits lie evenly around it. */
+  readonly signed?: boolean;
+  /** The product whose scatter over frames this page measures; absent for what the service computes. */
+  readonly scatterOf?: string;
 }
 
 /** The maps on offer, in the order of their tabs. */
@@ -18,7 +22,9 @@ export const MAP_PRODUCTS: readonly MapProduct[] = [
   { product: "direct", name: "Direct", hint: "Light of the first return", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
   { product: "indirect", name: "Indirect", hint: "Light that took a longer way", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
   { product: "brightness", name: "Brightness", hint: "All light: the zeroth moment", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
-  { product: "validity", name: "Validity", hint: "Smallest eigenvalue of the moments over b₀; below zero no light could have made them", unit: "1", colours: "cividis", scale: "linear", decimals: 4 },
+  { product: "validity", name: "Validity", hint: "Smallest eigenvalue of the moments over b₀; below zero no light could have made them", unit: "1", colours: "coolwarm", scale: "linear", decimals: 4, signed: true },
+  { product: "range_std", name: "Deviation", hint: "Standard deviation of the range that the noise of the sensor predicts, by the likelihood estimate", unit: "m", colours: "cividis", scale: "logarithmic", decimals: 4 },
+  { product: "range_scatter", name: "Scatter", hint: "Standard deviation of the range over the last 30 frames, as measured here", unit: "m", colours: "cividis", scale: "logarithmic", decimals: 4, scatterOf: "range" },
 ]; // prettier-ignore
 
 /** What the hover line says beside the map's own value. */

@@ -3,8 +3,9 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 
 import { LIVE, RequestError } from "../../store/api";
 import { aNumber, oneOf, remembered } from "../../store/settings";
-import { useStore } from "../../store/store";
+import { isField, useStore } from "../../store/store";
 import { frameUrl } from "../../stream/frameUrl";
+import { ColourBar } from "../../ui/ColourBar";
 import { Choice } from "../../ui/controls";
 import { save, savePicture } from "../../ui/download";
 import { download } from "../../ui/files";
@@ -12,7 +13,8 @@ import { fixed, grouped } from "../../ui/format";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { AMPLITUDE } from "../map/catalogue";
-import { byFlags, byValue, fieldOfView, fillCloud, pinholeOf, type Pinhole } from "./cloud";
+import { byFlags, byValue, fieldOfView, fillCloud } from "./cloud";
+import { knownLens, lensOf } from "./lens";
 import { plyOf } from "./ply";
 import type { PointScene } from "./Scene";
 
@@ -29,16 +31,9 @@ export function PointsView() {
   const store = useStore();
   const colouring = useMemo(() => remembered<Colouring>(store.shelf, "points.colouring", "range", oneOf(COLOURINGS)), [store]);
   const pointSize = useMemo(() => remembered(store.shelf, "points.size", 2, aNumber), [store]);
-  // Only where the service does not know where its camera looks.
-  const field_deg = useMemo(() => remembered(store.shelf, "points.field_deg", 45, isField), [store]);
-  const known = useComputed(() => {
-    const told = store.camera.value?.intrinsics;
-    return told === undefined || told.source === "assumed" ? null : told;
-  });
-  const lensOf = (width: number, height: number): Pinhole => {
-    const told = known.value;
-    return told !== null && told.width === width && told.height === height ? told : pinholeOf(width, height, field_deg.value * DEGREE);
-  };
+  const { field_deg } = store;
+  const known = useComputed(() => knownLens(store));
+  const [rangeLook, lightLook] = [store.looks.of("range"), store.looks.of(AMPLITUDE)];
   useProducts(NEEDED[colouring.value]);
   const range = store.frames.of("range");
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -80,24 +75,24 @@ export function PointsView() {
     const other = chosen === "light" ? store.frames.of(AMPLITUDE).value : chosen === "validity" ? store.frames.of("flags").value : null;
     if (frame === null || drawn === null) return;
     const [height, width] = frame.shape;
-    const lens = lensOf(width, height);
+    const lens = lensOf(store, width, height);
     const fits = other?.values.length === frame.values.length;
     const colourOf =
       chosen === "validity" && fits
         ? byFlags(other.values)
         : chosen === "light" && fits
-          ? byValue(other.values, 0, other.map?.high ?? 1, "grey")
-          : byValue(frame.values, frame.map?.low ?? 0, frame.map?.high ?? 1, "viridis");
+          ? byValue(other.values, lightLook.scale.value, lightLook.colours.value)
+          : byValue(frame.values, rangeLook.scale.value, rangeLook.colours.value);
     count.value = fillCloud(drawn.cloudFor(width * height), frame.values, width, lens, colourOf);
     drawn.show(count.value, { width, height, fieldOfView_rad: fieldOfView(width, lens) });
-    if (canvas.current !== null) Object.assign(canvas.current.dataset, { frame: frame.meta.frame, points: count.value, colouring: chosen, low: frame.map?.low, high: frame.map?.high });
+    if (canvas.current !== null) Object.assign(canvas.current.dataset, { frame: frame.meta.frame, points: count.value, colouring: chosen, ...rangeLook.scale.peek() });
   }, [scene, range]);
 
   const saveShown = (): void => {
     const [frame, drawn] = [range.peek(), scene.peek()];
     if (frame === null || drawn === null) return;
     const [height, width] = frame.shape;
-    const { fx, fy, cx, cy } = lensOf(width, height);
+    const { fx, fy, cx, cy } = lensOf(store, width, height);
     const facts = { frame: frame.meta.frame, intrinsics: { fx, fy, cx, cy, width, height, source: known.peek()?.source ?? "assumed" } };
     save(`points-${frame.meta.frame}.ply`, new Blob([plyOf(drawn.cloudFor(width * height), count.peek(), facts)]));
   };
@@ -120,6 +115,7 @@ export function PointsView() {
     event.stopPropagation();
     scene.peek()?.turn(...turn);
   };
+  const bar = useComputed(() => (colouring.value === "validity" ? null : colouring.value === "light" ? lightLook : rangeLook));
   const text = useComputed(() => (range.value === null ? "Waiting for the first frame" : scene.value === null ? "Loading" : null));
   return (
     <Panel
@@ -143,6 +139,7 @@ export function PointsView() {
         { text: "Points with light and flags (PLY)", run: () => void saveAll() },
       ]}
     >
+      <div class="picture">
       <div class="points" ref={box}>
         <canvas
           ref={canvas}
@@ -154,6 +151,20 @@ export function PointsView() {
           onKeyDown={onKeyDown}
         />
         {(trouble.value ?? text.value) !== null && <p class="stage-empty">{trouble.value ?? text.value}</p>}
+      </div>
+        {bar.value === null ? (
+          <div class="colour-bar" />
+        ) : (
+          <ColourBar
+            scale={bar.value.scale.value}
+            colours={bar.value.colours.value}
+            unit={bar.value.product.unit}
+            values={bar.value.frame}
+            onLimit={(limits) => {
+              if (bar.value !== null) store.looks.limit(bar.value, limits);
+            }}
+          />
+        )}
       </div>
       <footer class="panel-foot">
         <div class="panel-row">
@@ -203,7 +214,3 @@ const TURNS: Readonly<Record<string, readonly [number, number, number?] | undefi
   "+": [0, 0, 0.9],
   "-": [0, 0, 1 / 0.9],
 };
-
-function isField(value: unknown): value is number {
-  return aNumber(value) && value >= 5 && value <= 150;
-}

@@ -1,6 +1,8 @@
 /** A range map as points in space: written into the arrays of a geometry, nothing allocated a frame. */
-import { colourTable, levelOf, type ColourMapName } from "../../ui/colourMaps";
+import type { ColourMapName } from "../../ui/colourMaps";
 import { gravest } from "../../ui/flags";
+import { picker } from "../../ui/paint";
+import type { Scale } from "../../ui/scale";
 
 export interface Cloud {
   /** x to the right, y up, z towards the viewer, in m: the camera stands at 0 and looks along -z. */
@@ -63,15 +65,14 @@ export function fillCloud(
   return at / 3;
 }
 
-/** Colours by a value between two ends of a scale. */
-export function byValue(values: ArrayLike<number>, low: number, high: number, colours: ColourMapName): (pixel: number, out: Uint8Array, at: number) => void {
-  const table = colourTable(colours);
+/** Colours by a value, as a map on this scale has them. */
+export function byValue(values: ArrayLike<number>, scale: Scale, colours: ColourMapName): (pixel: number, out: Uint8Array, at: number) => void {
+  const pick = picker(scale, colours);
   return (pixel, out, at) => {
-    const place = (values[pixel] - low) / (high - low);
-    const level = 4 * levelOf(place >= 0 ? place : 0);
-    out[at] = table[level];
-    out[at + 1] = table[level + 1];
-    out[at + 2] = table[level + 2];
+    const rgba = pick(values[pixel]);
+    out[at] = rgba & 255;
+    out[at + 1] = (rgba >> 8) & 255;
+    out[at + 2] = (rgba >> 16) & 255;
   };
 }
 

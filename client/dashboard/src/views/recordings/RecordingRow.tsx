@@ -39,9 +39,14 @@ export function RecordingRow({ recording, task, onAnnotate, onDelete }: RowProps
         type="button"
         class="play"
         aria-label={`Play ${name}`}
-        title="Show it in all views"
+        title="Play it in all views"
         disabled={!whole || task.busy.value !== null}
-        onClick={() => void task.run("Opening…", () => replay.open(id))}
+        onClick={() =>
+          void task.run("Opening…", async () => {
+            await replay.open(id);
+            replay.toggle();
+          })
+        }
       >
         <PlayIcon />
       </button>

@@ -1,4 +1,4 @@
-import { computed, signal, useComputed, useSignal } from "@preact/signals";
+import { computed, effect, signal, untracked, useComputed, useSignal, type ReadonlySignal } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import "uplot/dist/uPlot.min.css";
 
@@ -6,8 +6,9 @@ import { rangeOfTime_m } from "../../physics/constants";
 import { peaks } from "../../physics/impulseResponse";
 import { pixelOf } from "../../physics/reflection";
 import { aBoolean, oneOf, remembered } from "../../store/settings";
+import type { Frame } from "../../store/frames";
 import type { Pixel } from "../../store/pixel";
-import { useStore } from "../../store/store";
+import { type Store, useStore } from "../../store/store";
 import { Tabs, Toggle } from "../../ui/controls";
 import { fixed, significant } from "../../ui/format";
 import { save } from "../../ui/download";
@@ -15,6 +16,10 @@ import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { autoLimits, type Span } from "../../ui/scale";
 import { csvOf, curvesOf, type Aspect } from "./curves";
+import { AMPLITUDE } from "../map/catalogue";
+import { PixelFigures } from "./Figures";
+import { FlagHistory } from "./flagShares";
+import { richestPixel } from "./interesting";
 import { Found, PeakTable } from "./Listings";
 import { MomentsPlane } from "./MomentsPlane";
 import { responsePlot, type ResponsePlot } from "./plot";
@@ -39,10 +44,12 @@ const SIDES: readonly { readonly value: Side; readonly text: string; readonly hi
 /** Everything about the selected pixel; its curves are computed here from the streamed coefficients. */
 export function ResponseView() {
   const store = useStore();
-  useProducts(["coefficients"]);
+  useProducts(["coefficients", "range", AMPLITUDE]);
+  const flags = useMemo(() => new FlagHistory(), []);
   const frame = store.frames.of("coefficients");
   useEffect(() => store.details.follow(store.selected, frame), [store, frame]);
-  const side = useMemo(() => remembered<Side>(store.shelf, "response.side", "density", oneOf(SIDES.map(({ value }) => value))), [store]);
+  useEffect(() => selectFirst(store, frame), [store, frame]);
+  const side = useMemo(() => remembered<Side>(store.shelf, "response.side", "bounds", oneOf(SIDES.map(({ value }) => value))), [store]);
   const shown = useMemo(
     () =>
       computed(() => {
@@ -90,20 +97,32 @@ export function ResponseView() {
     >
       <div class="response">
         {place.value === null && <p class="stage-empty">Click a pixel in one of the pictures.</p>}
-        {side.value === "moments" ? (
+        {place.value === null ? null : side.value === "moments" ? (
           <MomentsPlane pixel={levinson} />
         ) : (
           <Plot key={side.value} aspect={side.value} logarithmic={side.value === "density" && logarithmic.value} shown={shown} pointed={pointed} />
         )}
         {place.value !== null && (
           <aside class="response-side" aria-label="What was found at the pixel" tabIndex={0}>
+            {shown.value !== null && <PixelFigures key={place.value} pixel={shown.value.pixel} />}
             <PeakTable peaks={shown.value?.peaks ?? []} />
-            <Found told={store.details.document.value} held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null} />
+            <Found flags={flags} told={store.details.document.value} held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null} />
           </aside>
         )}
       </div>
     </Panel>
   );
+}
+
+/** Selects a pixel worth looking at with the first frame, unless one was selected before; the answer ends it. */
+function selectFirst(store: Store, frame: ReadonlySignal<Frame | null>): () => void {
+  const end = effect(() => {
+    const coefficients = frame.value?.coefficients;
+    if (store.selected.value !== null || !coefficients) return;
+    const pixel = richestPixel(coefficients);
+    untracked(() => (store.selected.value = pixel));
+  });
+  return end;
 }
 
 interface Shown {
@@ -183,14 +202,14 @@ function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
   return (
     <div class="response-plot-box">
       <div class="response-plot" ref={box} data-empty={shown.value === null} data-aspect={aspect} />
-      {aspect !== "density" && (
         <p class="key">
           {aspect === "bounds" && <span class="key-band">any light with these moments</span>}
           <span>estimate</span>
-          {simulated && <span class="key-truth">truth</span>}
+          {simulated && aspect !== "density" && <span class="key-truth">truth</span>}
+          {simulated && <span class="key-stem">true returns (height: share of the light)</span>}
           {aspect === "bounds" && <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">all smoothed, r = 0.93</em>}
+          {aspect === "density" && !logarithmic && <em title="Linear near zero, logarithmic where the density is high: peaks are too narrow and high to be drawn linearly">height: asinh</em>}
         </p>
-      )}
     </div>
   );
 }

@@ -68,7 +68,9 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, seek,
         x: { time: false, range: (_plot, low, high) => [low ?? 0, high ?? 1] },
         y: logarithmic
           ? { distr: 3, range: () => [10 ** (decade(top()) - LOG_DECADES), top()] }
-          : { range: () => [0, top()] },
+          : aspect === "density"
+            ? { distr: 4, range: () => [0, top()] }
+            : { range: () => [0, top()] },
       },
       axes: [
         { ...axis, size: 20, gap: 2, label: "time of flight (ns)", labelSize: 16, labelGap: 0 },
@@ -103,6 +105,8 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, seek,
     head,
     show: (curves, truthNow) => {
       truth = truthNow;
+      // Where the axis bends; it follows the axis, and uPlot takes it from here.
+      Object.assign(plot.scales["y"], { asinh: top() / ASINH_SHARE });
       plot.setData(curves === null ? [[], ...series[aspect].map(() => [])] : [curves.time_ns, ...curves.lines]);
     },
   };
@@ -125,6 +129,9 @@ function drawTruth(plot: uPlot, { returns, brightness }: Truth, ink: string): vo
   }
   ctx.restore();
 }
+
+/** Share of the axis from which heights grow by factors instead of by steps: a narrow peak leaves the rest in sight. */
+const ASINH_SHARE = 1000;
 
 /** Decades that the logarithmic axis shows. */
 const LOG_DECADES = 5;

@@ -135,7 +135,7 @@ function EffectRow({ effect, calledAbove, task }: { effect: EffectDocument; call
           </select>
         )}
       </td>
-      <td class="quiet">{effect.reason}</td>
+      <td class="quiet effect-why">{effect.reason}</td>
     </tr>
   );
 }

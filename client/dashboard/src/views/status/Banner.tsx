@@ -1,6 +1,7 @@
 import { useEffect } from "preact/hooks";
 import { useComputed, useSignal } from "@preact/signals";
 
+import { lossReason } from "../../store/events";
 import { useStore } from "../../store/store";
 
 /** Says at once what is wrong, and what is being done about it; goes away with it. */
@@ -38,7 +39,7 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
         <p>
           <strong>Camera lost</strong> at {new Date(1000 * loss.at_s).toLocaleTimeString()}. The service looks for it and
           goes on by itself; what you see is the last frame.{" "}
-          {loss.reason !== null && <span class="quiet">Reason: {loss.reason}</span>}
+          {loss.reason !== null && <span class="quiet">Reason: {lossReason(loss.reason)}</span>}
         </p>
       </div>
     );

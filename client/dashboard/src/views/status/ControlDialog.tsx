@@ -31,6 +31,7 @@ function Control({ onDone }: { onDone: () => void }) {
   const task = useTask();
   const now_s = useNow(1);
   const control = lease.control.value;
+  const barred = store.caller.obstacle.value;
   const left = control.kind === "us" || control.kind === "other" ? `${Math.max(0, Math.ceil(control.expires_s - now_s))} s` : "";
   const act = async (words: string, work: () => Promise<void>): Promise<void> => {
     if (await task.run(words, work)) onDone();
@@ -46,7 +47,8 @@ function Control({ onDone }: { onDone: () => void }) {
     >
       <p data-field="control-words">
         {control.kind === "unknown" && "Who controls the camera is not known yet."}
-        {control.kind === "nobody" && "Nobody has control, so everybody may change things. Take it, and only you may; others go on watching."}
+        {barred !== null && `${barred}: this page can look, but not take control. `}
+        {control.kind === "nobody" && barred === null && "Nobody has control, so everybody may change things. Take it, and only you may; others go on watching."}
         {control.kind === "us" && (
           <>
             You have control, as <strong>{control.holder}</strong>. This page renews it; if it stops doing so, the camera stops and its light goes off after {left}.
@@ -88,7 +90,7 @@ function Control({ onDone }: { onDone: () => void }) {
             Give back
           </button>
         ) : (
-          <button type="submit" class="primary" disabled={task.busy.value !== null || control.kind === "unknown" || name.value.trim() === ""}>
+          <button type="submit" class="primary" title={barred ?? undefined} disabled={barred !== null || task.busy.value !== null || control.kind === "unknown" || name.value.trim() === ""}>
             {control.kind === "other" ? "Take over" : "Take control"}
           </button>
         )}

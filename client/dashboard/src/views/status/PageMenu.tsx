@@ -1,3 +1,4 @@
+import { linkTo } from "../../store/permalink";
 import { useStore } from "../../store/store";
 import { ActionMenu } from "../../ui/ActionMenu";
 import { THEMES, type ThemeChoice } from "../../ui/theme";
@@ -9,11 +10,13 @@ export function PageMenu() {
   const { choice } = store.theme;
   const { credentials } = store.api;
   const link = async (): Promise<void> => {
+    const whole = linkTo(window, store);
     try {
-      await navigator.clipboard.writeText(window.location.href);
+      await navigator.clipboard.writeText(whole);
+      store.events.tell("The link was copied: it shows this layout, pixel, time and these colours.", "good");
     } catch {
-      // Refused, or not over https: the address is the same.
-      store.status.unreadable.value = `The link is this page's address: ${window.location.href}`;
+      // Refused, or not over https: to be copied by hand.
+      store.status.unreadable.value = `The link to what is shown: ${whole}`;
     }
   };
   return (
@@ -41,7 +44,7 @@ export function PageMenu() {
         {
           title: "Access",
           actions: [
-            { text: "Control…", run: () => (store.asksForControl.value = true) },
+            { text: "Take control…", run: () => (store.asksForControl.value = true) },
             { text: "Token…", run: () => (store.asksForToken.value = true) },
             ...(credentials.token.value === null ? [] : [{ text: "Forget the token", run: () => { credentials.use(null); } }]),
           ],

@@ -1,20 +1,26 @@
 import { useComputed } from "@preact/signals";
 
+import { flowTrouble } from "../../store/status";
 import { useStore } from "../../store/store";
-import { engineering, fixed, grouped, NOTHING } from "../../ui/format";
+import { deviation, fixed } from "../../ui/format";
+import { useNow } from "../../ui/hooks";
+import { Figures } from "./Figures";
 import { Steering } from "./Steering";
+import { Toasts } from "./Toasts";
 
-/** One line on how things stand: connection, camera, and the flow of frames. */
+/** How things stand in three things: health, rate and deviation, and what one looks at; all else is behind a button. */
 export function StatusBar() {
   return (
     <header class="bar">
       <h1 class="brand">
         <img src="/icon.svg" alt="" width="24" height="24" />
-        transientcam
+        <span class="brand-name">transientcam</span>
       </h1>
       <StateChip />
-      <CameraName />
-      <Flow />
+      <Performance />
+      <Subject />
+      <Figures />
+      <Toasts />
       <Steering />
     </header>
   );
@@ -22,9 +28,16 @@ export function StatusBar() {
 
 type Tone = "good" | "waiting" | "bad" | "still";
 
+interface State {
+  readonly tone: Tone;
+  readonly word: string;
+  readonly why?: string;
+}
+
 function StateChip() {
-  const { status, held, replay, calibrating } = useStore();
-  const state = useComputed((): { tone: Tone; word: string } => {
+  const { status, held, replay, calibrating, sequence } = useStore();
+  const now_s = useNow(1);
+  const state = useComputed((): State => {
     if (status.connection.value.kind === "connecting") return { tone: "waiting", word: "Connecting" };
     if (status.connection.value.kind === "waiting") return { tone: "bad", word: "Reconnecting" };
     if (status.connection.value.kind === "refused") return { tone: "bad", word: "Not let in" };
@@ -36,82 +49,49 @@ function StateChip() {
     if (status.newest.value === null) return { tone: "waiting", word: "Waiting" };
     return { tone: "good", word: "Live" };
   });
-  const { tone, word } = state.value;
+  const { tone, word, why } = slowed(state.value, flowTrouble(status.flow.value, sequence.value?.frame_rate_hz ?? null, now_s));
   return (
-    <span class={`chip chip-${tone}`} role="status" data-field="state">
+    <span class={`chip chip-${tone}`} role="status" data-field="state" title={why}>
       <i aria-hidden="true" />
       {word}
     </span>
   );
 }
 
-function CameraName() {
-  const { camera } = useStore();
+/** A live camera whose frames come too seldom or too late is not well. */
+function slowed(state: State, trouble: string | null): State {
+  return state.word === "Live" && trouble !== null ? { tone: "waiting", word: "Live, slow", why: trouble } : state;
+}
+
+/** Frames a second and what the noise of the sensor makes of the range; leads to what accuracy costs. */
+function Performance() {
+  const { status, alone } = useStore();
+  const rate = useComputed(() => fixed(status.rate_hz.value, 1, "Hz"));
+  const std = useComputed(() => deviation(status.newest.value?.predicted_range_std_m?.median, "m"));
+  return (
+    <button
+      type="button"
+      class="performance"
+      title="Frames drawn a second, and the standard deviation (1 σ) of the range in the median pixel; shows what accuracy costs"
+      onClick={() => (alone.value = alone.peek() === "accuracy" ? null : "accuracy")}
+    >
+      <span data-field="rate">{rate}</span>
+      <span class="quiet" data-field="deviation">
+        {std}
+      </span>
+    </button>
+  );
+}
+
+/** What one looks at: the scene of a simulated camera, else the camera. */
+function Subject() {
+  const { camera, simulation } = useStore();
   if (camera.value === null) return null;
-  const { capabilities } = camera.value;
+  const { capabilities, simulated } = camera.value;
+  const scene = simulation.world.value?.scene;
   return (
-    <span class="camera-name" title={`Serial number ${String(capabilities["serial"])}`}>
-      {String(capabilities["model"])}
+    <span class="camera-name" title={`Serial number ${String(capabilities["serial"])}`} data-field="subject">
+      {simulated && scene !== undefined ? `simulated ${scene}` : String(capabilities["model"])}
     </span>
-  );
-}
-
-/** A frame older than this, or from the future, tells of two clocks that differ and not of latency. */
-const CREDIBLE_LATENCY_S = 30;
-
-function Flow() {
-  const { status } = useStore();
-  const latency = useComputed(() => {
-    const latency_s = status.latency_s.value;
-    if (latency_s === null) return NOTHING;
-    if (latency_s < -0.05 || latency_s > CREDIBLE_LATENCY_S) return "clocks differ";
-    return fixed(1000 * Math.max(0, latency_s), 0, "ms");
-  });
-  return (
-    <dl class="flow">
-      <Figure name="Rate" field="rate" title="Frames drawn a second">
-        {useComputed(() => fixed(status.rate_hz.value, 1, "Hz"))}
-      </Figure>
-      <Figure name="Latency" field="latency" title="From the last image's arrival at the service to this screen">
-        {latency}
-      </Figure>
-      <Figure name="Capture" field="capture" title="From the first exposure of a frame to the last">
-        {useComputed(() => fixed(1000 * (status.newest.value?.capture_s ?? NaN), 1, "ms"))}
-      </Figure>
-      <Figure name="Reconstruct" field="reconstruct" title="Computing of a frame at the service">
-        {useComputed(() => fixed(1000 * (status.newest.value?.reconstruct_s ?? NaN), 1, "ms"))}
-      </Figure>
-      <Figure name="Encode" field="encode" title="Bringing the products of a frame into the form they are sent in">
-        {useComputed(() => engineering(status.encode_s.value, "s", 2))}
-      </Figure>
-      <Figure name="Dropped" field="dropped" title="Frames left out for this page, which was slower than the camera">
-        {useComputed(() => grouped(status.dropped.value))}
-      </Figure>
-      <Figure name="Lost images" field="lost" title="Images that did not arrive from the camera intact">
-        {useComputed(() => grouped(status.lostImages.value))}
-      </Figure>
-      <Figure name="Sensor" field="temperature" title="Temperature of the sensor">
-        {useComputed(() => fixed(status.newest.value?.temperature_c, 1, "°C"))}
-      </Figure>
-      <Figure name="Frame" field="frame" title="Number of the frame on screen">
-        {useComputed(() => (status.newest.value === null ? NOTHING : grouped(status.newest.value.frame)))}
-      </Figure>
-    </dl>
-  );
-}
-
-interface FigureProps {
-  readonly name: string;
-  readonly field: string;
-  readonly title: string;
-  readonly children: { readonly value: string };
-}
-
-function Figure({ name, field, title, children }: FigureProps) {
-  return (
-    <div class={`figure figure-${field}`} title={title}>
-      <dt>{name}</dt>
-      <dd data-field={field}>{children}</dd>
-    </div>
   );
 }

@@ -55,7 +55,7 @@ function Capture() {
         <SingleIcon /> <span class="wide">Single</span>
       </Steer>
       <Steer title={occupied ?? (running ? "Stop the camera; its light goes off" : "Start the camera")} disabled={busy} onClick={() => void toggle()}>
-        {running ? <PauseIcon /> : <PlayIcon />} {running ? "Stop" : "Start"}
+        {running ? <PauseIcon /> : <PlayIcon />} <span class="wide">{running ? "Stop" : "Start"}</span>
       </Steer>
     </>
   );
@@ -63,9 +63,17 @@ function Capture() {
 
 /** Who controls the camera; a click asks for control, or gives it back. */
 function ControlButton() {
-  const { lease, asksForControl } = useStore();
+  const { lease, asksForControl, caller } = useStore();
   const control = lease.control.value;
-  const words = { unknown: "Control", nobody: "Take control", us: "You have control", other: "" }[control.kind];
+  const barred = caller.obstacle.value;
+  if (barred !== null && control.kind !== "other") {
+    return (
+      <button type="button" class="control-button" title={`${barred}: it can look, but not take control`} data-field="control" data-obstacle="" onClick={() => (asksForControl.value = true)}>
+        <ControlIcon /> <span class="wide">View only</span>
+      </button>
+    );
+  }
+  const words = { unknown: "Take control", nobody: "Take control", us: "You have control", other: "" }[control.kind];
   return (
     <button type="button" class={`control-button control-${control.kind}`} title="Who controls the camera" data-field="control" onClick={() => (asksForControl.value = true)}>
       <ControlIcon />

@@ -5,9 +5,9 @@ import { useStore } from "../../store/store";
 
 /** How long a notice stays, and how many are seen together. */
 const STAYS_S = 6;
-const MOST = 3;
+const MOST = 2;
 
-/** What just happened; it goes away by itself and is in nobody's way. */
+/** What just happened, in the free part of the header: never over what can be pressed. It goes away by itself. */
 export function Toasts() {
   const { events } = useStore();
   const now_s = useSignal(Date.now() / 1000);
@@ -27,7 +27,7 @@ export function Toasts() {
   return (
     <div class="toasts" role="log" aria-label="What just happened">
       {fresh.map(({ number, words, tone }) => (
-        <p key={number} class={`toast toast-${tone}`}>
+        <p key={number} class={`toast toast-${tone}`} title={words}>
           {words}
         </p>
       ))}

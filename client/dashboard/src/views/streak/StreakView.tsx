@@ -1,10 +1,12 @@
 import { computed, useComputed, useSignal } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 
-import { TONES, type ToneKind } from "../../gl/tone";
+import { scaleOf, TONES, type ToneKind } from "../../gl/tone";
 import { rangeOfTime_m } from "../../physics/constants";
 import { oneOf, remembered } from "../../store/settings";
 import { useStore } from "../../store/store";
+import { ColourBar } from "../../ui/ColourBar";
+import { ColourChoice } from "../../ui/ColourChoice";
 import { COLOUR_MAPS, type ColourMapName } from "../../ui/colourMaps";
 import { Choice } from "../../ui/controls";
 import { npy, save, savePicture } from "../../ui/download";
@@ -25,7 +27,7 @@ export function StreakView() {
   const colours = useMemo(() => remembered<ColourMapName>(store.shelf, "streak.colours", "inferno", oneOf(COLOUR_MAPS)), [store]);
   const streak = useMemo(() => new Streak(), []);
   const canvas = useRef<HTMLCanvasElement>(null);
-  const white = useRef(NaN);
+  const bright = useSignal(NaN);
   const pointed = useSignal<{ x: number; bin: number } | null>(null);
   const size = useMemo(() => computed(() => `${frame.value?.coefficients?.width ?? 163}x${frame.value?.coefficients?.height ?? 120}`), [frame]);
   const [width, height] = size.value.split("x").map(Number);
@@ -37,13 +39,13 @@ export function StreakView() {
     const context = canvas.current?.getContext("2d");
     if (!coefficients || canvas.current === null || !context || y >= coefficients.height) return;
     streak.compute(coefficients, y);
-    const bright = whiteOf(streak.values);
-    if (!(Math.abs(Math.log(bright / white.current)) < 0.2)) white.current = bright; // not with every frame's noise
+    const white = whiteOf(streak.values);
+    if (!(Math.abs(Math.log(white / bright.peek())) < 0.2)) bright.value = white; // not with every frame's noise
     if (canvas.current.width !== streak.width || canvas.current.height !== BINS) [canvas.current.width, canvas.current.height] = [streak.width, BINS];
     const image = context.createImageData(streak.width, BINS);
-    paintStreak(streak.values, white.current, toneNow, coloursNow, image.data);
+    paintStreak(streak.values, bright.peek(), toneNow, coloursNow, image.data);
     context.putImageData(image, 0, 0);
-    Object.assign(canvas.current.dataset, { frame: frame.peek()?.meta.frame, row: y, white: white.current, colours: coloursNow });
+    Object.assign(canvas.current.dataset, { frame: frame.peek()?.meta.frame, row: y, white: bright.peek(), colours: coloursNow });
   }, [frame, row]);
 
   const placeOf = (event: PointerEvent): { x: number; turn: number } => {
@@ -70,7 +72,7 @@ export function StreakView() {
       tools={
         <>
           <Choice label="Tone" value={tone.value} options={TONES.map((kind) => ({ value: kind, text: TONE_NAMES[kind] }))} onChange={(kind) => (tone.value = kind)} />
-          <Choice label="Colours" value={colours.value} options={COLOUR_MAPS.map((each) => ({ value: each, text: each }))} onChange={(each) => (colours.value = each)} />
+          <ColourChoice colours={colours} />
         </>
       }
       downloads={[
@@ -102,6 +104,7 @@ export function StreakView() {
           <canvas ref={canvas} data-product="streak" />
           <Marks width={width} />
         </div>
+        {bright.value > 0 && <ColourBar scale={scaleOf(tone.value, Number((bright.value * 1e-9).toPrecision(3)))} colours={colours.value} unit="DN/ns" />}
       </div>
       <footer class="panel-foot">
         <div class="panel-row">

@@ -8,7 +8,7 @@ import { ticks } from "../../ui/scale";
 
 /** Finest step of the slider, in shares of the period. */
 const STEP = 1 / 2048;
-const CURVE_HEIGHT = 28;
+const CURVE_HEIGHT = 48;
 const CURVE_WIDTH = 512;
 
 /** The time of flight as a slider over a curve of when light arrives in the whole picture. */
@@ -35,10 +35,14 @@ export function Timeline() {
   }, [player]);
 
   const period_ns = period_s.value * 1e9;
+  const period_m = rangeOfTime_m(period_s.value);
   const marks = ticks({ low: 0, high: period_ns, kind: "linear" }, 6);
   return (
     <div class="timeline">
       <canvas ref={canvas} width={CURVE_WIDTH} height={CURVE_HEIGHT} aria-hidden="true" />
+      {player.arrivals.value.map((turn) => (
+        <i key={turn} class="timeline-arrival" style={{ left: `${100 * turn}%` }} />
+      ))}
       <i ref={head} class="timeline-head" />
       <input
         ref={slider}
@@ -52,6 +56,13 @@ export function Timeline() {
           player.seek(event.currentTarget.valueAsNumber);
         }}
       />
+      <div class="timeline-metres" aria-hidden="true">
+        {ticks({ low: 0, high: period_m, kind: "linear" }, 6).map((range_m) => (
+          <span key={range_m} style={{ left: `${(100 * range_m) / period_m}%` }}>
+            {fixed(range_m, 0, "m")}
+          </span>
+        ))}
+      </div>
       <div class="timeline-ticks" aria-hidden="true">
         {marks.map((time_ns, at) => (
           <span key={time_ns} style={{ left: `${(100 * time_ns) / period_ns}%` }}>

@@ -1,23 +1,25 @@
 import { computed, useComputed } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 
-import { TONES, type ToneKind } from "../../gl/tone";
+import { scaleOf, TONES, type ToneKind } from "../../gl/tone";
 import { densityAt } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
 import { SPEEDS_NS } from "../../store/player";
 import { useStore } from "../../store/store";
-import { COLOUR_MAPS } from "../../ui/colourMaps";
+import { ColourBar } from "../../ui/ColourBar";
+import { ColourChoice } from "../../ui/ColourChoice";
 import { Choice, Toggle } from "../../ui/controls";
 import { savePicture } from "../../ui/download";
 import { fixed, significant, superscript, withUnit } from "../../ui/format";
-import { useProducts } from "../../ui/hooks";
+import { useDrawing, useProducts } from "../../ui/hooks";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
 import { AMPLITUDE } from "../map/catalogue";
+import { litOf, peaksOf, turnsOf } from "./arrivals";
 import { TransientLook } from "./look";
 import { LightSoFar } from "./LightSoFar";
 import { Picture } from "./Picture";
-import { stripOf, turnsOf } from "./strip";
+import { stripOf, PICTURES } from "./strip";
 import { Timeline, TimeReadout } from "./Timeline";
 
 const TONE_NAMES: Record<ToneKind, string> = { linear: "linear", root: "root", logarithmic: "log" };
@@ -29,6 +31,12 @@ export function TransientView() {
   const frame = store.frames.of("coefficients");
   const look = useMemo(() => new TransientLook(frame, store.shelf), [frame, store]);
   const { player } = store;
+  useDrawing(() => {
+    const arrivals = frame.value?.light?.arrivals;
+    if (arrivals === undefined) return;
+    player.lit.value = steady(player.lit.peek(), litOf(arrivals));
+    player.arrivals.value = peaksOf(arrivals);
+  }, [frame, player]);
   const cumulative = look.play.value === "cumulative";
   return (
     <Panel
@@ -48,7 +56,7 @@ export function TransientView() {
             const arrivals = frame.peek()?.light?.arrivals;
             if (arrivals === undefined) return;
             const turn = player.turn.peek();
-            const strip = stripOf(turnsOf(arrivals), store.period_s.peek(), (each) => {
+            const strip = stripOf(turnsOf(arrivals, PICTURES), store.period_s.peek(), (each) => {
               player.seek(each);
               return look.snapshot();
             });
@@ -87,16 +95,14 @@ export function TransientView() {
               scene
             </Toggle>
           )}
-          <Choice
-            label="Colours"
-            value={look.colours.value}
-            options={COLOUR_MAPS.map((name) => ({ value: name, text: name }))}
-            onChange={(name) => (look.colours.value = name)}
-          />
+          <ColourChoice colours={look.colours} />
         </>
       }
     >
-      {cumulative ? <LightSoFar look={look} /> : <Picture look={look} />}
+      <div class="picture">
+        {cumulative ? <LightSoFar look={look} /> : <Picture look={look} />}
+        <LightBar look={look} />
+      </div>
       <footer class="panel-foot">
         <Timeline />
         <div class="panel-row">
@@ -128,6 +134,21 @@ export function TransientView() {
       </footer>
     </Panel>
   );
+}
+
+/** Ends that noise alone moves stay where they are. */
+function steady(before: ReturnType<typeof litOf>, now: ReturnType<typeof litOf>): ReturnType<typeof litOf> {
+  const near = before !== null && now !== null && Math.abs(before.first - now.first) + Math.abs(before.last - now.last) < 0.03;
+  return near ? before : now;
+}
+
+/** What the colours of the light mean. */
+function LightBar({ look }: { look: TransientLook }) {
+  const scene = useStore().frames.of(AMPLITUDE);
+  const cumulative = look.play.value === "cumulative";
+  const white = cumulative ? (scene.value?.map?.high ?? NaN) / 2 ** look.stops.value : look.white.value * 1e-9;
+  if (!(white > 0)) return null;
+  return <ColourBar scale={scaleOf(look.tone.value, Number(white.toPrecision(3)))} colours={look.colours.value} unit={cumulative ? "DN" : "DN/ns"} />;
 }
 
 const STOPS = [-4, -3, -2, -1, 0, 1, 2, 3, 4, 6, 8];

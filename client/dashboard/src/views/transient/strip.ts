@@ -4,19 +4,6 @@ import { fixed } from "../../ui/format";
 const COLUMNS = 4;
 export const PICTURES = 8;
 const LABEL_PX = 12;
-/** Share of the brightest moment's light from which a moment is worth a picture. */
-const LEAST = 0.05;
-
-/** Turns, 0 to 1, evenly over the times at which light arrives; over all times where none does. */
-export function turnsOf(arrivals: ArrayLike<number>, count = PICTURES): number[] {
-  const all = Array.from(arrivals);
-  const least = LEAST * Math.max(...all);
-  const worth = all.map((value) => value > least && value > 0);
-  const first = Math.max(0, worth.indexOf(true));
-  const last = worth.includes(true) ? worth.lastIndexOf(true) + 1 : all.length;
-  return Array.from({ length: count }, (_, n) => (first + ((n + 0.5) / count) * (last - first)) / all.length);
-}
-
 /** Draws what `pictureAt` shows at each turn, with its time below. */
 export function stripOf(turns: readonly number[], period_s: number, pictureAt: (turn: number) => HTMLCanvasElement | null): HTMLCanvasElement {
   const strip = document.createElement("canvas");

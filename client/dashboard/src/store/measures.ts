@@ -1,0 +1,81 @@
+/** What is measured in the pictures by hand: pixels that are kept, and a region. */
+import { signal } from "@preact/signals";
+
+import type { Pixel } from "./pixel";
+
+/** The names of pins, and their colours in all views: told apart by colour-blind eyes too (after Okabe and Ito). */
+export const PIN_NAMES = ["A", "B", "C"] as const;
+export const PIN_COLOURS: Readonly<Record<PinName, string>> = { A: "#e69f00", B: "#56b4e9", C: "#cc79a7" };
+export type PinName = (typeof PIN_NAMES)[number];
+
+/** A pixel that is kept. */
+export interface Pin extends Pixel {
+  readonly name: PinName;
+}
+
+/** A rectangle of pixels, both corners included; `x0` and `y0` are not larger than `x1` and `y1`. */
+export interface Region {
+  readonly x0: number;
+  readonly y0: number;
+  readonly x1: number;
+  readonly y1: number;
+}
+
+/** Half the width of a region that is made around a pixel by a key. */
+const REACH = 10;
+
+export class Measures {
+  readonly pins = signal<readonly Pin[]>([]);
+  readonly region = signal<Region | null>(null);
+
+  /** Keeps a pixel under the first free name, the last name where none is free; a pixel that is kept already is let go. */
+  pin({ x, y }: Pixel): void {
+    const pins = this.pins.peek();
+    const others = pins.filter((pin) => pin.x !== x || pin.y !== y);
+    if (others.length < pins.length) {
+      this.pins.value = others;
+      return;
+    }
+    const name = PIN_NAMES.find((each) => !pins.some((pin) => pin.name === each)) ?? PIN_NAMES[PIN_NAMES.length - 1];
+    this.pins.value = [...pins.filter((pin) => pin.name !== name), { name, x, y }].sort((a, b) => a.name.localeCompare(b.name));
+  }
+
+  /** The region around a pixel of a picture; none where there is one. */
+  toggleRegion({ x, y }: Pixel, width: number, height: number): void {
+    if (this.region.peek() !== null) this.region.value = null;
+    else this.region.value = regionOf({ x: Math.max(0, x - REACH), y: Math.max(0, y - REACH) }, { x: Math.min(width - 1, x + REACH), y: Math.min(height - 1, y + REACH) });
+  }
+}
+
+/** The region between two corners, in whatever order. */
+export function regionOf(a: Pixel, b: Pixel): Region {
+  return { x0: Math.min(a.x, b.x), y0: Math.min(a.y, b.y), x1: Math.max(a.x, b.x), y1: Math.max(a.y, b.y) };
+}
+
+/** Figures of the values within a region. */
+export interface RegionFigures {
+  /** Mean and standard deviation (with N - 1) of the pixels that have a value; NaN where too few have one. */
+  readonly mean: number;
+  readonly std: number;
+  /** How many have a value, and of how many. */
+  readonly count: number;
+  readonly pixels: number;
+  readonly values: Float64Array;
+}
+
+/** The values of a map (height, width) within a region, and their figures. */
+export function figuresOf(map: ArrayLike<number>, width: number, height: number, region: Region): RegionFigures {
+  const values: number[] = [];
+  let pixels = 0;
+  for (let y = region.y0; y <= Math.min(region.y1, height - 1); y++) {
+    for (let x = region.x0; x <= Math.min(region.x1, width - 1); x++, pixels++) {
+      const value = map[y * width + x];
+      if (Number.isFinite(value)) values.push(value);
+    }
+  }
+  const count = values.length;
+  const mean = count === 0 ? NaN : values.reduce((sum, value) => sum + value, 0) / count;
+  // Two passes: the squares of ranges that differ by millimetres would cancel.
+  const squares = values.reduce((sum, value) => sum + (value - mean) ** 2, 0);
+  return { mean, std: count > 1 ? Math.sqrt(squares / (count - 1)) : NaN, count, pixels, values: Float64Array.from(values) };
+}

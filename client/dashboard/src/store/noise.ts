@@ -1,0 +1,95 @@
+/** How much each pixel scatters from frame to frame: measured, for any camera and any cause. */
+import { effect, signal, untracked } from "@preact/signals";
+
+import type { Frame, Frames } from "./frames";
+
+/** Frames that count; older ones fade. */
+export const WINDOW = 30;
+/** Fewest frames that a deviation is told of. */
+export const FEWEST = 5;
+
+/**
+ * Running standard deviation of every pixel of one product over frames.
+ *
+ * The first `WINDOW` frames count alike, so that the deviation is that of the sample; after that a frame counts 1 / WINDOW
+ * and older ones fade exponentially (West 1979). The sum of the squared weights makes it free of bias for
+ * independent frames.
+ */
+export class Noise {
+  /** Frames taken since the last change of what is measured. */
+  readonly frames = signal(0);
+  #key = "";
+  #mean = new Float32Array(0);
+  #square = new Float32Array(0);
+  #count = new Uint16Array(0);
+
+  take({ values, shape, meta, origin }: Pick<Frame, "values" | "shape" | "meta" | "origin">): void {
+    // Another sequence, calibration or recording measures something else.
+    const key = [shape.join("x"), meta.sequence_id, meta.calibration_id, origin.split("/frames/")[0]].join();
+    if (key !== this.#key) {
+      this.#key = key;
+      this.#mean = new Float32Array(values.length);
+      this.#square = new Float32Array(values.length);
+      this.#count = new Uint16Array(values.length);
+      this.frames.value = 0;
+    }
+    for (let at = 0; at < values.length; at++) {
+      const value = values[at];
+      if (!Number.isFinite(value)) continue;
+      const count = Math.min(MOST, this.#count[at] + 1);
+      this.#count[at] = count;
+      const weight = 1 / Math.min(count, WINDOW);
+      const difference = value - this.#mean[at];
+      this.#mean[at] += weight * difference;
+      this.#square[at] = (1 - weight) * (this.#square[at] + weight * difference * difference);
+    }
+    this.frames.value = this.frames.peek() + 1;
+  }
+
+  /** Standard deviation of a pixel, by its place in the map; NaN before enough frames had a value there. */
+  std(at: number): number {
+    const count = this.#count[at] ?? 0;
+    return count < FEWEST ? NaN : Math.sqrt(this.#square[at] / (1 - SQUARED_WEIGHTS[count]));
+  }
+
+  /** Standard deviations of all pixels. */
+  map(): Float32Array {
+    return Float32Array.from(this.#count, (_, at) => this.std(at));
+  }
+}
+
+/** Counts beyond this change the sum of squared weights no more. */
+const MOST = 500;
+
+/** Sum of the squared weights of all frames after a count of them. */
+const SQUARED_WEIGHTS = (() => {
+  const sums = new Float64Array(MOST + 1);
+  for (let count = 1; count <= MOST; count++) {
+    const weight = 1 / Math.min(count, WINDOW);
+    sums[count] = (1 - weight) ** 2 * sums[count - 1] + weight * weight;
+  }
+  return sums;
+})();
+
+/** The noise of products, each measured from when it is first asked for, as frames come. */
+export class Noises {
+  readonly #frames: Frames;
+  readonly #all = new Map<string, Noise>();
+
+  constructor(frames: Frames) {
+    this.#frames = frames;
+  }
+
+  of(product: string): Noise {
+    const known = this.#all.get(product);
+    if (known !== undefined) return known;
+    const noise = new Noise();
+    this.#all.set(product, noise);
+    const newest = this.#frames.of(product);
+    effect(() => {
+      const frame = newest.value;
+      if (frame !== null) untracked(() => noise.take(frame));
+    });
+    return noise;
+  }
+}

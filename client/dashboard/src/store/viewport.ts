@@ -1,0 +1,57 @@
+/** Which part of the picture all views of the sensor show. */
+import { signal } from "@preact/signals";
+
+/** A part of the picture: `zoom` times as large, its left and top end in shares of the whole. */
+export interface View {
+  readonly zoom: number;
+  readonly left: number;
+  readonly top: number;
+}
+
+/** A place in the picture or in what is seen of it, in shares of its width and height. */
+export interface Point {
+  readonly x: number;
+  readonly y: number;
+}
+
+export const WHOLE: View = { zoom: 1, left: 0, top: 0 };
+const MOST_ZOOM = 40;
+
+/** The part that is shown of all pictures of the sensor alike. */
+export class Viewport {
+  readonly view = signal<View>(WHOLE);
+
+  /** Makes the picture larger by a factor around a place in what is seen; that place stays where it is. */
+  zoomAt(at: Point, factor: number): void {
+    const { zoom, left, top } = this.view.peek();
+    const larger = Math.min(MOST_ZOOM, Math.max(1, zoom * factor));
+    const gain = 1 / zoom - 1 / larger;
+    this.#show(larger, left + at.x * gain, top + at.y * gain);
+  }
+
+  /** Moves the picture under the window, by shares of what is seen. */
+  pan(by: Point): void {
+    const { zoom, left, top } = this.view.peek();
+    this.#show(zoom, left - by.x / zoom, top - by.y / zoom);
+  }
+
+  reset(): void {
+    this.view.value = WHOLE;
+  }
+
+  #show(zoom: number, left: number, top: number): void {
+    const most = 1 - 1 / zoom;
+    const inside = (value: number): number => Math.min(most, Math.max(0, value));
+    this.view.value = zoom === 1 ? WHOLE : { zoom, left: inside(left), top: inside(top) };
+  }
+}
+
+/** Where a place of the picture is seen. */
+export function seenAt({ zoom, left, top }: View, { x, y }: Point): Point {
+  return { x: (x - left) * zoom, y: (y - top) * zoom };
+}
+
+/** Which place of the picture is seen somewhere; inverse of `seenAt`. */
+export function placeIn({ zoom, left, top }: View, { x, y }: Point): Point {
+  return { x: left + x / zoom, y: top + y / zoom };
+}

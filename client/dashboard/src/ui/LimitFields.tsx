@@ -1,0 +1,62 @@
+import { useSignal } from "@preact/signals";
+
+import type { Look, Looks } from "../store/looks";
+import { Toggle } from "./controls";
+import type { Span } from "./scale";
+
+/** Limits with one end typed anew, or why they make no sense. */
+export function typed({ low, high }: Span, end: keyof Span, text: string): Span | string {
+  const value = Number(text.trim().replace(",", "."));
+  if (text.trim() === "" || !Number.isFinite(value)) return `${text.trim() === "" ? "Nothing" : `“${text}”`} is no number.`;
+  const limits = { low, high, [end]: value };
+  return limits.high > limits.low ? limits : `The low end must lie below the high end: ${limits.low} does not lie below ${limits.high}.`;
+}
+
+/** The ends of the scale: they follow the data until a number is typed. */
+export function LimitFields({ look, looks }: { look: Look; looks: Looks }) {
+  const scale = look.scale.value;
+  const wrong = useSignal<{ readonly end: keyof Span; readonly words: string } | null>(null);
+  const set = (end: keyof Span, text: string): void => {
+    const limits = typed(scale, end, text);
+    wrong.value = typeof limits === "string" ? { end, words: limits } : null;
+    if (typeof limits !== "string") looks.limit(look, limits);
+  };
+  const field = (end: keyof Span, name: string) => (
+    <input
+      class="limit"
+      type="text"
+      inputMode="decimal"
+      aria-label={`${name} end of the scale in ${look.product.unit}`}
+      aria-invalid={wrong.value?.end === end}
+      value={Number(scale[end].toPrecision(4))}
+      onChange={(event) => {
+        set(end, event.currentTarget.value);
+      }}
+    />
+  );
+  return (
+    <div class="limits">
+      {wrong.value !== null && (
+        <span class="refusal" role="alert" data-field="limits-refusal">
+          {wrong.value.words}
+        </span>
+      )}
+      {field("low", "Low")}
+      <span class="quiet">to</span>
+      {field("high", "High")}
+      <Toggle
+        pressed={look.manual.value === null}
+        title="Let the ends of the scale follow the data"
+        onToggle={() => {
+          wrong.value = null;
+          looks.limit(look, look.manual.peek() === null ? { low: scale.low, high: scale.high } : null);
+        }}
+      >
+        auto
+      </Toggle>
+      <Toggle pressed={looks.locked.value} title={`The same limits for all maps in ${look.product.unit}`} onToggle={() => looks.lock(look, !looks.locked.peek())}>
+        lock
+      </Toggle>
+    </div>
+  );
+}

@@ -1,0 +1,20 @@
+import { beyond, colourTable, levelOf, type ColourMapName } from "./colourMaps";
+import { fraction, type Scale } from "./scale";
+
+/** Writes the colours of `values` into RGBA bytes; what lies beyond the scale has a colour of its own, a pixel without a value stays clear. */
+export function paint(values: ArrayLike<number>, scale: Scale, colours: ColourMapName, rgba: Uint8ClampedArray): void {
+  const pick = picker(scale, colours);
+  const pixels = new Uint32Array(rgba.buffer, rgba.byteOffset, rgba.byteLength / 4);
+  for (let pixel = 0; pixel < pixels.length; pixel++) pixels[pixel] = pick(values[pixel]);
+}
+
+/** The colour of a value as RGBA bytes in one number; 0, which is clear, where there is no value. */
+export function picker(scale: Scale, colours: ColourMapName): (value: number) => number {
+  const table = new Uint32Array(colourTable(colours).buffer);
+  const { under, over } = beyond(colours);
+  return (value) => {
+    const place = fraction(scale, value);
+    if (Number.isNaN(place)) return 0;
+    return place < 0 ? under : place > 1 ? over : table[levelOf(place)];
+  };
+}

@@ -1,0 +1,115 @@
+import { computed } from "@preact/signals";
+import { useMemo, useRef } from "preact/hooks";
+
+import type { Look } from "../../store/looks";
+import { figuresOf, PIN_COLOURS, type Pin } from "../../store/measures";
+import { useStore } from "../../store/store";
+import { deviation, fixed, grouped } from "../../ui/format";
+import { useDrawing, useProducts } from "../../ui/hooks";
+import { histogram } from "../../ui/scale";
+import { distanceOf, lensOf, type Ranged } from "../points/lens";
+import { valueAtPixel } from "./Readout";
+
+const BINS = 64;
+const HEIGHT_PX = 24;
+
+/** What is measured by hand in the map: a region, and pins with their distances. */
+export function Measured({ look }: { look: Look }) {
+  const { measures } = useStore();
+  return (
+    <>
+      {measures.region.value !== null && <RegionRow key={look.product.product} look={look} />}
+      {measures.pins.value.length > 0 && <PinsRow look={look} />}
+    </>
+  );
+}
+
+/** Figures of the region's pixels on the map that is shown, and how often each value occurs. */
+function RegionRow({ look }: { look: Look }) {
+  const { measures } = useStore();
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const { unit, decimals } = look.product;
+  const figures = useMemo(
+    () =>
+      computed(() => {
+        const [frame, region] = [look.frame.value, measures.region.value];
+        return frame === null || region === null ? null : figuresOf(frame.values, frame.shape[1], frame.shape[0], region);
+      }),
+    [look, measures],
+  );
+  useDrawing(() => {
+    const context = canvas.current?.getContext("2d");
+    const values = figures.value?.values;
+    if (!context || values === undefined) return;
+    const counts = histogram(values, look.scale.value, BINS);
+    const most = Math.max(1, ...counts);
+    context.clearRect(0, 0, BINS, HEIGHT_PX);
+    context.fillStyle = getComputedStyle(context.canvas).color;
+    counts.forEach((count, bin) => {
+      context.fillRect(bin, HEIGHT_PX * (1 - count / most), 1, (HEIGHT_PX * count) / most);
+    });
+  }, [look, figures]);
+  const found = figures.value;
+  if (found === null) return null;
+  return (
+    <div class="panel-row measured" role="group" aria-label="Region">
+      <span>
+        <span class="quiet">region mean</span> <span data-field="region-mean">{fixed(found.mean, decimals, unit)}</span>
+      </span>
+      <span title="Standard deviation over the pixels of the region: of noise and of shape">
+        <span class="quiet">σ</span> <span data-field="region-std">{fixed(found.std, decimals, unit)}</span>
+      </span>
+      <span title="Pixels that have a value">
+        <span class="quiet">N</span> <span data-field="region-count">{grouped(found.count)}</span>{" "}
+        <span class="quiet">of {grouped(found.pixels)}</span>
+      </span>
+      <canvas ref={canvas} class="measured-histogram" width={BINS} height={HEIGHT_PX} role="img" aria-label="Histogram of the region over the colour scale" />
+      <button type="button" onClick={() => (measures.region.value = null)}>
+        Remove region
+      </button>
+    </div>
+  );
+}
+
+/** The values at the pins, and how far what two of them see is apart. */
+function PinsRow({ look }: { look: Look }) {
+  const store = useStore();
+  const { measures, noises } = store;
+  useProducts(["range"]);
+  const [noise, ranges] = useMemo(() => [noises.of("range"), store.frames.of("range")], [store, noises]);
+  const pins = measures.pins.value;
+  const range = ranges.value;
+  const ranged = (pin: Pin): Ranged | null => {
+    const range_m = valueAtPixel(range, pin);
+    return Number.isNaN(range_m) ? null : { x: pin.x, y: pin.y, range_m, std_m: noise.std(pin.y * (range?.shape[1] ?? 0) + pin.x) };
+  };
+  const pairs = pins.flatMap((a, n) => pins.slice(n + 1).map((b) => [a, b] as const));
+  return (
+    <div class="panel-row measured" role="group" aria-label="Pins">
+      {pins.map((pin) => (
+        <span key={pin.name} data-pin={pin.name}>
+          <b class="pin" style={{ "--pin": PIN_COLOURS[pin.name] }}>
+            {pin.name}
+          </b>{" "}
+          {fixed(valueAtPixel(look.frame.value, pin), look.product.decimals, look.product.unit)}
+        </span>
+      ))}
+      {range !== null &&
+        pairs.map(([a, b]) => {
+          const [from, to] = [ranged(a), ranged(b)];
+          const apart = from === null || to === null ? null : distanceOf(lensOf(store, range.shape[1], range.shape[0]), from, to);
+          return (
+            <span key={`${a.name}${b.name}`} data-distance={`${a.name}${b.name}`} title="Distance of the two points in space, with 1 σ from the scatter of both ranges">
+              <span class="quiet">
+                {a.name} to {b.name}
+              </span>{" "}
+              {fixed(apart?.distance_m, 3, "m")} <span class="quiet">{deviation(apart?.std_m, "m")}</span>
+            </span>
+          );
+        })}
+      <button type="button" onClick={() => (measures.pins.value = [])}>
+        Remove pins
+      </button>
+    </div>
+  );
+}

@@ -1,0 +1,57 @@
+import { useComputed } from "@preact/signals";
+import { useMemo } from "preact/hooks";
+
+import type { Frame } from "../../store/frames";
+import type { Look } from "../../store/looks";
+import { WINDOW } from "../../store/noise";
+import type { Pixel } from "../../store/pixel";
+import { useStore } from "../../store/store";
+import { deviation, fixed, NOTHING } from "../../ui/format";
+import { AMPLITUDE } from "./catalogue";
+
+/** Value of a frame at a pixel; NaN without a frame, a pixel or a value. */
+export function valueAtPixel(frame: Frame | null, pixel: Pixel | null): number {
+  if (frame === null || pixel === null) return NaN;
+  const [height, width] = frame.shape;
+  return pixel.x < width && pixel.y < height ? frame.values[pixel.y * width + pixel.x] : NaN;
+}
+
+/** The value under the pointer, how much it scatters, and how much light it rests on. */
+export function Readout({ look: { product: shown, frame } }: { look: Look }) {
+  const store = useStore();
+  const amplitude = store.frames.of(AMPLITUDE);
+  const [noise, lightNoise] = useMemo(() => [store.noises.of(shown.product), store.noises.of(AMPLITUDE)], [store, shown]);
+  const looked = useComputed(() => store.pointed.value ?? store.selected.value);
+  const at = (width: number | undefined): number => (looked.value === null || width === undefined ? -1 : looked.value.y * width + looked.value.x);
+  const place = useComputed(() => (looked.value === null ? "" : `${looked.value.x}, ${looked.value.y}`));
+  const value = useComputed(() => fixed(valueAtPixel(frame.value, looked.value), shown.decimals, shown.unit));
+  const scatter = useComputed(() => (noise.frames.value === 0 ? "" : deviation(noise.std(at(frame.value?.shape[1])), shown.unit)));
+  const light = useComputed(() => fixed(valueAtPixel(amplitude.value, looked.value), 0, amplitude.value?.unit ?? ""));
+  const lightScatter = useComputed(() => (lightNoise.frames.value === 0 ? "" : deviation(lightNoise.std(at(amplitude.value?.shape[1])), amplitude.value?.unit ?? "")));
+  const number = useComputed(() => frame.value?.meta.frame ?? "");
+  if (place.value === "") return <p class="readout quiet">Point at the picture to read it.</p>;
+  return (
+    <p class="readout" data-frame={number} aria-live="off">
+      <span>
+        <output class="readout-value" data-field="value">
+          {value}
+        </output>{" "}
+        <span class="quiet" data-field="scatter" title={`Standard deviation (1 σ) over the last ${WINDOW} frames, as measured at this pixel`}>
+          {scatter}
+        </span>
+      </span>
+      {shown.product !== AMPLITUDE && (
+        <span>
+          <span class="quiet">brightness</span> <span data-field="amplitude">{light}</span>{" "}
+          <span class="quiet" data-field="amplitude-scatter">
+            {lightScatter}
+          </span>
+        </span>
+      )}
+      <span class="quiet">
+        pixel <span data-field="pixel">{place}</span>
+      </span>
+      {value.value === NOTHING && <span class="quiet">no value here</span>}
+    </p>
+  );
+}

@@ -1,0 +1,43 @@
+/** Where pixels look: as the service says, or by a field of view that is assumed. */
+import type { Pixel } from "../../store/pixel";
+import type { Store } from "../../store/store";
+import type { Intrinsics } from "../../stream/protocol";
+import { fillCloud, makeCloud, pinholeOf, type Pinhole } from "./cloud";
+
+const DEGREE = Math.PI / 180;
+
+/** What the service knows of the lens; null where it only assumes. */
+export function knownLens({ camera }: Store): Intrinsics | null {
+  const told = camera.value?.intrinsics;
+  return told === undefined || told.source === "assumed" ? null : told;
+}
+
+/** The lens for pictures of a size. */
+export function lensOf(store: Store, width: number, height: number): Pinhole {
+  const told = knownLens(store);
+  return told !== null && told.width === width && told.height === height ? told : pinholeOf(width, height, store.field_deg.value * DEGREE);
+}
+
+/** A pixel with its range and the deviation of that, both in m. */
+export interface Ranged extends Pixel {
+  readonly range_m: number;
+  readonly std_m: number;
+}
+
+/** Distance of what two pixels see, and its standard deviation by that of both ranges, to first order; in m. */
+export function distanceOf(lens: Pinhole, a: Ranged, b: Ranged): { readonly distance_m: number; readonly std_m: number } {
+  const [from, to] = [pointAt(lens, a), pointAt(lens, b)];
+  const between = from.map((value, axis) => value - to[axis]);
+  const distance_m = Math.hypot(...between);
+  // A range moves its point along its ray: only what of that lies along the distance changes it.
+  const share = (point: readonly number[], { range_m }: Ranged): number => point.reduce((sum, value, axis) => sum + (value / range_m) * (between[axis] / distance_m), 0);
+  return { distance_m, std_m: Math.hypot(share(from, a) * a.std_m, share(to, b) * b.std_m) };
+}
+
+/** The point that a pixel sees, in m, as `fillCloud` has it. */
+function pointAt({ fx, fy, cx, cy }: Pinhole, { x, y, range_m }: Ranged): number[] {
+  const cloud = makeCloud(1);
+  // The same ray from a picture of this one pixel.
+  fillCloud(cloud, [range_m], 1, { fx, fy, cx: cx - x, cy: cy - y }, () => undefined);
+  return [...cloud.positions];
+}

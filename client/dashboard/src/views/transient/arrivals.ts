@@ -1,0 +1,44 @@
+/** When light arrives in the whole picture: mean densities at evenly spaced times over one period. */
+
+/** Share of the brightest moment's light from which a moment is worth a picture. */
+const LEAST = 0.05;
+
+/** Turns, 0 to 1, evenly over the times at which light arrives and no others; over all times where none does. */
+export function turnsOf(arrivals: ArrayLike<number>, count: number): number[] {
+  const all = Array.from(arrivals);
+  const least = LEAST * Math.max(...all);
+  const worth = all.flatMap((value, at) => (value > least && value > 0 ? [at] : []));
+  const times = worth.length > 0 ? worth : all.map((_, at) => at);
+  return Array.from({ length: count }, (_, n) => {
+    const place = ((n + 0.5) / count) * times.length;
+    return (times[Math.floor(place)] + (place % 1)) / all.length;
+  });
+}
+
+/** From when to when there is light, in shares of the period, with a little dark around it; null where there is none. */
+export function litOf(arrivals: ArrayLike<number>): { readonly first: number; readonly last: number } | null {
+  const all = Array.from(arrivals);
+  const least = LEAST * Math.max(...all);
+  const worth = all.map((value) => value > least && value > 0);
+  if (!worth.includes(true)) return null;
+  const room = 0.02;
+  return { first: Math.max(0, worth.indexOf(true) / all.length - room), last: Math.min(1, (worth.lastIndexOf(true) + 1) / all.length + room) };
+}
+
+/** Share of the brightest moment's light from which a maximum counts, and how far it must stand out on either side. */
+const LEAST_PEAK = 0.1;
+const REACH = 4;
+
+/** Turns, 0 to 1, at which most light arrives: the maxima of the curve, in their order. */
+export function peaksOf(arrivals: ArrayLike<number>): number[] {
+  const count = arrivals.length;
+  const least = LEAST_PEAK * Math.max(...Array.from(arrivals));
+  const at = (n: number): number => arrivals[(n + count) % count];
+  const isPeak = (n: number): boolean => {
+    for (let step = 1; step <= REACH; step++) if (at(n) <= at(n - step) || at(n) < at(n + step)) return false;
+    return at(n) > least;
+  };
+  return Array.from({ length: count }, (_, n) => n)
+    .filter(isPeak)
+    .map((n) => n / count);
+}

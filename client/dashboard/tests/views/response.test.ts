@@ -1,0 +1,65 @@
+import { describe, expect, test } from "vitest";
+
+import type { PixelDocument } from "../../src/stream/protocol";
+import { FlagHistory, LOOKS } from "../../src/views/response/flagShares";
+import { richestPixel } from "../../src/views/response/interesting";
+import { sifted } from "../../src/views/response/Listings";
+import { momentsOf, picture } from "../oracle";
+
+const look = (frame: number, flags: readonly string[], x = 4): PixelDocument => ({ x, y: 5, flags, meta: { frame, sequence_id: 1 } }) as unknown as PixelDocument;
+
+describe("flags of a pixel", () => {
+  test("that come and go are told by their share, and do not flicker", () => {
+    const history = new FlagHistory();
+    for (let frame = 0; frame < 10; frame++) history.take(look(frame, frame % 2 === 0 ? ["biased"] : []));
+    expect(history.shares()).toEqual([{ name: "biased", share: 0.5 }]);
+    expect(history.looks).toBe(10);
+  });
+
+  test("count once a frame, for the last looks only, and for one pixel", () => {
+    const history = new FlagHistory();
+    for (let n = 0; n < 5; n++) history.take(look(1, ["saturated"]));
+    expect(history.looks).toBe(1);
+    for (let frame = 2; frame < LOOKS + 2; frame++) history.take(look(frame, []));
+    expect([history.looks, history.shares()]).toEqual([LOOKS, []]);
+    history.take(look(99, ["biased"], 7));
+    expect([history.looks, history.shares()]).toEqual([1, [{ name: "biased", share: 1 }]]);
+  });
+});
+
+describe("returns of a pixel", () => {
+  test("with hardly any light are told of together", () => {
+    const returns = [3, 1160, 400, 11].map((weight, n) => ({ time_s: n * 1e-9, weight }));
+    const { strong, weak, weakShare } = sifted(returns);
+    expect(strong.map(({ weight }) => weight)).toEqual([1160, 400]);
+    expect(weak).toBe(2);
+    expect(weakShare).toBeCloseTo(14 / 1574, 12);
+  });
+
+  test("are all told where there are few, and none where there is none", () => {
+    expect(sifted([{ time_s: 0, weight: 5 }]).strong).toHaveLength(1);
+    expect(sifted([])).toEqual({ strong: [], weak: 0, weakShare: 0 });
+  });
+});
+
+const scene = (width: number, height: number, twice: (x: number, y: number) => boolean) => {
+  const two = momentsOf([{ phase_rad: 1, weight: 500 }, { phase_rad: 3.5, weight: 400 }], 20, 4);
+  const one = momentsOf([{ phase_rad: 2, weight: 900 }], 20, 4);
+  return picture(Array.from({ length: width * height }, (_, at) => (twice(at % width, Math.floor(at / width)) ? two : one)), width);
+};
+
+describe("the pixel that is shown first", () => {
+  test("is one with several returns, not one with one", () => {
+    const [width, height] = [32, 20];
+    const c = scene(width, height, (x, y) => x >= 20 && x < 24 && y >= 8 && y < 12);
+    const found = richestPixel(c);
+    expect(found?.x).toBeGreaterThanOrEqual(20);
+    expect(found?.x).toBeLessThan(24);
+    expect(found?.y).toBeGreaterThanOrEqual(8);
+  });
+
+  test("is none where no pixel has a density", () => {
+    const c = scene(16, 10, () => false);
+    expect(richestPixel({ ...c, planes: c.planes.map(() => 0) })).toBeNull();
+  });
+});

@@ -1,0 +1,24 @@
+"""Requests about accuracy and time: a sequence for a goal, and what accuracy costs."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from transientcam.requests.request import Request, document
+
+_PLANNED_S: Final = 120.0
+"""How much longer than usual it takes to look at a scene and weigh all sequences, when busy."""
+
+
+def plan(**parts: Mapping[str, Any] | str | None) -> Request[dict[str, Any]]:
+    """Build the request for a plan; parts that are None are left to the server."""
+    body = {
+        name: dict(part) if isinstance(part, Mapping) else part
+        for name, part in parts.items()
+        if part is not None
+    }
+    return document("plan", method="POST", body=body, extra_timeout_s=_PLANNED_S)
+
+
+def tradeoff(by: str) -> Request[dict[str, Any]]:
+    """Build the request for all sequences that no other beats."""
+    return document("tradeoff", params=[("by", by)], extra_timeout_s=_PLANNED_S)
