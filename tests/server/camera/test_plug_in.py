@@ -145,7 +145,8 @@ def test_what_they_cannot_give_is_absent_with_the_reason(fixed: Served) -> None:
 
     assert problem["field"] == "sampling"
     of_toeplitz = {"validity", "coefficients", "transient", "density_std", "cumulative", "streak"}
-    assert set(absent) == of_toeplitz | {"bounds", "brightness", "uniform", "truth"}
+    of_toeplitz |= {"bounds", "range_std", "range_bias", "range_error"}
+    assert set(absent) == of_toeplitz | {"brightness", "uniform", "truth"}
     assert "needs consecutive multiples of one frequency" in absent["transient"]
     assert "needs a zeroth moment" in absent["brightness"]
     assert estimator == "likelihood"
