@@ -37,6 +37,8 @@ export interface FrameMeta {
   readonly temperature_c: number;
   readonly lost_images: number;
   readonly pixels: Readonly<Record<string, number>> | null;
+  /** Standard deviation that the sensor's noise gives the range, in m; null until the range was computed. */
+  readonly predicted_range_std_m?: { readonly median: number; readonly p90: number } | null;
   /** Errors of the range that the frame knows of, in m; null until range_error was computed, and of bias where m = 1. */
   readonly accuracy?: { readonly range_error_m: number | null } | null;
 }
