@@ -64,8 +64,9 @@ class ReconstructionSettings(_Group):
     """Weight from which a return counts as the first, over the pixel's strongest return."""
     estimator: Estimator = "automatic"
     """What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
-    least over the scenes of docs/likelihood.md together, and in the daemon `pisarenko` until its
-    kernel is compiled; each frame names its `estimator`. The paper's are `pisarenko` and
+    least over the scenes of docs/likelihood.md together, and `pisarenko` where the noise of the
+    sensor is not known, and in the daemon until the kernel is compiled; each frame names its
+    `estimator`. The paper's are `pisarenko` and
     `maximum-entropy`, the others are there for comparison."""
     minimum_brightness_dn: _Finite = Field(default=0.0, ge=0.0)
     """Pixels with no more light than this have no range."""
@@ -76,15 +77,20 @@ class ReconstructionSettings(_Group):
     """Odd harmonics of the modulation, where the calibration has measured them: taken out of the
     moments, or kept in them."""
 
-    @property
-    def technique(self) -> str:
-        """The estimator by its name in `transientcam_moments`."""
-        return "likelihood" if self.estimator == "automatic" else self.estimator
+    def technique(self, *, noise_known: bool) -> str:
+        """Return the estimator by its name in `transientcam_moments`.
+
+        ``automatic`` is the likelihood where the noise of the sensor is known, and Pisarenko's
+        returns elsewhere: what the likelihood then assumes is no measurement.
+        """
+        if self.estimator != "automatic":
+            return self.estimator
+        return "likelihood" if noise_known else "pisarenko"
 
     @property
     def least_harmonics(self) -> int:
         """The smallest number of harmonics that the estimator gives a range of."""
-        return tm.comparisons.TECHNIQUES[self.technique].least_harmonics
+        return tm.comparisons.TECHNIQUES[self.technique(noise_known=True)].least_harmonics
 
     def for_moments(self, **others: Any) -> tm.Settings:
         """Return these settings as `tm.Settings`, together with its other ones."""
@@ -92,7 +98,7 @@ class ReconstructionSettings(_Group):
             epsilon=self.bias,
             smoothing_sigma_px=self.smoothing_px,
             threshold=self.return_threshold,
-            estimator=self.technique,
+            estimator=self.technique(noise_known=others.get("sensor") is not None),
             minimum_brightness=self.minimum_brightness_dn,
             spoilt_images=self.spoilt_images,
             **others,

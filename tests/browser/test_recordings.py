@@ -187,6 +187,8 @@ def test_a_recorded_frame_is_computed_with_the_present_settings(page: Page, serv
     recording = record(served, frames=2)
     show(page)
     page.get_by_role("button", name="Play corner").click()
+    shows_recorded(page, 2)
+    expect(page.get_by_role("button", name="Play the recording")).to_be_visible()
     page.get_by_label("Frame of the recording").focus()
     page.keyboard.press("Home")
     shows_recorded(page, 1)

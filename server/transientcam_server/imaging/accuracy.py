@@ -110,7 +110,7 @@ class _Frame:
         drawn = tm.noise.draw(self.b, tm.noise.MomentNoise(variance), random, draws=DRAWS)
         spread = np.broadcast_to(self.variance[:, None], drawn.shape)
         flat = (len(self.b), -1)
-        own = self.recipe.settings.technique
+        own = self.recipe.technique
         return self._ranges_m(drawn.reshape(flat), spread.reshape(flat), own).reshape((DRAWS, -1))
 
     def others_m(self) -> list[_Array]:
@@ -118,7 +118,7 @@ class _Frame:
         m = len(self.b) - 1
         if m == 1:
             return []
-        own = self.recipe.settings.technique
+        own = self.recipe.technique
         fewer = own if m > TECHNIQUES[own].least_harmonics > 0 and m > 2 else "single-frequency"
         ways = [(self.b[:m], self.variance[:m], fewer)]
         ways += [(self.b, self.variance, other) for other in _OTHERS if other != own]

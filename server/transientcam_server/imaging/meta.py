@@ -25,7 +25,7 @@ def frame_meta(
         "sequence_id": raw.epoch,
         "calibration_id": calibration_id(recipe.gains),
         "reconstruction_id": recipe.settings_version,
-        "estimator": recipe.settings.technique,
+        "estimator": recipe.technique,
         "device_time_s": raw.device_time_s,
         "host_time_s": raw.host_time_s,
         "capture_s": raw.capture_s,

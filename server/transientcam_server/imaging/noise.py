@@ -82,7 +82,7 @@ def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
     """
     if not np.asarray(found.has_range).any():
         return None
-    if recipe.settings.technique == "likelihood":
+    if recipe.technique == "likelihood":
         std_m = np.asarray(found.range_std_m)
         first_order = np.asarray(found.likelihood.explained())[np.asarray(found.has_range)]
     else:

@@ -42,13 +42,15 @@ class SettingsVersion:
     ) -> "SettingsVersion":
         """Return these settings with an estimator that keeps up with a camera now.
 
-        ``automatic`` is the likelihood where ``ready`` says that its kernel of this order is
-        compiled, and Pisarenko's returns elsewhere, if the multiples are consecutive.
+        ``automatic`` stays where ``ready`` says that the kernel of the likelihood of this order is
+        compiled, and with multiples that have gaps, and is Pisarenko's returns elsewhere.
         """
         if self.settings.estimator != "automatic" or not sequence.sampling.consecutive:
             return self
-        now = "likelihood" if ready("likelihood", sequence.harmonics) else _UNTIL_COMPILED
-        return replace(self, settings=self.settings.model_copy(update={"estimator": now}))
+        if ready("likelihood", sequence.harmonics):
+            return self
+        until = self.settings.model_copy(update={"estimator": _UNTIL_COMPILED})
+        return replace(self, settings=until)
 
     def followed_by(self, settings: ReconstructionSettings) -> "SettingsVersion":
         """Return the next version; the same one where the settings are equal."""
@@ -72,7 +74,10 @@ def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, f
     Problem
         ``estimator-misfit``.
     """
-    if not sequence.sampling.consecutive and settings.technique != OF_ANY_MULTIPLES:
+    if (
+        not sequence.sampling.consecutive
+        and settings.technique(noise_known=True) != OF_ANY_MULTIPLES
+    ):
         raise Problem(
             kinds.ESTIMATOR_MISFIT,
             f"The estimator {settings.estimator} needs consecutive multiples of one frequency, and "
@@ -86,7 +91,7 @@ def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, f
         return
     raise Problem(
         kinds.ESTIMATOR_MISFIT,
-        f"The estimator {settings.technique} needs {least} harmonics, and there are {harmonics}.",
+        f"The estimator {settings.estimator} needs {least} harmonics, and there are {harmonics}.",
         field=field,
         value=harmonics if field == "harmonics" else settings.estimator,
         limit=f"at least {least}"
@@ -97,7 +102,7 @@ def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, f
 
 def suited(settings: ReconstructionSettings, sampling: Sampling) -> ReconstructionSettings:
     """Return settings with an estimator that goes with the frequencies of a camera."""
-    if sampling.consecutive or settings.technique == OF_ANY_MULTIPLES:
+    if sampling.consecutive or settings.technique(noise_known=True) == OF_ANY_MULTIPLES:
         return settings
     _log.warning(
         "the camera measures the multiples %s, which %s cannot serve: the estimator is %s",
@@ -143,6 +148,13 @@ class Recipe:
     sensor: tm.noise.Sensor | None = None
 
     @property
+    def technique(self) -> str:
+        """The estimator of its frames, by its name in `transientcam_moments`."""
+        if not self.applied.sequence.sampling.consecutive:
+            return OF_ANY_MULTIPLES
+        return self.settings.technique(noise_known=self.sensor is not None)
+
+    @property
     def waveform(self) -> NDArray[Any] | None:
         """Harmonics of the modulation (m, K) that are taken out of the moments, if any."""
         known = None if self.gains is None else self.gains.waveform
@@ -181,7 +193,8 @@ class Recipe:
     def _reconstructor(self) -> tm.Reconstructor:
         """What frames with this recipe share: prepared for the first one."""
         sequence, gains = self.applied.sequence, self.gains
-        settings = self.settings.for_moments(
+        chosen = self.settings.model_copy(update={"estimator": self.technique})
+        settings = chosen.for_moments(
             base_frequency_hz=sequence.base_frequency_hz,
             zeroth=sequence.zeroth,
             takes=sequence.takes,

@@ -16,7 +16,7 @@ from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.look import LookedThrough, look_at
 from transientcam_server.planning.plan import Plan, in_a_sentence, plan
 from transientcam_server.planning.prediction import Predictor
-from transientcam_server.planning.queue import Rest
+from transientcam_server.planning.queue import Allowance, Rest
 from transientcam_server.planning.scene import SceneStatistics
 from transientcam_server.planning.search import Search
 from transientcam_server.planning.timing import ReconstructionTimer
@@ -35,7 +35,7 @@ class Planner:
     settings
         Of the reconstruction.
     share
-        Returns the share of one processor that this may take now; it rests in between.
+        Returns the share of one processor that this may take for good; see `Allowance`.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class Planner:
     ) -> None:
         self._capabilities = capabilities
         self._sensor = sensor
-        self._share = share
+        self._allowance = Allowance(share)
         self._closing = threading.Event()
         self.reconstruct_with(settings)
 
@@ -138,7 +138,7 @@ class Planner:
 
     def _pause(self) -> Callable[[], None]:
         """Return what work on this thread calls in between: it rests, or ends the work."""
-        rest = Rest(self._share, self._closing.wait)
+        rest = Rest(self._allowance, self._closing.wait)
 
         def pause() -> None:
             rest()

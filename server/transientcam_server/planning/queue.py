@@ -5,6 +5,7 @@ interpreter's lock for a moment waits for it, above all frames and their clients
 """
 
 import asyncio
+import threading
 import time
 from collections import Counter
 from collections.abc import AsyncIterator, Callable
@@ -22,7 +23,9 @@ MOST_OF_ONE: Final = 4
 WAIT_S: Final = 10.0
 RETRY_AFTER_S: Final = 10
 WATCHED_SHARE: Final = 0.25
-"""Of one processor, that planning takes while frames are sent or recorded."""
+"""Of one processor, that planning takes for good while frames are sent or recorded."""
+AT_ONCE_S: Final = 20.0
+"""Processor time that planning may take before: that of a look, a plan and a front."""
 _T = TypeVar("_T")
 
 
@@ -120,13 +123,56 @@ def _closing() -> Problem:
     return Problem(kinds.SHUTTING_DOWN, "The service is shutting down.")
 
 
-class Rest:
-    """Lets work on one thread take a share of one processor at most, by resting in between.
+class Allowance:
+    """Processor time that planning may take at once, before it has to keep to a share.
+
+    It is used up by what is planned, and comes back at the share; so a plan now and then is
+    computed without a rest, and one after the other keep to the share.
 
     Parameters
     ----------
     share
-        Returns the share, above 0 to 1, that may be taken now.
+        Returns the share of one processor, above 0 to 1, that may be taken now for good.
+    at_once_s
+        Processor time that may be taken beyond it.
+    now_s
+        The time.
+    """
+
+    def __init__(
+        self,
+        share: Callable[[], float],
+        *,
+        at_once_s: float = AT_ONCE_S,
+        now_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._share = share
+        self._most_s = at_once_s
+        self._now_s = now_s
+        self._left_s = at_once_s
+        self._since_s = now_s()
+        self._lock = threading.Lock()
+
+    def take(self, cpu_s: float) -> float:
+        """Note what was computed, and return how long to rest now, in s."""
+        share = self._share()
+        with self._lock:
+            now_s = self._now_s()
+            back_s = share * (now_s - self._since_s)
+            self._since_s = now_s
+            self._left_s = min(self._left_s + back_s - cpu_s, self._most_s)
+            if share >= 1.0:
+                self._left_s = max(self._left_s, 0.0)
+            return max(-self._left_s / share, 0.0)
+
+
+class Rest:
+    """Lets the work of one thread rest in between, as its allowance says.
+
+    Parameters
+    ----------
+    allowance
+        Of all planning.
     wait
         Waits for so many seconds; may end sooner.
     cpu_s
@@ -135,19 +181,19 @@ class Rest:
 
     def __init__(
         self,
-        share: Callable[[], float],
+        allowance: Allowance,
         wait: Callable[[float], object],
         *,
         cpu_s: Callable[[], float] = time.thread_time,
     ) -> None:
-        self._share = share
+        self._allowance = allowance
         self._wait = wait
         self._cpu_s = cpu_s
         self._since_s = cpu_s()
 
     def __call__(self) -> None:
-        """Wait for as long as makes what was taken since the last call its share."""
-        share = self._share()
-        if share < 1.0:
-            self._wait((self._cpu_s() - self._since_s) * (1.0 / share - 1.0))
+        """Rest for what was computed since the last call."""
+        rest_s = self._allowance.take(self._cpu_s() - self._since_s)
+        if rest_s:
+            self._wait(rest_s)
         self._since_s = self._cpu_s()

@@ -72,12 +72,17 @@ def hops(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def with_frame(
-    camera: Camera, raw: RawFrame, test: Callable[[Pipeline, Frame], Awaitable[None]]
+    camera: Camera,
+    raw: RawFrame,
+    test: Callable[[Pipeline, Frame], Awaitable[None]],
+    *,
+    sensor: tm.noise.Sensor | None = None,
 ) -> None:
     async def main() -> None:
         with ThreadPoolExecutor(2, thread_name_prefix="worker") as executor:
             workers = Workers(executor, count=2)
-            pipeline = Pipeline(camera, ReconstructionSettings(estimator="pisarenko"), workers)
+            settings = ReconstructionSettings(estimator="pisarenko")
+            pipeline = Pipeline(camera, settings, workers, sensor=sensor)
             try:
                 await test(pipeline, pipeline.frame(raw, camera.applied))
             finally:
@@ -340,7 +345,7 @@ def test_frames_are_those_of_pisarenko_until_the_likelihood_is_compiled_and_say_
         assert estimators == ["pisarenko", "pisarenko", "likelihood"]
         assert [each.meta()["reconstruction_id"] for each in (before, behind)] == [7, 7]
 
-    with_frame(camera, raw, test)
+    with_frame(camera, raw, test, sensor=tm.noise.Sensor())
 
 
 @pytest.mark.parametrize("named", ["likelihood", "maximum-entropy"])
@@ -353,7 +358,5 @@ def test_frequencies_with_gaps_are_the_likelihoods_compiled_or_not() -> None:
     settings = SettingsVersion(1, ReconstructionSettings())
     gapped = Sequence(harmonics=2, sampling=Sampling((2, 3)))
 
-    found = settings.for_live_frames(gapped, ready=lambda name, m: False)
-
-    assert found.settings.technique == "likelihood"
+    assert settings.for_live_frames(gapped, ready=lambda name, m: False) == settings
     assert suited(settings.settings, gapped.sampling) == settings.settings

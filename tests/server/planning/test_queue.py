@@ -14,6 +14,7 @@ from transientcam_server.planning.queue import (
     MOST,
     MOST_OF_ONE,
     RETRY_AFTER_S,
+    Allowance,
     PlanningQueue,
     Rest,
 )
@@ -131,21 +132,55 @@ def test_a_request_that_is_refused_is_told_when_to_ask_again() -> None:
     assert (refusal.status_code, refusal.headers["Retry-After"]) == (503, str(RETRY_AFTER_S))
 
 
-def test_work_rests_until_what_it_took_is_its_share() -> None:
-    now_s = 0.0
-    waited_s: list[float] = []
-    share = 0.25
-    rest = Rest(lambda: share, waited_s.append, cpu_s=lambda: now_s)
+class Day:
+    """Time that passes by resting and computing alone."""
 
-    for taken_s in (0.1, 0.4):
-        now_s += taken_s
+    def __init__(self) -> None:
+        self.now_s = 0.0
+        self.computed_s = 0.0
+        self.waited_s: list[float] = []
+
+    def compute(self, cpu_s: float) -> None:
+        self.now_s += cpu_s
+        self.computed_s += cpu_s
+
+    def wait(self, rest_s: float) -> None:
+        self.waited_s.append(rest_s)
+        self.now_s += rest_s
+
+
+def test_a_plan_now_and_then_does_not_rest_and_many_keep_to_the_share() -> None:
+    day, share = Day(), 0.25
+    allowance = Allowance(lambda: share, at_once_s=10.0, now_s=lambda: day.now_s)
+    rest = Rest(allowance, day.wait, cpu_s=lambda: day.computed_s)
+
+    day.compute(10.0)
+    rest()
+    assert day.waited_s == []
+
+    begin_s, before_s = day.now_s, day.computed_s
+    for _ in range(200):
+        day.compute(0.5)
         rest()
-    assert waited_s == pytest.approx([0.3, 1.2])
+    # the tenth that came back while the first ten seconds were computed is spent, too
+    taken = (day.computed_s - before_s - 2.5) / (day.now_s - begin_s)
+    assert taken == pytest.approx(share, rel=1e-6)
 
-    share = 1.0  # nobody watches
-    now_s += 5.0
+    day.now_s += 40.0  # the allowance is back
+    rested = len(day.waited_s)
+    day.compute(10.0)
+    rest()
+    assert len(day.waited_s) == rested
+
+
+def test_nothing_rests_while_nobody_watches_and_no_debt_is_left_behind() -> None:
+    day, share = Day(), 1.0
+    allowance = Allowance(lambda: share, at_once_s=0.0, now_s=lambda: day.now_s)
+    rest = Rest(allowance, day.wait, cpu_s=lambda: day.computed_s)
+
+    day.computed_s += 100.0  # on several processors, or with a clock that stands
     rest()
     share = 0.25
-    now_s += 0.1
+    day.compute(0.1)
     rest()
-    assert waited_s == pytest.approx([0.3, 1.2, 0.3])
+    assert day.waited_s == pytest.approx([0.3])

@@ -74,6 +74,7 @@ class Firmware:
         self._labels: tuple[ImageLabel, ...] = ()
         self._epoch = 0
         self._heartbeat_s = power_on_s
+        self._committed_s: float | None = None
         self._watchdog_tripped = False
         self._interlock_closed = True
         self._faulted = False
@@ -109,6 +110,17 @@ class Firmware:
         except Refusal as refusal:
             self._last_error = (refusal.code, request, refusal.detail)
             raise
+
+    def resume(self, now_s: float) -> None:
+        """Begin the exposures of a sequence that was just committed now.
+
+        The emulator has prepared its light meanwhile, which would take a device no time.
+        """
+        if self._committed_s is None or not self._exposures.running:
+            return
+        self._heartbeat_s += now_s - self._committed_s
+        self._committed_s = None
+        self._begin(now_s)
 
     def control_out(self, request: int, data: bytes, *, now_s: float) -> None:
         """Execute a vendor request from host to device; raise Refusal for a stall."""
@@ -158,6 +170,7 @@ class Firmware:
             self._epoch = max(self._epoch, epoch_above) + 1  # usb-protocol 3.1
             if streaming:
                 self._begin(now_s)
+                self._committed_s = now_s
         assert self._words is not None  # noqa: S101  (refused above otherwise)
         return Commitment(
             epoch=self._epoch,

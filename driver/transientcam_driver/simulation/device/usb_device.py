@@ -104,7 +104,9 @@ class EmulatedDevice:
             raise Stall
         try:
             if request_type & _DEVICE_TO_HOST:
-                return self._firmware.control_in(request, value, index, now_s=self.clock.now_s())
+                answer = self._firmware.control_in(request, value, index, now_s=self.clock.now_s())
+                self._firmware.resume(self.clock.now_s())
+                return answer
             self._firmware.control_out(request, data, now_s=self.clock.now_s())
         except Refusal as refusal:
             raise Stall from refusal

@@ -322,6 +322,26 @@ def test_commit_while_streaming_switches_at_once_and_says_the_first_number(devic
     assert device.status().state is DeviceState.STREAMING
 
 
+def test_what_the_emulator_takes_to_prepare_a_sequence_costs_no_images_and_no_heartbeat(
+    device: Device,
+) -> None:
+    device.write(Request.START)
+    device.now_s += 1.5
+    assert len(device.numbers()) == 8, "as many as the FIFO holds"
+    answer = device.configure(Sequence(harmonics=1, zeroth="estimated", exposure_s=1.02e-3))
+    device.now_s += 3.0  # more than the watchdog waits
+    device.firmware.resume(device.now_s)
+    device.now_s += 2 * PERIOD_S + 1e-6
+
+    headers = [packet.header for packet in device.read()]
+    assert [header.number for header in headers] == [answer.first_image, answer.first_image + 1]
+    assert headers[0].device_time_ns == pytest.approx(4.5e9, abs=1e3)
+    assert device.status().light_on
+
+    device.firmware.resume(device.now_s + 1.0)
+    assert [packet.header.number for packet in device.read()] == [], "nothing begins again"
+
+
 def test_the_light_goes_off_when_the_heartbeat_stops(device: Device) -> None:
     device.write(Request.START)
     device.now_s += 1.5
