@@ -135,6 +135,8 @@ def test_all_views_show_the_frame_that_is_scrubbed_to(page: Page, served: Served
     point_at(page, "map", 40, 50, click=True)
     page.get_by_role("button", name="Play corner").click()
     expect(page.locator("[data-field=state]")).to_have_text("Replay")
+    shows_recorded(page, 6)
+    expect(page.get_by_role("button", name="Play the recording")).to_be_visible()
     slider = page.get_by_label("Frame of the recording")
     slider.focus()
     page.keyboard.press("Home")

@@ -40,7 +40,7 @@ def test_large_sensors_share_nothing() -> None:
 
 def test_images_do_not_depend_on_what_other_cameras_did_before() -> None:
     def images(*before: Sequence) -> list[np.ndarray]:
-        with open_camera("sim:mirrors?seed=3", clock=VirtualClock()) as camera:
+        with open_camera("sim:wall?seed=3", clock=VirtualClock()) as camera:
             for sequence in before:
                 camera.configure(sequence)
             camera.configure(Sequence(harmonics=2))
