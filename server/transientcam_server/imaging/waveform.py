@@ -50,7 +50,10 @@ class SweepEvaluation:
         """Return the harmonics (m, K) of the takes (takes, N, H, W) of each step, or None."""
         phasors, saturated = [], False
         for takes in steps:
-            images, _ = tm.average_takes(takes)
+            # in three takes the same image may have lost its synchronisation twice, which no other
+            # take then tells
+            intact = tm.repair(takes, zeroth=self._zeroth, full_scale=self._full_scale)
+            images, _ = tm.average_takes(intact.images, left_out=intact.left_out)
             saturated = saturated | tm.saturated(images, full_scale=self._full_scale)
             phasors.append(tm.measure(images, zeroth=self._zeroth)[1:])
         swept = np.stack(phasors)  # (steps, m, H, W)

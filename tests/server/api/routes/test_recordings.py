@@ -62,12 +62,12 @@ def deep(levels: int) -> Any:
     return [deep(levels - 1)] if levels > 1 else []
 
 
-def finished(http: httpx.Client, recording: str) -> dict[str, Any]:
-    """Wait until a recording has ended by itself."""
+def finished(http: httpx.Client, recording: str, *, unfinished: str = "") -> dict[str, Any]:
+    """Wait until a recording has ended by itself, or is recovered from being ``unfinished``."""
     until_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < until_s:
         document: dict[str, Any] = http.get(f"{RECORDINGS}/{recording}").json()
-        if document["state"] not in ("recording", "finishing", "recovering"):
+        if document["state"] not in ("recording", "finishing", "recovering", unfinished):
             return document
         time.sleep(0.02)
     raise AssertionError(f"{recording} did not end")
@@ -407,7 +407,7 @@ def test_what_was_left_unfinished_is_recovered_at_the_start(directory: Path) -> 
         httpx.Client(base_url=served.url, timeout=60.0) as http,
     ):
         hold_to_contract(http, served.app.openapi())
-        document = finished(http, "left")
+        document = finished(http, "left", unfinished="interrupted")
 
     assert document["state"] == "complete"
     assert document["frames"] == 4
