@@ -19,7 +19,9 @@ directory = Path(sys.argv[1])
 library = Library(RecordingSettings(directory=directory), header=lambda *given: None)
 resource.setrlimit(resource.RLIMIT_DATA, (1800 << 20, 1800 << 20))  # as LimitDATA= of the service
 (listed,) = library.describe_all()
-peak_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+# not ru_maxrss, which begins with that of the process that was forked
+status = Path("/proc/self/status").read_text()
+peak_kb = int(status.split("VmHWM:")[1].split()[0])
 print(listed["state"], peak_kb < 1 << 20)
 """
 
