@@ -81,8 +81,9 @@ def _require_multiples(multiples: object) -> None:
 
 
 def _is_multiple(value: object) -> bool:
-    integer = isinstance(value, Integral) and not isinstance(value, bool)
-    return integer and 1 <= int(value) <= MAX_HARMONICS  # type: ignore[call-overload]
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        return False
+    return 1 <= int(value) <= MAX_HARMONICS
 
 
 def _require_phases(phases_rad: object) -> None:

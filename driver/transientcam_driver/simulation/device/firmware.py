@@ -116,10 +116,10 @@ class Firmware:
 
         The emulator has prepared its light meanwhile, which would take a device no time.
         """
-        if self._committed_s is None or not self._exposures.running:
+        committed_s, self._committed_s = self._committed_s, None
+        if committed_s is None or not self._exposures.running:
             return
-        self._heartbeat_s += now_s - self._committed_s
-        self._committed_s = None
+        self._heartbeat_s += now_s - committed_s
         self._begin(now_s)
 
     def control_out(self, request: int, data: bytes, *, now_s: float) -> None:

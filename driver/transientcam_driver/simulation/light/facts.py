@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from transientcam_driver.simulation.light.exchange import Exchange
 from transientcam_driver.simulation.light.paths import Lit, light_rays
 from transientcam_driver.simulation.light.radiosity import Interreflection
 from transientcam_driver.simulation.light.rays import rays_through
+from transientcam_driver.simulation.light.recent import Recent
 from transientcam_driver.simulation.light.variants import without_gloss, without_mirrors
 from transientcam_driver.simulation.scene.geometry import Points, Rectangle
 from transientcam_driver.simulation.scene.scene import Scene, Viewpoint
@@ -68,7 +69,8 @@ class SceneFacts:
         if scene.moves:
             period_s = max(each.period_s for surface in scene.surfaces for each in surface.motions)
             self._times_s = tuple((k + 0.5) / _TIMES * period_s for k in range(_TIMES))
-        self._found = lru_cache(maxsize=_KEPT)(self._changes)
+        self._found: Recent[tuple[str, tuple[float, ...], float], tuple[Values, ...]]
+        self._found = Recent(_KEPT)
         self._left_out: dict[str, list[list[_Seen]]] = {}
 
     @property
@@ -88,7 +90,8 @@ class SceneFacts:
         self, effect: str, frequencies_hz: tuple[float, ...], *, during_s: float = 0.0
     ) -> tuple[Values, ...]:
         """Return how far leaving out an effect moves each pixel's moments, at most, by time."""
-        return self._found(effect, _some(frequencies_hz), during_s if effect == "motion" else 0.0)
+        key = effect, _some(frequencies_hz), during_s if effect == "motion" else 0.0
+        return self._found.get(key, lambda: self._changes(*key))
 
     def further_bounces(self, tolerance: float) -> int:
         """Return how often light goes from surface to surface until less than this is left."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Final, Protocol
 
 import numpy as np
@@ -23,6 +23,7 @@ from transientcam_driver.simulation.light.layers import MovingResponses
 from transientcam_driver.simulation.light.moving import MovingLight, still_scene
 from transientcam_driver.simulation.light.radiosity import Interreflection, WithInterreflection
 from transientcam_driver.simulation.light.rays import camera_rays
+from transientcam_driver.simulation.light.recent import Recent
 from transientcam_driver.simulation.light.steps import Between, Steps
 from transientcam_driver.simulation.light.still import StillLight
 from transientcam_driver.simulation.light.variants import (
@@ -178,9 +179,8 @@ class SurfaceScenery:
         self._scene = scene
         self._camera = scene.camera
         self._size = {"width": width, "height": height}
-        self._still_views = lru_cache(_STILL_VIEWS if width * height <= KEPT_PIXELS else 1)(
-            self._traced
-        )
+        most = _STILL_VIEWS if width * height <= KEPT_PIXELS else 1
+        self._still_views: Recent[Wanted, Views] = Recent(most)
 
     @property
     def moves(self) -> bool:
@@ -219,7 +219,9 @@ class SurfaceScenery:
     def view(self, wanted: Wanted) -> Views:
         """Trace a still scene once; of a moving one what moves, for each time."""
         # what moves is remembered by its views, which belong to one camera
-        return self._traced(wanted) if self.moves else self._still_views(wanted)
+        if self.moves:
+            return self._traced(wanted)
+        return self._still_views.get(wanted, lambda: self._traced(wanted))
 
     def _traced(self, wanted: Wanted) -> Views:
         scene = self._with(wanted)

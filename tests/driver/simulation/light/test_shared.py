@@ -1,5 +1,7 @@
 """Cameras in front of the same scene share what was found of its light, and nothing else."""
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +10,7 @@ import pytest
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.simulation.build import find_scene
+from transientcam_driver.simulation.light import Wanted
 from transientcam_driver.simulation.light.shared import shared_scenery
 
 SIZE = {"width": 40, "height": 30}
@@ -36,6 +39,20 @@ def test_large_sensors_share_nothing() -> None:
     scene = find_scene("mirrors")
     large = {"width": 640, "height": 480}
     assert shared_scenery(scene, **large) is not shared_scenery(scene, **large)
+
+
+def test_what_is_not_shared_is_freed_at_once_without_the_garbage_collector() -> None:
+    large = {"width": 320, "height": 240}
+    scenery = shared_scenery(find_scene("wall"), **large)
+    scenery.view(Wanted(highest_hz=92e6))
+    scenery.facts.changes("mixed-pixels", (23e6, 92e6))
+    freed = weakref.ref(scenery), weakref.ref(scenery.facts)
+    gc.disable()
+    try:
+        del scenery
+        assert [each() for each in freed] == [None, None]
+    finally:
+        gc.enable()
 
 
 def test_images_do_not_depend_on_what_other_cameras_did_before() -> None:
