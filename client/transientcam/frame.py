@@ -50,7 +50,10 @@ class RangeAccuracy(TypedDict):
     range_bias_m: float | None
     """How far it is off for good, as far as the frame shows it."""
     outlier_share: float | None
-    """Share of the ranges that are off by more than five times `range_error_m`."""
+    """Share of the ranges that are off by more than five times `range_error_m`; a bias that none
+    of the frame's frequencies shows is not in it."""
+    every_px: NotRequired[int]
+    """The errors are those of one pixel in so many rows and columns."""
 
 
 class FrameMeta(TypedDict):

@@ -7,6 +7,7 @@ makes them disagree, too, but in neighbouring pixels independently, so that the 
 is taken. It is a figure of the frame alone; a plan rests on a look at more frequencies.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
@@ -28,7 +29,11 @@ NEIGHBOURS_PX: Final = 5
 """Side of the square of pixels whose median tells bias from noise."""
 DRAWS: Final = 4
 """Noisy copies of a frame."""
+SPARSE_PX: Final = 4
+"""Rows and columns between pixels, where there is no time for all of them."""
 _OTHERS: Final = ("likelihood", "pisarenko")
+_QUICK: Final = ("likelihood", "pisarenko", "single-frequency")
+"""Estimators that compiled kernels make quick."""
 _SEED: Final = 0
 
 
@@ -45,12 +50,16 @@ class RangeAccuracy:
         without a range, and where there is one frequency alone.
     outlier_share
         Share of the ranges that noise throws off by more than `OUTLIER_DEVIATIONS` times the
-        median error, or that are biased by as much; None where no error is known.
+        median error, or that are biased by as much; None where no error is known. A bias that none
+        of the frame's frequencies shows is not in it.
+    every_px
+        The errors are of one pixel in so many rows and columns, and stand for those around it.
     """
 
     std_m: _Array
     bias_m: _Array
     outlier_share: float | None
+    every_px: int = 1
 
     @cached_property
     def error_m(self) -> _Array:
@@ -64,10 +73,30 @@ class RangeAccuracy:
             "range_std_m": _median(self.std_m),
             "range_bias_m": _median(self.bias_m),
             "outlier_share": self.outlier_share,
+            "every_px": self.every_px,
         }
 
 
-def range_accuracy(recipe: Recipe, found: tm.Reconstruction) -> RangeAccuracy:
+def spacing_px(recipe: Recipe, *, ready: Callable[[str, int], bool] = tm.kernels.ready) -> int:
+    """Return how far apart the pixels are whose errors a live frame has time for.
+
+    All of them where every estimator that is needed is compiled (0.1 s at 163 x 120 pixels); in
+    NumPy, and by maximum entropy, that takes 1 to 5 s, and `SPARSE_PX` a sixteenth of it.
+
+    Parameters
+    ----------
+    ready
+        Says whether the kernel of an estimator and an order is compiled, and prepares it.
+    """
+    m, own = recipe.applied.sequence.harmonics, recipe.technique
+    orders = [m] if m > 1 else []  # nothing else is asked where m = 1
+    if own == "likelihood":
+        orders += [1] if m == 1 else [m - 1]
+    compiled = [ready("likelihood", order) for order in orders]  # each is asked for, and prepared
+    return 1 if own in _QUICK and all(compiled) else SPARSE_PX
+
+
+def range_accuracy(recipe: Recipe, found: tm.Reconstruction, every_px: int = 1) -> RangeAccuracy:
     """Predict noise, bias and outliers of a frame's range.
 
     Parameters
@@ -76,13 +105,17 @@ def range_accuracy(recipe: Recipe, found: tm.Reconstruction) -> RangeAccuracy:
         With a sensor.
     found
         (H, W) pixels.
+    every_px
+        One pixel in so many rows and columns is predicted, and stands for those around it.
     """
-    seen = np.asarray(found.has_range)
-    range_m = np.asarray(found.range_m)
+    grid = np.s_[..., every_px // 2 :: every_px, every_px // 2 :: every_px]
+    has_range = np.asarray(found.has_range)
+    seen = has_range[grid]
+    range_m = np.asarray(found.range_m)[grid]
     frame = _Frame(
         recipe,
-        np.asarray(found.smoothed)[:, seen],
-        np.asarray(moment_noise(recipe, found).variance, dtype=np.float32)[:, seen],
+        np.asarray(found.smoothed)[grid][:, seen],
+        np.asarray(moment_noise(recipe, found).variance, dtype=np.float32)[grid][:, seen],
     )
     drawn_m = frame.drawn_m()
     std_m = _placed(typical_deviation(drawn_m), seen)
@@ -90,7 +123,20 @@ def range_accuracy(recipe: Recipe, found: tm.Reconstruction) -> RangeAccuracy:
     unknown = np.full(seen.shape, np.nan, dtype=np.float32)
     bias_m = np.max([np.abs(median_around(each)) for each in shifts_m], axis=0, initial=0.0)
     bias_m = np.where(np.isfinite(range_m), bias_m, np.nan) if shifts_m else unknown
-    return RangeAccuracy(std_m, bias_m, _outliers(drawn_m - range_m[seen], std_m, bias_m, seen))
+    outlier_share = _outliers(drawn_m - range_m[seen], std_m, bias_m, seen)
+    std_m, bias_m = (_around(each, has_range, every_px) for each in (std_m, bias_m))
+    return RangeAccuracy(std_m, bias_m, outlier_share, every_px)
+
+
+def _around(plane: _Array, has_range: _Array, every_px: int) -> _Array:
+    """Let pixels of a coarser grid stand for those around them that have a range."""
+    if every_px == 1:
+        return plane
+    nearest = [
+        np.minimum(np.arange(n) // every_px, m - 1)
+        for n, m in zip(has_range.shape, plane.shape, strict=True)
+    ]
+    return np.where(has_range, plane[np.ix_(*nearest)], np.float32(np.nan))
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from transientcam.frame import FrameMeta
 from transientcam_driver import RawFrame, Truth
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.accuracy import RangeAccuracy, range_accuracy
+from transientcam_server.imaging.accuracy import RangeAccuracy, range_accuracy, spacing_px
 from transientcam_server.imaging.bands import STREAMED_BYTES, Banded, computed
 from transientcam_server.imaging.encodings.encoding import Encoding
 from transientcam_server.imaging.meta import frame_meta
@@ -200,7 +200,9 @@ class Frame:
 
     async def _compute_accuracy(self) -> RangeAccuracy:
         found = await self.reconstruction("returns")
-        accuracy, _ = await self._workers.run_long(range_accuracy, self.recipe, found)
+        # a live frame is late with what takes seconds, and so is all that is sent with it
+        every_px = 1 if self.past else spacing_px(self.recipe)
+        accuracy, _ = await self._workers.run_long(range_accuracy, self.recipe, found, every_px)
         self._accuracy = accuracy
         return accuracy
 

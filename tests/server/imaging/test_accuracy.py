@@ -12,7 +12,12 @@ import transientcam_moments as tm
 from transientcam_driver import RawFrame, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.camera.source import sensor_of
-from transientcam_server.imaging.accuracy import RangeAccuracy, median_around, range_accuracy
+from transientcam_server.imaging.accuracy import (
+    RangeAccuracy,
+    median_around,
+    range_accuracy,
+    spacing_px,
+)
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.planning.measures import pixel_errors
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
@@ -101,6 +106,44 @@ def test_the_bias_of_one_frequency_is_not_known(estimator: str) -> None:
         assert document[name] is None
 
 
+def test_one_pixel_in_sixteen_stands_for_those_around_it() -> None:
+    scene = captured("mirrors", 4, CAPTURES)
+    recipe, found = scene.by("pisarenko")
+    whole = range_accuracy(recipe, found[0])
+
+    sparse = range_accuracy(recipe, found[0], 4)
+
+    np.testing.assert_array_equal(np.isnan(sparse.std_m), np.isnan(whole.std_m))
+    blocks = sparse.error_m.reshape(15, 4, 15, 4)
+    assert (blocks == blocks[:, :1, :, :1]).all()
+    one, other = whole.to_document(), sparse.to_document()
+    assert (one["every_px"], other["every_px"]) == (1, 4)
+    for name in ("range_error_m", "range_std_m"):
+        assert other[name] == pytest.approx(one[name], rel=0.25)
+    # pixels further apart share no smoothed noise, whose rest their median takes for bias
+    assert other["range_bias_m"] == pytest.approx(one["range_bias_m"], rel=0.5)
+
+
+def test_all_pixels_are_predicted_as_soon_as_that_is_quick() -> None:
+    scene = captured("mirrors", 4, CAPTURES)
+
+    def spacing(estimator: str, *orders: int) -> tuple[int, list[int]]:
+        asked: list[int] = []
+
+        def ready(name: str, order: int) -> bool:
+            assert name == "likelihood"
+            asked.append(order)
+            return order in orders
+
+        return spacing_px(scene.by(estimator)[0], ready=ready), asked
+
+    assert spacing("pisarenko") == (4, [4])
+    assert spacing("pisarenko", 4) == (1, [4])
+    assert spacing("likelihood", 4) == (4, [4, 3])
+    assert spacing("likelihood", 4, 3) == (1, [4, 3])
+    assert spacing("maximum-entropy", 4) == (4, [4])
+
+
 def test_the_document_speaks_of_the_median_pixel_with_a_range() -> None:
     std_m = np.array([[3.0, 6.0, np.nan]])
     bias_m = np.array([[4.0, 8.0, np.nan]])
@@ -113,6 +156,7 @@ def test_the_document_speaks_of_the_median_pixel_with_a_range() -> None:
         "range_std_m": 4.5,
         "range_bias_m": 6.0,
         "outlier_share": 0.25,
+        "every_px": 1,
     }
 
 

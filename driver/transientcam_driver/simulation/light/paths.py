@@ -88,7 +88,7 @@ class Lit:
                 phasors *= scatter.transfer(frequency_hz)
         return phasors
 
-    def part(self, of: slice) -> "Lit":
+    def part(self, of: slice | NDArray[np.intp]) -> "Lit":
         """Return the light of some of the rays."""
         return Lit(
             self.surface[of],

@@ -36,6 +36,8 @@ class Interreflection:
         Pixels by index that are the mean over several rays, and the light of these.
     tolerance
         Brightness that light may lack, where the scene does not say how far it is followed.
+    exchange
+        Light between the scene's patches, where that is known.
     """
 
     def __init__(
@@ -47,12 +49,13 @@ class Interreflection:
         height: int,
         mixed: tuple[NDArray[np.intp], Lit] | None = None,
         tolerance: float = 1e-4,
+        exchange: Exchange | None = None,
     ) -> None:
         self._scene = scene
         self._lit = lit
         self._shape = (height, width)
         self._mixed = mixed
-        self._exchange = Exchange.of(scene, scene.transport.patches)
+        self._exchange = exchange or Exchange.of(scene, scene.transport.patches)
         self._bounces = self._exchange.bounces(tolerance)
         self._places = self._between(self._exchange.patches, lit)
         if mixed is not None:
@@ -65,6 +68,14 @@ class Interreflection:
 
     def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
         """``int g(tau) exp(2 pi i f tau) dtau`` of this light, (H, W)."""
+        return self._moments(frequency_hz) if frequency_hz else self._zeroth
+
+    @cached_property
+    def _zeroth(self) -> NDArray[np.complex128]:
+        """Moments at the frequency 0, which those at any other are asked for with."""
+        return self._moments(0.0)
+
+    def _moments(self, frequency_hz: float) -> NDArray[np.complex128]:
         irradiance = self._exchange.irradiance(frequency_hz, self._bounces)
         moments = self._gathered(irradiance, frequency_hz, self._lit, self._places)
         if self._mixed is not None:

@@ -10,12 +10,31 @@ from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Viewpoint
 
 _LENS_STEPS = 20
+_RAYS = 32
+"""Into a pixel that light differs in."""
+_GOLDEN = (5**0.5 - 1) / 2
 
 
 def camera_rays(view: Viewpoint, *, width: int, height: int) -> Points:
     """Return unit vectors through the pixels' centres, row by row from the top."""
     columns, rows = np.meshgrid(np.arange(width), np.arange(height))
     return rays_through(view, columns.ravel(), rows.ravel(), width=width, height=height)
+
+
+def rays_within(
+    view: Viewpoint, pixel: NDArray[np.intp], count: int = _RAYS, *, width: int, height: int
+) -> Points:
+    """Return unit vectors, so many each, through some pixels: for each place, all pixels.
+
+    Places are a lattice by the golden ratio, no two in one row or column: an edge along the pixels,
+    as of most things that are built, is resolved as finely as others.
+    """
+    rows, columns = np.divmod(pixel, width)
+    place = np.arange(count)[:, None]
+    right = (place + 0.5) / count - 0.5
+    down = (place * _GOLDEN + 0.5 / count) % 1.0 - 0.5
+    through = (columns + right).ravel(), (rows + down).ravel()
+    return rays_through(view, *through, width=width, height=height)
 
 
 def rays_through(

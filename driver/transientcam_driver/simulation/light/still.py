@@ -7,22 +7,19 @@ from numpy.typing import NDArray
 
 from transientcam_driver.simulation.effects.glimpses import Noise
 from transientcam_driver.simulation.light.bundle import Bundle
+from transientcam_driver.simulation.light.followed import FollowedRays
 from transientcam_driver.simulation.light.paths import (
     FAR_M,
     Lit,
     hit,
-    light_rays,
     scatter_of,
     sparse_image,
 )
-from transientcam_driver.simulation.light.rays import camera_rays, rays_through
+from transientcam_driver.simulation.light.rays import rays_within
 from transientcam_driver.simulation.responses import Scatter, SparseResponses
 from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene
 
-_RAYS = 32
-"""Into a pixel that light differs in."""
-_GOLDEN = (5**0.5 - 1) / 2
 _DIFFERS_ABOVE = 0.25  # of the noise
 
 
@@ -35,6 +32,8 @@ class StillLight:
         With a camera.
     noise, highest_hz
         Which differences of light between pixels matter: None if none do, and at which frequency.
+    followed
+        Rays into the same scene; its own where it shares none.
     """
 
     def __init__(
@@ -45,13 +44,14 @@ class StillLight:
         height: int,
         noise: Noise | None = None,
         highest_hz: float = 0.0,
+        followed: FollowedRays | None = None,
     ) -> None:
         assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
         self.scene = scene
         self.width, self.height = width, height
         self._camera = scene.camera
-        self.rays = camera_rays(self._camera, width=width, height=height)
-        self.lit = light_rays(scene, self.rays)
+        self._followed = followed or FollowedRays(scene, width=width, height=height)
+        self.rays, self.lit = self._followed.centres, self._followed.lit
         self.mixed = np.zeros(0, dtype=np.intp)
         """Pixels, by index, that are the mean over several rays."""
         if noise is not None:
@@ -64,18 +64,9 @@ class StillLight:
         middle = self.height // 2 * self.width + self.width // 2
         return float(np.arccos(np.clip(self.rays[middle] @ self.rays[middle - 1], -1, 1)))
 
-    def rays_in(self, pixel: NDArray[np.intp], count: int = _RAYS) -> Points:
-        """Return rays, so many each, in some pixels: for each place in a pixel, all pixels.
-
-        Places are a lattice by the golden ratio, no two in one row or column: an edge along the
-        pixels, as of most things that are built, is resolved as finely as others.
-        """
-        rows, columns = np.divmod(pixel, self.width)
-        place = np.arange(count)[:, None]
-        right = (place + 0.5) / count - 0.5
-        down = (place * _GOLDEN + 0.5 / count) % 1.0 - 0.5
-        size = {"width": self.width, "height": self.height}
-        return rays_through(self._camera, (columns + right).ravel(), (rows + down).ravel(), **size)
+    def rays_in(self, pixel: NDArray[np.intp], *count: int) -> Points:
+        """Return rays, so many each, in some pixels; see `rays_within`."""
+        return rays_within(self._camera, pixel, *count, width=self.width, height=self.height)
 
     @cached_property
     def reflectance(self) -> NDArray[np.float32]:
@@ -89,7 +80,7 @@ class StillLight:
     @cached_property
     def fine(self) -> Lit:
         """Light of several rays in each of the pixels ``mixed``."""
-        return light_rays(self.scene, self.rays_in(self.mixed))
+        return self._followed.within(self.mixed)
 
     def lit_by(self, chain: int) -> tuple[NDArray[np.bool_], Points]:
         """Return which pixels (H W) a chain of mirrors lights, and a point (H W, 3) that it does.

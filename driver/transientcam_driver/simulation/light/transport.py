@@ -19,6 +19,7 @@ from transientcam_driver.simulation.effects.scattering import Scattering
 from transientcam_driver.simulation.imperfections import PINHOLE, Lens
 from transientcam_driver.simulation.light.bundle import Region
 from transientcam_driver.simulation.light.facts import SceneFacts, cosine_to_axis
+from transientcam_driver.simulation.light.followed import FollowedRays
 from transientcam_driver.simulation.light.layers import MovingResponses
 from transientcam_driver.simulation.light.moving import MovingLight, still_scene
 from transientcam_driver.simulation.light.radiosity import Interreflection, WithInterreflection
@@ -38,6 +39,7 @@ Values = NDArray[np.float64]
 KEPT_PIXELS: Final = 40_000
 """Of sensors for which more is kept of a scene than what is shown: 1 KiB a pixel and view."""
 _STILL_VIEWS: Final = 3  # for sequences that alternate
+_FOLLOWED: Final = 2  # for effects that do
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,8 +181,10 @@ class SurfaceScenery:
         self._scene = scene
         self._camera = scene.camera
         self._size = {"width": width, "height": height}
-        most = _STILL_VIEWS if width * height <= KEPT_PIXELS else 1
-        self._still_views: Recent[Wanted, Views] = Recent(most)
+        small = width * height <= KEPT_PIXELS
+        self._still_views: Recent[Wanted, Views] = Recent(_STILL_VIEWS if small else 1)
+        self._followed: Recent[tuple[frozenset[str], Lens], FollowedRays]
+        self._followed = Recent(_FOLLOWED if small else 0)
 
     @property
     def moves(self) -> bool:
@@ -226,16 +230,22 @@ class SurfaceScenery:
     def _traced(self, wanted: Wanted) -> Views:
         scene = self._with(wanted)
         effects = wanted.effects
+        # effects within a pixel change which rays are followed, and not what they see
+        followed = self._followed.get(
+            (effects - {MixedPixels.name}, wanted.lens),
+            lambda: FollowedRays(still_scene(scene), **self._size),
+        )
         still = StillLight(
-            still_scene(scene),
+            followed.scene,
             **self._size,
             noise=wanted.noise if MixedPixels.name in effects else None,
             highest_hz=wanted.highest_hz,
+            followed=followed,
         )
         tolerance = CALLED_ABOVE * float(wanted.noise.deviation(0.0, 0.0))
         further = DiffuseInterreflection.name in effects
         if not self.moves:
-            view = self._still_view(still, tolerance if further else None)
+            view = self._still_view(still, followed, tolerance if further else None)
             return Views(lambda _time_s: view, lambda _time_s: view)
         moving = MovingLight(scene, still, soft=MixedPixels.name in effects)
         if further:
@@ -244,7 +254,7 @@ class SurfaceScenery:
         exact = Latest(lambda time_s: _view_of(moving.at(time_s)))
         steps = Steps(scene, moving.at, pixel_rad=still.pixel_rad, every_s=wanted.image_period_s)
         between = Latest(lambda time_s: _view_of(steps.at(time_s)))
-        return Views(between, exact, self._still_view(still, None))
+        return Views(between, exact, self._still_view(still, followed, None))
 
     def _lit_view(self, now: MovingResponses, tolerance: float) -> View:
         """View of a moving scene with light over several surfaces, computed anew."""
@@ -252,7 +262,9 @@ class SurfaceScenery:
         light = Interreflection(now.scene, now.lit, width=width, height=height, tolerance=tolerance)
         return View(WithInterreflection(now, light), lambda: now.reflectance)
 
-    def _still_view(self, still: StillLight, tolerance: float | None) -> View:
+    def _still_view(
+        self, still: StillLight, followed: FollowedRays, tolerance: float | None
+    ) -> View:
         """View what stands still, with light over several surfaces up to a tolerance."""
         shape = self._size["height"], self._size["width"]
         responses: Responses = still.responses()
@@ -265,9 +277,11 @@ class SurfaceScenery:
                 height=still.height,
                 mixed=mixed,
                 tolerance=tolerance,
+                exchange=followed.exchange,
             )
             responses = WithInterreflection(responses, light)
-        return View(responses, lambda: still.reflectance.reshape(shape))
+        reflectance = still.reflectance.reshape(shape)
+        return View(responses, lambda: reflectance)
 
     def _with(self, wanted: Wanted) -> Scene:
         """Return the scene with the effects of light that are wanted, and no others."""

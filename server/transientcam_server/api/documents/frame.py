@@ -41,7 +41,11 @@ class RangeAccuracyDocument(Document):
     range_bias_m: float | None = None
     """How far it is off for good, as far as the frame shows it; more takes do not reduce it."""
     outlier_share: float | None = None
-    """Share of the ranges that are off by more than five times `range_error_m`."""
+    """Share of the ranges that are off by more than five times `range_error_m`; a bias that none
+    of the frame's frequencies shows is not in it."""
+    every_px: int = 1
+    """The errors are those of one pixel in so many rows and columns: more than 1 where not all
+    that predicts them is compiled."""
 
 
 class FrameDocument(Document):

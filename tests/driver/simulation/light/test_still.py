@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 
 from transientcam_driver.simulation.build import find_scene
 from transientcam_driver.simulation.effects.glimpses import Noise
-from transientcam_driver.simulation.light.paths import light_rays
+from transientcam_driver.simulation.light.followed import FollowedRays
+from transientcam_driver.simulation.light.paths import Lit, light_rays
 from transientcam_driver.simulation.light.still import StillLight
 from transientcam_driver.simulation.scene.geometry import Rectangle
 from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Viewpoint
@@ -91,3 +92,18 @@ def test_returns_hold_the_light_of_all_surfaces_in_a_pixel() -> None:
     both = (weight > 0).sum(axis=0) == 2
     assert both.any()
     assert (np.diff(delay_s, axis=0)[0][both] > 2e-9).all()
+
+
+def test_rays_followed_for_other_pixels_before_change_nothing() -> None:
+    of = SCENES["silhouette and shadow on a wall"]
+    size = {"width": WIDTH, "height": HEIGHT}
+    shared = FollowedRays(of, **size)
+    still = StillLight(of, **size, noise=NOISE, highest_hz=69e6)
+    third = still.mixed[::3]
+
+    for pixel in (third, still.mixed[1::2], still.mixed, third):
+        shared_light = shared.within(pixel)
+
+        alone = light_rays(of, still.rays_in(pixel))
+        for name in Lit.__slots__:
+            np.testing.assert_array_equal(getattr(shared_light, name), getattr(alone, name))
