@@ -15,9 +15,10 @@ from rich.progress import Progress, TaskID
 import transientcam_moments as tm
 from benchmarks.accuracy.capturing import SEED, known_scenes
 from benchmarks.accuracy.noise import draw_noise, predicted_and_observed
+from benchmarks.accuracy.opening import draw_prices
 from benchmarks.accuracy.page import report
 from benchmarks.accuracy.pictures import drawn
-from benchmarks.accuracy.promises import BUILT_IN, GOALS, Kept, kept
+from benchmarks.accuracy.promises import BUILT_IN
 from benchmarks.measured_scenes import composite_scene
 from transientcam_experiments import tradeoff
 from transientcam_experiments.tradeoff.report import file_name
@@ -43,14 +44,11 @@ def main() -> None:
             scenes["composite"] = composite
         records = measured(scenes, folder, "quick" if arguments.quick else "paper")
         noise = predicted_and_observed()
-        plans = [
-            each for name in BUILT_IN for each in kept(name, GOALS, 30) if isinstance(each, Kept)
-        ]
         figures = DOCS / "figures" if arguments.write else folder
         figures.mkdir(exist_ok=True)
         drawings = dict(drawn(name, figures) for name in BUILT_IN)
-        sentences = {name: document["summary"] for name, document in drawings.items()}
-        page = report(scenes, records, noise, plans, sentences)
+        draw_prices(drawings, figures)
+        page = report(scenes, records, noise, drawings)
         print(page)
         if arguments.write:
             (DOCS / "accuracy.md").write_text(page, encoding="utf-8")

@@ -4,7 +4,7 @@ import numpy as np
 
 from benchmarks.accuracy.capturing import short
 from benchmarks.accuracy.noise import FRAMES, Compared
-from benchmarks.accuracy.promises import Kept, summary, table
+from benchmarks.accuracy.opening import Documents, opening
 from benchmarks.machine import machine
 from transientcam_driver import Sequence
 from transientcam_experiments import tradeoff
@@ -15,17 +15,19 @@ def report(
     scenes: dict[str, str],
     records: tradeoff.Records,
     noise: list[Compared],
-    plans: list[Kept],
-    pictures: dict[str, str],
+    prices: Documents,
 ) -> str:
     """Return the page."""
     lines = [
         "# What accuracy costs in time",
         "",
+        opening(prices, machine()),
+        "",
+        "## All that was measured",
+        "",
         "Written by `python -m benchmarks.accuracy --write` on",
         f"{machine()}.",
         "",
-        *_pictures(pictures),
         "All scenes are simulated, so that the truth is known; images come over the emulated USB "
         "and go through what the daemon computes. `transientcam tradeoff --scene NAME -o FOLDER` "
         "measures the same on any scene and makes a page on which every point can be copied as a "
@@ -36,7 +38,7 @@ def report(
     ]
     for name, spec in scenes.items():
         lines += _scene(name, spec, records)
-    lines += [*_computing(records), *_noise(noise), *_plans(plans), *_time(scenes, records)]
+    lines += [*_computing(records), *_noise(noise), *_time(scenes, records)]
     return "\n".join(lines) + "\n"
 
 
@@ -285,34 +287,6 @@ def _noise(noise: list[Compared]) -> list[str]:
         *rows,
         "",
         "![Observed against predicted noise](figures/noise-prediction.png)",
-        "",
-    ]
-
-
-def _pictures(pictures: dict[str, str]) -> list[str]:
-    lines = []
-    for name, sentence in pictures.items():
-        figure = f"figures/accuracy-{name}-error.png"
-        lines += [f"![Range error against capture time on {name}]({figure})", "", sentence, ""]
-    return [
-        "Each pair of thin lines is one set of frequencies: noise falls with time, bias stays. The "
-        "thick line is the best that `transientcam plan` finds; the star is the default sequence.",
-        "",
-        *lines,
-    ]
-
-
-def _plans(plans: list[Kept]) -> list[str]:
-    return [
-        "## Do plans keep what they promise?",
-        "",
-        "Each scene is looked at once, and what is recommended is captured with other noise; "
-        "`python -m benchmarks.accuracy.promises` measures all scenes. Errors are of the median "
-        "lit pixel in mm.",
-        "",
-        table(plans),
-        "",
-        *[f"- {line}" for line in summary(plans).splitlines()],
         "",
     ]
 

@@ -85,6 +85,25 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
             planning.plan(target=target, budget=budget, fixed=fixed, estimator=estimator)
         )
 
+    def start_plan(
+        self,
+        target: Mapping[str, float] | None = None,
+        *,
+        budget: Mapping[str, float] | None = None,
+        fixed: Mapping[str, Any] | None = None,
+        estimator: str | None = None,
+    ) -> _Document:
+        """Begin what `plan` returns as a job, and return that; arguments as in `plan`.
+
+        ::
+
+        job = camera.start_plan({"range_error_m": 0.005})
+        plan = camera.wait_for(job["id"], on_progress=print)["result"]
+        """
+        return self._ask(
+            planning.start_plan(target=target, budget=budget, fixed=fixed, estimator=estimator)
+        )
+
     def tradeoff(self, by: str = "range_error_m") -> _Document:
         """Return what accuracy costs in time: the sequences that no other beats, in ``front``."""
         return self._ask(planning.tradeoff(by))

@@ -81,6 +81,11 @@ _CALLS: dict[
         lambda c: c.plan({"range_error_m": 0.005}, estimator="likelihood"),
         ("POST", "plan", "", {"target": {"range_error_m": 0.005}, "estimator": "likelihood"}),
     ),
+    "start a plan": (
+        lambda c: c.start_plan(budget={"capture_s": 0.1}, target=None),
+        lambda c: c.start_plan(budget={"capture_s": 0.1}, target=None),
+        ("POST", "plan/jobs", "", {"budget": {"capture_s": 0.1}}),
+    ),
     "tradeoff": (
         lambda c: c.tradeoff(),
         lambda c: c.tradeoff(),

@@ -11,12 +11,20 @@ _PLANNED_S: Final = 120.0
 
 def plan(**parts: Mapping[str, Any] | str | None) -> Request[dict[str, Any]]:
     """Build the request for a plan; parts that are None are left to the server."""
-    body = {
+    return document("plan", method="POST", body=_body(parts), extra_timeout_s=_PLANNED_S)
+
+
+def start_plan(**parts: Mapping[str, Any] | str | None) -> Request[dict[str, Any]]:
+    """Build the request for the job that makes a plan; parts as in `plan`."""
+    return document("plan/jobs", method="POST", body=_body(parts))
+
+
+def _body(parts: Mapping[str, Mapping[str, Any] | str | None]) -> dict[str, Any]:
+    return {
         name: dict(part) if isinstance(part, Mapping) else part
         for name, part in parts.items()
         if part is not None
     }
-    return document("plan", method="POST", body=body, extra_timeout_s=_PLANNED_S)
 
 
 def tradeoff(by: str) -> Request[dict[str, Any]]:

@@ -1,16 +1,17 @@
 """Long work that a client starts and does not wait for: its progress, and how to cancel it.
 
-Jobs run on the event loop, one task each, in the order they were started in, one at a
-time. A job reports its progress from any thread.
+Jobs run on the event loop, one task each. Those of the camera run in the order they were started
+in, one at a time; plans, which have a queue of their own, beside them. A job reports its progress
+from any thread.
 """
 
 import asyncio
+import contextlib
 import logging
 import secrets
 import threading
 import time
 from collections.abc import Awaitable, Callable
-from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
@@ -33,6 +34,8 @@ class Job:
 
     Attributes
     ----------
+    in_turn
+        Whether it waits for those that were started before.
     progress
         From 0 to 1.
     step
@@ -48,6 +51,7 @@ class Job:
     id: str
     kind: str
     created_at: float
+    in_turn: bool = True
     state: State = "queued"
     progress: float = 0.0
     step: str = "waiting"
@@ -134,22 +138,23 @@ class Jobs:
                 kinds.UNKNOWN_JOB, f"There is no job {shown!r}.", field="job", value=shown
             ) from None
 
-    def start(self, kind: str, work: Work) -> Job:
-        """Queue a job; it runs after those that were started before.
+    def start(self, kind: str, work: Work, *, in_turn: bool = True) -> Job:
+        """Start a job; one ``in_turn`` runs after those of these that were started before.
 
         Raises
         ------
         Problem
             ``too-many-jobs``.
         """
-        unfinished = [each for each in self._jobs.values() if not each.finished]
+        unfinished = [each for each in self._jobs.values() if each.in_turn == in_turn]
+        unfinished = [each for each in unfinished if not each.finished]
         if len(unfinished) >= MAX_UNFINISHED:
             raise Problem(
                 kinds.TOO_MANY_JOBS,
                 f"{len(unfinished)} jobs run or wait already.",
                 limit=MAX_UNFINISHED,
             )
-        job = Job(secrets.token_hex(6), kind, self._clock())
+        job = Job(secrets.token_hex(6), kind, self._clock(), in_turn)
         self._jobs[job.id] = job
         self._forget_old()
         task = asyncio.get_running_loop().create_task(self._run(job, work))
@@ -173,7 +178,7 @@ class Jobs:
 
     async def end_of(self, job: Job, *, wait_s: float) -> None:
         """Wait until a job has ended, or for so long."""
-        with suppress(TimeoutError):
+        with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(wait_s):
                 await job.ended.wait()
 
@@ -189,7 +194,7 @@ class Jobs:
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     async def _run(self, job: Job, work: Work) -> None:
-        async with self._one_at_a_time:
+        async with self._one_at_a_time if job.in_turn else contextlib.nullcontext():
             if job.finished:  # cancelled while it waited
                 return
             job.state = "running"

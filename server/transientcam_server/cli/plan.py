@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 from rich.console import Console
+from rich.status import Status
 
 from transientcam.cli.options import JsonOption
 
 if TYPE_CHECKING:
     from transientcam_driver import Camera, Sequence
     from transientcam_server.planning import Planner, SceneStatistics
+    from transientcam_server.planning.progress import Report
 
 MOVING: Final = 0.02
 """Share of moving pixels from which on it is said."""
@@ -94,7 +96,7 @@ def plan(
     from transientcam_driver.clock import RealClock, VirtualClock
     from transientcam_server.camera.source import sensor_of
     from transientcam_server.errors.exceptions import Problem
-    from transientcam_server.planning import Goal, Planner, uniform_scene
+    from transientcam_server.planning import Goal, Planner, Progress, uniform_scene
     from transientcam_server.planning.estimation import ESTIMATORS
     from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
@@ -134,8 +136,8 @@ def plan(
                     [_return(text) for text in returns or ["2"]],
                     ambient_dn_per_s=ambient_dn_per_s or 0.0,
                 )
-        with console.status("predicting"):
-            made = planner.plan(goal, scene)
+        with console.status("predicting") as status:
+            made = planner.plan(goal, scene, Progress(_shown(status)))
     except Problem as problem:
         if as_json:
             typer.echo(json.dumps({"detail": problem.detail, **problem.extensions}))
@@ -155,14 +157,21 @@ def _looked(
     ambient_dn_per_s: float | None,
     console: Console,
 ) -> "SceneStatistics":
-    """Look at the scene, and name each stage of that."""
+    """Look at the scene, and show how far that has come."""
+    from transientcam_server.planning import Progress
+
     with console.status("looking at the scene") as status:
         return planner.look(
             camera,
             base,
             ambient_dn_per_s=ambient_dn_per_s,
-            go_on=lambda stage: status.update(f"looking at the scene: {stage}"),
+            progress=Progress(_shown(status)),
         )
+
+
+def _shown(status: Status) -> "Report":
+    """Return what shows how far a look or a plan has come."""
+    return lambda share, step: status.update(f"{share:.0%}: {step}")
 
 
 def _fields(texts: list[str]) -> dict[str, Any]:

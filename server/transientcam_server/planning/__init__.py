@@ -11,6 +11,7 @@ from transientcam_server.planning.looks import Looks
 from transientcam_server.planning.plan import Plan
 from transientcam_server.planning.planner import Planner
 from transientcam_server.planning.prediction import Predictor
+from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.scene import SceneStatistics, uniform_scene
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "Plan",
     "Planner",
     "Predictor",
+    "Progress",
     "SceneStatistics",
     "uniform_scene",
 ]

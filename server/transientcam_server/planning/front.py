@@ -12,6 +12,7 @@ from transientcam_server.imaging.workers import Workers
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.looks import Looks
 from transientcam_server.planning.planner import Planner, range_error
+from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.queue import PlanningQueue
 
 KEPT_S: Final = 10.0
@@ -76,7 +77,7 @@ class FrontCache:
         else:
             frequency_hz = base.base_frequency_hz
             base = Sequence(base_frequency_hz=frequency_hz, sub_phases=base.sub_phases)
-            scene = await self._looks.of_twin(base, None, lambda: None)
+            scene = await self._looks.of_twin(base, None, Progress())
         goal = Goal(
             base=base,
             range_std_m=_WIDE if by == "range_std_m" else None,

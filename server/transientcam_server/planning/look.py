@@ -19,6 +19,8 @@ from transientcam_server.settings import ReconstructionSettings
 _Array = NDArray[Any]
 FRAMES: Final = 8
 """Frames of the look; what differs between them is motion."""
+STEPS: Final = FRAMES + 3
+"""Of a look, where the first exposure does not saturate."""
 COARSE_HZ: Final = 2e6
 """Base frequency of the coarse frame, unambiguous to 75 m."""
 COARSE_TAKES: Final = 4

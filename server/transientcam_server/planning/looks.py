@@ -11,6 +11,7 @@ from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.workers import Workers
 from transientcam_server.planning.look import LookedThrough, look_of_frame
 from transientcam_server.planning.planner import Planner
+from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.queue import PlanningQueue
 from transientcam_server.planning.scene import SceneStatistics
 
@@ -49,9 +50,9 @@ class Looks:
         return self._twin is None
 
     async def of_twin(
-        self, base: Sequence, ambient_dn_per_s: float | None, go_on: Callable[[], None]
+        self, base: Sequence, ambient_dn_per_s: float | None, progress: Progress
     ) -> SceneStatistics:
-        """Return the scene by the twin of a simulated camera; ``go_on`` may raise to end it.
+        """Return the scene by the twin of a simulated camera; ``progress`` may raise to end it.
 
         Raises
         ------
@@ -62,7 +63,7 @@ class Looks:
         async with self._looking:
             kept = self._kept
             if kept is None or kept[:2] != (base, ambient_dn_per_s) or self._clock() > kept[2]:
-                scene = await self._queue.run(self._look, base, ambient_dn_per_s, go_on)
+                scene = await self._queue.run(self._look, base, ambient_dn_per_s, progress)
                 kept = self._kept = (base, ambient_dn_per_s, self._clock() + KEPT_S, scene)
             return kept[3]
 
@@ -86,10 +87,10 @@ class Looks:
         self._kept = None
 
     def _look(
-        self, base: Sequence, ambient_dn_per_s: float | None, go_on: Callable[[], None]
+        self, base: Sequence, ambient_dn_per_s: float | None, progress: Progress
     ) -> SceneStatistics:
         assert self._twin is not None  # noqa: S101 - callers look at `needs_frame`
         with self._twin() as camera:
             return self._planner.look(
-                camera, base, ambient_dn_per_s=ambient_dn_per_s, go_on=lambda _: go_on()
+                camera, base, ambient_dn_per_s=ambient_dn_per_s, progress=progress
             )

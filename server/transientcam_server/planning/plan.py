@@ -15,6 +15,7 @@ from transientcam_server.planning.choice import Choice
 from transientcam_server.planning.families import families
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.prediction import Predictor
+from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.refusal import too_small, unreachable
 from transientcam_server.planning.scene import SceneStatistics
 from transientcam_server.planning.search import Search, Timed
@@ -83,7 +84,14 @@ class Plan:
         }
 
 
-def plan(goal: Goal, predictor: Predictor, capabilities: Capabilities, *, timed: Timed) -> Plan:
+def plan(
+    goal: Goal,
+    predictor: Predictor,
+    capabilities: Capabilities,
+    *,
+    timed: Timed,
+    progress: Progress | None = None,
+) -> Plan:
     """Recommend a sequence and an estimator.
 
     Parameters
@@ -96,6 +104,8 @@ def plan(goal: Goal, predictor: Predictor, capabilities: Capabilities, *, timed:
         Of the camera.
     timed
         Computing time in s of a frame of a sequence with an estimator on this machine.
+    progress
+        Receives the steps.
 
     Raises
     ------
@@ -104,6 +114,8 @@ def plan(goal: Goal, predictor: Predictor, capabilities: Capabilities, *, timed:
         ``target-unreachable`` with the best that can be achieved and what limits it.
     """
     goal.require_sensible()
+    progress = progress or Progress()
+    progress.at(0.0, "sequences for the goal")
     search = Search(goal, families(goal, predictor, capabilities), predictor, timed)
     targets = {name: goal.limit(name) for name in goal.targets}
     leading = goal.leading
@@ -114,7 +126,9 @@ def plan(goal: Goal, predictor: Predictor, capabilities: Capabilities, *, timed:
             raise too_small(goal, search)
         if not goal.reached_by(best):
             raise unreachable(goal, search, best)
+    progress.at(0.7, "half the time")
     half_time = search.finest(leading, best.applied.capture_s / 2, contenders=1)
+    progress.at(0.8, "twice the accuracy")
     half = {leading: best.error(leading) / 2}
     twice = search.without_budgets().quickest(half, contenders=1)
     return Plan(best, half_time, twice, leading, _summary(best, twice), predictor.scene)

@@ -1,5 +1,6 @@
 """Plans sequences for the scene that a camera sees. Runs on workers."""
 
+import itertools
 import threading
 from collections.abc import Callable
 from dataclasses import asdict
@@ -13,9 +14,10 @@ from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.planning.families import Family, families, require_plannable
 from transientcam_server.planning.goal import Goal
-from transientcam_server.planning.look import LookedThrough, look_at
+from transientcam_server.planning.look import STEPS, LookedThrough, look_at
 from transientcam_server.planning.plan import Plan, in_a_sentence, plan
 from transientcam_server.planning.prediction import Predictor
+from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.queue import Allowance, Rest
 from transientcam_server.planning.scene import SceneStatistics
 from transientcam_server.planning.search import Search
@@ -63,14 +65,15 @@ class Planner:
         base: Sequence,
         *,
         ambient_dn_per_s: float | None = None,
-        go_on: Callable[[str], None] = lambda stage: None,
+        progress: Progress | None = None,
     ) -> SceneStatistics:
         """Look at the scene before a camera; see `look_at`."""
-        pause = self._pause()
+        pause, progress = self._pause(), progress or Progress()
+        done = itertools.count()
 
         def checked(stage: str) -> None:
             pause()
-            go_on(stage)
+            progress.at(next(done) / STEPS, stage)
 
         return look_at(
             camera,
@@ -85,17 +88,17 @@ class Planner:
         """Refuse a camera whose captures are not predicted (Problem ``target-unreachable``)."""
         require_plannable(self._capabilities)
 
-    def plan(
-        self, goal: Goal, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
-    ) -> Plan:
-        """Recommend a sequence; see `planning.plan`. What ``go_on`` raises ends it."""
-        return plan(goal, self._predictor(scene, go_on), self._capabilities, timed=self._computing)
+    def plan(self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None) -> Plan:
+        """Recommend a sequence; see `planning.plan`. What is raised by ``progress`` ends it."""
+        progress = progress or Progress()
+        predictor = self._predictor(scene, progress)
+        return plan(goal, predictor, self._capabilities, timed=self._computing, progress=progress)
 
     def plan_document(
-        self, goal: Goal, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
+        self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
     ) -> dict[str, Any]:
         """Return `plan` as JSON."""
-        return self.plan(goal, scene, go_on).to_document()
+        return self.plan(goal, scene, progress).to_document()
 
     def families(self, goal: Goal, scene: SceneStatistics) -> list[Family]:
         """Return all that is searched for a goal; see `planning.families`."""

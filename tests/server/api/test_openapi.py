@@ -79,6 +79,7 @@ def test_every_resource_of_the_interface_is_described(document: dict[str, Any]) 
         "DELETE /api/v1/lease",
         "POST /api/v1/acquisition/safe-off",
         "POST /api/v1/plan",
+        "POST /api/v1/plan/jobs",
         "GET /api/v1/tradeoff",
         "GET /livez",
         "GET /metrics",

@@ -31,6 +31,7 @@ from transientcam_server.planning.families import EXPOSURES, HARMONICS, TAKES, f
 from transientcam_server.planning.measures import pixel_errors
 from transientcam_server.planning.plan import plan
 from transientcam_server.planning.prediction import Figure, Prediction
+from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.resolving import both_found
 from transientcam_server.planning.search import Search
 from transientcam_server.planning.timing import ReconstructionTimer
@@ -441,14 +442,20 @@ def test_a_look_can_be_ended() -> None:
     class EnoughError(Exception):
         pass
 
-    def go_on(stage: str) -> None:
-        if stage == "all frequencies":
+    shares = []
+
+    def report(share: float, step: str) -> None:
+        shares.append(share)
+        if step == "all frequencies":
             raise EnoughError
 
     with open_camera("sim:wall", clock=VirtualClock()) as camera:
         planner = Planner(camera.capabilities, sensor_of(camera, SensorSettings()), SETTINGS)
         with pytest.raises(EnoughError):
-            planner.look(camera, Sequence(), go_on=go_on)
+            planner.look(camera, Sequence(), progress=Progress(report))
+
+    assert shares == sorted(shares)
+    assert 0 < shares[-1] < 0.5
 
 
 # -- prediction ---------------------------------------------------------------------------------

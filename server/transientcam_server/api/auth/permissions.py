@@ -17,6 +17,7 @@ from transientcam_server.api.auth.tokens import Role
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.problems import document_problems
 from transientcam_server.errors import Problem, kinds
+from transientcam_server.service import Service
 
 _READS: Final = frozenset(("GET", "HEAD", "OPTIONS"))
 _Endpoint = TypeVar("_Endpoint", bound=Callable[..., Any])
@@ -31,7 +32,8 @@ class Needs:
 
 
 _TO_READ: Final = Needs(Role.VIEWER, lease=False)
-_TO_CHANGE: Final = Needs(Role.OPERATOR, lease=True)
+TO_CHANGE: Final = Needs(Role.OPERATOR, lease=True)
+"""What a change of the camera or of what is kept requires."""
 
 
 def needs(role: Role, *, lease: bool) -> Callable[[_Endpoint], _Endpoint]:
@@ -47,7 +49,7 @@ def needs(role: Role, *, lease: bool) -> Callable[[_Endpoint], _Endpoint]:
 def needed(endpoint: Callable[..., Any], method: str) -> Needs:
     """Return what is needed to call a route."""
     marked: Needs | None = getattr(endpoint, _MARK, None)
-    return marked or (_TO_READ if method in _READS else _TO_CHANGE)
+    return marked or (_TO_READ if method in _READS else TO_CHANGE)
 
 
 _MARK: Final = "_transientcam_needs"
@@ -55,7 +57,17 @@ _MARK: Final = "_transientcam_needs"
 
 async def admit(request: Request, service: ServiceOf) -> None:
     """Admit a request of the interface, or refuse it with what it lacks."""
-    wanted = needed(request.scope["endpoint"], request.method)
+    require(request, service, needed(request.scope["endpoint"], request.method))
+
+
+def require(request: Request, service: Service, wanted: Needs) -> None:
+    """Refuse a request that lacks what it needs.
+
+    Raises
+    ------
+    Problem
+        ``role-too-low``, or as `LeaseManager.check`.
+    """
     principal: Principal = request.state.principal
     if principal.role < wanted.role:
         detail = f"{principal.name} is a {principal.role}, but this takes the role {wanted.role}."

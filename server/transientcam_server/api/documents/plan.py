@@ -110,7 +110,8 @@ class PredictedDocument(Document):
     range_bias_m: float
     """How far the mean range of the median pixel is off; more captures do not reduce it."""
     outlier_share: float
-    """Share of the ranges that are off by more than five times `range_error_m`."""
+    """Share of the ranges that are off by more than five times `range_error_m`; pixels whose bias
+    none of the frequencies looked at shows are not in it."""
     beyond_scene: bool
     """Whether it sees more of the scene than the look that the scene was judged by, so that the
     prediction is a bound on how good it can be."""

@@ -2,8 +2,10 @@
 
 from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 
+from transientcam_server.api.auth import Role
+from transientcam_server.api.auth.permissions import TO_CHANGE, needs, require
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.job import JobDocument, JobsDocument
 from transientcam_server.api.problems import documented
@@ -12,6 +14,8 @@ from transientcam_server.errors import kinds
 
 router = APIRouter(tags=["jobs"])
 MAX_WAIT_S: Final = 30.0
+PLAN: Final = "plan"
+"""The kind of job that makes a plan."""
 ACCEPTED: Final[dict[int | str, dict[str, Any]]] = {
     202: {
         "description": "It has begun, or waits for its turn",
@@ -57,10 +61,19 @@ async def read_job(
 @router.post(
     "/jobs/{job}/cancel",
     summary="Cancel a job",
-    responses=documented(kinds.UNKNOWN_JOB, kinds.INVALID_REQUEST),
+    responses=documented(
+        kinds.UNKNOWN_JOB, kinds.INVALID_REQUEST, kinds.ROLE_TOO_LOW, kinds.LEASE_HELD
+    ),
 )
-async def cancel_job(service: ServiceOf, job: _Job) -> JobDocument:
-    """Cancel a job, which ends as soon as it can; it stays listed, and an ended one as it is."""
+@needs(Role.VIEWER, lease=False)
+async def cancel_job(service: ServiceOf, job: _Job, request: Request) -> JobDocument:
+    """Cancel a job, which ends as soon as it can; it stays listed, and an ended one as it is.
+
+    A plan changes nothing, and may be cancelled by whoever may ask for one; another job by whoever
+    may change the camera.
+    """
+    if service.jobs.get(job).kind != PLAN:
+        require(request, service, TO_CHANGE)
     return document(service.jobs.cancel(job))
 
 

@@ -13,7 +13,9 @@ import pytest
 
 from tests.server.contract import hold_to_contract
 from tests.serving import Served, serving
-from transientcam_server.errors.exceptions import Problem
+from transientcam.wire import LEASE_HEADER
+from transientcam_server.errors.exceptions import JobCancelled, Problem
+from transientcam_server.planning import Progress
 
 FIXED = {"base_frequency_hz": 23e6, "harmonics": 3}
 SCENE = {"brightness_dn_per_s": 8e5, "returns": [{"range_m": 1.5}, {"range_m": 3.0, "weight": 0.5}]}
@@ -166,6 +168,74 @@ def test_a_client_that_leaves_ends_the_work(
     client.close()
 
     assert ended.wait(60)
+
+
+def start(client: httpx.Client, **request: Any) -> dict[str, Any]:
+    response = client.post("/api/v1/plan/jobs", json={"fixed": FIXED, "scene": SCENE, **request})
+    job: dict[str, Any] = response.json()
+    assert response.status_code == 202
+    assert response.headers["location"] == f"/api/v1/jobs/{job['id']}"
+    return job
+
+
+def end_of(client: httpx.Client, job: dict[str, Any]) -> dict[str, Any]:
+    while job["finished_at"] is None:
+        job = client.get(f"/api/v1/jobs/{job['id']}", params={"wait_s": 30}).json()
+    return job
+
+
+def test_a_job_makes_the_plan_that_a_request_waits_for(noisy: httpx.Client) -> None:
+    goal = {"budget": {"capture_s": 0.2}, "estimator": "maximum-entropy"}
+    expected = ask(noisy, scene=SCENE, **goal).json()
+
+    job = end_of(noisy, start(noisy, **goal))
+
+    assert (job["kind"], job["state"], job["progress"]) == ("plan", "done", 1.0)
+    for name in ("sequence", "predicted", "summary", "scene"):
+        assert job["result"][name] == expected[name]
+
+
+def test_a_job_fails_with_what_the_request_is_refused_with(noisy: httpx.Client) -> None:
+    impossible = {"target": {"range_error_m": 1e-7}, "estimator": "single-frequency"}
+
+    job = end_of(noisy, start(noisy, **impossible))
+
+    assert job["state"] == "failed"
+    assert job["problem"]["type"] == "/problems/target-unreachable"
+    assert job["problem"]["field"] == "range_error_m"
+
+
+def test_a_plan_is_cancelled_without_the_lease_and_reports_its_steps(
+    noisy: httpx.Client, noisy_daemon: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    began, ended, pause = threading.Event(), threading.Event(), threading.Event()
+
+    def endless(goal: object, scene: object, progress: Progress) -> None:
+        progress.at(0.5, "searching")
+        began.set()
+        try:
+            while True:
+                progress()
+                pause.wait(0.01)
+        except JobCancelled:
+            ended.set()
+            raise
+
+    monkeypatch.setattr(noisy_daemon.service.planner, "plan_document", endless)
+    lease = noisy.post("/api/v1/lease", json={"holder": "test", "duration_s": 60}).json()
+    try:
+        job = start(noisy, target={"range_error_m": 0.01})
+        assert began.wait(60)
+        running = noisy.get(f"/api/v1/jobs/{job['id']}").json()
+
+        noisy.post(f"/api/v1/jobs/{job['id']}/cancel")
+
+        assert ended.wait(60)
+        assert (running["state"], running["step"]) == ("running", "searching")
+        assert 0.5 < running["progress"] < 1
+        assert end_of(noisy, job)["state"] == "cancelled"
+    finally:
+        noisy.delete("/api/v1/lease", headers={LEASE_HEADER: lease["lease_id"]})
 
 
 def test_errors_of_the_range_cost_nothing_until_a_client_requests_them(

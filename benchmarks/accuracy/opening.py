@@ -1,0 +1,107 @@
+"""How docs/accuracy.md opens: what 5 mm cost on each scene, in one picture and a sentence each."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from transientcam_experiments.tradeoff.picture import saved
+
+TARGET_M: Final = 5e-3
+PICTURE: Final = "accuracy-price.png"
+BEGIN: Final = "<!-- opening: python -m benchmarks.accuracy.pictures --write -->"
+END: Final = "<!-- end of the opening -->"
+Documents = Mapping[str, Mapping[str, Any]]
+"""Answers of `GET /api/v1/tradeoff` by the name of the scene."""
+
+
+def opening(documents: Documents, machine: str) -> str:
+    """Return the opening, between its marks."""
+    lines = [
+        BEGIN,
+        "## What do I pay for 5 mm?",
+        "",
+        f"![Range error against the time of a capture, by scene](figures/{PICTURE})",
+        "",
+        *[f"- **{name}**: {price(document)}" for name, document in documents.items()],
+        "",
+        "Each line is the best that `transientcam plan` predicts for the time, noise and bias "
+        "together, of the median lit pixel; planned with margin, so that 80 % of the captures stay "
+        "below, a plan takes longer.",
+        "",
+        *[
+            f"![Range error against capture time on {name}](figures/accuracy-{name}-error.png)\n"
+            for name in documents
+        ],
+        "Thin lines are sets of frequencies: noise (dashed) falls with time, bias (dotted) stays. "
+        "The star is the default sequence with the default estimator, as captured.",
+        "",
+        f"Measured on {machine}.",
+        "",
+        END,
+    ]
+    return "\n".join(lines)
+
+
+def price(document: Mapping[str, Any]) -> str:
+    """State the time from which on the error is below `TARGET_M`, and what rules there."""
+    front = document["front"]
+    reached = [each for each in front if _error_m(each) <= TARGET_M]
+    if not reached:
+        if not front:
+            return "nothing is predicted to reach any accuracy."
+        best = front[-1]
+        return (
+            f"5 mm are out of reach; the best is {_error_m(best) * 1e3:.3g} mm in "
+            f"{best['capture_s'] * 1e3:.3g} ms, {_ruled_by(best)}."
+        )
+    first = reached[0]
+    sequence = first["sequence"]
+    return (
+        f"{first['capture_s'] * 1e3:.3g} ms for {_error_m(first) * 1e3:.3g} mm, {_ruled_by(first)} "
+        f"(m = {sequence['harmonics']} at {sequence['base_frequency_hz'] / 1e6:g} MHz, "
+        f"{first['estimator']})."
+    )
+
+
+def draw_prices(documents: Documents, folder: Path) -> None:
+    """Draw the best error for the time of all scenes into one picture."""
+    figure = Figure(figsize=(7.2, 4.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    panel = figure.subplots()
+    for name, document in documents.items():
+        front = document["front"]
+        time_s = [each["capture_s"] for each in front]
+        panel.plot(time_s, [_error_m(each) for each in front], "o-", label=name)
+    panel.axhline(TARGET_M, color="black", linestyle="--", linewidth=1)
+    panel.set(
+        xscale="log",
+        yscale="log",
+        xlabel="time of one capture / s",
+        ylabel="range error of the median pixel / m",
+        title="What does 5 mm (dashed) cost? Noise and bias together",
+    )
+    panel.grid(alpha=0.25, which="both")
+    panel.legend()
+    (folder / PICTURE).write_bytes(saved(figure, "png"))
+
+
+def replaced(page: str, text: str) -> str:
+    """Return a page with another opening: in place of the last, else below its first heading."""
+    if BEGIN in page:
+        before, _, rest = page.partition(BEGIN)
+        return before + text + rest.partition(END)[2]
+    heading, _, rest = page.partition("\n\n")
+    return f"{heading}\n\n{text}\n\n{rest}"
+
+
+def _error_m(choice: Mapping[str, Any]) -> float:
+    return float(choice["predicted"]["range_error_m"]["median"])
+
+
+def _ruled_by(choice: Mapping[str, Any]) -> str:
+    predicted = choice["predicted"]
+    biased = predicted["range_bias_m"] > predicted["range_std_m"]["median"]
+    return "bias rules: more time buys little" if biased else "noise rules: more time buys accuracy"

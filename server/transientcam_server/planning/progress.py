@@ -1,0 +1,46 @@
+"""How far a look or a plan has come; what it reports to may end it."""
+
+from collections.abc import Callable
+
+Report = Callable[[float, str], None]
+"""Takes the share that is done, 0 to 1, and the present step; what it raises ends the work."""
+
+
+class Progress:
+    """Steps of work, reported by the work itself.
+
+    Parameters
+    ----------
+    report
+        Receives all that becomes known; called from the thread of the work.
+    first, last
+        Shares of the whole at which this work begins and ends.
+    """
+
+    def __init__(
+        self,
+        report: Report = lambda share, step: None,
+        *,
+        first: float = 0.0,
+        last: float = 1.0,
+    ) -> None:
+        self._report = report
+        self._first, self._last = first, last
+        self._now = first, "waiting"
+
+    def __call__(self) -> None:
+        """Ask whether to go on, at the same step."""
+        self._report(*self._now)
+
+    def at(self, share: float, step: str) -> None:
+        """Report the share of this work that is done, and what is next."""
+        whole = self._first + (self._last - self._first) * min(share, 1.0)
+        self._now = whole, step
+        self._report(whole, step)
+
+    def part(self, first: float, last: float) -> "Progress":
+        """Return the progress of work that is a part of this."""
+        span = self._last - self._first
+        return Progress(
+            self._report, first=self._first + span * first, last=self._first + span * last
+        )
