@@ -51,9 +51,9 @@ class SweepEvaluation:
         for takes in steps:
             flat = takes.reshape((*takes.shape[:2], -1))
             sampled.append(flat[:, :, :: -(-flat.shape[2] // MOST_PIXELS)])
-        below: list[_Array] = [(flat < self._full_scale).all(axis=(0, 1)) for flat in sampled]
-        used = np.flatnonzero(np.logical_and.reduce(below))
-        lit = np.zeros(len(below[0]), bool)
+        below = np.array([(flat < self._full_scale).all(axis=(0, 1)) for flat in sampled])
+        used = np.flatnonzero(below.all(axis=0))
+        lit = np.zeros(below.shape[1], bool)
         swept = None
         if used.size:
             swept = tm.sweep_phasors(np.stack([flat[:, :, used] for flat in sampled])).phasors
