@@ -29,7 +29,8 @@ def opening(documents: Documents, machine: str) -> str:
         "",
         "Each line is the best that `transientcam plan` predicts for the time, noise and bias "
         "together, of the median lit pixel; planned with margin, so that 80 % of the captures stay "
-        "below, a plan takes longer.",
+        "below, a plan takes longer. Light that none of the frequencies of the look resolves moves "
+        "a range without any sign of it: neither the error nor `outlier_share` has that.",
         "",
         *[
             f"![Range error against capture time on {name}](figures/accuracy-{name}-error.png)\n"
@@ -38,7 +39,7 @@ def opening(documents: Documents, machine: str) -> str:
         "Thin lines are sets of frequencies: noise (dashed) falls with time, bias (dotted) stays. "
         "The star is the default sequence with the default estimator, as captured.",
         "",
-        f"Measured on {machine}.",
+        f"Measured by `python -m benchmarks.accuracy.pictures --write` on {machine}.",
         "",
         END,
     ]
@@ -60,7 +61,8 @@ def price(document: Mapping[str, Any]) -> str:
     first = reached[0]
     sequence = first["sequence"]
     return (
-        f"{first['capture_s'] * 1e3:.3g} ms for {_error_m(first) * 1e3:.3g} mm, {_ruled_by(first)} "
+        f"at most {first['capture_s'] * 1e3:.3g} ms, for {_error_m(first) * 1e3:.3g} mm, "
+        f"{_ruled_by(first)} "
         f"(m = {sequence['harmonics']} at {sequence['base_frequency_hz'] / 1e6:g} MHz, "
         f"{first['estimator']})."
     )
