@@ -96,9 +96,8 @@ def test_returns_hold_the_light_of_all_surfaces_in_a_pixel() -> None:
 
 def test_rays_followed_for_other_pixels_before_change_nothing() -> None:
     of = SCENES["silhouette and shadow on a wall"]
-    size = {"width": WIDTH, "height": HEIGHT}
-    shared = FollowedRays(of, **size)
-    still = StillLight(of, **size, noise=NOISE, highest_hz=69e6)
+    shared = FollowedRays(of, width=WIDTH, height=HEIGHT)
+    still = StillLight(of, width=WIDTH, height=HEIGHT, noise=NOISE, highest_hz=69e6)
     third = still.mixed[::3]
 
     for pixel in (third, still.mixed[1::2], still.mixed, third):
