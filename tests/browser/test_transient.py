@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 import transientcam_moments as tm
 from tests.browser.conftest import Watch
@@ -45,6 +45,13 @@ def stop(served: Served) -> int:
     httpx.put(f"{served.url}/api/v1/acquisition", json={"running": False}).raise_for_status()
     number: int = httpx.get(f"{served.url}/api/v1/frames/latest").json()["frame"]
     return number
+
+
+def look(page: Page) -> Locator:
+    """Open the popover of how the light looks."""
+    panel = page.locator(".panel-transient")
+    panel.get_by_role("button", name="Look of the light").click()
+    return panel.get_by_role("dialog", name="Look of the light")
 
 
 def toeplitz(moments: NDArray[Any]) -> NDArray[np.complex128]:
@@ -181,7 +188,8 @@ def test_light_passes_the_pixels_when_their_range_says(page: Page, served: Serve
     open_page(page)
     shows_frame(page, stop(served))
     ranges = np.load(io.BytesIO(httpx.get(f"{served.url}/api/v1/frames/latest/range.npy").content))
-    page.get_by_role("button", name="scene").click()  # the light alone
+    look(page).get_by_label("Scene behind the light").uncheck()  # the light alone
+    page.keyboard.press("Escape")
     steps_m = np.arange(1.4, 2.2, 0.04)
     pictures = np.stack(
         [
@@ -249,18 +257,6 @@ def test_a_click_shows_the_pixels_impulse_response(page: Page, served: Served) -
     shows_frame(page, stop(served))
     point_at(page, "transient", 81, 20, click=True)
     expect(page.locator(".panel-response h2")).to_have_text("Impulse response of pixel 81, 20")
-    pixel = httpx.get(
-        f"{served.url}/api/v1/frames/latest/pixel", params={"x": 81, "y": 20, "bins": 4096}
-    ).raise_for_status()
-    density = np.array(pixel.json()["density_per_s"])
-    tops = np.flatnonzero((density > np.roll(density, 1)) & (density >= np.roll(density, -1)))
-    expected_ns = np.array(pixel.json()["time_s"])[tops] * 1e9
-    listed = page.locator(".peaks tbody tr").evaluate_all(
-        "(rows) => rows.map((row) => parseFloat(row.cells[0].textContent))"
-    )
-    assert len(listed) >= 2
-    for time_ns in listed:
-        assert np.min(np.abs(expected_ns - time_ns)) < 0.02
     ink = page.locator(".response-plot .uplot canvas").evaluate(
         "(canvas) => new Set(new Uint32Array(canvas.getContext('2d')"
         ".getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size"
@@ -281,10 +277,11 @@ def test_a_click_into_the_response_moves_the_light_there(page: Page) -> None:
 
 def test_light_so_far_is_what_the_daemon_integrates(page: Page, served: Served) -> None:
     open_page(page)
-    page.get_by_role("button", name="sum").click()
+    page.get_by_role("tab", name="So far").click()
     page.locator("canvas[data-renderer=closed-form][data-frame]").wait_for()
     shows_frame(page, stop(served))
-    page.locator(".panel-transient").get_by_label("Tone").select_option("linear")
+    look(page).get_by_label("Tone").select_option("linear")
+    page.keyboard.press("Escape")
     white = float(str(transient_canvas(page).get_attribute("data-white")))
     for turn in (0.1, 0.27, 0.45, 0.9):
         answer = httpx.get(
@@ -301,7 +298,7 @@ def test_light_so_far_is_what_the_daemon_integrates(page: Page, served: Served) 
 def test_the_light_so_far_at_a_pixel_is_told(page: Page, served: Served) -> None:
     open_page(page)
     shows_frame(page, stop(served))
-    page.get_by_role("button", name="sum").click()
+    page.get_by_role("tab", name="So far").click()
     point_at(page, "map", 81, 20, click=True)
     page.evaluate("() => transientcam.store.player.seek(0.4)")
     answer = httpx.get(

@@ -1,4 +1,7 @@
 import { BACKDROP_GAIN, DECADES, FULL_LIGHT } from "./tone";
+import { TRAIL_SHARES } from "./trail";
+
+const MOMENTS = TRAIL_SHARES.length;
 
 /** One triangle that covers the canvas, from the vertex number alone. */
 export const VERTEX_SHADER = `#version 300 es
@@ -20,7 +23,8 @@ uniform sampler2DArray coefficients;
 uniform sampler2D backdrop;
 uniform sampler2D colours;
 uniform int layers;
-uniform vec2 z;                // exp(i phi)
+uniform vec2 z[${MOMENTS}];          // exp(i phi) now, and at the earlier moments of the trail
+uniform int moments;           // how many of them count
 uniform float baseFrequencyHz;
 uniform float white;           // density shown brightest
 uniform float backdropWhite;   // 0: no backdrop
@@ -28,19 +32,21 @@ uniform int tone;              // linear, root, logarithmic
 uniform bool asNumbers;
 out vec4 colour;
 
-vec2 horner(vec2 p, vec2 a) {  // (p + conj(a)) z
+const float kept[${MOMENTS}] = float[${MOMENTS}](${TRAIL_SHARES.map((share) => share.toFixed(3)).join(", ")});
+
+vec2 horner(vec2 p, vec2 a, vec2 z) {  // (p + conj(a)) z
   p += vec2(a.x, -a.y);
   return vec2(p.x * z.x - p.y * z.y, p.x * z.y + p.y * z.x);
 }
 
-float density(ivec2 at) {
+float density(ivec2 at, vec2 z) {
   vec2 p = vec2(0.0);
   for (int layer = layers - 1; layer >= 1; layer--) {
     vec4 pair = texelFetch(coefficients, ivec3(at, layer), 0);
-    p = horner(horner(p, pair.zw), pair.xy);
+    p = horner(horner(p, pair.zw, z), pair.xy, z);
   }
   vec4 first = texelFetch(coefficients, ivec3(at, 0), 0);
-  p = horner(p, first.zw);
+  p = horner(p, first.zw, z);
   p.x += 1.0;
   return first.x * baseFrequencyHz / dot(p, p);
 }
@@ -50,11 +56,12 @@ void main() {
   ivec2 size = textureSize(coefficients, 0).xy;
   ivec2 at = ivec2(gl_FragCoord.xy);
   if (!asNumbers) at.y = size.y - 1 - at.y;
-  float value = density(at);
+  float value = density(at, z[0]);
   if (asNumbers) {
     colour = vec4(value, 0.0, 0.0, 1.0);
     return;
   }
+  for (int n = 1; n < moments; n++) value = max(value, kept[n] * density(at, z[n]));
   float share = value / white;
   share = share >= 0.0 ? min(share, 1.0) : 0.0;  // not a number: no density, no light
   float place = share;

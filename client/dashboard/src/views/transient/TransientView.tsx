@@ -1,28 +1,31 @@
 import { computed, useComputed } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 
-import { scaleOf, TONES, type ToneKind } from "../../gl/tone";
+import { scaleOf } from "../../gl/tone";
 import { densityAt } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
 import { SPEEDS_NS } from "../../store/player";
 import { useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
-import { ColourChoice } from "../../ui/ColourChoice";
-import { Choice, Toggle } from "../../ui/controls";
+import { Choice, Tabs } from "../../ui/controls";
 import { savePicture } from "../../ui/download";
-import { fixed, significant, superscript, withUnit } from "../../ui/format";
+import { fixed, significant, superscript } from "../../ui/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
 import { AMPLITUDE } from "../map/catalogue";
 import { litOf, peaksOf, turnsOf } from "./arrivals";
-import { TransientLook } from "./look";
+import { TransientLook, type Play } from "./look";
 import { LightSoFar } from "./LightSoFar";
+import { LookMenu } from "./LookMenu";
 import { Picture } from "./Picture";
 import { stripOf, PICTURES } from "./strip";
 import { Timeline, TimeReadout } from "./Timeline";
 
-const TONE_NAMES: Record<ToneKind, string> = { linear: "linear", root: "root", logarithmic: "log" };
+const PLAY_TABS: readonly { readonly value: Play; readonly text: string; readonly hint: string }[] = [
+  { value: "density", text: "In flight", hint: "The light that arrives at one time" },
+  { value: "cumulative", text: "So far", hint: "All light that has come up to that time" },
+];
 
 /** Light in flight: the density of Eq. (2) at one time of flight, evaluated in this browser. */
 export function TransientView() {
@@ -41,7 +44,7 @@ export function TransientView() {
   return (
     <Panel
       name="transient"
-      title={<h2>{cumulative ? "Light so far" : "Light in flight"}</h2>}
+      title={<h2>Light</h2>}
       downloads={[
         {
           text: "Picture (PNG)",
@@ -67,35 +70,8 @@ export function TransientView() {
       ]}
       tools={
         <>
-          <Toggle
-            pressed={cumulative}
-            title="Let the light stay once it has come"
-            onToggle={() => (look.play.value = cumulative ? "density" : "cumulative")}
-          >
-            sum
-          </Toggle>
-          <Choice
-            label="Tone"
-            value={look.tone.value}
-            options={TONES.map((kind) => ({ value: kind, text: TONE_NAMES[kind] }))}
-            onChange={(kind) => (look.tone.value = kind)}
-          />
-          <Choice
-            label="Exposure compensation"
-            value={look.stops.value}
-            options={STOPS.map((stops) => ({ value: stops, text: stopsText(stops) }))}
-            onChange={(stops) => (look.stops.value = stops)}
-          />
-          {!cumulative && (
-            <Toggle
-              pressed={look.backdrop.value}
-              title="Show the still scene behind the light"
-              onToggle={() => (look.backdrop.value = !look.backdrop.peek())}
-            >
-              scene
-            </Toggle>
-          )}
-          <ColourChoice colours={look.colours} />
+          <Tabs label="What of the light" value={look.play.value} options={PLAY_TABS} onChange={(play) => (look.play.value = play)} />
+          <LookMenu look={look} />
         </>
       }
     >
@@ -149,12 +125,6 @@ function LightBar({ look }: { look: TransientLook }) {
   const white = cumulative ? (scene.value?.map?.high ?? NaN) / 2 ** look.stops.value : look.white.value * 1e-9;
   if (!(white > 0)) return null;
   return <ColourBar scale={scaleOf(look.tone.value, Number(white.toPrecision(3)))} colours={look.colours.value} unit={cumulative ? "DN" : "DN/ns"} />;
-}
-
-const STOPS = [-4, -3, -2, -1, 0, 1, 2, 3, 4, 6, 8];
-
-function stopsText(stops: number): string {
-  return withUnit(stops > 0 ? `+${stops}` : String(stops).replace("-", "−"), "EV");
 }
 
 /** Times slower than real: 5 ns of flight in a second are 2·10⁸. */

@@ -17,6 +17,8 @@ export class TransientLook {
   /** Exposure compensation in stops: +1 shows half as much light as brightest. */
   readonly stops: Signal<number>;
   readonly backdrop: Signal<boolean>;
+  /** Whether light that plays leaves a trail; a picture at rest is the density alone. */
+  readonly trail: Signal<boolean>;
   readonly play: Signal<Play>;
   /** Draws the picture anew and answers its canvas, which can be read in this task. */
   snapshot: () => HTMLCanvasElement | null = () => null;
@@ -28,6 +30,7 @@ export class TransientLook {
     this.tone = remembered<ToneKind>(shelf, "transient.tone", "root", oneOf(TONES));
     this.stops = remembered(shelf, "transient.stops", 0, aNumber);
     this.backdrop = remembered(shelf, "transient.backdrop", true, aBoolean);
+    this.trail = remembered(shelf, "transient.trail", true, aBoolean);
     this.play = remembered<Play>(shelf, "transient.play", "density", oneOf(PLAYS));
     this.white = computed(() => this.#meter(frame.value?.light?.peak ?? NaN) / 2 ** this.stops.value);
   }
