@@ -63,7 +63,7 @@ export function Picture({ look }: { look: TransientLook }) {
       wanted && fits && white > 0 && brightness?.values instanceof Float32Array
         ? { values: brightness.values, white }
         : null;
-    const trail_rad = look.trail.value && store.player.playing.value ? (2 * Math.PI * TRAIL_S) / store.period_s.value : 0;
+    const trail_rad = look.trail.value && (store.player.playing.value || look.filming.share.value !== null) ? (2 * Math.PI * TRAIL_S) / store.period_s.value : 0;
     renderer.value.draw(coefficients, { phase_rad, trail_rad, tone, colours, backdrop });
     if (canvas.current !== null) canvas.current.dataset["frame"] = String(frame.peek()?.meta.frame);
     look.snapshot = () => {

@@ -2,19 +2,24 @@ import { computed, useComputed } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 
 import { scaleOf } from "../../gl/tone";
+import { rangeOfTime_m } from "../../physics/constants";
 import { densityAt } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
 import { SPEEDS_NS } from "../../store/player";
-import { useStore } from "../../store/store";
+import { type Store, useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
 import { Choice, Tabs } from "../../ui/controls";
 import { savePicture } from "../../ui/download";
 import { fixed, significant, superscript } from "../../ui/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
+import { captionOf, timeWords } from "../../ui/figure";
+import { saveFigure, type FigureParts } from "../../ui/figureFiles";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
+import type { Scale } from "../../ui/scale";
 import { AMPLITUDE } from "../map/catalogue";
 import { litOf, peaksOf, turnsOf } from "./arrivals";
+import { FilmProgress } from "./Filming";
 import { TransientLook, type Play } from "./look";
 import { LightSoFar } from "./LightSoFar";
 import { LookMenu } from "./LookMenu";
@@ -41,6 +46,8 @@ export function TransientView() {
     player.arrivals.value = peaksOf(arrivals);
   }, [frame, player]);
   const cumulative = look.play.value === "cumulative";
+  const subject = useMemo(() => ({ snapshot: () => look.snapshot(), parts: () => partsOf(look, store) }), [look, store]);
+  const figureName = (): string => `${look.play.peek()}-${Math.round(player.time_s.peek() * 1e12)}ps-${frame.peek()?.meta.frame ?? 0}`;
   return (
     <Panel
       name="transient"
@@ -49,9 +56,16 @@ export function TransientView() {
         {
           text: "Picture (PNG)",
           run: () => {
-            const time_ps = Math.round(player.time_s.peek() * 1e12);
-            savePicture(`${look.play.peek()}-${time_ps}ps-${frame.peek()?.meta.frame ?? 0}`, look.snapshot());
+            savePicture(figureName(), look.snapshot());
           },
+        },
+        {
+          text: "Figure (PNG)",
+          run: () => void saveFigure(figureName(), look.snapshot(), subject.parts(), "png"),
+        },
+        {
+          text: "Figure (SVG)",
+          run: () => void saveFigure(figureName(), look.snapshot(), subject.parts(), "svg"),
         },
         {
           text: "Strip of 8 times (PNG)",
@@ -67,6 +81,7 @@ export function TransientView() {
             savePicture(`${look.play.peek()}-strip-${frame.peek()?.meta.frame ?? 0}`, strip);
           },
         },
+        ...look.filming.actions(subject, store),
       ]}
       tools={
         <>
@@ -80,6 +95,7 @@ export function TransientView() {
         <LightBar look={look} />
       </div>
       <footer class="panel-foot">
+        <FilmProgress filming={look.filming} />
         <Timeline />
         <div class="panel-row">
           <button
@@ -118,13 +134,30 @@ function steady(before: ReturnType<typeof litOf>, now: ReturnType<typeof litOf>)
   return near ? before : now;
 }
 
-/** What the colours of the light mean. */
-function LightBar({ look }: { look: TransientLook }) {
-  const scene = useStore().frames.of(AMPLITUDE);
+/** What the colours of the light mean: their scale and its unit. */
+function lightScale(look: TransientLook, store: Store): { readonly scale: Scale; readonly unit: string } {
   const cumulative = look.play.value === "cumulative";
-  const white = cumulative ? (scene.value?.map?.high ?? NaN) / 2 ** look.stops.value : look.white.value * 1e-9;
-  if (!(white > 0)) return null;
-  return <ColourBar scale={scaleOf(look.tone.value, Number(white.toPrecision(3)))} colours={look.colours.value} unit={cumulative ? "DN" : "DN/ns"} />;
+  const white = cumulative ? (store.frames.of(AMPLITUDE).value?.map?.high ?? NaN) / 2 ** look.stops.value : look.white.value * 1e-9;
+  return { scale: scaleOf(look.tone.value, Number(white.toPrecision(3))), unit: cumulative ? "DN" : "DN/ns" };
+}
+
+function LightBar({ look }: { look: TransientLook }) {
+  const { scale, unit } = lightScale(look, useStore());
+  return scale.high > 0 ? <ColourBar scale={scale} colours={look.colours.value} unit={unit} /> : null;
+}
+
+/** What is written around a figure or a film of the light. */
+function partsOf(look: TransientLook, store: Store): FigureParts {
+  const time_s = store.player.time_s.peek();
+  const meta = store.frames.of("coefficients").peek()?.meta;
+  const kind = look.play.peek() === "cumulative" ? "Light so far" : "Light in flight";
+  return {
+    ...lightScale(look, store),
+    title: `${kind}, ${timeWords(time_s, rangeOfTime_m(time_s))}`,
+    caption: meta === undefined ? "" : captionOf(meta),
+    colours: look.colours.peek(),
+    ground: "black",
+  };
 }
 
 /** Times slower than real: 5 ns of flight in a second are 2·10⁸. */

@@ -5,6 +5,7 @@ import { TONES } from "../../gl/tone";
 import type { Frame } from "../../store/frames";
 import { aBoolean, aNumber, oneOf, remembered, type Shelf } from "../../store/settings";
 import { COLOUR_MAPS, type ColourMapName } from "../../ui/colourMaps";
+import { Filming } from "./Filming";
 
 /** Light as it comes, or all that has come so far. */
 export const PLAYS = ["density", "cumulative"] as const;
@@ -22,6 +23,8 @@ export class TransientLook {
   readonly play: Signal<Play>;
   /** Draws the picture anew and answers its canvas, which can be read in this task. */
   snapshot: () => HTMLCanvasElement | null = () => null;
+  /** The film that is made of it. */
+  readonly filming = new Filming();
   readonly white: ReadonlySignal<number>;
   #metered: number | null = null;
 
