@@ -10,8 +10,6 @@ export interface Backdrop {
 
 export interface Exposure {
   readonly phase_rad: number;
-  /** How long light stays in the picture, fading, as a phase; 0 shows the present alone. */
-  readonly trail_rad: number;
   readonly tone: Tone;
   readonly colours: ColourMapName;
   readonly backdrop: Backdrop | null;

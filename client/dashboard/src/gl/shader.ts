@@ -1,7 +1,4 @@
 import { BACKDROP_GAIN, DECADES, FULL_LIGHT } from "./tone";
-import { TRAIL_SHARES } from "./trail";
-
-const MOMENTS = TRAIL_SHARES.length;
 
 /** One triangle that covers the canvas, from the vertex number alone. */
 export const VERTEX_SHADER = `#version 300 es
@@ -23,8 +20,7 @@ uniform sampler2DArray coefficients;
 uniform sampler2D backdrop;
 uniform sampler2D colours;
 uniform int layers;
-uniform vec2 z[${MOMENTS}];          // exp(i phi) now, and at the earlier moments of the trail
-uniform int moments;           // how many of them count
+uniform vec2 z;                // exp(i phi)
 uniform float baseFrequencyHz;
 uniform float white;           // density shown brightest
 uniform float backdropWhite;   // 0: no backdrop
@@ -32,21 +28,19 @@ uniform int tone;              // linear, root, logarithmic
 uniform bool asNumbers;
 out vec4 colour;
 
-const float kept[${MOMENTS}] = float[${MOMENTS}](${TRAIL_SHARES.map((share) => share.toFixed(3)).join(", ")});
-
-vec2 horner(vec2 p, vec2 a, vec2 z) {  // (p + conj(a)) z
+vec2 horner(vec2 p, vec2 a) {  // (p + conj(a)) z
   p += vec2(a.x, -a.y);
   return vec2(p.x * z.x - p.y * z.y, p.x * z.y + p.y * z.x);
 }
 
-float density(ivec2 at, vec2 z) {
+float density(ivec2 at) {
   vec2 p = vec2(0.0);
   for (int layer = layers - 1; layer >= 1; layer--) {
     vec4 pair = texelFetch(coefficients, ivec3(at, layer), 0);
-    p = horner(horner(p, pair.zw, z), pair.xy, z);
+    p = horner(horner(p, pair.zw), pair.xy);
   }
   vec4 first = texelFetch(coefficients, ivec3(at, 0), 0);
-  p = horner(p, first.zw, z);
+  p = horner(p, first.zw);
   p.x += 1.0;
   return first.x * baseFrequencyHz / dot(p, p);
 }
@@ -56,12 +50,11 @@ void main() {
   ivec2 size = textureSize(coefficients, 0).xy;
   ivec2 at = ivec2(gl_FragCoord.xy);
   if (!asNumbers) at.y = size.y - 1 - at.y;
-  float value = density(at, z[0]);
+  float value = density(at);
   if (asNumbers) {
     colour = vec4(value, 0.0, 0.0, 1.0);
     return;
   }
-  for (int n = 1; n < moments; n++) value = max(value, kept[n] * density(at, z[n]));
   float share = value / white;
   share = share >= 0.0 ? min(share, 1.0) : 0.0;  // not a number: no density, no light
   float place = share;

@@ -2,7 +2,6 @@ import { densityImage, type Coefficients } from "../physics/maximumEntropy";
 import { colourTable, levelOf } from "../ui/colourMaps";
 import type { DensityRenderer, Exposure } from "./renderer";
 import { backdropGrey, strength, toned } from "./tone";
-import { TRAIL_SHARES, trailPhases } from "./trail";
 
 /** Draws with typed arrays on a 2D canvas, for browsers that refuse WebGL2. */
 export class TypedArrayRenderer implements DensityRenderer {
@@ -19,9 +18,9 @@ export class TypedArrayRenderer implements DensityRenderer {
     this.#context = context;
   }
 
-  draw(coefficients: Coefficients, { phase_rad, trail_rad, tone, colours, backdrop }: Exposure): void {
+  draw(coefficients: Coefficients, { phase_rad, tone, colours, backdrop }: Exposure): void {
     const { width, height } = coefficients;
-    const density = this.#trailOf(coefficients, trailPhases(phase_rad, trail_rad));
+    const density = this.#densityOf(coefficients, phase_rad);
     const { data } = this.#imageOf(width, height);
     const table = colourTable(colours);
     for (let pixel = 0; pixel < density.length; pixel++) {
@@ -50,19 +49,6 @@ export class TypedArrayRenderer implements DensityRenderer {
   dispose(): void {
     this.#image = null;
     this.#density = new Float32Array(0);
-  }
-
-  /** The brightest of what each moment leaves. */
-  #trailOf(coefficients: Coefficients, phases_rad: readonly number[]): Float32Array {
-    const brightest = this.#densityOf(coefficients, phases_rad[0]).slice();
-    phases_rad.slice(1).forEach((phase_rad, n) => {
-      const earlier = this.#densityOf(coefficients, phase_rad);
-      for (let pixel = 0; pixel < earlier.length; pixel++) {
-        const left = TRAIL_SHARES[n + 1] * earlier[pixel];
-        if (left > brightest[pixel]) brightest[pixel] = left;
-      }
-    });
-    return brightest;
   }
 
   #densityOf(coefficients: Coefficients, phase_rad: number): Float32Array {

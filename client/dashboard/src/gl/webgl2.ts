@@ -4,10 +4,9 @@ import type { Backdrop, DensityRenderer, Exposure } from "./renderer";
 import { FRAGMENT_SHADER, VERTEX_SHADER } from "./shader";
 import { layersOf, packTexels } from "./texels";
 import { toneIndex } from "./tone";
-import { trailPhases } from "./trail";
 
 const UNIFORMS = [
-  "coefficients", "backdrop", "colours", "layers", "z", "moments", "baseFrequencyHz", "white", "backdropWhite", "tone", "asNumbers",
+  "coefficients", "backdrop", "colours", "layers", "z", "baseFrequencyHz", "white", "backdropWhite", "tone", "asNumbers",
 ] as const; // prettier-ignore
 
 type Uniforms = Record<(typeof UNIFORMS)[number], WebGLUniformLocation | null>;
@@ -61,7 +60,7 @@ export class WebGl2Renderer implements DensityRenderer {
     canvas.addEventListener("webglcontextlost", this.#onContextLost);
   }
 
-  draw(coefficients: Coefficients, { phase_rad, trail_rad, tone, colours, backdrop }: Exposure): void {
+  draw(coefficients: Coefficients, { phase_rad, tone, colours, backdrop }: Exposure): void {
     const gl = this.#gl;
     if (gl.isContextLost()) return;
     const { width, height } = coefficients;
@@ -76,7 +75,7 @@ export class WebGl2Renderer implements DensityRenderer {
     gl.uniform1f(this.#uniforms.backdropWhite, backdrop?.white ?? 0);
     gl.uniform1i(this.#uniforms.tone, toneIndex(tone.kind));
     gl.uniform1i(this.#uniforms.asNumbers, 0);
-    this.#shade(coefficients, trailPhases(phase_rad, trail_rad));
+    this.#shade(coefficients, phase_rad);
   }
 
   readDensity(coefficients: Coefficients, phase_rad: number): Float32Array {
@@ -93,7 +92,7 @@ export class WebGl2Renderer implements DensityRenderer {
     gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.RENDERBUFFER, target);
     this.#upload(coefficients);
     gl.uniform1i(this.#uniforms.asNumbers, 1);
-    this.#shade(coefficients, [phase_rad]);
+    this.#shade(coefficients, phase_rad);
     const rgba = new Float32Array(4 * width * height);
     gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, rgba);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
@@ -115,11 +114,10 @@ export class WebGl2Renderer implements DensityRenderer {
     this.#lost?.();
   };
 
-  #shade(coefficients: Coefficients, phases_rad: readonly number[]): void {
+  #shade(coefficients: Coefficients, phase_rad: number): void {
     const gl = this.#gl;
     gl.uniform1i(this.#uniforms.layers, layersOf(coefficients.harmonics));
-    gl.uniform2fv(this.#uniforms.z, phases_rad.flatMap((phase_rad) => [Math.cos(phase_rad), Math.sin(phase_rad)]));
-    gl.uniform1i(this.#uniforms.moments, phases_rad.length);
+    gl.uniform2f(this.#uniforms.z, Math.cos(phase_rad), Math.sin(phase_rad));
     gl.uniform1f(this.#uniforms.baseFrequencyHz, coefficients.baseFrequency_hz);
     gl.viewport(0, 0, coefficients.width, coefficients.height);
     gl.drawArrays(gl.TRIANGLES, 0, 3);

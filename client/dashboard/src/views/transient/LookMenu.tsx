@@ -8,20 +8,17 @@ const STOPS = [-4, -3, -2, -1, 0, 1, 2, 3, 4, 6, 8];
 
 /** How the light is shown, behind a button. */
 export function LookMenu({ look }: { look: TransientLook }) {
-  const cumulative = look.play.value === "cumulative";
-  const check = (of: typeof look.trail, text: string, title: string) => (
-    <label class="check" title={title}>
-      <input type="checkbox" checked={of.value} onChange={(event) => (of.value = event.currentTarget.checked)} />
-      {text}
-    </label>
-  );
   return (
     <PopoverButton face="Look" label="Look of the light" title="Tone, exposure and colours" kind="look">
       <ToneChoice tone={look.tone} />
       <Choice label="Exposure" value={look.stops.value} options={STOPS.map((stops) => ({ value: stops, text: stopsText(stops) }))} onChange={(stops) => (look.stops.value = stops)} />
       <ColourChoice colours={look.colours} />
-      {!cumulative && check(look.backdrop, "Scene behind the light", "Show the still scene behind the light")}
-      {!cumulative && check(look.trail, "Trail of the last nanosecond", "While it plays, light fades over 1 ns; at rest the picture is of one time")}
+      {look.play.value === "density" && (
+        <label class="check" title="Show the still scene behind the light">
+          <input type="checkbox" checked={look.backdrop.value} onChange={(event) => (look.backdrop.value = event.currentTarget.checked)} />
+          Scene behind the light
+        </label>
+      )}
     </PopoverButton>
   );
 }

@@ -12,9 +12,6 @@ import type { TransientLook } from "./look";
 /** Tries of WebGL2 before the page is content with typed arrays. */
 const GRAPHICS_TRIES = 2;
 
-/** How long light stays in the picture while it plays, in time of flight. */
-const TRAIL_S = 1e-9;
-
 /** The picture of the light at the player's time. */
 export function Picture({ look }: { look: TransientLook }) {
   const store = useStore();
@@ -63,8 +60,7 @@ export function Picture({ look }: { look: TransientLook }) {
       wanted && fits && white > 0 && brightness?.values instanceof Float32Array
         ? { values: brightness.values, white }
         : null;
-    const trail_rad = look.trail.value && (store.player.playing.value || look.filming.share.value !== null) ? (2 * Math.PI * TRAIL_S) / store.period_s.value : 0;
-    renderer.value.draw(coefficients, { phase_rad, trail_rad, tone, colours, backdrop });
+    renderer.value.draw(coefficients, { phase_rad, tone, colours, backdrop });
     if (canvas.current !== null) canvas.current.dataset["frame"] = String(frame.peek()?.meta.frame);
     look.snapshot = () => {
       draw();

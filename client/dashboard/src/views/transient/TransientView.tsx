@@ -20,7 +20,7 @@ import type { Scale } from "../../ui/scale";
 import { AMPLITUDE } from "../map/catalogue";
 import { litOf, peaksOf, turnsOf } from "./arrivals";
 import { FilmProgress } from "./Filming";
-import { TransientLook, type Play } from "./look";
+import { gateStart_rad, NAMES, TransientLook, type Play } from "./look";
 import { LightSoFar } from "./LightSoFar";
 import { LookMenu } from "./LookMenu";
 import { Picture } from "./Picture";
@@ -29,6 +29,7 @@ import { Timeline, TimeReadout } from "./Timeline";
 
 const PLAY_TABS: readonly { readonly value: Play; readonly text: string; readonly hint: string }[] = [
   { value: "density", text: "In flight", hint: "The light that arrives at one time" },
+  { value: "gate", text: "Last 1 ns", hint: "The light that came within the nanosecond before: a front that is too thin to be seen leaves a trail" },
   { value: "cumulative", text: "So far", hint: "All light that has come up to that time" },
 ];
 
@@ -45,7 +46,7 @@ export function TransientView() {
     player.lit.value = steady(player.lit.peek(), litOf(arrivals));
     player.arrivals.value = peaksOf(arrivals);
   }, [frame, player]);
-  const cumulative = look.play.value === "cumulative";
+  const play = look.play.value;
   const subject = useMemo(() => ({ snapshot: () => look.snapshot(), parts: () => partsOf(look, store) }), [look, store]);
   const figureName = (): string => `${look.play.peek()}-${Math.round(player.time_s.peek() * 1e12)}ps-${frame.peek()?.meta.frame ?? 0}`;
   return (
@@ -91,7 +92,7 @@ export function TransientView() {
       }
     >
       <div class="picture">
-        {cumulative ? <LightSoFar look={look} /> : <Picture look={look} />}
+        {play === "density" ? <Picture look={look} /> : <LightSoFar look={look} />}
         <LightBar look={look} />
       </div>
       <footer class="panel-foot">
@@ -110,7 +111,7 @@ export function TransientView() {
             {player.playing.value ? <PauseIcon /> : <PlayIcon />}
           </button>
           <TimeReadout />
-          <DensityReadout cumulative={cumulative} />
+          <DensityReadout play={play} />
           <div class="panel-tools">
             <span class="quiet slowed" title="How many times slower than light really is">
               1 : {slowness(player.speed_ns.value)}
@@ -136,9 +137,9 @@ function steady(before: ReturnType<typeof litOf>, now: ReturnType<typeof litOf>)
 
 /** What the colours of the light mean: their scale and its unit. */
 function lightScale(look: TransientLook, store: Store): { readonly scale: Scale; readonly unit: string } {
-  const cumulative = look.play.value === "cumulative";
-  const white = cumulative ? (store.frames.of(AMPLITUDE).value?.map?.high ?? NaN) / 2 ** look.stops.value : look.white.value * 1e-9;
-  return { scale: scaleOf(look.tone.value, Number(white.toPrecision(3))), unit: cumulative ? "DN" : "DN/ns" };
+  const gathered = look.play.value !== "density";
+  const white = gathered ? (store.frames.of(AMPLITUDE).value?.map?.high ?? NaN) / 2 ** look.stops.value : look.white.value * 1e-9;
+  return { scale: scaleOf(look.tone.value, Number(white.toPrecision(3))), unit: gathered ? "DN" : "DN/ns" };
 }
 
 function LightBar({ look }: { look: TransientLook }) {
@@ -150,10 +151,9 @@ function LightBar({ look }: { look: TransientLook }) {
 function partsOf(look: TransientLook, store: Store): FigureParts {
   const time_s = store.player.time_s.peek();
   const meta = store.frames.of("coefficients").peek()?.meta;
-  const kind = look.play.peek() === "cumulative" ? "Light so far" : "Light in flight";
   return {
     ...lightScale(look, store),
-    title: `${kind}, ${timeWords(time_s, rangeOfTime_m(time_s))}`,
+    title: `${NAMES[look.play.peek()]}, ${timeWords(time_s, rangeOfTime_m(time_s))}`,
     caption: meta === undefined ? "" : captionOf(meta),
     colours: look.colours.peek(),
     ground: "black",
@@ -168,8 +168,8 @@ function slowness(speed_ns: number): string {
   return `${mantissa === 1 ? "" : `${Number(mantissa.toFixed(1))}·`}10${superscript(exponent)}`;
 }
 
-/** The density at the pixel looked at, at the player's time; or the light up to then. */
-function DensityReadout({ cumulative }: { cumulative: boolean }) {
+/** The density at the pixel looked at, at the player's time; or the light within the gate or up to then. */
+function DensityReadout({ play }: { play: Play }) {
   const poles = useRef<Poles | null>(null);
   const store = useStore();
   const density = useMemo(
@@ -181,14 +181,15 @@ function DensityReadout({ cumulative }: { cumulative: boolean }) {
         if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return NaN;
         const index = pixel.y * coefficients.width + pixel.x;
         const phase_rad = store.player.phase_rad.value;
-        if (!cumulative) return densityAt(coefficients, index, phase_rad);
+        if (play === "density") return densityAt(coefficients, index, phase_rad);
         if (poles.current?.harmonics !== coefficients.harmonics) poles.current = new Poles(coefficients.harmonics, 1);
         poles.current.findOne(coefficients, index, 0);
-        return poles.current.upTo(0, phase_rad);
+        const before = play === "gate" ? poles.current.upTo(0, gateStart_rad(phase_rad, store.period_s.value)) : 0;
+        return poles.current.upTo(0, phase_rad) - before;
       }),
-    [store, cumulative],
+    [store, play],
   );
-  const text = useComputed(() => (Number.isNaN(density.value) ? "" : cumulative ? fixed(density.value, 0, "DN") : significant(density.value * 1e-9, 3, "DN/ns")));
+  const text = useComputed(() => (Number.isNaN(density.value) ? "" : play === "density" ? significant(density.value * 1e-9, 3, "DN/ns") : fixed(density.value, 0, "DN")));
   return (
     <span class="readout-density" data-field="density">
       {text}

@@ -7,9 +7,19 @@ import { aBoolean, aNumber, oneOf, remembered, type Shelf } from "../../store/se
 import { COLOUR_MAPS, type ColourMapName } from "../../ui/colourMaps";
 import { Filming } from "./Filming";
 
-/** Light as it comes, or all that has come so far. */
-export const PLAYS = ["density", "cumulative"] as const;
+/** Light as it comes, what came within the last nanosecond, or all that has come so far. */
+export const PLAYS = ["density", "gate", "cumulative"] as const;
 export type Play = (typeof PLAYS)[number];
+
+export const NAMES: Readonly<Record<Play, string>> = { density: "Light in flight", gate: "Light of the last nanosecond", cumulative: "Light so far" };
+
+/** Length of the gate, in time of flight. */
+const GATE_S = 1e-9;
+
+/** Phase at which the gate opens that closes at a phase; a flight begins with its period. */
+export function gateStart_rad(phase_rad: number, period_s: number): number {
+  return Math.max(0, phase_rad - (2 * Math.PI * GATE_S) / period_s);
+}
 
 /** How light in flight is shown. */
 export class TransientLook {
@@ -18,8 +28,6 @@ export class TransientLook {
   /** Exposure compensation in stops: +1 shows half as much light as brightest. */
   readonly stops: Signal<number>;
   readonly backdrop: Signal<boolean>;
-  /** Whether light that plays leaves a trail; a picture at rest is the density alone. */
-  readonly trail: Signal<boolean>;
   readonly play: Signal<Play>;
   /** Draws the picture anew and answers its canvas, which can be read in this task. */
   snapshot: () => HTMLCanvasElement | null = () => null;
@@ -33,7 +41,6 @@ export class TransientLook {
     this.tone = remembered<ToneKind>(shelf, "transient.tone", "root", oneOf(TONES));
     this.stops = remembered(shelf, "transient.stops", 0, aNumber);
     this.backdrop = remembered(shelf, "transient.backdrop", true, aBoolean);
-    this.trail = remembered(shelf, "transient.trail", true, aBoolean);
     this.play = remembered<Play>(shelf, "transient.play", "density", oneOf(PLAYS));
     this.white = computed(() => this.#meter(frame.value?.light?.peak ?? NaN) / 2 ** this.stops.value);
   }
