@@ -160,7 +160,9 @@ SEQUENCE_FIELDS = (
 
 def put(served: Served, path: str, document: dict[str, Any]) -> None:
     """Set something of a daemon."""
-    httpx.put(f"{served.url}/api/v1/{path}", json=document).raise_for_status()
+    # a laden machine builds a scene in its own time
+    url = f"{served.url}/api/v1/{path}"
+    httpx.put(url, json=document, timeout=60).raise_for_status()
 
 
 @pytest.fixture

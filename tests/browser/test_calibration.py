@@ -65,7 +65,7 @@ def test_one_is_measured_used_and_watched(page: Page, served: Served) -> None:
 def test_one_of_a_scene_is_used_only_on_a_second_click_and_undone(
     page: Page, served: Served
 ) -> None:
-    httpx.put(f"{served.url}/api/v1/simulation", json={"scene": "mirrors"}).raise_for_status()
+    put(served, "simulation", {"scene": "mirrors"})
     open_page(page)
     choose(page, "response", "Calibration")
     panel = page.locator(".panel-calibration")
@@ -89,7 +89,7 @@ def test_one_of_a_scene_is_used_only_on_a_second_click_and_undone(
 def test_the_diffusor_of_a_simulated_camera_is_put_before_the_lens(
     page: Page, served: Served
 ) -> None:
-    httpx.put(f"{served.url}/api/v1/simulation", json={"scene": "mirrors"}).raise_for_status()
+    put(served, "simulation", {"scene": "mirrors"})
     open_page(page)
     choose(page, "response", "Calibration")
     panel = page.locator(".panel-calibration")
