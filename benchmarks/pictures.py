@@ -1,7 +1,8 @@
 """Make README's film and picture of the page. ``python -m benchmarks.pictures``.
 
-They are written to docs/figures. The film is the page's own export, "Film of one pass (GIF)", in Chromium without a window, of the
-simulated scene of mirrors with its noise; the picture is the page after it.
+They are written to docs/figures. The film is the page's own export, "Film of one pass (GIF)", in
+Chromium without a window, of the simulated scene of mirrors with its noise; the picture is the page
+after it.
 """
 
 import argparse
