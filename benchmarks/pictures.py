@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page, ViewportSize, sync_playwright
 
 from tests.browser.dashboard import choose, open_page
 from tests.serving import serving
@@ -33,7 +33,7 @@ _PATIENCE_MS = 300_000
 _OF_THE_SEQUENCE = """
 (m) => transientcam.store.frames.of("coefficients").peek()?.coefficients?.harmonics === m
 """
-_SIZE = {"width": 1440, "height": 900}
+_SIZE: ViewportSize = {"width": 1440, "height": 900}
 
 
 def film(page: Page, path: Path) -> None:
