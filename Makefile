@@ -54,6 +54,7 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 	$(BIN)/python -m benchmarks.abuse --write
 	$(BIN)/python -m benchmarks.throughput --write
 	$(BIN)/python -m benchmarks.dashboard --hours 0.1 --write
+	$(BIN)/python -m benchmarks.pictures
 	$(BIN)/transientcam paper -o docs
 
 clean:  ## Remove everything that was built or installed here

@@ -28,7 +28,7 @@ _BUILT = _ROOT / "server" / "transientcam_server" / "static" / "index.html"
 
 def pytest_configure(config: pytest.Config) -> None:
     """Name the marker of modules whose tests share a daemon."""
-    config.addinivalue_line("markers", "shared_daemon: the module's tests share one daemon")
+    config.addinivalue_line("markers", "shared_daemon(camera): the module's tests share one daemon")
 
 
 @pytest.fixture(scope="session")
@@ -106,30 +106,44 @@ def shared_daemon(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Served | None]:
     """One daemon for all tests of a module that is marked `shared_daemon`."""
-    if request.node.get_closest_marker("shared_daemon") is None:
+    marker = request.node.get_closest_marker("shared_daemon")
+    if marker is None:
         yield None
         return
-    with _storing_in(tmp_path_factory.mktemp("daemon"), MIRRORS) as daemon:
+    camera = marker.args[0] if marker.args else MIRRORS
+    with _storing_in(tmp_path_factory.mktemp("daemon"), camera) as daemon:
         daemon.start_all_workers()
         yield daemon
 
 
 @pytest.fixture
 def served(shared_daemon: Served | None, camera: str, tmp_path: Path) -> Iterator[Served]:
-    """A daemon; where tests share one, its camera and sequence are as it began with."""
+    """A daemon; where tests share one, all that they set or stored is as it began with."""
     if shared_daemon is None:
         with _storing_in(tmp_path, camera) as own:
             yield own
         return
     daemon = shared_daemon
-    began_with = httpx.get(f"{daemon.url}/api/v1/sequence").raise_for_status().json()
+    began_with = {of: _document(daemon, of) for of in ("sequence", "reconstruction")}
     put(daemon, "acquisition", {"running": True})
     yield daemon
-    if (
-        httpx.get(f"{daemon.url}/api/v1/sequence").json()["sequence_id"]
-        != began_with["sequence_id"]
-    ):
-        put(daemon, "sequence", {name: began_with[name] for name in SEQUENCE_FIELDS})
+    if _document(daemon, "sequence")["sequence_id"] != began_with["sequence"]["sequence_id"]:
+        put(daemon, "sequence", {name: began_with["sequence"][name] for name in SEQUENCE_FIELDS})
+    settings = ("estimator", "smoothing_px")
+    before, now = (
+        {name: each[name] for name in settings}
+        for each in (began_with["reconstruction"], _document(daemon, "reconstruction"))
+    )
+    if now != before:
+        put(daemon, "reconstruction", before)
+    for recording in _document(daemon, "recordings")["recordings"]:
+        httpx.delete(f"{daemon.url}/api/v1/recordings/{recording['id']}").raise_for_status()
+
+
+def _document(served: Served, path: str) -> dict[str, Any]:
+    """What a daemon says of something."""
+    document: dict[str, Any] = httpx.get(f"{served.url}/api/v1/{path}").raise_for_status().json()
+    return document
 
 
 # what is set of a sequence; the rest of its document follows from it
@@ -146,7 +160,9 @@ SEQUENCE_FIELDS = (
 
 def put(served: Served, path: str, document: dict[str, Any]) -> None:
     """Set something of a daemon."""
-    httpx.put(f"{served.url}/api/v1/{path}", json=document).raise_for_status()
+    # a laden machine builds a scene in its own time
+    url = f"{served.url}/api/v1/{path}"
+    httpx.put(url, json=document, timeout=60).raise_for_status()
 
 
 @pytest.fixture

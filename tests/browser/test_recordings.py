@@ -24,11 +24,8 @@ from tests.serving import Served
 
 PANEL = ".panel-recordings"
 
-
-@pytest.fixture
-def camera() -> str:
-    """A camera no two frames of which are alike."""
-    return "sim:mirrors?seed=11"
+# a camera no two frames of which are alike
+pytestmark = pytest.mark.shared_daemon("sim:mirrors?seed=11")
 
 
 def show(page: Page) -> None:

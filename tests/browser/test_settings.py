@@ -1,4 +1,4 @@
-"""The reconstruction's settings and the calibrations, set from the page."""
+"""The settings of reconstruction and sequence, set from the page."""
 
 import re
 import struct
@@ -11,12 +11,11 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import Watch
-from tests.browser.dashboard import LIVE, choose, choose_from, open_page, shows_frame
+from tests.browser.dashboard import choose, open_page, shows_frame
 from tests.browser.test_map import product, stop
 from tests.serving import Served
 
-# A measurement captures every frame twice, and is evaluated.
-PATIENCE_MS = 60_000
+pytestmark = pytest.mark.shared_daemon
 
 
 def reconstruction(served: Served) -> dict[str, Any]:
@@ -66,140 +65,6 @@ def test_settings_that_somebody_else_changed_meanwhile_are_not_overwritten(
     assert reconstruction(served)["bias"] == 0.004
     panel.get_by_role("button", name="Undo").click()
     expect(panel.get_by_label("Smoothing")).to_have_value("3")
-
-
-class TestCalibrations:
-    @pytest.fixture
-    def camera(self) -> str:
-        """A camera before the diffusor."""
-        return "sim:calibration?seed=3"
-
-    def test_one_is_measured_used_and_watched(self, page: Page, served: Served) -> None:
-        open_page(page)
-        choose(page, "response", "Calibration")
-        panel = page.locator(".panel-calibration")
-        panel.get_by_label("Name", exact=True).fill("after warm-up")
-        panel.get_by_label("Frames, with and without light").fill("8")
-        panel.get_by_role("button", name="Measure").click()
-        expect(panel.locator("progress")).to_be_visible()
-        expect(page.locator("[data-field=state]")).to_have_text("Calibrating")
-        expect(page.get_by_role("button", name="Stop", exact=True)).to_be_disabled()
-        outcome = panel.locator("[data-field=calibration-outcome]")
-        expect(outcome).to_contain_text("Measured", timeout=PATIENCE_MS)
-        row = panel.locator("[data-calibration]").last
-        expect(row).to_contain_text("after warm-up")
-        expect(row).to_contain_text("in use")
-        expect(page.locator("[data-field=state]")).to_have_text(LIVE)
-        listed = httpx.get(f"{served.url}/api/v1/calibrations").json()
-        assert listed["active"] == listed["calibrations"][0]["id"]
-        page.wait_for_function(
-            "(id) => transientcam.store.frames.of('range').peek()?.meta.calibration_id === id",
-            arg=listed["active"],
-        )
-        page.evaluate("() => transientcam.store.calibrations.refresh()")
-        expect(row.locator("[data-field=drift]")).to_contain_text("contradict themselves")
-
-        # another sequence, another calibration: it says why, and waits
-        httpx.put(f"{served.url}/api/v1/sequence", json={"harmonics": 2}).raise_for_status()
-        expect(row.locator("[data-field=misfit]")).to_contain_text("harmonics")
-        expect(row).to_contain_text("waits for its sequence")
-        expect(page.locator(".toast", has_text="Nominal gains")).to_be_visible()
-
-    def test_one_of_a_scene_is_used_only_on_a_second_click_and_undone(
-        self, page: Page, served: Served
-    ) -> None:
-        httpx.put(f"{served.url}/api/v1/simulation", json={"scene": "mirrors"}).raise_for_status()
-        open_page(page)
-        choose(page, "response", "Calibration")
-        panel = page.locator(".panel-calibration")
-        outcome = panel.locator("[data-field=calibration-outcome]")
-        panel.get_by_label("Frames, with and without light").fill("3")
-        panel.get_by_role("button", name="Measure").click()
-        expect(outcome).to_contain_text("a scene, not a diffusor", timeout=PATIENCE_MS)
-        row = panel.locator("[data-calibration]").nth(1)
-        expect(row.locator("[data-field=verdict]")).to_have_text("of a scene")
-        expect(panel.locator("[data-calibration=nominal]")).to_contain_text("in use")
-        row.get_by_role("button", name="Use").click()
-        expect(row.locator("[data-field=doubt]")).to_contain_text("unlike a diffusor")
-        expect(row.get_by_role("img")).to_be_visible()
-        expect(panel.locator("[data-calibration=nominal]")).to_contain_text("in use")
-        row.get_by_role("button", name="Use anyway").click()
-        expect(row).to_contain_text("in use")
-        panel.get_by_role("button", name="Return to the nominal gains").click()
-        expect(panel.locator("[data-calibration=nominal]")).to_contain_text("in use")
-
-    def test_the_diffusor_of_a_simulated_camera_is_put_before_the_lens(
-        self, page: Page, served: Served
-    ) -> None:
-        httpx.put(f"{served.url}/api/v1/simulation", json={"scene": "mirrors"}).raise_for_status()
-        open_page(page)
-        choose(page, "response", "Calibration")
-        panel = page.locator(".panel-calibration")
-        panel.get_by_role("button", name="Put the diffusor before the lens").click()
-        taking = panel.get_by_role("button", name="Take the diffusor away")
-        expect(taking).to_be_visible(timeout=PATIENCE_MS)
-        panel.get_by_label("Frames, with and without light").fill("3")
-        panel.get_by_role("button", name="Measure").click()
-        outcome = panel.locator("[data-field=calibration-outcome]")
-        expect(outcome).to_contain_text("Measured: ", timeout=PATIENCE_MS)
-        expect(panel.locator("[data-calibration]").nth(1)).to_contain_text("in use")
-        taking.click()
-        expect(panel.get_by_role("button", name="Put the diffusor before the lens")).to_be_visible()
-        assert httpx.get(f"{served.url}/api/v1/simulation").json()["scene"] == "mirrors"
-
-    def test_one_is_exported_deleted_and_imported(
-        self, page: Page, served: Served, tmp_path: Path
-    ) -> None:
-        url = f"{served.url}/api/v1/calibrations"
-        job = httpx.post(url, json={"name": "bench", "frames": 2}).raise_for_status().json()
-        jobs = f"{served.url}/api/v1/jobs/{job['id']}"
-        result = httpx.get(jobs, params={"wait_s": 30}, timeout=60).json()["result"]
-        identity = result["calibration"]
-        open_page(page)
-        choose(page, "response", "Calibration")
-        panel = page.locator(".panel-calibration")
-        with page.expect_download() as download:
-            panel.get_by_role("button", name="Export bench").click()
-        exported = tmp_path / "bench.npz"
-        download.value.save_as(exported)
-        assert exported.read_bytes() == httpx.get(f"{url}/{identity}/file").content
-        row = panel.locator(f"[data-calibration='{identity}']")
-        choose_from(row, "More of bench", "Delete…")
-        confirm = page.get_by_role("dialog", name="Delete this calibration?")
-        confirm.get_by_role("button", name="Delete").click()
-        expect(row).to_have_count(0)
-        assert httpx.get(url).json()["calibrations"] == []
-        panel.get_by_label("File of a calibration").set_input_files(exported)
-        expect(row).to_contain_text("bench")
-        row.get_by_role("button", name="Use").click()
-        expect(row).to_contain_text("in use")
-        assert httpx.get(url).json()["active"] == identity
-        panel.locator("[data-calibration=nominal]").get_by_role("button", name="Use").click()
-        expect(panel.locator("[data-calibration=nominal]")).to_contain_text("in use")
-
-    def test_a_measurement_is_cancelled(self, page: Page, served: Served) -> None:
-        open_page(page)
-        choose(page, "response", "Calibration")
-        panel = page.locator(".panel-calibration")
-        panel.get_by_label("Frames, with and without light").fill("400")
-        panel.get_by_role("button", name="Measure").click()
-        panel.get_by_role("button", name="Cancel").click()
-        outcome = panel.locator("[data-field=calibration-outcome]")
-        expect(outcome).to_have_text("The measurement was cancelled.", timeout=PATIENCE_MS)
-        assert httpx.get(f"{served.url}/api/v1/calibrations").json()["calibrations"] == []
-
-    def test_a_file_that_is_no_calibration_is_refused_in_words(
-        self, page: Page, served: Served, watch: Watch, tmp_path: Path
-    ) -> None:
-        open_page(page)
-        choose(page, "response", "Calibration")
-        watch.refusals_expected = True
-        wrong = tmp_path / "wrong.npz"
-        wrong.write_bytes(b"PK\x03\x04 and no more")
-        page.get_by_label("File of a calibration").set_input_files(wrong)
-        expect(page.locator("[data-field=calibration-status].refusal")).to_have_text(
-            re.compile(".{10,}")
-        )
 
 
 def test_takes_follow_each_other_as_chosen(page: Page, served: Served) -> None:

@@ -7,15 +7,17 @@ import httpx
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from PIL import Image
-from playwright.sync_api import Page, expect
+from PIL import Image, ImageSequence
+from playwright.sync_api import Locator, Page, expect
 
 import transientcam_moments as tm
 from tests.browser.conftest import Watch
 from tests.browser.dashboard import (
+    canvas_pixels,
     choose,
     colours,
     density_of,
+    map_canvas,
     open_page,
     point_at,
     shown_density,
@@ -45,6 +47,13 @@ def stop(served: Served) -> int:
     httpx.put(f"{served.url}/api/v1/acquisition", json={"running": False}).raise_for_status()
     number: int = httpx.get(f"{served.url}/api/v1/frames/latest").json()["frame"]
     return number
+
+
+def look(page: Page) -> Locator:
+    """Open the popover of how the light looks."""
+    panel = page.locator(".panel-transient")
+    panel.get_by_role("button", name="Look of the light").click()
+    return panel.get_by_role("dialog", name="Look of the light")
 
 
 def toeplitz(moments: NDArray[Any]) -> NDArray[np.complex128]:
@@ -181,7 +190,8 @@ def test_light_passes_the_pixels_when_their_range_says(page: Page, served: Serve
     open_page(page)
     shows_frame(page, stop(served))
     ranges = np.load(io.BytesIO(httpx.get(f"{served.url}/api/v1/frames/latest/range.npy").content))
-    page.get_by_role("button", name="scene").click()  # the light alone
+    look(page).get_by_label("Scene behind the light").uncheck()  # the light alone
+    page.keyboard.press("Escape")
     steps_m = np.arange(1.4, 2.2, 0.04)
     pictures = np.stack(
         [
@@ -249,18 +259,6 @@ def test_a_click_shows_the_pixels_impulse_response(page: Page, served: Served) -
     shows_frame(page, stop(served))
     point_at(page, "transient", 81, 20, click=True)
     expect(page.locator(".panel-response h2")).to_have_text("Impulse response of pixel 81, 20")
-    pixel = httpx.get(
-        f"{served.url}/api/v1/frames/latest/pixel", params={"x": 81, "y": 20, "bins": 4096}
-    ).raise_for_status()
-    density = np.array(pixel.json()["density_per_s"])
-    tops = np.flatnonzero((density > np.roll(density, 1)) & (density >= np.roll(density, -1)))
-    expected_ns = np.array(pixel.json()["time_s"])[tops] * 1e9
-    listed = page.locator(".peaks tbody tr").evaluate_all(
-        "(rows) => rows.map((row) => parseFloat(row.cells[0].textContent))"
-    )
-    assert len(listed) >= 2
-    for time_ns in listed:
-        assert np.min(np.abs(expected_ns - time_ns)) < 0.02
     ink = page.locator(".response-plot .uplot canvas").evaluate(
         "(canvas) => new Set(new Uint32Array(canvas.getContext('2d')"
         ".getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size"
@@ -279,35 +277,48 @@ def test_a_click_into_the_response_moves_the_light_there(page: Page) -> None:
     expect(shown).to_have_text(re.compile(r"^21\.[678]"))  # half a period: 21.74 ns
 
 
+def cumulative(served: Served, time_s: float) -> NDArray[np.float32]:
+    """Light up to a time in every pixel of the newest frame, as the daemon integrates it."""
+    answer = httpx.get(
+        f"{served.url}/api/v1/frames/latest/cumulative.npy", params={"time_s": time_s}
+    ).raise_for_status()
+    light: NDArray[np.float32] = np.load(io.BytesIO(answer.content))[0]
+    return light
+
+
 def test_light_so_far_is_what_the_daemon_integrates(page: Page, served: Served) -> None:
     open_page(page)
-    page.get_by_role("button", name="sum").click()
+    page.get_by_role("tab", name="So far").click()
     page.locator("canvas[data-renderer=closed-form][data-frame]").wait_for()
     shows_frame(page, stop(served))
-    page.locator(".panel-transient").get_by_label("Tone").select_option("linear")
+    look(page).get_by_label("Tone").select_option("linear")
+    page.keyboard.press("Escape")
     white = float(str(transient_canvas(page).get_attribute("data-white")))
     for turn in (0.1, 0.27, 0.45, 0.9):
-        answer = httpx.get(
-            f"{served.url}/api/v1/frames/latest/cumulative.npy", params={"time_s": turn / F_HZ}
-        ).raise_for_status()
-        light = np.load(io.BytesIO(answer.content))[0]
+        light = cumulative(served, turn / F_HZ)
         expected = colours(light, 0.0, white, "inferno").astype(int)
         painted = transient_pixels(page, turn).astype(int)
         beside = np.abs(painted - expected).max(axis=-1) > 12
         assert beside.mean() < 0.005, "but for colours that round to their neighbours"
+    assert expected.std() > 5
+    # the gate shows what came within its nanosecond
+    page.get_by_role("tab", name="Last 1 ns").click()
+    page.locator("canvas[data-play=gate]").wait_for()
+    turn = 0.27
+    light = cumulative(served, turn / F_HZ) - cumulative(served, turn / F_HZ - 1e-9)
+    expected = colours(light, 0.0, white, "inferno").astype(int)
+    painted = transient_pixels(page, turn).astype(int)
+    assert (np.abs(painted - expected).max(axis=-1) > 12).mean() < 0.005
     assert expected.std() > 5
 
 
 def test_the_light_so_far_at_a_pixel_is_told(page: Page, served: Served) -> None:
     open_page(page)
     shows_frame(page, stop(served))
-    page.get_by_role("button", name="sum").click()
+    page.get_by_role("tab", name="So far").click()
     point_at(page, "map", 81, 20, click=True)
     page.evaluate("() => transientcam.store.player.seek(0.4)")
-    answer = httpx.get(
-        f"{served.url}/api/v1/frames/latest/cumulative.npy", params={"time_s": 0.4 / F_HZ}
-    ).raise_for_status()
-    light = np.load(io.BytesIO(answer.content))[0, 20, 81]
+    light = cumulative(served, 0.4 / F_HZ)[20, 81]
     expect(page.locator(".panel-transient [data-field=density]")).to_contain_text("DN")
     shown = float(text(page, ".panel-transient", "density").split()[0])
     assert shown == pytest.approx(light, rel=2e-3, abs=0.6)
@@ -342,3 +353,29 @@ def test_a_strip_shows_light_at_the_times_it_arrives(page: Page, served: Served)
     for one, other in pairwise(pictures):
         assert np.mean(one != other) > 0.05, "the light has moved"
     assert text(page, ".panel-transient", "time") == before, "and is where it was"
+
+
+def test_a_film_and_a_figure_are_handed_out(page: Page, served: Served) -> None:
+    open_page(page)
+    shows_frame(page, stop(served))
+    page.locator(".panel-transient").get_by_label("Speed").select_option("20")
+    before = text(page, ".panel-transient", "time")
+    with page.expect_download() as download:
+        choose(page, "transient", "Film of one pass (GIF)")
+    with Image.open(download.value.path()) as film:
+        pictures = [np.array(each.convert("RGB")) for each in ImageSequence.Iterator(film)]
+    assert len(pictures) > 10
+    assert all(np.mean(one != other) > 0.001 for one, other in pairwise(pictures))
+    assert text(page, ".panel-transient", "time") == before, "the light is where it was"
+    with page.expect_download() as download:
+        choose(page, "transient", "Film of one pass (WebM)")
+    content = download.value.path().read_bytes()
+    assert content[:4] == b"\x1a\x45\xdf\xa3", "EBML, which WebM is written in"
+    assert b"webm" in content[:64]
+    with page.expect_download() as download:
+        choose(page, "map", "Figure (PNG)")
+    with Image.open(download.value.path()) as image:
+        figure = np.array(image.convert("RGBA"))
+    # 2 x 4 pixels of the figure for each of the sensor's, behind margins of 2 x 46 and 2 x 30
+    middles = figure[64 : 64 + 8 * 120 : 8, 96 : 96 + 8 * 163 : 8]
+    np.testing.assert_array_equal(middles, canvas_pixels(map_canvas(page)))

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
+from tests.browser.conftest import Watch
 from tests.browser.dashboard import (
     canvas_pixels,
     choose,
@@ -126,6 +127,13 @@ def test_the_validity_map_says_what_is_wrong_where_and_how_often(
 ) -> None:
     show(page, served, "Validity", "flags")
     assert np.all(painted_flags(page)[..., :3] == [127, 147, 163]), "without noise all are biased"
+    # what is on screen is handed out in numbers
+    np.testing.assert_array_equal(
+        numbers(page, "map", "Range in m (NPY)"), product(served, "range")
+    )
+    np.testing.assert_array_equal(
+        numbers(page, "validity", "Flags (NPY)"), product(served, "flags")
+    )
     bits = np.array([0, 0, *FLAG_COLOURS, 1 | 4, 2 | 16, 8 | 1], np.uint8)
     flags = np.random.default_rng(7).choice(bits, (120, 163))
     show_message(page, "flags", flags)
@@ -147,8 +155,13 @@ def test_the_validity_map_says_what_is_wrong_where_and_how_often(
         assert count(name) == np.sum(flags & bit != 0)
 
 
-def test_points_stand_where_their_pixels_look(page: Page, served: Served) -> None:
-    show(page, served, "Points in space", "points")
+def test_points_stand_where_their_pixels_look(page: Page, served: Served, watch: Watch) -> None:
+    open_page(page)
+    assert not any("Scene" in each for each in watch.requests), "loaded where it is shown"
+    shows_frame(page, stop(served))
+    choose(page, "sequence", "Points in space")
+    page.locator("canvas[data-product=points][data-frame]").wait_for()
+    assert any("Scene" in each for each in watch.requests)
     canvas = page.locator("canvas[data-product=points]")
     ranges = product(served, "range")
     expect(canvas).to_have_attribute("data-points", str(np.isfinite(ranges).sum()))
@@ -205,17 +218,6 @@ def canvas_pixels_of_scene(page: Page) -> NDArray[np.uint8]:
         return np.array(image.convert("RGBA"))
 
 
-@pytest.mark.parametrize(
-    ("panel", "action", "name"),
-    [("map", "Range in m (NPY)", "range"), ("validity", "Flags (NPY)", "flags")],
-)
-def test_what_is_on_screen_is_handed_out_in_numbers(
-    page: Page, served: Served, panel: str, action: str, name: str
-) -> None:
-    show(page, served, "Validity", "flags")
-    np.testing.assert_array_equal(numbers(page, panel, action), product(served, name))
-
-
 def test_panels_are_moved_added_closed_and_resized_and_stay_so(page: Page, served: Served) -> None:
     open_page(page)
 
@@ -259,13 +261,3 @@ def test_panels_are_moved_added_closed_and_resized_and_stay_so(page: Page, serve
     assert shown() == ["response"]
     choose(page, "response", "Show all panels")
     assert len(shown()) == 5
-
-
-def test_the_page_loads_what_draws_points_only_where_it_is_shown(
-    page: Page, served: Served, watch: Any
-) -> None:
-    open_page(page)
-    assert not any("Scene" in each for each in watch.requests)
-    choose(page, "sequence", "Points in space")
-    page.locator("canvas[data-product=points][data-frame]").wait_for()
-    assert any("Scene" in each for each in watch.requests)

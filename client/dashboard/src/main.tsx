@@ -6,6 +6,7 @@ import { keepAddress } from "./store/permalink";
 import { Store, StoreContext } from "./store/store";
 import { StreamClient } from "./stream/client";
 import { AnimationLoop } from "./ui/animation";
+import "@fontsource-variable/inter/wght.css";
 import "./style.css";
 
 const loop = new AnimationLoop((callback) => requestAnimationFrame(callback));

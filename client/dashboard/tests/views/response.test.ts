@@ -3,7 +3,7 @@ import { describe, expect, test } from "vitest";
 import type { PixelDocument } from "../../src/stream/protocol";
 import { FlagHistory, LOOKS } from "../../src/views/response/flagShares";
 import { richestPixel } from "../../src/views/response/interesting";
-import { sifted } from "../../src/views/response/Listings";
+import { linesOf, ReturnHistory, sifted } from "../../src/views/response/returns";
 import { momentsOf, picture } from "../oracle";
 
 const look = (frame: number, flags: readonly string[], x = 4): PixelDocument => ({ x, y: 5, flags, meta: { frame, sequence_id: 1 } }) as unknown as PixelDocument;
@@ -39,6 +39,41 @@ describe("returns of a pixel", () => {
   test("are all told where there are few, and none where there is none", () => {
     expect(sifted([{ time_s: 0, weight: 5 }]).strong).toHaveLength(1);
     expect(sifted([])).toEqual({ strong: [], weak: 0, weakShare: 0 });
+  });
+});
+
+const at = (time_ns: number, weight = 100) => ({ time_s: time_ns * 1e-9, weight });
+
+describe("returns beside the true ones", () => {
+  test("stand with the one that is the nearest to them, and the other way round", () => {
+    const [found, truth] = [[at(10.1), at(20)], [at(10), at(20.3), at(28)]];
+    expect(linesOf(found, truth)).toEqual([
+      { found: found[0], truth: truth[0] },
+      { found: found[1], truth: truth[1] },
+      { found: null, truth: truth[2] },
+    ]);
+  });
+
+  test("of which two are near the same true one share it not", () => {
+    const [found, truth] = [[at(10), at(12)], [at(10.4)]];
+    expect(linesOf(found, truth).map((line) => line.truth)).toEqual([truth[0], null]);
+    expect(linesOf(found, []).map((line) => line.truth)).toEqual([null, null]);
+  });
+
+  test("scatter as they did in the looks before, of the same pixel", () => {
+    const history = new ReturnHistory();
+    const taken = (frame: number, time_ns: number, x = 4): void => {
+      history.take({ ...look(frame, [], x), returns: [at(time_ns, 100 + frame), at(30)] });
+    };
+    for (const [frame, time_ns] of [9.9, 10.1, 9.9, 10.1].entries()) taken(frame, time_ns);
+    expect(history.of(at(10)).time_s).toBeNaN();
+    taken(4, 10);
+    // by hand: squares of 0.1 four times over five less one
+    expect(history.of(at(10)).time_s).toBeCloseTo(0.1e-9, 15);
+    expect(history.of(at(10)).weight).toBeCloseTo(Math.sqrt(2.5), 9);
+    expect(history.of(at(15)).time_s).toBeNaN();
+    taken(5, 10, 7);
+    expect(history.of(at(10)).time_s).toBeNaN();
   });
 });
 

@@ -8,6 +8,8 @@ import { ColourBar } from "../../ui/ColourBar";
 import { ColourChoice } from "../../ui/ColourChoice";
 import { Tabs, Toggle } from "../../ui/controls";
 import { saveNumbers, savePicture } from "../../ui/download";
+import { captionOf } from "../../ui/figure";
+import { saveFigure } from "../../ui/figureFiles";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { LimitFields } from "../../ui/LimitFields";
 import { paint } from "../../ui/paint";
@@ -24,11 +26,19 @@ export function MapView() {
   const shown = MAP_PRODUCTS.find(({ product }) => product === choice.value) ?? MAP_PRODUCTS[0];
   const look = store.looks.of(shown.product);
   const canvas = useRef<HTMLCanvasElement>(null);
+  const figure = (kind: "png" | "svg"): void => {
+    const meta = look.frame.peek()?.meta;
+    if (meta === undefined) return;
+    const parts = { title: shown.name, caption: captionOf(meta), scale: look.scale.peek(), colours: look.colours.peek(), unit: shown.unit, ground: "white" } as const;
+    void saveFigure(`${shown.product}-${meta.frame}`, canvas.current, parts, kind);
+  };
   return (
     <Panel
       name="map"
       downloads={[
         { text: "Picture (PNG)", run: () => { savePicture(`${shown.product}-${look.frame.peek()?.meta.frame ?? 0}`, canvas.current); } },
+        { text: "Figure (PNG)", run: () => { figure("png"); } },
+        { text: "Figure (SVG)", run: () => { figure("svg"); } },
         { text: `${shown.name} in ${shown.unit} (NPY)`, run: () => { saveNumbers(look.frame.peek()); } },
       ]} // prettier-ignore
       title={

@@ -1,41 +1,15 @@
 import { rangeOfTime_m } from "../../physics/constants";
-import type { Peak } from "../../physics/impulseResponse";
 import type { PixelDocument, Return } from "../../stream/protocol";
 import { FLAGS } from "../../ui/flags";
-import { fixed } from "../../ui/format";
+import { deviation, engineering, fixed } from "../../ui/format";
 import type { FlagHistory } from "./flagShares";
-
-/** The maxima of the density and the light around each. */
-export function PeakTable({ peaks: listed }: { peaks: readonly Peak[] }) {
-  if (listed.length === 0) return null;
-  return (
-    <table class="listing peaks">
-      <caption class="quiet">Peaks of the density</caption>
-      <thead>
-        <tr>
-          <th scope="col">time</th>
-          <th scope="col">range</th>
-          <th scope="col">light</th>
-        </tr>
-      </thead>
-      <tbody>
-        {listed.map((peak, at) => (
-          <tr key={at}>
-            <td>{fixed(peak.time_s * 1e9, 2, "ns")}</td>
-            <td>{fixed(rangeOfTime_m(peak.time_s), 2, "m")}</td>
-            <td>{fixed(100 * peak.share, 0, "%")}</td>
-          </tr>
-        ))}
-      </tbody>
-    </table>
-  );
-}
+import { linesOf, sifted, type ReturnHistory, type ReturnLine } from "./returns";
 
 /** What the service found at the pixel: returns, the truth where it is known, and flags. `held` is the number of the frame that is held. */
-export function Found({ told, held, flags }: { told: PixelDocument | null; held: number | null; flags: FlagHistory }) {
+export function Found({ told, held, flags, returns }: { told: PixelDocument | null; held: number | null; flags: FlagHistory; returns: ReturnHistory }) {
   if (told === null) return null;
   flags.take(told);
-  const { truth } = told;
+  returns.take(told);
   return (
     <>
       {held !== null && held !== told.meta.frame && (
@@ -43,15 +17,14 @@ export function Found({ told, held, flags }: { told: PixelDocument | null; held:
           The service tells of frame {told.meta.frame}; the curves are of frame {held}, which is held.
         </p>
       )}
-      <ReturnTable name="returns" caption="Returns" returns={told.returns} />
-      {truth !== null && <ReturnTable name="truth" caption={truth.kind === "sparse" ? "True returns" : "Strongest true returns"} returns={truth.returns} />}
-      <FlagWords flags={flags} />
+      <ReturnTable told={told} history={returns} />
     </>
   );
 }
 
 /** Flags with how often they were set lately: at the foot, so that nothing moves when one comes or goes. */
-function FlagWords({ flags }: { flags: FlagHistory }) {
+export function FlagWords({ flags, looked }: { flags: FlagHistory; looked: boolean }) {
+  if (!looked) return null;
   const shares = flags.shares();
   const shown = FLAGS.flatMap(({ name, title, words }) => {
     const found = shares.find((each) => each.name === name);
@@ -69,42 +42,72 @@ function FlagWords({ flags }: { flags: FlagHistory }) {
   );
 }
 
-/** Returns with less than this share of the light are told of together. */
-const WEAK_SHARE = 0.02;
+/** Lines of the table, however many returns there are: what stands below keeps its place. */
+const LINES = 4;
 
-/** The returns that are worth a line, by time, and the light of the others together. */
-export function sifted(returns: readonly Return[]): { readonly strong: readonly Return[]; readonly weak: number; readonly weakShare: number } {
-  const light = returns.reduce((sum, { weight }) => sum + Math.max(0, weight), 0);
-  const strong = returns.filter(({ weight }) => weight >= WEAK_SHARE * light);
-  const rest = returns.filter((each) => !strong.includes(each));
-  return { strong, weak: rest.length, weakShare: light > 0 ? rest.reduce((sum, { weight }) => sum + weight, 0) / light : 0 };
-}
-
-function ReturnTable({ name, caption, returns }: { name: string; caption: string; returns: readonly Return[] }) {
-  if (returns.length === 0) return null;
-  const { strong, weak, weakShare } = sifted(returns);
+/** The returns of the pixel, each with its standard deviation, beside the true ones where these are known. */
+function ReturnTable({ told, history }: { told: PixelDocument; history: ReturnHistory }) {
+  const { strong, weak, weakShare } = sifted(told.returns);
+  const lines = linesOf(strong, sifted(told.truth?.returns ?? []).strong);
+  const beyond = Math.max(0, lines.length - LINES);
+  const [found, truth, difference] = [lines.slice(0, LINES).map((line) => line.found), lines.map((line) => line.truth), lines.map(differenceOf)];
+  const notes = [beyond > 0 ? `${beyond} more` : "", weak > 0 ? `${weak} weak, together ${fixed(100 * weakShare, 1, "%")} of the light` : ""];
   return (
-    <div class="listing-room">
-      <table class={`listing listing-${name}`} data-field={name}>
-        <caption class="quiet">{caption}</caption>
+    <div>
+      <table class="listing returns" data-field="returns">
+        <caption class="quiet" title="Standard deviations (1 σ) over the last looks at this pixel; the true returns of a simulated scene">
+          Returns, ± 1 σ
+        </caption>
         <thead>
           <tr>
-            <th scope="col">time</th>
-            <th scope="col">range</th>
-            <th scope="col">light</th>
+            {["time", "range", "light", "truth", "difference"].map((name) => (
+              <th key={name} scope="col">
+                {name}
+              </th>
+            ))}
           </tr>
         </thead>
         <tbody>
-          {strong.map(({ time_s, weight }, at) => (
-            <tr key={at}>
-              <td>{fixed(time_s * 1e9, 2, "ns")}</td>
-              <td>{fixed(rangeOfTime_m(time_s), 2, "m")}</td>
-              <td>{fixed(weight, 0, "DN")}</td>
-            </tr>
+          {Array.from({ length: LINES }, (_, at) => (
+            <ReturnRow key={at} found={found[at] ?? null} truth={truth[at] ?? null} difference={difference[at] ?? ""} history={history} />
           ))}
         </tbody>
       </table>
-      <p class="quiet listing-rest">{weak > 0 && `and ${weak} weaker, together ${fixed(100 * weakShare, 1, "%")} of the light`}</p>
+      <p class="quiet listing-rest">{notes.filter((note) => note !== "").join("; ")}</p>
     </div>
+  );
+}
+
+/** How far a return is from the true one, as a range. */
+function differenceOf({ found, truth }: ReturnLine): string {
+  if (truth === null) return "";
+  if (found === null) return "not found";
+  const difference_m = rangeOfTime_m(found.time_s - truth.time_s);
+  return `${difference_m > 0 ? "+" : ""}${engineering(difference_m, "m", 2)}`;
+}
+
+interface ReturnRowProps {
+  readonly found: Return | null;
+  readonly truth: Return | null;
+  readonly difference: string;
+  readonly history: ReturnHistory;
+}
+
+function ReturnRow({ found, truth, difference, history }: ReturnRowProps) {
+  const scatter = found === null ? null : history.of(found);
+  const cell = (value: string, std: string) => (
+    <td>
+      {value}
+      <small class="quiet">{std}</small>
+    </td>
+  );
+  return (
+    <tr data-found={found !== null} data-true={truth !== null}>
+      {cell(found === null ? "" : fixed(found.time_s * 1e9, 2, "ns"), deviation(scatter?.time_s, "s"))}
+      {cell(found === null ? "" : fixed(rangeOfTime_m(found.time_s), 2, "m"), deviation(rangeOfTime_m(scatter?.time_s ?? NaN), "m"))}
+      {cell(found === null ? "" : fixed(found.weight, 0, "DN"), deviation(scatter?.weight, "DN"))}
+      {cell(truth === null ? "" : fixed(rangeOfTime_m(truth.time_s), 2, "m"), truth === null ? "" : fixed(truth.weight, 0, "DN"))}
+      <td>{difference}</td>
+    </tr>
   );
 }

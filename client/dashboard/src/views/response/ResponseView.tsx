@@ -20,14 +20,14 @@ import { AMPLITUDE } from "../map/catalogue";
 import { PixelFigures } from "./Figures";
 import { FlagHistory } from "./flagShares";
 import { richestPixel } from "./interesting";
-import { Found, PeakTable } from "./Listings";
+import { FlagWords, Found } from "./Listings";
 import { MomentsPlane } from "./MomentsPlane";
 import { responsePlot, type ResponsePlot } from "./plot";
+import { ReturnHistory } from "./returns";
 
 /** Share of the height that the axis was made for which is left after a frame without such a peak. */
 const SHRINK = 0.96;
-/** Returns listed beside the plot, and the least share of the light that makes one worth it. */
-const LISTED = 4;
+/** Least share of the light that makes a peak worth finer samples around it. */
 const LEAST_SHARE = 0.02;
 
 type Side = Aspect | "moments";
@@ -46,6 +46,7 @@ export function ResponseView() {
   const store = useStore();
   useProducts(["coefficients", "range", AMPLITUDE]);
   const flags = useMemo(() => new FlagHistory(), []);
+  const returns = useMemo(() => new ReturnHistory(), []);
   const frame = store.frames.of("coefficients");
   useEffect(() => store.details.follow(store.selected, frame), [store, frame]);
   useEffect(() => selectFirst(store, frame), [store, frame]);
@@ -59,7 +60,7 @@ export function ResponseView() {
         if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return null;
         const index = pixel.y * coefficients.width + pixel.x;
         const found = peaks(coefficients, index).filter(({ share }) => share >= LEAST_SHARE);
-        return { pixel, coefficients, index, found, peaks: found.slice(0, LISTED).sort((a, b) => a.time_s - b.time_s) };
+        return { pixel, coefficients, index, found };
       }),
     [frame, store],
   );
@@ -104,9 +105,9 @@ export function ResponseView() {
         )}
         {place.value !== null && (
           <aside class="response-side" aria-label="What was found at the pixel" tabIndex={0}>
+            <Found flags={flags} returns={returns} told={store.details.document.value} held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null} />
             {shown.value !== null && <PixelFigures key={place.value} pixel={shown.value.pixel} />}
-            <PeakTable peaks={shown.value?.peaks ?? []} />
-            <Found flags={flags} told={store.details.document.value} held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null} />
+            <FlagWords flags={flags} looked={store.details.document.value !== null} />
           </aside>
         )}
       </div>
@@ -157,6 +158,7 @@ function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
       aspect,
       logarithmic,
       top: () => top.current?.high ?? 1,
+      period_ns: () => store.period_s.peek() * 1e9,
       seek: (time_ns) => {
         store.player.playing.value = false;
         store.player.seek((time_ns * 1e-9) / store.period_s.peek());
@@ -206,9 +208,9 @@ function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
           {aspect === "bounds" && <span class="key-band">any light with these moments</span>}
           <span>estimate</span>
           {simulated && aspect !== "density" && <span class="key-truth">truth</span>}
-          {simulated && <span class="key-stem">true returns (height: share of the light)</span>}
-          {aspect === "bounds" && <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">all smoothed, r = 0.93</em>}
-          {aspect === "density" && !logarithmic && <em title="Linear near zero, logarithmic where the density is high: peaks are too narrow and high to be drawn linearly">height: asinh</em>}
+          {simulated && <span class="key-stem" title="As high as their share of the light">true returns</span>}
+          {aspect === "bounds" && <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">smoothed</em>}
+          {aspect !== "cumulative" && !logarithmic && <em title="Linear near zero, logarithmic where it is high: what is dim stays in sight beside narrow and high peaks">height: asinh</em>}
         </p>
     </div>
   );

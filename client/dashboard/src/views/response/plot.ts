@@ -17,6 +17,8 @@ export interface PlotOptions {
   readonly logarithmic: boolean;
   /** Upper end of the density's axis. */
   readonly top: () => number;
+  /** The time after which the flight repeats: the right end of the axis, before there is data too. */
+  readonly period_ns: () => number;
   /** Called with the time that was clicked. */
   readonly seek: (time_ns: number) => void;
   /** Called with the sample under the pointer; null when it leaves. */
@@ -24,7 +26,7 @@ export interface PlotOptions {
 }
 
 /** A plot of light over time of flight in ns, with the range it stands for on top. */
-export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, seek, point }: PlotOptions): ResponsePlot {
+export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, period_ns, seek, point }: PlotOptions): ResponsePlot {
   const style = getComputedStyle(box);
   const ink = style.getPropertyValue("--quiet");
   const hairline = style.getPropertyValue("--hairline");
@@ -65,16 +67,16 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, seek,
         ],
       },
       scales: {
-        x: { time: false, range: (_plot, low, high) => [low ?? 0, high ?? 1] },
+        x: { time: false, range: () => [0, period_ns()] },
         y: logarithmic
           ? { distr: 3, range: () => [10 ** (decade(top()) - LOG_DECADES), top()] }
-          : aspect === "density"
+          : aspect !== "cumulative"
             ? { distr: 4, range: () => [0, top()] }
             : { range: () => [0, top()] },
       },
       axes: [
         { ...axis, size: 20, gap: 2, label: "time of flight (ns)", labelSize: 16, labelGap: 0 },
-        { ...axis, size: 52, gap: 4, label: aspect === "cumulative" ? "DN" : "DN/ns", labelSize: 16, labelGap: 0, space: 28, values: (_plot, splits) => splits.map(tickText), ...(logarithmic ? { splits: powersOfTen, filter: (_plot: uPlot, splits: number[]) => splits } : {}) },
+        { ...axis, size: 52, gap: 4, label: aspect === "cumulative" ? "DN" : "DN/ns", labelSize: 16, labelGap: 0, space: 28, values: (_plot, splits) => splits.map(tickText), ...(logarithmic ? { splits: powersOfTen, filter: all } : aspect !== "cumulative" ? { splits: bentSplits(ASINH_SHARES[aspect]), filter: all } : {}) },
         {
           ...axis,
           scale: "x",
@@ -106,7 +108,7 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, seek,
     show: (curves, truthNow) => {
       truth = truthNow;
       // Where the axis bends; it follows the axis, and uPlot takes it from here.
-      Object.assign(plot.scales["y"], { asinh: top() / ASINH_SHARE });
+      Object.assign(plot.scales["y"], { asinh: top() / ASINH_SHARES[aspect] });
       plot.setData(curves === null ? [[], ...series[aspect].map(() => [])] : [curves.time_ns, ...curves.lines]);
     },
   };
@@ -130,8 +132,8 @@ function drawTruth(plot: uPlot, { returns, brightness }: Truth, ink: string): vo
   ctx.restore();
 }
 
-/** Share of the axis from which heights grow by factors instead of by steps: a narrow peak leaves the rest in sight. */
-const ASINH_SHARE = 1000;
+/** The axis over the height from which heights grow by factors instead of by steps: a narrow peak leaves the rest in sight, and what is smoothed has none so narrow. */
+const ASINH_SHARES: Readonly<Record<Aspect, number>> = { density: 1000, bounds: 20, cumulative: 1 };
 
 /** Decades that the logarithmic axis shows. */
 const LOG_DECADES = 5;
@@ -143,6 +145,26 @@ function decade(value: number): number {
 function powersOfTen(_plot: uPlot, _axis: number, low: number, high: number): number[] {
   const count = decade(high) - decade(low) + 1;
   return Array.from({ length: count }, (_, n) => 10 ** (decade(low) + n));
+}
+
+const all = (_plot: uPlot, splits: number[]): number[] => splits;
+
+/** Least room of a number on a bent axis, in shares of its height. */
+const BENT_ROOM = 0.1;
+
+/** Round numbers of an axis that bends at its end over `share`, as close as they can be read. */
+function bentSplits(share: number): (plot: uPlot, axis: number, low: number, high: number) => number[] {
+  return (_plot, _axis, _low, high) => {
+    const place = (value: number): number => Math.asinh((share * value) / high) / Math.asinh(share);
+    const kept = [0];
+    for (let power = decade(high / share); power <= decade(high); power++) {
+      for (const factor of [1, 2, 5]) {
+        const value = factor * 10 ** power;
+        if (value <= high && place(value) - place(kept[kept.length - 1]) >= BENT_ROOM) kept.push(value);
+      }
+    }
+    return kept;
+  };
 }
 
 function tickText(value: number): string {

@@ -1,17 +1,14 @@
 import { useComputed } from "@preact/signals";
-import { useId, useRef } from "preact/hooks";
 
 import { CREDIBLE_LATENCY_S } from "../../store/status";
 import { useStore } from "../../store/store";
 import { engineering, fixed, grouped, NOTHING } from "../../ui/format";
 import { PulseIcon } from "../../ui/icons";
-import { placeBeside } from "../../ui/popover";
+import { PopoverButton } from "../../ui/PopoverButton";
 
 /** All figures of the flow of frames, behind a button. */
 export function Figures() {
   const { status } = useStore();
-  const id = useId();
-  const button = useRef<HTMLButtonElement>(null);
   const latency = useComputed(() => {
     const latency_s = status.latency_s.value;
     if (latency_s === null) return NOTHING;
@@ -19,48 +16,34 @@ export function Figures() {
     return fixed(1000 * Math.max(0, latency_s), 0, "ms");
   });
   return (
-    <>
-      <button ref={button} type="button" class="figures-button" aria-label="All figures" title="All figures of the flow of frames" aria-haspopup="dialog" popovertarget={id}>
-        <PulseIcon />
-      </button>
-      <div
-        id={id}
-        class="menu figures"
-        role="dialog"
-        aria-label="Figures"
-        popover="auto"
-        onToggle={(event) => {
-          if (event.newState === "open" && button.current !== null) placeBeside(event.currentTarget, button.current);
-        }}
-      >
-        <dl class="flow">
-          <Figure name="Latency" field="latency" title="From the last image's arrival at the service to this screen">
-            {latency}
-          </Figure>
-          <Figure name="Capture" field="capture" title="From the first exposure of a frame to the last">
-            {useComputed(() => fixed(1000 * (status.newest.value?.capture_s ?? NaN), 1, "ms"))}
-          </Figure>
-          <Figure name="Reconstruct" field="reconstruct" title="Computing of a frame at the service">
-            {useComputed(() => fixed(1000 * (status.newest.value?.reconstruct_s ?? NaN), 1, "ms"))}
-          </Figure>
-          <Figure name="Encode" field="encode" title="Bringing the products of a frame into the form they are sent in">
-            {useComputed(() => engineering(status.encode_s.value, "s", 2))}
-          </Figure>
-          <Figure name="Dropped" field="dropped" title="Frames left out for this page, which was slower than the camera">
-            {useComputed(() => grouped(status.dropped.value))}
-          </Figure>
-          <Figure name="Lost images" field="lost" title="Images that did not arrive from the camera intact since this page connected">
-            {useComputed(() => grouped(status.lostImages.value))}
-          </Figure>
-          <Figure name="Sensor" field="temperature" title="Temperature of the sensor">
-            {useComputed(() => fixed(status.newest.value?.temperature_c, 1, "°C"))}
-          </Figure>
-          <Figure name="Frame" field="frame" title="Number of the frame on screen">
-            {useComputed(() => (status.newest.value === null ? NOTHING : grouped(status.newest.value.frame)))}
-          </Figure>
-        </dl>
-      </div>
-    </>
+    <PopoverButton face={<PulseIcon />} label="All figures" title="All figures of the flow of frames" kind="figures">
+      <dl class="flow">
+        <Figure name="Latency" field="latency" title="From the last image's arrival at the service to this screen">
+          {latency}
+        </Figure>
+        <Figure name="Capture" field="capture" title="From the first exposure of a frame to the last">
+          {useComputed(() => fixed(1000 * (status.newest.value?.capture_s ?? NaN), 1, "ms"))}
+        </Figure>
+        <Figure name="Reconstruct" field="reconstruct" title="Computing of a frame at the service">
+          {useComputed(() => fixed(1000 * (status.newest.value?.reconstruct_s ?? NaN), 1, "ms"))}
+        </Figure>
+        <Figure name="Encode" field="encode" title="Bringing the products of a frame into the form they are sent in">
+          {useComputed(() => engineering(status.encode_s.value, "s", 2))}
+        </Figure>
+        <Figure name="Dropped" field="dropped" title="Frames left out for this page, which was slower than the camera">
+          {useComputed(() => grouped(status.dropped.value))}
+        </Figure>
+        <Figure name="Lost images" field="lost" title="Images that did not arrive from the camera intact since this page connected">
+          {useComputed(() => grouped(status.lostImages.value))}
+        </Figure>
+        <Figure name="Sensor" field="temperature" title="Temperature of the sensor">
+          {useComputed(() => fixed(status.newest.value?.temperature_c, 1, "°C"))}
+        </Figure>
+        <Figure name="Frame" field="frame" title="Number of the frame on screen">
+          {useComputed(() => (status.newest.value === null ? NOTHING : grouped(status.newest.value.frame)))}
+        </Figure>
+      </dl>
+    </PopoverButton>
   );
 }
 

@@ -8,15 +8,13 @@ import { useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
 import { ColourChoice } from "../../ui/ColourChoice";
 import { COLOUR_MAPS, type ColourMapName } from "../../ui/colourMaps";
-import { Choice } from "../../ui/controls";
 import { npy, save, savePicture } from "../../ui/download";
 import { fixed, significant } from "../../ui/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { ticks } from "../../ui/scale";
+import { ToneChoice } from "../../ui/ToneChoice";
 import { BINS, paintStreak, Streak, whiteOf } from "./streak";
-
-const TONE_NAMES: Record<ToneKind, string> = { linear: "linear", root: "root", logarithmic: "log" };
 
 /** One row of the picture over time of flight: columns across, time downwards. */
 export function StreakView() {
@@ -71,7 +69,7 @@ export function StreakView() {
       }
       tools={
         <>
-          <Choice label="Tone" value={tone.value} options={TONES.map((kind) => ({ value: kind, text: TONE_NAMES[kind] }))} onChange={(kind) => (tone.value = kind)} />
+          <ToneChoice tone={tone} />
           <ColourChoice colours={colours} />
         </>
       }

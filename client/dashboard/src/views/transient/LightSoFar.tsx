@@ -9,12 +9,12 @@ import { colourTable, levelOf } from "../../ui/colourMaps";
 import { useDrawing } from "../../ui/hooks";
 import { Stage } from "../../ui/Stage";
 import { AMPLITUDE } from "../map/catalogue";
-import type { TransientLook } from "./look";
+import { gateStart_rad, NAMES, type TransientLook } from "./look";
 
 /** Finding poles takes microseconds a pixel: larger pictures are thinned to about this many. */
 const MOST_PIXELS = 40_000;
 
-/** The light that has come up to the player's time, in closed form. */
+/** The light that has come up to the player's time, or within a gate before it, in closed form. */
 export function LightSoFar({ look }: { look: TransientLook }) {
   const store = useStore();
   const frame = store.frames.of("coefficients");
@@ -33,7 +33,7 @@ export function LightSoFar({ look }: { look: TransientLook }) {
     const context = canvas.current?.getContext("2d");
     if (!coefficients || canvas.current === null || !context || !(white > 0)) return;
     light.take(coefficients);
-    const values = light.upTo(phase_rad);
+    const values = light.between(look.play.value === "gate" ? gateStart_rad(phase_rad, store.period_s.value) : 0, phase_rad);
     if (canvas.current.width !== light.width || canvas.current.height !== light.height) [canvas.current.width, canvas.current.height] = [light.width, light.height];
     const image = context.createImageData(light.width, light.height);
     const table = new Uint32Array(colourTable(colours).buffer);
@@ -43,12 +43,12 @@ export function LightSoFar({ look }: { look: TransientLook }) {
       pixels[at] = table[levelOf(share >= 0 ? toned(tone, share) : 0)];
     }
     context.putImageData(image, 0, 0);
-    Object.assign(canvas.current.dataset, { frame: frame.peek()?.meta.frame, white });
+    Object.assign(canvas.current.dataset, { frame: frame.peek()?.meta.frame, white, play: look.play.peek() });
     look.snapshot = () => canvas.current;
   }, [frame, look]);
 
   return (
-    <Stage width={width} height={height} label="Light so far">
+    <Stage width={width} height={height} label={NAMES[look.play.value]}>
       <canvas ref={canvas} data-product="transient" data-renderer="closed-form" />
       {useComputed(() => frame.value === null).value && <p class="stage-empty">Waiting for the first frame</p>}
     </Stage>
@@ -62,6 +62,7 @@ class GatheredLight {
   #poles = new Poles(1, 0);
   #taken: Coefficients | null = null;
   #values = new Float32Array(0);
+  #before = new Float32Array(0);
 
   take(c: Coefficients): void {
     if (c === this.#taken) return;
@@ -73,14 +74,19 @@ class GatheredLight {
     if (this.#poles.harmonics !== c.harmonics || this.#poles.area !== area) {
       this.#poles = new Poles(c.harmonics, area);
       this.#values = new Float32Array(area);
+      this.#before = new Float32Array(area);
     }
     for (let y = 0, at = 0; y < this.height; y++) {
       for (let x = 0; x < this.width; x++, at++) this.#poles.findOne(c, y * step * c.width + x * step, at);
     }
   }
 
-  upTo(phase_rad: number): Float32Array {
-    this.#poles.image(phase_rad, this.#values);
+  /** Light between two times, given as phases, of every pixel. */
+  between(from_rad: number, to_rad: number): Float32Array {
+    this.#poles.image(to_rad, this.#values);
+    if (from_rad === 0) return this.#values;
+    this.#poles.image(from_rad, this.#before);
+    for (let at = 0; at < this.#values.length; at++) this.#values[at] -= this.#before[at];
     return this.#values;
   }
 }

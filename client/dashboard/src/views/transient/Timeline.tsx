@@ -8,7 +8,7 @@ import { ticks } from "../../ui/scale";
 
 /** Finest step of the slider, in shares of the period. */
 const STEP = 1 / 2048;
-const CURVE_HEIGHT = 48;
+const CURVE_HEIGHT = 64;
 const CURVE_WIDTH = 512;
 
 /** The time of flight as a slider over a curve of when light arrives in the whole picture. */

@@ -1,28 +1,37 @@
 import { computed, useComputed } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 
-import { scaleOf, TONES, type ToneKind } from "../../gl/tone";
+import { scaleOf } from "../../gl/tone";
+import { rangeOfTime_m } from "../../physics/constants";
 import { densityAt } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
 import { SPEEDS_NS } from "../../store/player";
-import { useStore } from "../../store/store";
+import { type Store, useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
-import { ColourChoice } from "../../ui/ColourChoice";
-import { Choice, Toggle } from "../../ui/controls";
+import { Choice, Tabs } from "../../ui/controls";
 import { savePicture } from "../../ui/download";
-import { fixed, significant, superscript, withUnit } from "../../ui/format";
+import { fixed, significant, superscript } from "../../ui/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
+import { captionOf, timeWords } from "../../ui/figure";
+import { saveFigure, type FigureParts } from "../../ui/figureFiles";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
+import type { Scale } from "../../ui/scale";
 import { AMPLITUDE } from "../map/catalogue";
 import { litOf, peaksOf, turnsOf } from "./arrivals";
-import { TransientLook } from "./look";
+import { FilmProgress } from "./Filming";
+import { gateStart_rad, NAMES, TransientLook, type Play } from "./look";
 import { LightSoFar } from "./LightSoFar";
+import { LookMenu } from "./LookMenu";
 import { Picture } from "./Picture";
 import { stripOf, PICTURES } from "./strip";
 import { Timeline, TimeReadout } from "./Timeline";
 
-const TONE_NAMES: Record<ToneKind, string> = { linear: "linear", root: "root", logarithmic: "log" };
+const PLAY_TABS: readonly { readonly value: Play; readonly text: string; readonly hint: string }[] = [
+  { value: "density", text: "In flight", hint: "The light that arrives at one time" },
+  { value: "gate", text: "Last 1 ns", hint: "The light that came within the nanosecond before: a front that is too thin to be seen leaves a trail" },
+  { value: "cumulative", text: "So far", hint: "All light that has come up to that time" },
+];
 
 /** Light in flight: the density of Eq. (2) at one time of flight, evaluated in this browser. */
 export function TransientView() {
@@ -37,18 +46,27 @@ export function TransientView() {
     player.lit.value = steady(player.lit.peek(), litOf(arrivals));
     player.arrivals.value = peaksOf(arrivals);
   }, [frame, player]);
-  const cumulative = look.play.value === "cumulative";
+  const play = look.play.value;
+  const subject = useMemo(() => ({ snapshot: () => look.snapshot(), parts: () => partsOf(look, store) }), [look, store]);
+  const figureName = (): string => `${look.play.peek()}-${Math.round(player.time_s.peek() * 1e12)}ps-${frame.peek()?.meta.frame ?? 0}`;
   return (
     <Panel
       name="transient"
-      title={<h2>{cumulative ? "Light so far" : "Light in flight"}</h2>}
+      title={<h2>Light</h2>}
       downloads={[
         {
           text: "Picture (PNG)",
           run: () => {
-            const time_ps = Math.round(player.time_s.peek() * 1e12);
-            savePicture(`${look.play.peek()}-${time_ps}ps-${frame.peek()?.meta.frame ?? 0}`, look.snapshot());
+            savePicture(figureName(), look.snapshot());
           },
+        },
+        {
+          text: "Figure (PNG)",
+          run: () => void saveFigure(figureName(), look.snapshot(), subject.parts(), "png"),
+        },
+        {
+          text: "Figure (SVG)",
+          run: () => void saveFigure(figureName(), look.snapshot(), subject.parts(), "svg"),
         },
         {
           text: "Strip of 8 times (PNG)",
@@ -64,46 +82,21 @@ export function TransientView() {
             savePicture(`${look.play.peek()}-strip-${frame.peek()?.meta.frame ?? 0}`, strip);
           },
         },
+        ...look.filming.actions(subject, store),
       ]}
       tools={
         <>
-          <Toggle
-            pressed={cumulative}
-            title="Let the light stay once it has come"
-            onToggle={() => (look.play.value = cumulative ? "density" : "cumulative")}
-          >
-            sum
-          </Toggle>
-          <Choice
-            label="Tone"
-            value={look.tone.value}
-            options={TONES.map((kind) => ({ value: kind, text: TONE_NAMES[kind] }))}
-            onChange={(kind) => (look.tone.value = kind)}
-          />
-          <Choice
-            label="Exposure compensation"
-            value={look.stops.value}
-            options={STOPS.map((stops) => ({ value: stops, text: stopsText(stops) }))}
-            onChange={(stops) => (look.stops.value = stops)}
-          />
-          {!cumulative && (
-            <Toggle
-              pressed={look.backdrop.value}
-              title="Show the still scene behind the light"
-              onToggle={() => (look.backdrop.value = !look.backdrop.peek())}
-            >
-              scene
-            </Toggle>
-          )}
-          <ColourChoice colours={look.colours} />
+          <Tabs label="What of the light" value={look.play.value} options={PLAY_TABS} onChange={(play) => (look.play.value = play)} />
+          <LookMenu look={look} />
         </>
       }
     >
       <div class="picture">
-        {cumulative ? <LightSoFar look={look} /> : <Picture look={look} />}
+        {play === "density" ? <Picture look={look} /> : <LightSoFar look={look} />}
         <LightBar look={look} />
       </div>
       <footer class="panel-foot">
+        <FilmProgress filming={look.filming} />
         <Timeline />
         <div class="panel-row">
           <button
@@ -118,7 +111,7 @@ export function TransientView() {
             {player.playing.value ? <PauseIcon /> : <PlayIcon />}
           </button>
           <TimeReadout />
-          <DensityReadout cumulative={cumulative} />
+          <DensityReadout play={play} />
           <div class="panel-tools">
             <span class="quiet slowed" title="How many times slower than light really is">
               1 : {slowness(player.speed_ns.value)}
@@ -142,19 +135,29 @@ function steady(before: ReturnType<typeof litOf>, now: ReturnType<typeof litOf>)
   return near ? before : now;
 }
 
-/** What the colours of the light mean. */
-function LightBar({ look }: { look: TransientLook }) {
-  const scene = useStore().frames.of(AMPLITUDE);
-  const cumulative = look.play.value === "cumulative";
-  const white = cumulative ? (scene.value?.map?.high ?? NaN) / 2 ** look.stops.value : look.white.value * 1e-9;
-  if (!(white > 0)) return null;
-  return <ColourBar scale={scaleOf(look.tone.value, Number(white.toPrecision(3)))} colours={look.colours.value} unit={cumulative ? "DN" : "DN/ns"} />;
+/** What the colours of the light mean: their scale and its unit. */
+function lightScale(look: TransientLook, store: Store): { readonly scale: Scale; readonly unit: string } {
+  const gathered = look.play.value !== "density";
+  const white = gathered ? (store.frames.of(AMPLITUDE).value?.map?.high ?? NaN) / 2 ** look.stops.value : look.white.value * 1e-9;
+  return { scale: scaleOf(look.tone.value, Number(white.toPrecision(3))), unit: gathered ? "DN" : "DN/ns" };
 }
 
-const STOPS = [-4, -3, -2, -1, 0, 1, 2, 3, 4, 6, 8];
+function LightBar({ look }: { look: TransientLook }) {
+  const { scale, unit } = lightScale(look, useStore());
+  return scale.high > 0 ? <ColourBar scale={scale} colours={look.colours.value} unit={unit} /> : null;
+}
 
-function stopsText(stops: number): string {
-  return withUnit(stops > 0 ? `+${stops}` : String(stops).replace("-", "−"), "EV");
+/** What is written around a figure or a film of the light. */
+function partsOf(look: TransientLook, store: Store): FigureParts {
+  const time_s = store.player.time_s.peek();
+  const meta = store.frames.of("coefficients").peek()?.meta;
+  return {
+    ...lightScale(look, store),
+    title: `${NAMES[look.play.peek()]}, ${timeWords(time_s, rangeOfTime_m(time_s))}`,
+    caption: meta === undefined ? "" : captionOf(meta),
+    colours: look.colours.peek(),
+    ground: "black",
+  };
 }
 
 /** Times slower than real: 5 ns of flight in a second are 2·10⁸. */
@@ -165,8 +168,8 @@ function slowness(speed_ns: number): string {
   return `${mantissa === 1 ? "" : `${Number(mantissa.toFixed(1))}·`}10${superscript(exponent)}`;
 }
 
-/** The density at the pixel looked at, at the player's time; or the light up to then. */
-function DensityReadout({ cumulative }: { cumulative: boolean }) {
+/** The density at the pixel looked at, at the player's time; or the light within the gate or up to then. */
+function DensityReadout({ play }: { play: Play }) {
   const poles = useRef<Poles | null>(null);
   const store = useStore();
   const density = useMemo(
@@ -178,14 +181,15 @@ function DensityReadout({ cumulative }: { cumulative: boolean }) {
         if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return NaN;
         const index = pixel.y * coefficients.width + pixel.x;
         const phase_rad = store.player.phase_rad.value;
-        if (!cumulative) return densityAt(coefficients, index, phase_rad);
+        if (play === "density") return densityAt(coefficients, index, phase_rad);
         if (poles.current?.harmonics !== coefficients.harmonics) poles.current = new Poles(coefficients.harmonics, 1);
         poles.current.findOne(coefficients, index, 0);
-        return poles.current.upTo(0, phase_rad);
+        const before = play === "gate" ? poles.current.upTo(0, gateStart_rad(phase_rad, store.period_s.value)) : 0;
+        return poles.current.upTo(0, phase_rad) - before;
       }),
-    [store, cumulative],
+    [store, play],
   );
-  const text = useComputed(() => (Number.isNaN(density.value) ? "" : cumulative ? fixed(density.value, 0, "DN") : significant(density.value * 1e-9, 3, "DN/ns")));
+  const text = useComputed(() => (Number.isNaN(density.value) ? "" : play === "density" ? significant(density.value * 1e-9, 3, "DN/ns") : fixed(density.value, 0, "DN")));
   return (
     <span class="readout-density" data-field="density">
       {text}

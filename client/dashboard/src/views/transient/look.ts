@@ -5,10 +5,21 @@ import { TONES } from "../../gl/tone";
 import type { Frame } from "../../store/frames";
 import { aBoolean, aNumber, oneOf, remembered, type Shelf } from "../../store/settings";
 import { COLOUR_MAPS, type ColourMapName } from "../../ui/colourMaps";
+import { Filming } from "./Filming";
 
-/** Light as it comes, or all that has come so far. */
-export const PLAYS = ["density", "cumulative"] as const;
+/** Light as it comes, what came within the last nanosecond, or all that has come so far. */
+export const PLAYS = ["density", "gate", "cumulative"] as const;
 export type Play = (typeof PLAYS)[number];
+
+export const NAMES: Readonly<Record<Play, string>> = { density: "Light in flight", gate: "Light of the last nanosecond", cumulative: "Light so far" };
+
+/** Length of the gate, in time of flight. */
+const GATE_S = 1e-9;
+
+/** Phase at which the gate opens that closes at a phase; a flight begins with its period. */
+export function gateStart_rad(phase_rad: number, period_s: number): number {
+  return Math.max(0, phase_rad - (2 * Math.PI * GATE_S) / period_s);
+}
 
 /** How light in flight is shown. */
 export class TransientLook {
@@ -20,6 +31,8 @@ export class TransientLook {
   readonly play: Signal<Play>;
   /** Draws the picture anew and answers its canvas, which can be read in this task. */
   snapshot: () => HTMLCanvasElement | null = () => null;
+  /** The film that is made of it. */
+  readonly filming = new Filming();
   readonly white: ReadonlySignal<number>;
   #metered: number | null = null;
 

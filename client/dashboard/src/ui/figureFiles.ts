@@ -1,0 +1,46 @@
+/** Figures as files and as pictures: what needs a browser. */
+import { save } from "./download";
+import { figureLayout, figureSvg, type Figure } from "./figure";
+
+/** Width of a figure's picture, in px; a PNG has `PNG_SCALE` times as many. */
+const FIGURE_PX = 640;
+const PNG_SCALE = 2;
+
+/** What a figure is made of, but for its picture, which is a canvas of the sensor's size. */
+export type FigureParts = Omit<Figure, "picture" | "columns" | "rows">;
+
+/** Hands a figure of a canvas out. Of WebGL only in the task that drew it. */
+export async function saveFigure(name: string, canvas: HTMLCanvasElement | null, parts: FigureParts, kind: "png" | "svg"): Promise<void> {
+  if (canvas === null) return;
+  const [columns, rows] = [canvas.width, canvas.height];
+  const layout = figureLayout(columns, rows, FIGURE_PX);
+  const svg = figureSvg({ ...parts, columns, rows, picture: canvas.toDataURL("image/png") }, layout);
+  if (kind === "svg") {
+    save(`${name}.svg`, new Blob([svg], { type: "image/svg+xml" }));
+    return;
+  }
+  const drawn = document.createElement("canvas");
+  [drawn.width, drawn.height] = [PNG_SCALE * layout.width, PNG_SCALE * layout.height];
+  const context = drawn.getContext("2d") as CanvasRenderingContext2D;
+  context.drawImage(await imageOf(svg), 0, 0, drawn.width, drawn.height);
+  // The picture again, pixel by pixel: a browser may smooth what is within an SVG.
+  context.imageSmoothingEnabled = false;
+  context.drawImage(canvas, PNG_SCALE * layout.left, PNG_SCALE * layout.top, PNG_SCALE * layout.pictureWidth, PNG_SCALE * layout.pictureHeight);
+  const content = await new Promise<Blob | null>((done) => {
+    drawn.toBlob(done, "image/png");
+  });
+  if (content !== null) save(`${name}.png`, content);
+}
+
+/** An SVG as an image that can be drawn. */
+export async function imageOf(svg: string): Promise<HTMLImageElement> {
+  const address = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
+  try {
+    const image = new Image();
+    image.src = address;
+    await image.decode();
+    return image;
+  } finally {
+    URL.revokeObjectURL(address);
+  }
+}

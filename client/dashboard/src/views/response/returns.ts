@@ -1,0 +1,77 @@
+/** The returns of one pixel beside what is true, and how they scatter from look to look. */
+import type { PixelDocument, Return } from "../../stream/protocol";
+
+/** Returns with less than this share of the light are told of together. */
+const WEAK_SHARE = 0.02;
+/** A return of a look before is the same one where it came within this time: 1 ns is 15 cm. */
+const SAME_S = 1e-9;
+/** Looks that count, and the fewest that a deviation is told of. */
+export const LOOKS = 30;
+const FEWEST = 5;
+
+/** The returns that are worth a line, by time, and the light of the others together. */
+export function sifted(returns: readonly Return[]): { readonly strong: readonly Return[]; readonly weak: number; readonly weakShare: number } {
+  const light = returns.reduce((sum, { weight }) => sum + Math.max(0, weight), 0);
+  const strong = returns.filter(({ weight }) => weight >= WEAK_SHARE * light).sort((a, b) => a.time_s - b.time_s);
+  const rest = returns.filter((each) => !strong.includes(each));
+  return { strong, weak: rest.length, weakShare: light > 0 ? rest.reduce((sum, { weight }) => sum + weight, 0) / light : 0 };
+}
+
+/** A line of the table: what was found, what is true, or both. */
+export interface ReturnLine {
+  readonly found: Return | null;
+  readonly truth: Return | null;
+}
+
+/** Returns beside the true ones, by time. The two are the same one where each is the nearest to the other. */
+export function linesOf(found: readonly Return[], truth: readonly Return[]): ReturnLine[] {
+  const matched = found.map((each) => {
+    const near = nearest(each, truth);
+    return { found: each, truth: near !== null && nearest(near, found) === each ? near : null };
+  });
+  const missed = truth.filter((each) => !matched.some((line) => line.truth === each)).map((each) => ({ found: null, truth: each }));
+  const time_s = ({ found: seen, truth: real }: ReturnLine): number => (seen ?? real)?.time_s ?? 0;
+  return [...matched, ...missed].sort((a, b) => time_s(a) - time_s(b));
+}
+
+function nearest(each: Return, others: readonly Return[]): Return | null {
+  const distance = (other: Return): number => Math.abs(other.time_s - each.time_s);
+  return others.reduce<Return | null>((best, other) => (best === null || distance(other) < distance(best) ? other : best), null);
+}
+
+/** Standard deviations (1 σ) of a return over the last looks; NaN before there were enough. */
+export interface Scatter {
+  readonly time_s: number;
+  readonly weight: number;
+}
+
+/** The returns of one pixel over its last looks. */
+export class ReturnHistory {
+  #place = "";
+  #frame = NaN;
+  #looks: (readonly Return[])[] = [];
+
+  /** Takes a look, once a frame; another pixel or sequence begins anew. */
+  take({ x, y, returns, meta }: Pick<PixelDocument, "x" | "y" | "returns" | "meta">): void {
+    const place = `${x},${y},${meta.sequence_id},${meta.calibration_id}`;
+    if (place !== this.#place) [this.#place, this.#looks, this.#frame] = [place, [], NaN];
+    if (meta.frame === this.#frame) return;
+    this.#frame = meta.frame;
+    this.#looks = [...this.#looks.slice(1 - LOOKS), returns];
+  }
+
+  /** How a return scatters. */
+  of(found: Return): Scatter {
+    const same = this.#looks.flatMap((look) => {
+      const near = nearest(found, look);
+      return near !== null && Math.abs(near.time_s - found.time_s) <= SAME_S ? [near] : [];
+    });
+    return { time_s: deviationOf(same.map(({ time_s }) => time_s)), weight: deviationOf(same.map(({ weight }) => weight)) };
+  }
+}
+
+function deviationOf(values: readonly number[]): number {
+  if (values.length < FEWEST) return NaN;
+  const mean = values.reduce((sum, value) => sum + value, 0) / values.length;
+  return Math.sqrt(values.reduce((sum, value) => sum + (value - mean) ** 2, 0) / (values.length - 1));
+}

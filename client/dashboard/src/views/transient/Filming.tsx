@@ -1,0 +1,69 @@
+import { signal, type Signal } from "@preact/signals";
+
+import type { Store } from "../../store/store";
+import { save } from "../../ui/download";
+import type { Progress, FilmKind } from "../../ui/film";
+import type { Action } from "../../ui/ActionMenu";
+import { filmFrames, filmPass, type Subject } from "./film";
+
+/** The film that is being made, if one is, and why the last one was not. */
+export class Filming {
+  /** Share that is done, 0 to 1; null while no film is made. */
+  readonly share: Signal<number | null> = signal(null);
+  readonly trouble = signal("");
+  readonly #cancelled = signal(false);
+
+  cancel(): void {
+    this.#cancelled.value = true;
+  }
+
+  /** Films to choose from. */
+  actions(subject: Subject, store: Store): Action[] {
+    const run = (make: typeof filmPass, name: string, kind: FilmKind) => (): void => {
+      void this.#make(() => make(subject, store, kind, this.#progress()), `${name}-${store.frames.of("coefficients").peek()?.meta.frame ?? 0}.${kind}`);
+    };
+    const kinds: readonly (readonly [FilmKind, string])[] = [["webm", "WebM"], ["gif", "GIF"]]; // prettier-ignore
+    return kinds.flatMap(([kind, text]) => [
+      { text: `Film of one pass (${text})`, run: run(filmPass, "pass", kind) },
+      { text: `Film of 30 frames (${text})`, run: run(filmFrames, "frames", kind) },
+    ]);
+  }
+
+  #progress(): Progress {
+    const cancelled = this.#cancelled;
+    return {
+      get cancelled() {
+        return cancelled.value;
+      },
+      report: (share) => (this.share.value = share),
+    };
+  }
+
+  async #make(make: () => Promise<Blob | null>, name: string): Promise<void> {
+    if (this.share.peek() !== null) return; // one film at a time
+    [this.share.value, this.trouble.value, this.#cancelled.value] = [0, "", false];
+    try {
+      const film = await make();
+      if (film !== null) save(name, film);
+    } catch (error) {
+      this.trouble.value = `No film was made: ${error instanceof Error ? error.message : String(error)}`;
+    } finally {
+      this.share.value = null;
+    }
+  }
+}
+
+/** How far the film is; nothing while none is made. */
+export function FilmProgress({ filming }: { filming: Filming }) {
+  if (filming.trouble.value !== "") return <p role="alert">{filming.trouble.value}</p>;
+  if (filming.share.value === null) return null;
+  return (
+    <div class="panel-row filming" role="status">
+      <span>Filming {Math.round(100 * filming.share.value)} %</span>
+      <progress value={filming.share.value} aria-label="Film" />
+      <button type="button" onClick={() => { filming.cancel(); }}>
+        Cancel
+      </button>
+    </div>
+  ); // prettier-ignore
+}
