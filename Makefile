@@ -22,7 +22,7 @@ serve: .venv/serve.stamp dashboard  ## Run the daemon and its dashboard (PORT=80
 	$(BIN)/transientcam serve --host $(HOST) --port $(PORT) --camera '$(CAMERA)'
 
 test: check debian-packages dashboard  ## Run every check and every test
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 check: .venv/test.stamp client/dashboard/node_modules/.package-lock.json  ## Lint, types, import laws
 	@$(MAKE) --no-print-directory --jobs 2 check-pyright check-mypy check-style check-dashboard

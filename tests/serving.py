@@ -16,6 +16,8 @@ from transientcam_server.service import Service
 from transientcam_server.settings import Settings
 
 START_S = 60.0
+UNSERVED_S = 60.0
+"""A laden machine does not turn the light off in tests that are about something else."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +65,7 @@ def serving(
         usual = {"port": 0, "log_level": "warning", "calibrations": {"directory": state}}
         # "automatic" depends on the kernels that other tests of this process have compiled
         usual |= {"reconstruction": {"estimator": "pisarenko"}}
-        chosen = Settings(camera=camera, **{**usual, **settings})
+        chosen = _patient(Settings(camera=camera, **{**usual, **settings}))
         app = build_app(opened, chosen)
         prepare(app)
         with listen(chosen.host, chosen.port) as listener:
@@ -78,3 +80,11 @@ def serving(
             finally:
                 server.should_exit = True
                 thread.join()
+
+
+def _patient(settings: Settings) -> Settings:
+    """Return settings with a long limit of time without clients, unless one was chosen."""
+    if "unserved_s" in settings.limits.model_fields_set:
+        return settings
+    limits = settings.limits.model_copy(update={"unserved_s": UNSERVED_S})
+    return settings.model_copy(update={"limits": limits})

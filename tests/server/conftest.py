@@ -28,7 +28,7 @@ def steady_daemon() -> Iterator[Served]:
 def steady(steady_daemon: Served) -> Iterator[httpx.Client]:
     """A client of the shared daemon, which has a frame already."""
     with httpx.Client(base_url=steady_daemon.url, timeout=60.0) as client:
-        hold_to_contract(client, steady_daemon.app.openapi())
+        hold_to_contract(client, steady_daemon.app)
         client.get("/api/v1/frames/latest", params={"wait_s": 10.0})
         yield client
 
@@ -43,5 +43,5 @@ def steady_stream(steady_daemon: Served) -> str:
 def http(served: Served) -> Iterator[httpx.Client]:
     """A client whose every answer is checked against the daemon's own OpenAPI document."""
     with httpx.Client(base_url=served.url, timeout=60.0) as client:
-        hold_to_contract(client, served.app.openapi())
+        hold_to_contract(client, served.app)
         yield client

@@ -40,7 +40,7 @@ def served(directory: Path) -> Iterator[Served]:
 @pytest.fixture
 def http(served: Served) -> Iterator[httpx.Client]:
     with httpx.Client(base_url=served.url + "/api/v1/", timeout=60.0) as client:
-        hold_to_contract(client, served.app.openapi())
+        hold_to_contract(client, served.app)
         yield client
 
 

@@ -90,11 +90,11 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     app.state.service = service
     app.state.metrics = metrics
     app.state.guard = guard
-    api = APIRouter(prefix=API)
+    api = APIRouter()
     for resource in _RESOURCES:
         api.include_router(resource.router, dependencies=[Depends(permissions.admit)])
     api.include_router(websocket.router)
-    app.include_router(api)
+    app.include_router(api, prefix=API)  # with a prefix of its own FastAPI analyses it twice
     for outside in (info.versions, health.router, metrics_route.router):
         app.include_router(outside)
     for documents in (openapi.router, pages.router):

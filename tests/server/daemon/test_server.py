@@ -260,9 +260,11 @@ def test_sigterm_while_kernels_are_compiled_closes_streams_and_recordings(tmp_pa
 
 @pytest.fixture
 def collector() -> Iterator[None]:
-    """Unfreeze the garbage collector after the test."""
+    """Let go of what the test froze."""
     yield
     gc.unfreeze()
+    gc.collect()
+    gc.freeze()  # as it was after collection (tests/conftest.py)
 
 
 class Node:

@@ -44,7 +44,7 @@ def daemon(file: TokenFile, tokens: dict[str, str]) -> Iterator[Served]:
 @pytest.fixture
 def http(daemon: Served) -> Iterator[httpx.Client]:
     with httpx.Client(base_url=daemon.url, timeout=60.0) as client:
-        hold_to_contract(client, daemon.app.openapi())
+        hold_to_contract(client, daemon.app)
         yield client
 
 

@@ -30,7 +30,7 @@ def bench(tmp_path: Path) -> Iterator[Served]:
 @pytest.fixture
 def http(bench: Served) -> Iterator[httpx.Client]:
     with httpx.Client(base_url=bench.url, timeout=60.0) as client:
-        hold_to_contract(client, bench.app.openapi())
+        hold_to_contract(client, bench.app)
         yield client
 
 
@@ -84,7 +84,7 @@ def test_harmonics_are_measured_by_a_phase_sweep_and_taken_out(tmp_path: Path) -
         serving("sim:calibration?device=prototype", calibrations=kept) as daemon,
         httpx.Client(base_url=daemon.url, timeout=60.0) as http,
     ):
-        hold_to_contract(http, daemon.app.openapi())
+        hold_to_contract(http, daemon.app)
         sub_phases = {"scheme": "arccos", "n": 4}
         # two frequencies have four sums of opposite images, which tell spoilt ones in each take
         sequence = QUICK | {"harmonics": 2, "sub_phases": sub_phases}
@@ -228,7 +228,7 @@ def test_a_disk_that_takes_nothing_is_a_problem_and_no_more(tmp_path: Path) -> N
         serving("sim:calibration", calibrations={"directory": occupied / "kept"}) as daemon,
         httpx.Client(base_url=daemon.url, timeout=60) as http,
     ):
-        hold_to_contract(http, daemon.app.openapi())
+        hold_to_contract(http, daemon.app)
         sent = http.post(f"{CALIBRATIONS}/import", content=b"PK")
         job = measured(http)
         assert next_meta(http)["calibration_id"] == "nominal"
@@ -245,7 +245,7 @@ def test_a_file_beyond_the_limit_is_refused(tmp_path: Path) -> None:
         serving("sim:calibration", calibrations=limits) as daemon,
         httpx.Client(base_url=daemon.url, timeout=60) as http,
     ):
-        hold_to_contract(http, daemon.app.openapi())
+        hold_to_contract(http, daemon.app)
         answer = http.post(f"{CALIBRATIONS}/import", content=b"\x00" * 4096)
 
     assert answer.status_code == 413

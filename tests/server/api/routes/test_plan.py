@@ -31,7 +31,7 @@ def noisy_daemon() -> Iterator[Served]:
 @pytest.fixture(scope="module")
 def noisy(noisy_daemon: Served) -> Iterator[httpx.Client]:
     with httpx.Client(base_url=noisy_daemon.url, timeout=60.0) as client:
-        hold_to_contract(client, noisy_daemon.app.openapi())
+        hold_to_contract(client, noisy_daemon.app)
         client.get("/api/v1/frames/latest", params={"wait_s": 10.0})
         yield client
 

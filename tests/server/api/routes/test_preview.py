@@ -77,8 +77,9 @@ def test_a_rate_leaves_frames_out(http: httpx.Client) -> None:
 
     lines = response.content.split(b"\r\n")
     numbers = [int(each.split()[1]) for each in lines if each.startswith(b"Transientcam-Frame")]
-    # 10.6 frames a second, of which 3 are shown
-    assert all(2 <= step <= 5 for step in np.diff(numbers))
+    # 10.6 frames a second, of which 3 are shown; a laden machine leaves out more
+    assert len(numbers) == 4
+    assert min(np.diff(numbers)) >= 2
 
 
 def test_who_does_not_read_delays_no_other_and_has_nothing_made_ahead(

@@ -38,7 +38,7 @@ def daemon(directory: Path) -> Iterator[Served]:
 @pytest.fixture(scope="module")
 def http(daemon: Served) -> Iterator[httpx.Client]:
     with httpx.Client(base_url=daemon.url, timeout=60.0) as client:
-        hold_to_contract(client, daemon.app.openapi())
+        hold_to_contract(client, daemon.app)
         yield client
 
 

@@ -53,7 +53,7 @@ def captured(daemon: Served) -> list[RawFrame]:
 @pytest.fixture
 def http(daemon: Served) -> Iterator[httpx.Client]:
     with httpx.Client(base_url=daemon.url, timeout=60.0) as client:
-        hold_to_contract(client, daemon.app.openapi())
+        hold_to_contract(client, daemon.app)
         yield client
 
 
@@ -385,7 +385,7 @@ def test_a_directory_that_cannot_be_written_is_a_problem_and_capture_goes_on(
         serving(recordings={"directory": tmp_path / "file" / "here"}) as served,
         httpx.Client(base_url=served.url, timeout=60.0) as http,
     ):
-        hold_to_contract(http, served.app.openapi())
+        hold_to_contract(http, served.app)
         refused = http.post(RECORDINGS, json={})
         assert refused.status_code == 507
         assert "Not a directory" in refused.json()["detail"]
@@ -406,7 +406,7 @@ def test_what_was_left_unfinished_is_recovered_at_the_start(directory: Path) -> 
         serving(recordings={"directory": directory}) as served,
         httpx.Client(base_url=served.url, timeout=60.0) as http,
     ):
-        hold_to_contract(http, served.app.openapi())
+        hold_to_contract(http, served.app)
         document = finished(http, "left", unfinished="interrupted")
 
     assert document["state"] == "complete"
@@ -464,7 +464,7 @@ def test_a_recording_served_as_a_camera_gives_the_same_images_and_refuses_anothe
         serving(f"recording:{path}?loop=on") as replayed,
         httpx.Client(base_url=replayed.url, timeout=60.0) as again,
     ):
-        hold_to_contract(again, replayed.app.openapi())
+        hold_to_contract(again, replayed.app)
         frame = wire.parse_frame(
             again.get("/api/v1/frames/latest/raw.msgpack", params={"wait_s": 10}).content
         )
