@@ -87,6 +87,19 @@ class Rectangle:
         signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
         return self.centre + signs[:, :1] * across + signs[:, 1:] * along
 
+    def tangents(self, apex: Points, middle: Points, across: Points) -> tuple[float, float]:
+        """Lowest and highest tangent of its points' angles at an apex to a direction.
+
+        In the plane of the direction and of one across it, both unit vectors. Infinite where it
+        reaches behind the apex.
+        """
+        away = self.extent() - apex
+        along = away @ middle
+        if along.min() <= _CLEAR:
+            return -np.inf, np.inf
+        tangents = away @ across / along
+        return float(tangents.min()), float(tangents.max())
+
     def cells(self, edge_m: float) -> Cells:
         """Cut it into equal cells of about the edge given."""
         rows, columns = _counts(self.height, edge_m), _counts(self.width, edge_m)
@@ -208,6 +221,22 @@ class Ellipsoid:
             ahead = np.where(first > _CLEAR_OF_CURVED, first, second)
             at[met] = np.where(ahead > _CLEAR_OF_CURVED, ahead, np.inf)
         return at
+
+    def tangents(self, apex: Points, middle: Points, across: Points) -> tuple[float, float]:
+        """Lowest and highest tangent of its points' angles at an apex to a direction.
+
+        In the plane of the direction and of one across it, both unit vectors. Infinite where it
+        reaches behind the apex.
+        """
+        away, squared = self.centre - apex, self.radii**2
+        along, aside = away @ middle, away @ across
+        # planes through the apex that touch it: (aside - t along)^2 = |radii (across - t middle)|^2
+        a = along * along - squared @ middle**2
+        if along <= 0 or a <= _CLEAR:
+            return -np.inf, np.inf
+        b = along * aside - squared @ (middle * across)
+        root = np.sqrt(max(b * b - a * (aside * aside - squared @ across**2), 0.0))
+        return float((b - root) / a), float((b + root) / a)
 
     def cells(self, edge_m: float) -> Cells:
         """Cut it along equal steps of height and of longitude."""
