@@ -187,7 +187,8 @@ class MovingLight:
         whole = union([region for region, _share in dark])
         left = np.ones(extent(whole), dtype=np.float32)
         for region, share in dark:
-            left[inside(region, whole)] *= 1 - share
+            at = inside(region, whole)
+            left[at] = overlapped(left[at], 1 - share)
         return Shadow(chain, whole, left)
 
     def _light_segments(self, chain: int, light: ImageLight) -> list[Bundle]:

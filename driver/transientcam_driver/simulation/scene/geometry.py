@@ -3,6 +3,7 @@
 Lengths in m; x points right, y away from the camera, z up.
 """
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -228,15 +229,16 @@ class Ellipsoid:
         In the plane of the direction and of one across it, both unit vectors. Infinite where it
         reaches behind the apex.
         """
-        away, squared = self.centre - apex, self.radii**2
-        along, aside = away @ middle, away @ across
+        away, along_m, across_m = self.centre - apex, self.radii * middle, self.radii * across
+        along, aside = float(away @ middle), float(away @ across)
         # planes through the apex that touch it: (aside - t along)^2 = |radii (across - t middle)|^2
-        a = along * along - squared @ middle**2
+        a = along * along - float(along_m @ along_m)
         if along <= 0 or a <= _CLEAR:
             return -np.inf, np.inf
-        b = along * aside - squared @ (middle * across)
-        root = np.sqrt(max(b * b - a * (aside * aside - squared @ across**2), 0.0))
-        return float((b - root) / a), float((b + root) / a)
+        b = along * aside - float(along_m @ across_m)
+        c = aside * aside - float(across_m @ across_m)
+        root = math.sqrt(max(b * b - a * c, 0.0))
+        return (b - root) / a, (b + root) / a
 
     def cells(self, edge_m: float) -> Cells:
         """Cut it along equal steps of height and of longitude."""
