@@ -156,7 +156,9 @@ class SceneFacts:
         """Follow rays through places in the pixels judged, from their centres."""
         rays = np.concatenate([self._rays(camera, at) for at in places])
         lit, count = light_rays(scene, rays), len(self._rows)
-        return _Seen(scene, tuple(lit.part(slice(k, k + count)) for k in range(0, len(rays), count)))
+        return _Seen(
+            scene, tuple(lit.part(slice(k, k + count)) for k in range(0, len(rays), count))
+        )
 
     def _rays(self, camera: Viewpoint, at: tuple[float, float] = (0.0, 0.0)) -> Points:
         width, height = self._size
