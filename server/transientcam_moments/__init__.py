@@ -31,13 +31,7 @@ from transientcam_moments.errors import (
 )
 from transientcam_moments.flags import INVALID, Flags, flags
 from transientcam_moments.four_bucket import four_bucket, measure, saturated
-from transientcam_moments.harmonics import (
-    Corrected,
-    HarmonicCorrection,
-    checked_waveform,
-    sweep_offsets_rad,
-    waveform_of,
-)
+from transientcam_moments.harmonics import Corrected, HarmonicCorrection, checked_waveform
 from transientcam_moments.labels import Labels
 from transientcam_moments.levinson import (
     Coefficients,
@@ -57,6 +51,12 @@ from transientcam_moments.reconstruction import Reconstruction, Settings
 from transientcam_moments.reconstructor import Reconstructor, reconstruct
 from transientcam_moments.repair import Repair, repair
 from transientcam_moments.smoothing import smooth
+from transientcam_moments.sweep import (
+    SweepPhasors,
+    sweep_offsets_rad,
+    sweep_phasors,
+    waveform_of,
+)
 from transientcam_moments.takes import Average, average_takes
 
 __all__ = [
@@ -80,6 +80,7 @@ __all__ = [
     "Separation",
     "Settings",
     "ShapeError",
+    "SweepPhasors",
     "UnlabelledImages",
     "average_takes",
     "bias",
@@ -117,5 +118,6 @@ __all__ = [
     "smooth",
     "smoothed_density",
     "sweep_offsets_rad",
+    "sweep_phasors",
     "waveform_of",
 ]
