@@ -138,7 +138,7 @@ def _at(
 ) -> tuple[Plane, Plane]:
     """Share of pixels at a border, and the mean root, by the values on both sides of each."""
     (down, bend), (right, more) = (_slope(value - one, other - value) for one, other in beside)
-    value = value + (bend + more) / 24  # its mean over the pixel
+    value = single(value + (bend + more) / 24)  # its mean over the pixel
     share = _half_plane(value, np.maximum(down, right), np.minimum(down, right))
     if not rooted:
         return share, share

@@ -43,7 +43,8 @@ class Motion:
         place = (time_s / self.period_s) % 1.0 * (len(knots_m) - 1)
         knot = min(int(place), len(knots_m) - 2)
         before: Points = knots_m[knot]
-        return before + (place - knot) * (knots_m[knot + 1] - before)
+        offset: Points = before + (place - knot) * (knots_m[knot + 1] - before)
+        return offset
 
     @property
     def speed_m_s(self) -> float:
