@@ -121,7 +121,7 @@ class MovingLight:
         return covered(values, rooted=False)[0] if self._soft else (values > 0).astype(np.float32)
 
     def _visible(self, seen: list[_Seen]) -> list[_Seen]:
-        """Take from each share what nearer surfaces that move cover of it."""
+        """Take from each share what nearer surfaces that move cover of it; leave out the hidden."""
         left = [each.share.copy() for each in seen]
         for k, one in enumerate(seen):
             for other, share in zip(seen[k + 1 :], left[k + 1 :], strict=True):
@@ -135,7 +135,8 @@ class MovingLight:
                 nearer = self._above(other.at_m[its] - one.at_m[mine])
                 share[its] *= 1 - nearer * hidden / np.maximum(other.share[its], _TINY)
                 left[k][mine] *= 1 - (1 - nearer) * hidden / np.maximum(one.share[mine], _TINY)
-        return [replace(each, share=share) for each, share in zip(seen, left, strict=True)]
+        shown = zip(seen, left, strict=True)
+        return [replace(each, share=share) for each, share in shown if share.any()]
 
     def _lit(self, scene: Scene, seen: list[_Seen]) -> list[Layer]:
         """Light the parts of surfaces that are seen, all at once."""

@@ -220,3 +220,16 @@ def test_what_stands_before_something_that_moves_hides_it() -> None:
     now = moving(hidden, soft=True).at(1.0)
 
     assert now.moments(0.0) == pytest.approx(averaged(hidden.at(1.0), (0.0,), 1)[0], rel=1e-5)
+
+
+def test_what_something_that_moves_hides_wholly_is_not_there() -> None:
+    scene = with_a_moving(BOARD, ASIDE)
+    behind = Ellipsoid(v(0.03, 1.6, 0.03), v(0.05, 0.05, 0.05))
+    hidden = replace(scene.surfaces[1], name="hidden", shape=behind)
+    both = replace(scene, surfaces=(*scene.surfaces, hidden))
+
+    returns = moving(both, soft=True).at(1.0).returns()
+
+    expected = moving(scene, soft=True).at(1.0).returns()
+    middle = (..., HEIGHT // 2, WIDTH // 2 + 6)
+    assert returns[1][middle].sum() == pytest.approx(expected[1][middle].sum(), rel=1e-6)
