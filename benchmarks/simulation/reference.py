@@ -27,7 +27,12 @@ Places = NDArray[np.float64]
 
 
 def reference_moments(
-    scene: Scene, pixel: Pixels, size: tuple[int, int], frequencies_hz: tuple[float, ...]
+    scene: Scene,
+    pixel: Pixels,
+    size: tuple[int, int],
+    frequencies_hz: tuple[float, ...],
+    *,
+    fine: int = FINE,
 ) -> Moments:
     """Return mean moments (F, P) over the rays of some pixels, by index, of a scene at a time."""
     coarse = _rays(scene, pixel, size, _hammersley(COARSE))
@@ -35,8 +40,8 @@ def reference_moments(
     corners = _rays(scene, pixel, size, _CORNERS)
     edge = np.flatnonzero(_differ(coarse, corners, len(pixel)))
     if edge.size:
-        fine = _rays(scene, pixel[edge], size, _hammersley(FINE))
-        moments[:, edge] = _means(scene, fine, len(edge), frequencies_hz)
+        many = _rays(scene, pixel[edge], size, _hammersley(fine))
+        moments[:, edge] = _means(scene, many, len(edge), frequencies_hz)
     return moments
 
 

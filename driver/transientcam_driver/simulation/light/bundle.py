@@ -1,40 +1,42 @@
 """Straight lines through one point, one for each pixel: rays of the camera, or ways of light."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.light.coverage import Plane
 from transientcam_driver.simulation.scene.geometry import Points, Shape
 
 Region = tuple[slice, slice]
-_TILE = 8  # pixels a side
-_WIDER = 1e-3  # rad, for rounding
+_TILE = 4  # pixels a side
+_AROUND = 1  # pixels beside a tile, whose squares what is seen just outside of them may reach
+_ACROSS = 0.05  # cosine to the middle line, below which a line's place beside it is not taken
 
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """Lines ``apex + t way`` of H x W pixels, and their directions by tiles of pixels.
+    """Lines ``apex + t way`` of H x W pixels, and where tiles of pixels lie among them.
 
     Attributes
     ----------
     near
         (H, W) t from which a line counts; it counts up to ``far``.
-    axis, cosine, sine
-        (R, C, 3) mean direction of a tile's lines, and (R, C) of the largest angle to it.
-    counts
-        (R, C) whether any line of a tile counts.
+    frame
+        (3, 3) the middle line, and two unit vectors across it.
+    low, high
+        (2, R, C) along these two, tangents of the angles of a tile's lines to the middle line.
     """
 
     apex: Points
     way: tuple[Plane, Plane, Plane]
     near: Plane
     far: Plane
-    axis: NDArray[np.float64]
-    cosine: NDArray[np.float64]
-    sine: NDArray[np.float64]
-    counts: NDArray[np.bool_]
+    frame: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
 
     @classmethod
     def of(
@@ -47,43 +49,32 @@ class Bundle:
         far: NDArray[np.floating] | np.floating | float,
     ) -> "Bundle":
         """Make one of ways (H, W, 3); lines that do not count have any."""
-        height, width = counts.shape
         unit = way / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-12)
-        unit[~counts] = 0
-        rows, columns = -(-height // _TILE), -(-width // _TILE)
-        padded = np.zeros((rows * _TILE, columns * _TILE, 3))
-        padded[:height, :width] = unit
-        tiles = padded.reshape(rows, _TILE, columns, _TILE, 3).swapaxes(1, 2)
-        tiles = tiles.reshape(rows, columns, -1, 3)
-        axis = tiles.sum(axis=2)
-        axis /= np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), 1e-12)
-        cosine = np.einsum("rcpx,rcx->rcp", tiles, axis)
-        there = tiles.any(axis=-1)
-        angle = np.where(there, np.arccos(np.clip(cosine, -1, 1)), 0.0).max(axis=-1) + _WIDER
+        frame = _frame(unit[counts].sum(axis=0))
+        along, *across = np.moveaxis(unit @ frame.T, -1, 0)
+        aside = along <= _ACROSS
+        tangents = np.array(across) / np.where(aside, 1.0, along)
+        low = _of_tiles(np.where(counts, np.where(aside, -np.inf, tangents), np.inf), np.min)
+        high = _of_tiles(np.where(counts, np.where(aside, np.inf, tangents), -np.inf), np.max)
         x, y, z = (np.ascontiguousarray(way[..., k], dtype=np.float32) for k in range(3))
         return cls(
             apex,
             (x, y, z),
             np.broadcast_to(np.asarray(near, dtype=np.float32), counts.shape),
             np.broadcast_to(np.asarray(far, dtype=np.float32), counts.shape),
-            axis,
-            np.cos(angle),
-            np.sin(angle),
-            np.asarray(there.any(axis=-1)),
+            frame,
+            low,
+            high,
         )
 
     def meeting(self, shape: Shape) -> Region | None:
         """Return the region of the pixels whose lines may meet a shape; None if there are none."""
-        low, high = shape.box
-        centre, radius_m = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-        away = centre - self.apex
-        distance_m = float(np.linalg.norm(away))
-        if distance_m <= radius_m:
-            return _bounds(self.counts, self.way[0].shape)
-        sine = radius_m / distance_m
-        # cosine of the largest angle at which a tile's lines reach the sphere around the shape
-        least = np.sqrt(1 - sine * sine) * self.cosine - sine * self.sine
-        return _bounds((self.axis @ (away / distance_m) >= least) & self.counts, self.way[0].shape)
+        middle, *across = self.frame
+        meets = np.ones(self.low.shape[1:], dtype=bool)
+        for axis, low, high in zip(across, self.low, self.high, strict=True):
+            least, most = shape.tangents(self.apex, middle, axis)
+            meets &= (low <= most) & (high >= least)
+        return _bounds(meets, self.way[0].shape)
 
     def within(self, region: Region) -> tuple[tuple[Plane, ...], Plane, Plane]:
         """Return the ways of a region's lines, and from where to where they count."""
@@ -99,6 +90,26 @@ def _bounds(tiles: NDArray[np.bool_], shape: tuple[int, ...]) -> Region | None:
         slice(int(rows[0]) * _TILE, min(int(rows[-1] + 1) * _TILE, shape[0])),
         slice(int(columns[0]) * _TILE, min(int(columns[-1] + 1) * _TILE, shape[1])),
     )
+
+
+def _frame(middle: Points) -> NDArray[np.float64]:
+    """Return unit vectors along a direction and across it, the first of these level."""
+    middle = middle / max(float(np.linalg.norm(middle)), 1e-12)
+    level = np.cross(middle, [0.0, 0.0, 1.0] if abs(middle[2]) < 0.9 else [0.0, 1.0, 0.0])
+    level /= np.linalg.norm(level)
+    return np.array([middle, level, np.cross(level, middle)])
+
+
+def _of_tiles(
+    planes: NDArray[np.float64], most: Callable[..., NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Lowest or highest values (2, R, C) of tiles and of the pixels around each."""
+    height, width = planes.shape[1:]
+    padding = [(_AROUND, _AROUND + -size % _TILE) for size in (height, width)]
+    padded = np.pad(planes, [(0, 0), *padding], mode="edge")
+    side = _TILE + 2 * _AROUND
+    windows = sliding_window_view(padded, (side, side), axis=(1, 2))[:, ::_TILE, ::_TILE]
+    return most(windows, axis=(-2, -1))
 
 
 def extent(region: Region) -> tuple[int, int]:

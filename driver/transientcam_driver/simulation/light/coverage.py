@@ -110,20 +110,43 @@ def covered(inside: Plane, *, rooted: bool = True) -> tuple[Plane, Plane]:
     near = np.flatnonzero(_at_border(positive))
     if near.size:
         flat = inside.ravel()
-        value = flat[near]
-        (down, bend), (right, more) = (
-            _slope(value - flat[before], flat[after] - value)
-            for before, after in _neighbours(inside.shape, near)
-        )
-        value += (bend + more) / 24  # its mean over the pixel
+        beside = tuple((flat[to], flat[of]) for to, of in _neighbours(inside.shape, near))
+        part, mean = _at(flat[near], beside, rooted=rooted)
+        share.ravel()[near] = part
         if rooted:
-            width = np.sqrt(down * down + right * right)
-            high = np.maximum(value + width / 2, np.float32(1e-9))
-            low = np.maximum(value - width / 2, np.float32(0))
-            cubes = high * np.sqrt(high) - low * np.sqrt(low)
-            root.ravel()[near] = cubes / np.maximum(1.5 * (high - low), np.float32(1e-9))
-        share.ravel()[near] = _half_plane(value, np.maximum(down, right), np.minimum(down, right))
+            root.ravel()[near] = mean
     return share, root
+
+
+def covered_among(inside: Plane, around: NDArray[np.intp]) -> Plane:
+    """Share of each of some pixels (P) where a function is above 0; NaN is nowhere.
+
+    ``around`` (4, P) are the pixels above, below, left and right of each, by index; P is none.
+    """
+    values = np.append(inside, np.float32(np.nan))
+    positive = values > 0
+    share = positive[:-1].astype(np.float32)
+    near = np.flatnonzero((positive[around] != positive[:-1]).any(axis=0))
+    if near.size:
+        up, down, left, right = values[around[:, near]]
+        share[near] = _at(values[near], ((up, down), (left, right)), rooted=False)[0]
+    return share
+
+
+def _at(
+    value: Plane, beside: tuple[tuple[Plane, Plane], ...], *, rooted: bool
+) -> tuple[Plane, Plane]:
+    """Share of pixels at a border, and the mean root, by the values on both sides of each."""
+    (down, bend), (right, more) = (_slope(value - one, other - value) for one, other in beside)
+    value = single(value + (bend + more) / 24)  # its mean over the pixel
+    share = _half_plane(value, np.maximum(down, right), np.minimum(down, right))
+    if not rooted:
+        return share, share
+    width = np.sqrt(down * down + right * right)
+    high = np.maximum(value + width / 2, np.float32(1e-9))
+    low = np.maximum(value - width / 2, np.float32(0))
+    cubes = high * np.sqrt(high) - low * np.sqrt(low)
+    return share, single(cubes / np.maximum(1.5 * (high - low), np.float32(1e-9)))
 
 
 def _at_border(positive: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -201,5 +224,6 @@ def _half_plane(value: Plane, steep: Plane, gentle: Plane) -> Plane:
         part = np.maximum(value + offset, np.float32(0))
         area += sign * part * part
     share = single(np.clip(area / (2 * steep * gentle), 0, 1))
+    share[value >= half] = 1  # where nothing is left of the differences but rounding
     share[np.isnan(share)] = 0
     return share

@@ -71,6 +71,10 @@ class Ends:
         Components of the points.
     distance_m
         From the camera.
+    direction
+        Components of the unit vectors along which rays of the camera arrive.
+    throughput
+        Share of light that mirrors leave on its way to the camera.
     """
 
     still: Scene
@@ -78,10 +82,10 @@ class Ends:
     index: NDArray[np.intp]
     point: tuple[Plane, Plane, Plane]
     distance_m: Plane
+    direction: tuple[Plane, Plane, Plane]
+    throughput: NDArray[np.float64]
 
-    def lit(
-        self, lights: tuple[ImageLight, ...], *, eye: Points, movers: tuple[int, ...], cover: Cover
-    ) -> Lit:
+    def lit(self, lights: tuple[ImageLight, ...], *, movers: tuple[int, ...], cover: Cover) -> Lit:
         """Return the light by each chain of mirrors; on the back of a rectangle there is none.
 
         ``movers`` are the surfaces that move, and ``cover`` says which share of the pixels around
@@ -89,10 +93,8 @@ class Ends:
         """
         count = len(self.distance_m)
         normal = self._normals()
-        towards = np.zeros(count, dtype=np.float32)
-        for n, p, e in zip(normal, self.point, eye, strict=True):
-            towards += n * (np.float32(e) - p)
-        facing = (towards > 0).astype(np.float64)
+        along = sum(n * d for n, d in zip(normal, self.direction, strict=True))
+        facing = np.where(along < 0, self.throughput, 0.0)
         albedo = np.array([surface.reflectivity for surface in self.surfaces])
         lit = Lit(
             self.index,
@@ -106,7 +108,7 @@ class Ends:
         for k, light in enumerate(lights):
             sent = lit.reflectance
             if glossy:
-                direction = (lit.point - eye) / lit.distance_m[:, None]
+                direction = np.stack(self.direction, axis=-1).astype(np.float64)
                 ends = RayEnds(
                     np.arange(count), lit.point, self.index, lit.distance_m, facing, direction
                 )

@@ -154,7 +154,11 @@ class SceneFacts:
         places: tuple[tuple[float, float], ...] = ((0.0, 0.0),),
     ) -> _Seen:
         """Follow rays through places in the pixels judged, from their centres."""
-        return _Seen(scene, tuple(light_rays(scene, self._rays(camera, at)) for at in places))
+        rays = np.concatenate([self._rays(camera, at) for at in places])
+        lit, count = light_rays(scene, rays), len(self._rows)
+        return _Seen(
+            scene, tuple(lit.part(slice(k, k + count)) for k in range(0, len(rays), count))
+        )
 
     def _rays(self, camera: Viewpoint, at: tuple[float, float] = (0.0, 0.0)) -> Points:
         width, height = self._size

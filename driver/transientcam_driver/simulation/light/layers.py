@@ -17,17 +17,12 @@ from transientcam_driver.simulation.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """Pixels, by index, each once, that show something that moves, and by which share.
-
-    ``lit`` is the light of one ray a pixel, or of several: for each place in a pixel, all pixels.
-    ``last``: it takes the place of all other layers, too.
-    """
+    """Pixels, by index, each once, that show something that moves, and by which share."""
 
     region: Region
     pixel: NDArray[np.intp]
     share: NDArray[np.float32]
     lit: Lit
-    last: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +56,7 @@ class MovingResponses:
         self._still = still
         self._found: dict[float, NDArray[np.complex64]] = {}
         self._shape = still.height, still.width
-        only = np.concatenate([np.zeros(0, np.intp), *(each.pixel for each in layers if each.last)])
-        self._layers = tuple(each if each.last else _without(each, only) for each in layers)
+        self._layers = layers
         self._uncovered = np.ones(still.height * still.width, dtype=np.float32)
         for each in self._layers:
             self._uncovered[each.pixel] -= each.share
@@ -127,9 +121,8 @@ class MovingResponses:
         scatter = lit.scatter(self.scene)
         if scatter is not None:
             of_rays *= scatter.transfer(frequency_hz)
-        mean = of_rays.reshape(-1, len(layer.pixel)).mean(axis=0)
-        result: NDArray[np.complex64] = layer.share * mean
-        return result
+        of_rays *= layer.share
+        return of_rays
 
     def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the returns of all pixels."""
@@ -163,8 +156,7 @@ class MovingResponses:
         """(H, W) of what the pixels see, by its shares."""
         reflectance = self._still.reflectance * self._uncovered
         for layer in self._layers:
-            of_pixels = layer.lit.reflectance.reshape(-1, len(layer.pixel)).mean(axis=0)
-            reflectance[layer.pixel] += (layer.share * of_pixels).astype(np.float32)
+            reflectance[layer.pixel] += (layer.share * layer.lit.reflectance).astype(np.float32)
         return reflectance.reshape(self._shape)
 
     @cached_property
@@ -191,10 +183,9 @@ class MovingResponses:
     def _planes_of(
         self, layer: Layer
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], Scatter | None]:
-        """Delays, weights and spread of a layer, (K, H W); delays of the first of several rays."""
-        lit, count = layer.lit, len(layer.pixel)
-        weights = layer.share * lit.weight.reshape(len(lit.weight), -1, count).mean(axis=1)
-        delays, surfaces = lit.delay_s[:, :count], lit.surface[:count]
+        """Delays, weights and spread of a layer, (K, H W)."""
+        delays, surfaces = layer.lit.delay_s, layer.lit.surface
+        weights = layer.share * layer.lit.weight
         delay_s, weight, surface = [], [], []
         for index in np.unique(surfaces):
             mine = surfaces == index
@@ -206,11 +197,3 @@ class MovingResponses:
             surface.append(np.full(shape, index))
         spread = scatter_of(self.scene, np.concatenate(surface))
         return np.concatenate(delay_s), np.concatenate(weight), spread
-
-
-def _without(layer: Layer, pixel: NDArray[np.intp]) -> Layer:
-    """Return a layer that shows nothing in some pixels."""
-    if not pixel.size:
-        return layer
-    share = np.where(np.isin(layer.pixel, pixel), np.float32(0), layer.share)
-    return Layer(layer.region, layer.pixel, share, layer.lit)

@@ -6,6 +6,7 @@ it blocks. Everything follows the device's time without steps.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +23,17 @@ from transientcam_driver.simulation.light.coverage import (
     Crossing,
     Plane,
     covered,
+    covered_among,
     crossing,
     overlapped,
 )
 from transientcam_driver.simulation.light.ends import Ends
 from transientcam_driver.simulation.light.layers import Layer, MovingResponses, Shadow
-from transientcam_driver.simulation.light.paths import ImageLight, image_lights, light_rays
-from transientcam_driver.simulation.light.still import StillLight, grown
+from transientcam_driver.simulation.light.paths import ImageLight, image_lights
+from transientcam_driver.simulation.light.still import Sight, StillLight
 from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene
 
-_RAYS_IN_MIRRORS = 16  # into pixels that show something that moves in a mirror
 _TINY = np.float32(1e-9)
 _AWAY = np.array([0.0, 0.0, -1e6])  # where surfaces that move are put while the rest is traced
 
@@ -42,24 +43,19 @@ class _Seen:
     """A surface that moves, where the camera sees it: shares (h, w) of the pixels of a region."""
 
     index: int
+    sight: Sight
     region: Region
     share: Plane
     at_m: Plane
 
-
-@dataclass(frozen=True, slots=True)
-class _Grid:
-    """Where points lie in a region of the image of so many rows and columns."""
-
-    rows: NDArray[np.intp]
-    columns: NDArray[np.intp]
-    shape: tuple[int, int]
-
-    def plane(self, on: NDArray[np.intp], values: Plane, there: NDArray[np.bool_]) -> Plane:
-        """Return values of some points as a plane; NaN is where there are none."""
-        plane = np.full(self.shape, np.nan, dtype=np.float32)
-        plane[self.rows[on], self.columns[on]] = np.where(there, values, np.nan)
-        return plane
+    def points(self) -> tuple[NDArray[Any], ...]:
+        """Return its pixels: rows, columns, shares, distances, and points and ways by component."""
+        place = np.nonzero(self.share)
+        at_m, bundle = self.at_m[place], self.sight.bundle
+        rows, columns = (on + of.start for on, of in zip(place, self.region, strict=True))
+        way = [each[rows, columns] for each in bundle.way]
+        point = [w * at_m + np.float32(a) for w, a in zip(way, bundle.apex, strict=True)]
+        return rows, columns, self.share[place], at_m, *point, *way
 
 
 class MovingLight:
@@ -82,7 +78,7 @@ class MovingLight:
         self._soft = soft
         self._movers = tuple(k for k, each in enumerate(scene.surfaces) if each.motions)
         self._lights = tuple(image_lights(scene))
-        self._sight, *self._mirrored = still.lines_of_sight()
+        self._sights = still.lines_of_sight(soft=soft)
         self._chains = tuple(
             tuple(self._light_segments(k, light)) for k, light in enumerate(self._lights)
         )
@@ -90,26 +86,26 @@ class MovingLight:
     def at(self, time_s: float) -> MovingResponses:
         """Impulse responses at a time."""
         scene = self.scene.at(time_s)
-        seen = self._visible([each for k in self._movers if (each := self._cover(scene, k))])
+        found = [self._cover(scene, k, sight) for sight in self._sights for k in self._movers]
+        seen = self._visible([each for each in found if each])
         layers = self._lit(scene, seen) if seen else []
-        if mirrored := self._seen_in_mirrors(scene):
-            layers.append(mirrored)
         shadows = [shadow for k in range(len(self._chains)) if (shadow := self._shadow(scene, k))]
         region = union([*(each.region for each in layers), *(each.region for each in shadows)])
         return MovingResponses(self.still, scene, tuple(layers), tuple(shadows), region)
 
-    def _cover(self, scene: Scene, index: int) -> _Seen | None:
+    def _cover(self, scene: Scene, index: int, sight: Sight) -> _Seen | None:
         """Shares of pixels that a surface covers, where nothing that stands still is before it."""
         shape = scene.surfaces[index].shape
-        region = self._sight.meeting(shape)
+        region = sight.bundle.meeting(shape)
         if region is None:
             return None
-        way, _near, far = self._sight.within(region)
-        cross = crossing(shape, self._sight.apex, way)
+        way, near, far = sight.bundle.within(region)
+        cross = crossing(shape, sight.bundle.apex, way)
         share, root = self._share(cross, rooted=True)
         at_m = cross.entered(root)
-        share[~((at_m > 0) & (at_m < far))] = 0
-        return _Seen(index, region, share, at_m) if share.any() else None
+        share *= sight.fills[region]
+        share[~((at_m > near) & (at_m < far))] = 0
+        return _Seen(index, sight, region, share, at_m) if share.any() else None
 
     def _share(self, cross: Crossing, *, rooted: bool = False) -> tuple[Plane, Plane]:
         """Share of each pixel that a shape covers; with the mean root that says where, if asked."""
@@ -125,7 +121,7 @@ class MovingLight:
         return covered(values, rooted=False)[0] if self._soft else (values > 0).astype(np.float32)
 
     def _visible(self, seen: list[_Seen]) -> list[_Seen]:
-        """Take from each share what nearer surfaces that move cover of it."""
+        """Take from each share what nearer surfaces that move cover of it; leave out the hidden."""
         left = [each.share.copy() for each in seen]
         for k, one in enumerate(seen):
             for other, share in zip(seen[k + 1 :], left[k + 1 :], strict=True):
@@ -139,48 +135,38 @@ class MovingLight:
                 nearer = self._above(other.at_m[its] - one.at_m[mine])
                 share[its] *= 1 - nearer * hidden / np.maximum(other.share[its], _TINY)
                 left[k][mine] *= 1 - (1 - nearer) * hidden / np.maximum(one.share[mine], _TINY)
-        return [replace(each, share=share) for each, share in zip(seen, left, strict=True)]
+        shown = zip(seen, left, strict=True)
+        return [replace(each, share=share) for each, share in shown if share.any()]
 
     def _lit(self, scene: Scene, seen: list[_Seen]) -> list[Layer]:
         """Light the parts of surfaces that are seen, all at once."""
         region = union([each.region for each in seen])
-        places = [np.nonzero(each.share) for each in seen]
-        rows, columns = (
-            np.concatenate(
-                [
-                    place[axis] + each.region[axis].start
-                    for each, place in zip(seen, places, strict=True)
-                ]
-            )
-            for axis in (0, 1)
-        )
-        owner = np.repeat([each.index for each in seen], [len(place[0]) for place in places])
-        found = list(zip(seen, places, strict=True))
-        at_m = np.concatenate([each.at_m[place] for each, place in found])
-        share = np.concatenate([each.share[place] for each, place in found])
-        x, y, z = (
-            way[rows, columns] * at_m + np.float32(start)
-            for way, start in zip(self._sight.way, self._sight.apex, strict=True)
-        )
-        grid = _Grid(rows - region[0].start, columns - region[1].start, extent(region))
+        points = [each.points() for each in seen]
+        counts = [len(each[0]) for each in points]
+        rows, columns, share, at_m, *components = map(np.concatenate, zip(*points, strict=True))
+        around = _around(rows - region[0].start, columns - region[1].start, extent(region))
 
         def cover(cross: Crossing, on: NDArray[np.intp], counts: NDArray[np.bool_]) -> Plane:
-            planes = tuple(grid.plane(on, each, counts) for each in cross.inside)
-            share = self._share(replace(cross, inside=planes))[0]
-            of_points: Plane = share[grid.rows[on], grid.columns[on]] * counts
-            return of_points
+            values = [np.where(counts, each, np.float32(np.nan)) for each in cross.inside]
+            if not self._soft:
+                return _product([(each > 0).astype(np.float32) for each in values])
+            beside = around if len(on) == around.shape[1] else _among(on, around)
+            return _product([covered_among(each, beside) for each in values])
 
-        lit = Ends(self.still.scene, scene.surfaces, owner, (x, y, z), at_m).lit(
-            self._lights, eye=self._sight.apex, movers=self._movers, cover=cover
-        )
+        lit = Ends(
+            self.still.scene,
+            scene.surfaces,
+            np.repeat([each.index for each in seen], counts),
+            (components[0], components[1], components[2]),
+            at_m,
+            (components[3], components[4], components[5]),
+            np.repeat([each.sight.throughput for each in seen], counts),
+        ).lit(self._lights, movers=self._movers, cover=cover)
         pixel = rows * self.still.width + columns
-        ends = np.cumsum([len(place[0]) for place in places])
-        parts = [
-            slice(int(start), int(end)) for start, end in zip([0, *ends[:-1]], ends, strict=True)
-        ]
+        ends = np.cumsum(counts)
         return [
-            Layer(each.region, pixel[of], share[of], lit.part(of))
-            for each, of in zip(seen, parts, strict=True)
+            Layer(each.region, pixel[start:end], share[start:end], lit.part(slice(start, end)))
+            for each, start, end in zip(seen, [0, *ends[:-1]], ends, strict=True)
         ]
 
     def _shadow(self, scene: Scene, chain: int) -> Shadow | None:
@@ -202,34 +188,9 @@ class MovingLight:
         whole = union([region for region, _share in dark])
         left = np.ones(extent(whole), dtype=np.float32)
         for region, share in dark:
-            left[inside(region, whole)] *= 1 - share
+            at = inside(region, whole)
+            left[at] = overlapped(left[at], 1 - share)
         return Shadow(chain, whole, left)
-
-    def _seen_in_mirrors(self, scene: Scene) -> Layer | None:
-        """Follow several rays a pixel that meet something that moves behind a mirror."""
-        over = np.zeros((self.still.height, self.still.width), dtype=bool)
-        for bundle in self._mirrored:
-            for index in self._movers:
-                shape = scene.surfaces[index].shape
-                region = bundle.meeting(shape)
-                if region is not None:
-                    way, near, far = bundle.within(region)
-                    cross = crossing(shape, bundle.apex, way)
-                    over[region] |= (self._share(cross)[0] > 0) & cross.between(near, far)
-        mixed = np.zeros_like(over)
-        mixed.ravel()[self.still.mixed] = True
-        over |= grown(over) & mixed  # pixels that a mirror fills in part
-        pixel = np.flatnonzero(over)
-        if not pixel.size:
-            return None
-        rays = self.still.rays_in(pixel, _RAYS_IN_MIRRORS) if self._soft else self.still.rays[pixel]
-        rows, columns = np.nonzero(over)
-        region = (
-            slice(int(rows.min()), int(rows.max()) + 1),
-            slice(int(columns.min()), int(columns.max()) + 1),
-        )
-        share = np.ones(len(pixel), dtype=np.float32)
-        return Layer(region, pixel, share, light_rays(scene, rays), last=True)
 
     def _light_segments(self, chain: int, light: ImageLight) -> list[Bundle]:
         """Ways of light to what stands still, where it arrives, one bundle a segment."""
@@ -274,6 +235,23 @@ def _segments(
         start = start + fraction[:, None] * (image_m - start)
     segments.append((light.positions_m[-1], start, np.float32(0)))
     return segments
+
+
+def _around(
+    rows: NDArray[np.intp], columns: NDArray[np.intp], shape: tuple[int, int]
+) -> NDArray[np.intp]:
+    """Return the points (4, P) above, below, left and right of points; P is none."""
+    place = np.full((shape[0] + 2, shape[1] + 2), len(rows))
+    place[rows + 1, columns + 1] = np.arange(len(rows))
+    steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
+    return np.array([place[rows + 1 + down, columns + 1 + right] for down, right in steps])
+
+
+def _among(on: NDArray[np.intp], around: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return what is around some of the points, by their own indices."""
+    place = np.full(around.shape[1] + 1, len(on))
+    place[on] = np.arange(len(on))
+    return place[around[:, on]]
 
 
 def _product(planes: list[Plane]) -> Plane:

@@ -1,5 +1,6 @@
 """The light of what stands still: a ray a pixel, and more where light differs within it."""
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -7,6 +8,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.simulation.effects.glimpses import Noise
 from transientcam_driver.simulation.light.bundle import Bundle
+from transientcam_driver.simulation.light.coverage import Plane, covered, crossing
 from transientcam_driver.simulation.light.followed import FollowedRays
 from transientcam_driver.simulation.light.paths import (
     FAR_M,
@@ -21,6 +23,23 @@ from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene
 
 _DIFFERS_ABOVE = 0.25  # of the noise
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """Rays of the camera behind so many mirrors.
+
+    Attributes
+    ----------
+    fills
+        (H, W) share of each pixel that the last mirror fills.
+    throughput
+        Share of the light that the mirrors leave.
+    """
+
+    bundle: Bundle
+    fills: Plane
+    throughput: float
 
 
 class StillLight:
@@ -140,16 +159,21 @@ class StillLight:
         delay_s, weight, scatter = self.returns
         return sparse_image(delay_s, weight, scatter, (self.height, self.width))
 
-    def lines_of_sight(self) -> list[Bundle]:
-        """Rays of the camera up to what stands still: before any mirror, then behind mirrors."""
+    def lines_of_sight(self, *, soft: bool) -> list[Sight]:
+        """Rays of the camera up to what stands still: before any mirror, then behind mirrors.
+
+        If soft, of a pixel that a mirror fills in part, the ray through its centre counts behind
+        the mirror wherever it would meet the mirror's plane.
+        """
         shape = self.height, self.width
         surfaces = self.scene.surfaces
-        bundles: list[Bundle] = []
+        sights: list[Sight] = []
         eye = self._camera.position_m
         start = np.broadcast_to(eye, self.rays.shape)
-        follow = [(0, np.arange(len(self.rays)), eye, start, self.rays)]
+        everywhere = np.ones(shape, dtype=np.float32)
+        follow = [(0, np.arange(len(self.rays)), eye, start, self.rays, everywhere, 1.0)]
         while follow:
-            bounces, index, apex, start, direction = follow.pop(0)
+            bounces, index, apex, start, direction, fills, throughput = follow.pop(0)
             hits = np.stack([hit(each, start, start + FAR_M * direction) for each in surfaces])
             nearest, which = hits.min(axis=0), hits.argmin(axis=0)
             reach_m = np.minimum(nearest, 1.0) * FAR_M
@@ -158,24 +182,34 @@ class StillLight:
             far[index] = near[index] + reach_m
             counts = np.zeros(len(self.rays), dtype=bool)
             counts[index] = True
-            bundles.append(
-                Bundle.of(
-                    apex,
-                    way.reshape(*shape, 3),
-                    counts.reshape(shape),
-                    near=near.reshape(shape),
-                    far=far.reshape(shape),
-                )
+            bundle = Bundle.of(
+                apex,
+                way.reshape(*shape, 3),
+                counts.reshape(shape),
+                near=near.reshape(shape),
+                far=far.reshape(shape),
             )
+            sights.append(Sight(bundle, fills, throughput))
+            if bounces == self.scene.mirror_bounces:
+                continue
             for k in np.unique(which[np.isfinite(nearest)]):
-                if surfaces[k].kind == "mirror" and bounces < self.scene.mirror_bounces:
-                    on = np.isfinite(nearest) & (which == k)
-                    mirror = surfaces[k].mirror
-                    on[on] = direction[on] @ mirror.normal < 0
-                    end = start[on] + reach_m[on, None] * direction[on]
-                    turned = mirror.mirrored_direction(direction[on])
-                    follow.append((bounces + 1, index[on], mirror.mirrored(apex), end, turned))
-        return bundles
+                if surfaces[k].kind != "mirror":
+                    continue
+                mirror = surfaces[k].mirror
+                cross = crossing(mirror, apex, bundle.way)
+                shares = [covered(each, rooted=False)[0] for each in cross.inside]
+                share = fills * np.minimum.reduce(
+                    shares if soft else [each > 0 for each in cross.inside]
+                )
+                reach = cross.at.ravel()[index]
+                on = (share.ravel()[index] > 0) & (direction @ mirror.normal < 0)
+                on &= (reach > near[index]) & ((which == k) | (reach < far[index]))
+                end = apex + reach[on, None] * direction[on]
+                turned = mirror.mirrored_direction(direction[on])
+                image_m = mirror.mirrored(apex)
+                left = throughput * surfaces[k].reflectivity
+                follow.append((bounces + 1, index[on], image_m, end, turned, share, left))
+        return sights
 
     def _differs(self, noise: Noise, highest_hz: float) -> NDArray[np.bool_]:
         """Pixels in which light may differ, (H W): where it does between neighbours.

@@ -3,6 +3,7 @@
 Lengths in m; x points right, y away from the camera, z up.
 """
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -86,6 +87,19 @@ class Rectangle:
         across, along = self.right * self.width / 2, self.up * self.height / 2
         signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
         return self.centre + signs[:, :1] * across + signs[:, 1:] * along
+
+    def tangents(self, apex: Points, middle: Points, across: Points) -> tuple[float, float]:
+        """Lowest and highest tangent of its points' angles at an apex to a direction.
+
+        In the plane of the direction and of one across it, both unit vectors. Infinite where it
+        reaches behind the apex.
+        """
+        away = self.extent() - apex
+        along = away @ middle
+        if along.min() <= _CLEAR:
+            return -np.inf, np.inf
+        tangents = away @ across / along
+        return float(tangents.min()), float(tangents.max())
 
     def cells(self, edge_m: float) -> Cells:
         """Cut it into equal cells of about the edge given."""
@@ -208,6 +222,23 @@ class Ellipsoid:
             ahead = np.where(first > _CLEAR_OF_CURVED, first, second)
             at[met] = np.where(ahead > _CLEAR_OF_CURVED, ahead, np.inf)
         return at
+
+    def tangents(self, apex: Points, middle: Points, across: Points) -> tuple[float, float]:
+        """Lowest and highest tangent of its points' angles at an apex to a direction.
+
+        In the plane of the direction and of one across it, both unit vectors. Infinite where it
+        reaches behind the apex.
+        """
+        away, along_m, across_m = self.centre - apex, self.radii * middle, self.radii * across
+        along, aside = float(away @ middle), float(away @ across)
+        # planes through the apex that touch it: (aside - t along)^2 = |radii (across - t middle)|^2
+        a = along * along - float(along_m @ along_m)
+        if along <= 0 or a <= _CLEAR:
+            return -np.inf, np.inf
+        b = along * aside - float(along_m @ across_m)
+        c = aside * aside - float(across_m @ across_m)
+        root = math.sqrt(max(b * b - a * c, 0.0))
+        return (b - root) / a, (b + root) / a
 
     def cells(self, edge_m: float) -> Cells:
         """Cut it along equal steps of height and of longitude."""

@@ -41,7 +41,10 @@ class Motion:
         """Return the offset at a time of the device."""
         knots_m = self._knots_m
         place = (time_s / self.period_s) % 1.0 * (len(knots_m) - 1)
-        return np.array([np.interp(place, np.arange(len(knots_m)), axis) for axis in knots_m.T])
+        knot = min(int(place), len(knots_m) - 2)
+        before: Points = knots_m[knot]
+        offset: Points = before + (place - knot) * (knots_m[knot + 1] - before)
+        return offset
 
     @property
     def speed_m_s(self) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.light.coverage import covered, overlapped
+from transientcam_driver.simulation.light.coverage import covered, covered_among, overlapped
 
 FINE = 64  # places a side of a pixel
 
@@ -52,3 +52,23 @@ def test_two_shapes_overlap_in_a_pixel_as_their_borders_lie(
     first, second = (half_plane(*border, fine=True) > 0 for border in borders)
     inner = (slice(1, 4), slice(1, 4))
     assert both[inner] == pytest.approx(share_of(first & second)[inner], abs=within)
+
+
+def test_scattered_pixels_are_covered_as_those_of_an_image() -> None:
+    inside = half_plane(0.4, 0.13, bent=-0.08)
+    place = np.full((7, 7), 25)
+    place[1:-1, 1:-1] = np.arange(25).reshape(5, 5)
+    around = np.array([place[:-2, 1:-1], place[2:, 1:-1], place[1:-1, :-2], place[1:-1, 2:]])
+
+    share = covered_among(inside.ravel(), around.reshape(4, -1)).reshape(5, 5)
+
+    inner = (slice(1, 4), slice(1, 4))  # beyond the edge of the image there is nothing
+    assert share[inner] == pytest.approx(covered(inside, rooted=False)[0][inner], abs=1e-6)
+
+
+def test_a_pixel_without_neighbours_is_covered_or_not() -> None:
+    nowhere = np.full((4, 2), 2)
+
+    share = covered_among(np.array([0.7, -0.2], dtype=np.float32), nowhere)
+
+    assert share.tolist() == [1, 0]

@@ -30,18 +30,21 @@ def moving(scene: Scene, *, soft: bool) -> MovingLight:
     return MovingLight(scene, StillLight(still_scene(scene), width=WIDTH, height=HEIGHT), soft=soft)
 
 
-def averaged(scene: Scene, frequency_hz: float, side: int) -> NDArray[np.complex128]:
+def averaged(
+    scene: Scene, frequencies_hz: tuple[float, ...], side: int
+) -> list[NDArray[np.complex128]]:
     """Mean over many rays in each pixel, traced one by one."""
     assert scene.camera is not None
     rows, columns = np.divmod(np.arange(WIDTH * HEIGHT), WIDTH)
-    total = np.zeros(WIDTH * HEIGHT, dtype=np.complex128)
+    total = np.zeros((len(frequencies_hz), WIDTH * HEIGHT), dtype=np.complex128)
     offsets = (2 * np.arange(side) + 1) / (2 * side) - 0.5
     for x in offsets:
         for y in offsets:
             rays = rays_through(scene.camera, columns + x, rows + y, width=WIDTH, height=HEIGHT)
             lit = light_rays(scene, rays)
-            total += lit.moments(frequency_hz, lit.scatter(scene))
-    return (total / side**2).reshape(HEIGHT, WIDTH)
+            scatter = lit.scatter(scene)
+            total += [lit.moments(frequency_hz, scatter) for frequency_hz in frequencies_hz]
+    return list((total / side**2).reshape(-1, HEIGHT, WIDTH))
 
 
 def with_a_moving(shape: Rectangle | Ellipsoid, path_m: V, *, period_s: float = 10.0) -> Scene:
@@ -93,8 +96,9 @@ def test_silhouettes_and_shadows_cover_the_share_of_a_pixel_that_many_rays_find(
     scene = with_a_moving(shape, ASIDE)
     soft, hard = (moving(scene, soft=soft).at(3.1) for soft in (True, False))
 
-    for frequency_hz in (0.0, 69e6):
-        expected = averaged(scene.at(3.1), frequency_hz, 8)
+    frequencies_hz = (0.0, 69e6)
+    many = averaged(scene.at(3.1), frequencies_hz, 8)
+    for frequency_hz, expected in zip(frequencies_hz, many, strict=True):
         contrast = float(np.abs(expected).max())
         error = np.abs(soft.moments(frequency_hz) - expected) / contrast
         without = np.abs(hard.moments(frequency_hz) - expected) / contrast
@@ -102,6 +106,24 @@ def test_silhouettes_and_shadows_cover_the_share_of_a_pixel_that_many_rays_find(
         assert edges.sum() > 50
         assert np.sqrt(np.mean(error[edges] ** 2)) < 0.15 * np.sqrt(np.mean(without[edges] ** 2))
         assert np.mean(error > 0.03) < 0.01
+
+
+def test_what_a_mirror_shows_covers_the_share_of_a_pixel_that_many_rays_find() -> None:
+    scene = with_a_moving(BALL, ASIDE)
+    # the ball lies before the camera and a little aside; the mirror shows it from behind
+    mirror = Rectangle.facing(v(0.45, 1.6, 0), v(-1, -0.9, 0), size=(0.6, 0.9))
+    scene = replace(scene, surfaces=(*scene.surfaces, Surface("mirror", "mirror", mirror, 0.9)))
+    (expected,) = averaged(scene.at(3.1), (69e6,), 5)
+    assert scene.camera is not None
+    ends = light_rays(scene.at(3.1), camera_rays(scene.camera, width=WIDTH, height=HEIGHT))
+    shown = (ends.surface == 1) & (ends.distance_m > 1.6)
+
+    error = (
+        np.abs(moving(scene, soft=True).at(3.1).moments(69e6) - expected) / np.abs(expected).max()
+    )
+
+    assert shown.sum() > 100
+    assert np.mean(error.ravel()[shown] > 0.03) < 0.05
 
 
 def test_range_is_continuous_while_something_comes_nearer() -> None:
@@ -197,4 +219,17 @@ def test_what_stands_before_something_that_moves_hides_it() -> None:
 
     now = moving(hidden, soft=True).at(1.0)
 
-    assert now.moments(0.0) == pytest.approx(averaged(hidden.at(1.0), 0.0, 1), rel=1e-5)
+    assert now.moments(0.0) == pytest.approx(averaged(hidden.at(1.0), (0.0,), 1)[0], rel=1e-5)
+
+
+def test_what_something_that_moves_hides_wholly_is_not_there() -> None:
+    scene = with_a_moving(BOARD, ASIDE)
+    behind = Ellipsoid(v(0.03, 1.6, 0.03), v(0.05, 0.05, 0.05))
+    hidden = replace(scene.surfaces[1], name="hidden", shape=behind)
+    both = replace(scene, surfaces=(*scene.surfaces, hidden))
+
+    returns = moving(both, soft=True).at(1.0).returns()
+
+    expected = moving(scene, soft=True).at(1.0).returns()
+    middle = (..., HEIGHT // 2, WIDTH // 2 + 6)
+    assert returns[1][middle].sum() == pytest.approx(expected[1][middle].sum(), rel=1e-6)

@@ -99,3 +99,34 @@ def test_interpolation_between_cells_of_a_sphere_goes_around() -> None:
     error = (weights * values[index]).sum(axis=-1) - points @ v(1, 2, 3)
     assert np.abs(error).max() < 0.6  # at the poles, of values between 3 and 12
     assert np.sqrt(np.mean(error**2)) < 0.1
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        Ellipsoid(np.array([0.3, 1.5, -0.2]), np.array([0.1, 0.3, 0.5])),
+        Rectangle.facing(np.array([-0.2, 1.2, 0.4]), np.array([0.3, -1.0, 0.2]), size=(0.6, 0.2)),
+    ],
+)
+def test_tangents_are_those_of_the_outermost_points(shape: Ellipsoid | Rectangle) -> None:
+    apex = np.array([0.1, -0.1, 0.05])
+    middle, across = np.array([0.0, 0.8, 0.6]), np.array([0.6, -0.48, 0.64])
+    points = _many_points(shape) - apex
+    tangents = points @ across / (points @ middle)
+
+    assert shape.tangents(apex, middle, across) == pytest.approx(
+        (tangents.min(), tangents.max()), abs=2e-4
+    )
+    assert shape.tangents(apex, -middle, across) == (-np.inf, np.inf)  # it lies behind the apex
+    assert shape.tangents(shape.centre, middle, across) == (-np.inf, np.inf)
+
+
+def _many_points(shape: Ellipsoid | Rectangle) -> NDArray[np.float64]:
+    steps = np.linspace(-1, 1, 401)
+    u, v = (each.reshape(-1, 1) for each in np.meshgrid(steps, steps))
+    if isinstance(shape, Rectangle):
+        x, y = u * shape.width / 2, v * shape.height / 2
+        return np.asarray(shape.centre + x * shape.right + y * shape.up)
+    around = np.sqrt(1 - v * v)
+    on_unit = np.hstack([around * np.cos(np.pi * u), around * np.sin(np.pi * u), v])
+    return np.asarray(shape.centre + on_unit * shape.radii)
