@@ -47,6 +47,7 @@ from transientcam_moments.levinson import (
     moments_of,
 )
 from transientcam_moments.likelihood import Likelihood, likelihood
+from transientcam_moments.likelihood.pairs import two_returns
 from transientcam_moments.maximum_entropy import density
 from transientcam_moments.merging import merge_returns
 from transientcam_moments.modulation import modulation_gain
@@ -58,6 +59,7 @@ from transientcam_moments.reconstructor import Reconstructor, reconstruct
 from transientcam_moments.repair import Repair, repair
 from transientcam_moments.smoothing import smooth
 from transientcam_moments.takes import Average, average_takes
+from transientcam_moments.unwrapping import Unwrapped, unwrap
 
 __all__ = [
     "INVALID",
@@ -81,6 +83,7 @@ __all__ = [
     "Settings",
     "ShapeError",
     "UnlabelledImages",
+    "Unwrapped",
     "average_takes",
     "bias",
     "bounds",
@@ -117,5 +120,7 @@ __all__ = [
     "smooth",
     "smoothed_density",
     "sweep_offsets_rad",
+    "two_returns",
+    "unwrap",
     "waveform_of",
 ]

@@ -16,7 +16,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_moments.comparisons import TECHNIQUES
+from transientcam_moments.reconstruction import least_harmonics
 from transientcam_server.imaging.noise import moment_noise, typical_deviation
 from transientcam_server.imaging.ranging import ranges_m
 from transientcam_server.imaging.recipe import Recipe
@@ -77,6 +77,8 @@ def range_accuracy(recipe: Recipe, found: tm.Reconstruction) -> RangeAccuracy:
     found
         (H, W) pixels.
     """
+    if not recipe.applied.sequence.sampling.consecutive:
+        return _of_gaps(found)
     seen = np.asarray(found.has_range)
     range_m = np.asarray(found.range_m)
     frame = _Frame(
@@ -91,6 +93,12 @@ def range_accuracy(recipe: Recipe, found: tm.Reconstruction) -> RangeAccuracy:
     bias_m = np.max([np.abs(median_around(each)) for each in shifts_m], axis=0, initial=0.0)
     bias_m = np.where(np.isfinite(range_m), bias_m, np.nan) if shifts_m else unknown
     return RangeAccuracy(std_m, bias_m, _outliers(drawn_m - range_m[seen], std_m, bias_m, seen))
+
+
+def _of_gaps(found: tm.Reconstruction) -> RangeAccuracy:
+    """Return what an estimate of any multiples says of itself; nothing disagrees with it."""
+    std_m = np.asarray(found.range_std_m, dtype=np.float32)
+    return RangeAccuracy(std_m, np.full_like(std_m, np.nan), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +127,7 @@ class _Frame:
         if m == 1:
             return []
         own = self.recipe.technique
-        fewer = own if m > TECHNIQUES[own].least_harmonics > 0 and m > 2 else "single-frequency"
+        fewer = own if m > least_harmonics(own) and m > 2 else "single-frequency"
         ways = [(self.b[:m], self.variance[:m], fewer)]
         ways += [(self.b, self.variance, other) for other in _OTHERS if other != own]
         return [self._ranges_m(*each) for each in ways]
