@@ -93,7 +93,7 @@ def camera_at(scene: str, waveform: Path, sequence: Capture) -> Iterator[Camera]
 def calibration(waveform: Path, sequence: Capture) -> tuple[Calibration, str | None]:
     """Calibrate through the diffusor; also return why no harmonics are known."""
     with camera_at("calibration", waveform, sequence) as camera:
-        sweep = SweepEvaluation(camera.capabilities, takes=DEFAULT_TAKES, zeroth=sequence.zeroth)
+        sweep = SweepEvaluation(camera.capabilities, takes=DEFAULT_TAKES)
         capture = capture_calibration(camera, average=tm.average_takes, waveform=sweep)
     return evaluate(capture), sweep.reason
 

@@ -22,10 +22,7 @@ _STAGES = {
     "eigenvalue": "smallest eigenvalue",
     "flag_and_bias": "flags, biasing",
     "returns": "returns",
-    "gather": "redone in float64",
-    "wide_eigenvalue": "redone in float64",
-    "wide_returns": "redone in float64",
-    "scatter": "redone in float64",
+    "wide": "redone in float64",
     "separate": "direct, indirect, range",
 }
 
@@ -65,6 +62,7 @@ def _spent(m: int) -> tuple[dict[str, float], float]:
 
     stages = reconstruct_stages(m)
     watched: dict[str, Any] = {name: timed(name, getattr(stages, name)) for name in _STAGES}
+    watched["wide"].room = stages.wide.room
     one_pass = OnePass(stages._replace(**watched), VGA, constants(m))
     raw = images(m, VGA)
     best, redone = dict.fromkeys(_STAGES, np.inf), 0

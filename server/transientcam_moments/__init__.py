@@ -31,13 +31,7 @@ from transientcam_moments.errors import (
 )
 from transientcam_moments.flags import INVALID, Flags, flags
 from transientcam_moments.four_bucket import four_bucket, measure, saturated
-from transientcam_moments.harmonics import (
-    Corrected,
-    HarmonicCorrection,
-    checked_waveform,
-    sweep_offsets_rad,
-    waveform_of,
-)
+from transientcam_moments.harmonics import Corrected, HarmonicCorrection, checked_waveform
 from transientcam_moments.labels import Labels
 from transientcam_moments.levinson import (
     Coefficients,
@@ -58,6 +52,12 @@ from transientcam_moments.reconstruction import Reconstruction, Settings
 from transientcam_moments.reconstructor import Reconstructor, reconstruct
 from transientcam_moments.repair import Repair, repair
 from transientcam_moments.smoothing import smooth
+from transientcam_moments.sweep import (
+    SweepPhasors,
+    sweep_offsets_rad,
+    sweep_phasors,
+    waveform_of,
+)
 from transientcam_moments.takes import Average, average_takes
 from transientcam_moments.unwrapping import Unwrapped, unwrap
 
@@ -82,6 +82,7 @@ __all__ = [
     "Separation",
     "Settings",
     "ShapeError",
+    "SweepPhasors",
     "UnlabelledImages",
     "Unwrapped",
     "average_takes",
@@ -120,6 +121,7 @@ __all__ = [
     "smooth",
     "smoothed_density",
     "sweep_offsets_rad",
+    "sweep_phasors",
     "two_returns",
     "unwrap",
     "waveform_of",

@@ -1,4 +1,4 @@
-"""Odd harmonics of the modulation, measured by a phase sweep and taken out of the moments.
+"""Odd harmonics of the modulation, which a phase sweep measures, taken out of the moments.
 
 The four-bucket difference of Sec. 3.1 removes the even harmonics of the correlation of light and
 reference; the sub-phases of Sec. 4.1 weaken the odd ones. What is left of them adds moments of
@@ -26,7 +26,6 @@ import numpy as np
 
 from transientcam_moments._arrays import (
     Array,
-    as_array,
     by_blocks,
     moment_planes,
     namespace,
@@ -39,6 +38,7 @@ from transientcam_moments.calibration import inverse_gains
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.levinson import levinson, predicted
 from transientcam_moments.smoothing import smooth
+from transientcam_moments.sweep import odd_orders
 
 ROUNDS = 3
 """Of the iteration; the third changes moments by 1e-4 b_0 where harmonics have 3 % (docs)."""
@@ -47,68 +47,6 @@ NEGLIGIBLE = 5e-4
 _BLOCK_PIXELS = 2048  # of up to 120 planes, which stay in the second cache
 _PHASE_STEPS = 30  # at most, of the fixed point for the phase of a pixel
 _PHASE_TOLERANCE = 1e-8
-
-
-def sweep_offsets_rad(steps: int) -> Array:
-    """Return what a phase sweep of so many steps adds to the four phases: a quarter turn evenly.
-
-    Q steps tell the harmonics below 2 Q from each other.
-    """
-    return np.arange(steps) * (np.pi / (2 * steps))
-
-
-def waveform_of(phasors: Array, count: int) -> Array:
-    """Return the odd harmonics of the correlation from a phase sweep.
-
-    Parameters
-    ----------
-    phasors : array, shape (Q, m, P)
-        Four-bucket phasors of b_1 .. b_m at each of `sweep_offsets_rad(Q)`, of pixels that see
-        a single return at phase zero, through filter and diffusor.
-    count : int
-        How many harmonics; 3, 5, .. 2 count + 1 must be below 2 Q.
-
-    Returns
-    -------
-    array, shape (m, count), complex128
-        c_3 / c_1, c_5 / c_1, ..., where time zero is where the fundamental peaks; NaN for a
-        frequency without light. All pixels share them, each with its own phase, and
-        weigh by the square of their fundamental.
-
-    Raises
-    ------
-    ShapeError
-        For other than three axes.
-    ParameterError
-        When the sweep has too few steps for that many harmonics.
-
-    Notes
-    -----
-    At offset d, (1) reads a_j(d) = sum over n = 1, -3, 5, -7, ... of C_n exp(-i n d), a Fourier
-    series in 4 d whose coefficient of n is c_n u^n, or conj(c_|n| u^|n|) for n < 0.
-    """
-    phasors = as_array(phasors)
-    if phasors.ndim != 3:
-        raise ShapeError("phasors", f"of shape {tuple(phasors.shape)}", "(Q, m, P)")
-    steps = phasors.shape[0]
-    if not 0 <= count < steps:
-        raise ParameterError("count", count, f"0 to {steps - 1} with {steps} steps")
-    offset_rad = sweep_offsets_rad(steps)
-
-    def coefficient(n: int) -> Array:
-        turn = np.exp(1j * n * offset_rad) / steps
-        return np.tensordot(turn, phasors.astype(np.complex128), axes=1)
-
-    first = coefficient(1)
-    size = np.abs(first)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        turn = np.conj(first) / np.where(size > 0, size, 1)
-        weight = (size**2).sum(axis=-1)
-        columns = []
-        for k in _orders(count):
-            found = coefficient(k) if k % 4 == 1 else np.conj(coefficient(-k))
-            columns.append((found * turn**k * size).sum(axis=-1) / np.where(weight > 0, weight, 0))
-    return np.stack(columns, axis=-1) if columns else np.empty((phasors.shape[1], 0), complex)
 
 
 class Corrected(NamedTuple):
@@ -232,7 +170,7 @@ def checked_waveform(waveform: Array) -> Array:
     found = np.asarray(waveform)
     if found.ndim != 2 or not len(found) or found.dtype.kind not in "iufc":
         raise ShapeError("waveform", f"{found.dtype} of shape {found.shape}", "numbers (m, K)")
-    turning = np.abs(found) @ [4.0 * _fourths(k) for k in _orders(found.shape[1])]
+    turning = np.abs(found) @ [4.0 * _fourths(k) for k in odd_orders(found.shape[1])]
     if not (turning < 1).all():
         limit = "finite, the sum of (k - 1) |c_k / c_1| (k = 5, 9, ..) and (k + 1) |c_k / c_1| < 1"
         raise ParameterError("waveform", float(turning.max()), limit)
@@ -246,10 +184,6 @@ def matters(waveform: Array) -> bool:
 
 def _matters(waveform: Array) -> Array:
     return (np.abs(waveform) > NEGLIGIBLE).any(axis=0)
-
-
-def _orders(count: int) -> range:
-    return range(3, 2 * count + 3, 2)
 
 
 def _fourths(k: int) -> int:

@@ -1,6 +1,6 @@
 """Slow and obvious: what the planar algorithms are compared with."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -82,3 +82,19 @@ def around(difference: ArrayLike) -> Real:
     """Distance of angles on the circle."""
     turned: Real = np.abs((np.asarray(difference) + np.pi) % (2 * np.pi) - np.pi)
     return turned
+
+
+Content = Mapping[int, complex]
+SQUARE = {k: (-1) ** ((k - 1) // 2) / k for k in range(1, 400, 2)}
+"""Fourier coefficients of a square wave over those of its fundamental: 4 / (pi k), in turn."""
+
+
+def correlation(content: Content, theta_rad: float, b: Content) -> float:
+    """Correlation at one phase: I = sum_k Re(c_k b_k exp(-i k theta)) (usb-protocol 5.5)."""
+    return float(sum((c * b[k] * np.exp(-1j * k * theta_rad)).real for k, c in content.items()))
+
+
+def phasor(content: Content, offset_rad: float, b: Content) -> complex:
+    """Four-bucket phasor of Sec. 3.1, from its definition."""
+    i = [correlation(content, offset_rad + q * np.pi / 2, b) for q in range(4)]
+    return complex(i[0] - i[2], i[1] - i[3])

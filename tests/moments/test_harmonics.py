@@ -1,6 +1,5 @@
-"""Harmonics of the modulation: measured by a phase sweep, and taken out of the moments."""
+"""Harmonics of the modulation, taken out of the moments."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,23 +12,10 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import lanes, without_lanes
+from tests.moments.oracles import Content, phasor
 from transientcam_moments.harmonics import ROUNDS
 
 Array = NDArray[np.complex128]
-Content = Mapping[int, complex]
-SQUARE = {k: (-1) ** ((k - 1) // 2) / k for k in range(1, 400, 2)}
-"""Fourier coefficients of a square wave over those of its fundamental: 4 / (pi k), in turn."""
-
-
-def images(content: Content, theta_rad: float, b: Content) -> float:
-    """Correlation at one phase: I = sum_k Re(c_k b_k exp(-i k theta)) (usb-protocol 5.5)."""
-    return float(sum((c * b[k] * np.exp(-1j * k * theta_rad)).real for k, c in content.items()))
-
-
-def phasor(content: Content, offset_rad: float, b: Content) -> complex:
-    """Four-bucket phasor of Sec. 3.1, from its definition."""
-    i = [images(content, offset_rad + q * np.pi / 2, b) for q in range(4)]
-    return complex(i[0] - i[2], i[1] - i[3])
 
 
 def measured(
@@ -63,55 +49,6 @@ def columns(content: Content, m: int, count: int) -> Array:
 
 def error(b: Array, true: Array) -> float:
     return float((np.abs(b - true) / true[0].real).max())
-
-
-# -- the phase sweep -------------------------------------------------------------------------------
-
-
-def test_a_sweep_finds_the_fourier_coefficients_of_a_square_wave() -> None:
-    steps, count = 60, 7
-    delays_rad = np.array([0.0, 0.7, -2.9])
-    square = {k: c for k, c in SQUARE.items() if k < 2 * steps}
-    phasors = np.array(
-        [
-            [[phasor(square, d, {k: np.exp(1j * k * p) for k in square}) for p in delays_rad]]
-            for d in tm.sweep_offsets_rad(steps)
-        ]
-    )
-
-    found = tm.waveform_of(phasors, count)
-
-    expected = [float((-1) ** ((k - 1) // 2) / mpmath.mpf(k)) for k in range(3, 17, 2)]
-    np.testing.assert_allclose(found, [expected], atol=1e-12)
-
-
-def test_what_a_sweep_cannot_tell_is_folded_onto_its_mirror_image() -> None:
-    content = {1: 1.0, 3: 0.1, 2 * 4 + 1: 0.02}  # four steps tell harmonics up to 7
-    phasors = np.array(
-        [[[phasor(content, d, dict.fromkeys(content, 1.0))]] for d in tm.sweep_offsets_rad(4)]
-    )
-
-    found = tm.waveform_of(phasors, 3)
-
-    np.testing.assert_allclose(found, [[0.1, 0.0, 0.02]], atol=1e-12)  # 9 = 2 x 8 - 7
-
-
-def test_a_frequency_without_light_has_no_waveform() -> None:
-    phasors = np.ones((4, 2, 5), complex)
-    phasors[:, 1] = 0
-
-    found = tm.waveform_of(phasors, 2)
-
-    assert np.isfinite(found[0]).all()
-    assert np.isnan(found[1]).all()
-
-
-@pytest.mark.parametrize("count", [-1, 4])
-def test_a_sweep_of_too_few_steps_is_refused(count: int) -> None:
-    with pytest.raises(tm.ParameterError, match="0 to 3 with 4 steps"):
-        tm.waveform_of(np.ones((4, 1, 1), complex), count)
-    with pytest.raises(tm.ShapeError):
-        tm.waveform_of(np.ones((4, 1), complex), 1)
 
 
 # -- taking them out -------------------------------------------------------------------------------

@@ -76,13 +76,6 @@ def test_small_calls_are_not_worth_a_compiler(compiler: Compiler) -> None:
     assert compiler.finish() == []
 
 
-def test_returns_bring_the_lane_that_redoes_them_in_double_precision(compiler: Compiler) -> None:
-    tm.pisarenko(moments(4))
-
-    keys = compiler.finish()
-    assert {Key("pisarenko", 4, "f"), Key("pisarenko", 4, "d")} <= set(keys)
-
-
 def test_an_order_that_has_no_lane_is_left_to_numpy(compiler: Compiler) -> None:
     tm.pisarenko(moments(9))
 

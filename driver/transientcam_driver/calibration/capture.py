@@ -159,14 +159,15 @@ def _steps(
     report: Callable[[int], None],
     done_before: int,
 ) -> Iterator[NDArray[np.uint16]]:
-    """Capture the takes (takes, N, H, W) of one step of a sweep after the other."""
+    """Capture the takes (takes, 4 m, H, W) of b_1 .. b_m, one step of a sweep after the other."""
     for step, sequence in enumerate(sweep.sequences(single)):
 
         def done(frames: int, before: int = done_before + step * sweep.takes) -> None:
             report(before + frames)
 
         frames = _frames(camera, sequence, sweep.takes, done)
-        yield np.stack([frame.images for frame in frames])
+        swept = [label.index for label in frames[0].labels if label.harmonic]
+        yield np.stack([frame.images[swept] for frame in frames])
 
 
 def _frames(

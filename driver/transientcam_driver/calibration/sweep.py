@@ -1,6 +1,6 @@
 """The phase sweep of a calibration: the same images at phases between the four.
 
-What it is for, and how it is evaluated, is others' (`transientcam_moments.waveform_of`).
+`transientcam_moments.sweep_phasors` and `waveform_of` evaluate it.
 """
 
 import math
@@ -20,7 +20,7 @@ LEAST_TAKES = 30
 _TAKES_SHARE = 10  # of the takes of a calibration, each step of the sweep has one in so many
 
 Waveform = Callable[[Iterator[NDArray[np.uint16]]], NDArray[Any] | None]
-"""From the takes (takes, N, H, W) at each step to the harmonics (m, K) relative to the
+"""From the takes (takes, 4 m, H, W) at each step to the harmonics (m, K) relative to the
 fundamental, complex; None where they cannot be told."""
 
 

@@ -38,20 +38,14 @@ _WANTED = _Wanted()
 
 
 def want(key: Key) -> None:
-    """Have a lane made ready in the background; returns at once, also where it cannot be.
-
-    The lane for returns in single precision brings along that for double precision, which redoes
-    the pixels that single precision is not enough for.
-    """
+    """Have a lane made ready in the background; returns at once, also where it cannot be."""
     if not REGISTRY.automatic or key in _WANTED.seen:
         return
-    keys = [key]
-    if key.name == "pisarenko" and key.precision == "f":
-        keys.append(Key(key.name, key.harmonics, "d"))
     with _WANTED.lock:
-        new = [each for each in keys if each not in _WANTED.seen and is_offered(each)]
-        _WANTED.seen.update(keys)
-        if not new:
+        if key in _WANTED.seen:
+            return
+        _WANTED.seen.add(key)
+        if not is_offered(key):
             return
         if not _WANTED.said:
             _WANTED.said = True
@@ -59,7 +53,7 @@ def want(key: Key) -> None:
                 "kernels are loaded from the cache, or compiled in the background; until then "
                 "NumPy computes the same (TRANSIENTCAM_KERNELS=off leaves everything to it)"
             )
-        _WANTED.waiting += new
+        _WANTED.waiting.append(key)
         if _WANTED.thread is None:
             # not a daemon: those are frozen at exit wherever they are, which a compiler
             # doesn't survive

@@ -4,14 +4,17 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from transientcam_moments._kernels.padding import normalisation, row_length
 from transientcam_moments._kernels.parallel import Spread, blocks
-from transientcam_moments._kernels.refine import redo
+from transientcam_moments._kernels.refine import Found
 from transientcam_moments._kernels.registry import LEAST_PIXELS
+
+if TYPE_CHECKING:  # it brings along the compiler
+    from transientcam_moments._kernels.wide import WideReturns
 
 _ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}
 _ROOM = 1024  # pixels that are redone in double precision at a time
@@ -20,21 +23,17 @@ _SATURATED, _REPLACED = 4, 32  # transientcam_moments.Flags
 
 
 class Stages(NamedTuple):
-    """Compiled stages of one order in single precision; the wide ones are in double precision."""
+    """Compiled stages of one order in single precision."""
 
     order: tuple[int, ...]
     turns: Any
-    wide_turns: Any
     measure: Callable[..., Any]
     smooth: Callable[..., Any]
     eigenvalue: Callable[..., Any]
     flag_and_bias: Callable[..., Any]
     returns: Callable[..., Any]
     separate: Callable[..., Any]
-    gather: Callable[..., Any]
-    scatter: Callable[..., Any]
-    wide_eigenvalue: Callable[..., Any]
-    wide_returns: Callable[..., Any]
+    wide: "WideReturns"
 
 
 class Planes(NamedTuple):
@@ -202,7 +201,8 @@ class OnePass:
             )  # fmt: skip
 
         spread(analyse, self._pixels)
-        redone = self._redo(planes, scratch)
+        found = Found(None, planes.phase_rad, planes.weight, planes.count, scratch.residual)
+        redone = s.wide(smoothed, planes.brightness, found, scratch.wide, 0, self._pixels)
         spread(separate, self._pixels)
         if constants.bad is not None:
             planes.flags[constants.bad] |= _REPLACED
@@ -258,35 +258,6 @@ class OnePass:
         everywhere = np.broadcast_to(present, self._pixels).reshape(self._shape)
         self._weight = normalisation(everywhere, taps)
 
-    def _redo(self, planes: Planes, scratch: "_Scratch") -> int:
-        """Redo in double precision what doesn't reproduce its moments; return how many pixels."""
-        s = self._stages
-        tolerance = 16 * (len(s.order) + 1) * _EPS
-        moments, uniform, phase, weight, count, residual = scratch.wide
-        redone = begin = 0
-        while True:
-            found = s.gather(
-                s.order, planes.smoothed, planes.brightness, scratch.residual, tolerance, moments,
-                scratch.places, begin,
-            )  # fmt: skip
-            if not found:
-                return redone
-            stop = -(-found // LEAST_PIXELS) * LEAST_PIXELS
-            s.wide_eigenvalue(s.order, moments, 0, uniform, 0, stop)
-            ill = s.wide_returns(
-                s.order, s.wide_turns, moments, uniform, 0, uniform, phase, weight, count,
-                residual, _EPS, 0, stop,
-            )  # fmt: skip
-            if ill:
-                where = np.flatnonzero(residual[:stop] > tolerance)
-                redo(moments, (phase, weight, uniform, count), where, _EPS)
-            s.scatter(
-                s.order, scratch.places, found, phase, weight, count, residual, planes.phase_rad,
-                planes.weight, planes.count, scratch.residual,
-            )  # fmt: skip
-            redone += found
-            begin = int(scratch.places[found - 1]) + 1
-
 
 class _Scratch:
     """Room for what one call computes on the way."""
@@ -296,15 +267,7 @@ class _Scratch:
         self.saturated = np.empty(pixels, np.uint8)
         self.eigenvalue = np.empty(pixels, np.float32)
         self.residual = np.empty(pixels, np.float32)
-        self.places = np.empty(_ROOM, np.int64)
-        self.wide = (
-            np.empty((m + 1, _ROOM), np.complex128),
-            np.empty(_ROOM),
-            np.empty((m, _ROOM)),
-            np.empty((m, _ROOM)),
-            np.empty(_ROOM, np.int32),
-            np.empty(_ROOM),
-        )
+        self.wide = stages.wide.room(_ROOM)
         if taps is not None:
             self.calibrated = np.empty((m + 1, pixels), np.complex64)
             self._row_length = row_length(shape[1], taps.size)

@@ -5,46 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from transientcam_moments._kernels.compiled_entry import (
-    COUNTS,
-    PIXELS,
-    REAL,
-    complex_arrays,
-    entry,
-    order_type,
-    real_arrays,
-)
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.parallel import Spread, at_once, blocks
-from transientcam_moments._kernels.refine import redo
-from transientcam_moments._kernels.returns import find_returns
+from transientcam_moments._kernels.refine import Found, redo
+from transientcam_moments._kernels.returns import half_turns, returns_entry
+from transientcam_moments._kernels.wide import WideReturns
 
-
-def half_turns(m: int, precision: str) -> Any:
-    """Return cos and sin of pi k / m, k < m, one after the other."""
-    angle = np.pi * np.arange(m) / m
-    return np.concatenate([np.cos(angle), np.sin(angle)]).astype(precision)
-
-
-def returns_entry(m: int, precision: str) -> Callable[..., Any]:
-    """Compile the kernel of order m."""
-    real, cplx = real_arrays(precision), complex_arrays(precision)
-    return entry(
-        find_returns,
-        order_type(m),
-        real[1],
-        cplx[2],
-        real[1],
-        PIXELS,
-        real[1],
-        real[2],
-        real[2],
-        COUNTS,
-        real[1],
-        REAL,
-        PIXELS,
-        PIXELS,
-    )
+_ROOM = 256  # pixels that are redone in double precision at a time
 
 
 def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
@@ -52,6 +19,7 @@ def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
     order = (0,) * m
     turns = half_turns(m, precision)
     run_eigenvalue, run_returns = eigenvalue_entry(m, precision), returns_entry(m, precision)
+    wide = WideReturns(m) if precision == "f" else None
 
     def lane(
         b: Any,
@@ -67,23 +35,29 @@ def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
             uniform[:] = eigenvalue.reshape(-1)
         phase, weight = np.empty((m, pixels), precision), np.empty((m, pixels), precision)
         count, residual = np.empty(pixels, np.int32), np.empty(pixels, precision)
+        found = Found(uniform, phase, weight, count, residual)
+        brightness = np.ascontiguousarray(planes[0].real)
         eps = noise or float(np.finfo(precision).eps)
         ill: list[int] = []
 
         def part(start: int, stop: int) -> None:
+            worst = 0
             for left, right in blocks(start, stop):
                 if eigenvalue is None:
                     run_eigenvalue(order, planes, 0, uniform, left, right)
-                worst = run_returns(
+                worst += run_returns(
                     order, turns, planes, uniform, 0, uniform, phase, weight, count, residual,
                     eps, left, right,
                 )  # fmt: skip
+            if worst and wide is not None:
+                wide(planes, brightness, found, wide.room(_ROOM), start, stop)
+            else:
                 ill.append(worst)
 
         spread(part, pixels)
-        found = (phase, weight, uniform, count)
         if any(ill):
-            redo(planes, found, np.flatnonzero(residual > 16 * (m + 1) * eps), eps)
+            where = np.flatnonzero(residual > 16 * (m + 1) * eps)
+            redo(planes, (phase, weight, uniform, count), where, eps)
         return (
             phase.reshape((m, *shape)),
             weight.reshape((m, *shape)),

@@ -1,12 +1,24 @@
 """What lanes cannot do safely: a few pixels, with more digits or by the planar statement."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from transientcam_moments._arrays import in_turn
-from transientcam_moments._kernels.registry import LEAST_PIXELS, REGISTRY, Key
 from transientcam_moments.polishing import polish
+
+
+class Found(NamedTuple):
+    """Returns of all pixels in single precision, flat; their residual says which are wrong.
+
+    Without ``uniform`` the uniform part stays as it is.
+    """
+
+    uniform: Any | None
+    phase: Any
+    weight: Any
+    count: Any
+    residual: Any
 
 
 def redo(planes: Any, found: tuple[Any, ...], ill: Any, noise: float) -> None:
@@ -15,7 +27,7 @@ def redo(planes: Any, found: tuple[Any, ...], ill: Any, noise: float) -> None:
     Parameters
     ----------
     planes : array, shape (m + 1, P)
-        Moments.
+        Moments in double precision.
     found : tuple of array
         Phase, weight, uniform, count; written to.
     ill : integer array
@@ -26,23 +38,12 @@ def redo(planes: Any, found: tuple[Any, ...], ill: Any, noise: float) -> None:
     from transientcam_moments.pisarenko import _improved, _pisarenko
 
     part = planes[:, ill]
-    lane = REGISTRY.compiled.get(Key("pisarenko", len(planes) - 1, "d"))
-    if part.dtype == np.complex64 and lane is not None:
-        enough = np.resize(np.arange(ill.size), max(ill.size, LEAST_PIXELS))
-        better = lane(part[:, enough].astype(np.complex128), noise=noise)
-        better = tuple(plane[..., : ill.size] for plane in better)
-    elif part.dtype == np.complex64:
-        better = _improved(part, tuple(plane[..., ill] for plane in found))
+    found64 = _pisarenko(part, noise=noise)
+    if noise == np.finfo(np.float64).eps:
+        phase, weight, uniform, _ = _improved(part, found64)
     else:
-        better = _pisarenko(part, noise=noise)
-        if noise == np.finfo(np.float64).eps:
-            better = _improved(part, better)
-    phase, weight, uniform, _ = better
-    if noise > np.finfo(np.float64).eps:
-        wide = part.astype(np.complex128)
-        found64 = (each.astype(np.float64) for each in (phase, weight, uniform))
         with np.errstate(all="ignore"):
-            phase, weight, uniform = polish(wide, *found64, tolerance=4 * len(planes) * noise)
+            phase, weight, uniform = polish(part, *found64[:3], tolerance=4 * len(planes) * noise)
     weight = weight.astype(found[1].dtype)
     # what is less than the least number of that precision isn't a return
     phase = in_turn(np.where(weight > 0, phase, np.nan).astype(found[0].dtype))

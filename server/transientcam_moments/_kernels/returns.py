@@ -5,12 +5,22 @@ the unit circle z = exp(i phi) is kept as omega = exp(i phi / 2), with which all
 a polynomial there is real.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numba import njit
 
 from transientcam_moments._kernels import simd, toeplitz
+from transientcam_moments._kernels.compiled_entry import (
+    COUNTS,
+    PIXELS,
+    REAL,
+    complex_arrays,
+    entry,
+    order_type,
+    real_arrays,
+)
 
 _INTERLEAVE = 2
 _FAINT = 1024.0  # times what rounding makes of nothing
@@ -258,3 +268,30 @@ def _sort(order: Any, keys: Any, values: Any) -> None:
             first = simd.select(swap, values[k + 1], values[k])
             second = simd.select(swap, values[k], values[k + 1])
             keys[k], keys[k + 1], values[k], values[k + 1] = low, high, first, second
+
+
+def half_turns(m: int, precision: str) -> Any:
+    """Return cos and sin of pi k / m, k < m, one after the other."""
+    angle = np.pi * np.arange(m) / m
+    return np.concatenate([np.cos(angle), np.sin(angle)]).astype(precision)
+
+
+def returns_entry(m: int, precision: str) -> Callable[..., Any]:
+    """Compile the kernel of order m."""
+    real, cplx = real_arrays(precision), complex_arrays(precision)
+    return entry(
+        find_returns,
+        order_type(m),
+        real[1],
+        cplx[2],
+        real[1],
+        PIXELS,
+        real[1],
+        real[2],
+        real[2],
+        COUNTS,
+        real[1],
+        REAL,
+        PIXELS,
+        PIXELS,
+    )

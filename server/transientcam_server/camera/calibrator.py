@@ -253,9 +253,7 @@ class Calibrator:
         async def work(job: Job) -> dict[str, Any]:
             await asyncio.to_thread(self.store.require_room)  # checked before anything is captured
             takes = _Takes()
-            sweep = SweepEvaluation(
-                self._camera.capabilities, takes=options.frames, zeroth=once.sequence.zeroth
-            )
+            sweep = SweepEvaluation(self._camera.capabilities, takes=options.frames)
             measuring = self._acquisition.occupy(
                 job.id, lambda camera, go_on: _capture(camera, job, options, takes, sweep, go_on)
             )

@@ -228,8 +228,7 @@ def _measure(camera: "Camera", order: _Order) -> "tuple[Calibration, str | None]
     from transientcam_server.imaging.calibration import evaluate
     from transientcam_server.imaging.waveform import SweepEvaluation
 
-    zeroth = camera.applied.sequence.zeroth
-    sweep = SweepEvaluation(camera.capabilities, takes=order.takes, zeroth=zeroth)
+    sweep = SweepEvaluation(camera.capabilities, takes=order.takes)
     with Progress(console=Console(stderr=True)) as shown:
         task = shown.add_task("capturing", total=None)
         capture = capture_calibration(

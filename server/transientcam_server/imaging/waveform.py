@@ -19,6 +19,8 @@ LIT_SHARE: Final = 0.5
 """Share of the pixels that have to be lit, and not saturated, at every phase."""
 LEAST_SIGNAL_DN: Final = 20.0
 """Amplitude of a pixel that counts as lit."""
+MOST_PIXELS: Final = 20_000
+"""Pixels that are evaluated, spread over the sensor: all share the harmonics."""
 
 
 class SweepEvaluation:
@@ -28,8 +30,6 @@ class SweepEvaluation:
     ----------
     capabilities, takes
         Of the camera, and of the calibration.
-    zeroth
-        How its sequence measures b_0.
 
     Attributes
     ----------
@@ -37,8 +37,7 @@ class SweepEvaluation:
         Why no harmonics were found; None where they were.
     """
 
-    def __init__(self, capabilities: Capabilities, *, takes: int, zeroth: str) -> None:
-        self._zeroth = zeroth
+    def __init__(self, capabilities: Capabilities, *, takes: int) -> None:
         self._full_scale = 2.0**capabilities.bits - 1.0
         self.reason: str | None = None
         if not capabilities.phase_offsets:
@@ -47,24 +46,28 @@ class SweepEvaluation:
             self.reason = f"a phase sweep needs a calibration of {LEAST_TAKES} takes or more"
 
     def __call__(self, steps: Iterator[NDArray[np.uint16]]) -> _Array | None:
-        """Return the harmonics (m, K) of the takes (takes, N, H, W) of each step, or None."""
-        phasors, saturated = [], False
+        """Return the harmonics (m, K) of the takes (takes, 4 m, H, W) of each step, or None."""
+        sampled = []
         for takes in steps:
-            # in three takes the same image may have lost its synchronisation twice, which no other
-            # take then tells
-            intact = tm.repair(takes, zeroth=self._zeroth, full_scale=self._full_scale)
-            images, _ = tm.average_takes(intact.images, left_out=intact.left_out)
-            saturated = saturated | tm.saturated(images, full_scale=self._full_scale)
-            phasors.append(tm.measure(images, zeroth=self._zeroth)[1:])
-        swept = np.stack(phasors)  # (steps, m, H, W)
-        lit = ~np.asarray(saturated) & (np.abs(swept) > LEAST_SIGNAL_DN).all(axis=(0, 1))
-        if lit.mean() < LIT_SHARE:
+            flat = takes.reshape((*takes.shape[:2], -1))
+            sampled.append(flat[:, :, :: -(-flat.shape[2] // MOST_PIXELS)])
+        below = np.array([(flat < self._full_scale).all(axis=(0, 1)) for flat in sampled])
+        used = np.flatnonzero(below.all(axis=0))
+        lit = np.zeros(below.shape[1], bool)
+        swept = None
+        if used.size:
+            swept = tm.sweep_phasors(np.stack([flat[:, :, used] for flat in sampled])).phasors
+            lit[used] = ~(np.abs(swept) <= LEAST_SIGNAL_DN).any(axis=(0, 1))
+        if swept is None or lit.mean() < LIT_SHARE:
             self.reason = (
                 f"{1 - lit.mean():.0%} of the pixels are dark or saturated in the phase sweep "
                 f"(at most {1 - LIT_SHARE:.0%})"
             )
             return None
-        found: _Array = tm.waveform_of(swept[:, :, lit], COUNT)
+        if not np.isfinite(swept).all():
+            self.reason = "opposite images lost their synchronisation in all takes"
+            return None
+        found: _Array = tm.waveform_of(swept[:, :, lit[used]], COUNT)
         try:
             checked: _Array = tm.checked_waveform(found)
         except tm.ParameterError as error:
