@@ -18,7 +18,7 @@ from transientcam_moments._arrays import (
 )
 from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError
-from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, chi_square_quantile
+from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, checked, explained
 from transientcam_moments.likelihood.estimate import places_of, variance_of
 from transientcam_moments.noise.moments import MomentNoise
 from transientcam_moments.pisarenko import Separation
@@ -78,19 +78,12 @@ class Unwrapped(NamedTuple):
         ParameterError
             For a significance outside of 0 to 1.
         """
-        _check(significance)
+        checked(significance)
         return self.lead < -2 * math.log(significance)
 
     def explained(self, significance: float = SIGNIFICANCE) -> Array:
         """Say where one return explains the phases; arguments as of `Likelihood.explained`."""
-        _check(significance)
-        xp = namespace(self.chi_square)
-        most = int(self.degrees_of_freedom.max()) if self.degrees_of_freedom.size else 0
-        limits = [chi_square_quantile(free, significance) for free in range(most + 1)]
-        limit = xp.asarray(np.array(limits))[self.degrees_of_freedom]
-        return (self.chi_square <= limit) | (
-            (self.degrees_of_freedom == 0) & (self.chi_square >= 0)
-        )
+        return explained(self.chi_square, self.degrees_of_freedom, significance)
 
     def separate(self) -> Separation:
         """Return all light as direct."""
@@ -154,11 +147,6 @@ def unwrap(
         xp.stack([variance[at] for at in kept]),
     )
     return Unwrapped(*(part.reshape(trailing) for part in found))
-
-
-def _check(significance: float) -> None:
-    if not 0 < significance < 1:
-        raise ParameterError("significance", significance, "0 < significance < 1")
 
 
 def _unwrap(b: Array, variance: Array, multiples: list[int], error: float) -> tuple[Array, ...]:

@@ -21,7 +21,7 @@ from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.likelihood import choice
 from transientcam_moments.likelihood.arithmetic import logarithm
-from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, chi_square_quantile
+from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, explained
 from transientcam_moments.likelihood.choice import MARGIN, MOST_RETURNS, TAIL_SHAPE
 from transientcam_moments.likelihood.planar import Data, fit
 from transientcam_moments.noise.moments import MomentNoise
@@ -112,14 +112,7 @@ class Likelihood(NamedTuple):
         ParameterError
             For a significance outside of 0 to 1.
         """
-        if not 0 < significance < 1:
-            raise ParameterError("significance", significance, "0 < significance < 1")
-        xp = namespace(self.chi_square)
-        limits = [chi_square_quantile(free, significance) for free in range(2 * MAX_HARMONICS + 2)]
-        limit = xp.asarray(np.array(limits))[self.degrees_of_freedom]
-        return (self.chi_square <= limit) | (
-            (self.degrees_of_freedom == 0) & (self.chi_square >= 0)
-        )
+        return explained(self.chi_square, self.degrees_of_freedom, significance)
 
     def separate(self, threshold: float = DIRECT_THRESHOLD) -> Separation:
         """Separate direct from indirect light.
