@@ -41,8 +41,8 @@ def least_of_all_pairs(b: Array, multiples: tuple[int, ...], std: float, steps: 
     """Least chi-square of one pixel over a grid of pairs, by the normal equations of each."""
     best = np.inf
     waves = np.exp(1j * np.outer(np.arange(steps) * 2 * np.pi / steps, multiples))
-    real = np.concatenate([waves.real, waves.imag], axis=1) / std
-    target = np.concatenate([b.real, b.imag]) / std
+    real = np.concatenate([np.real(waves), np.imag(waves)], axis=1) / std
+    target = np.concatenate([np.real(b), np.imag(b)]) / std
     for i, j in itertools.combinations(range(steps), 2):
         design = real[[i, j]].T
         weight = np.linalg.solve(design.T @ design, design.T @ target)
