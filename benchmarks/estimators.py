@@ -72,6 +72,7 @@ def report(records: Iterable[tradeoff.Record]) -> str:
         "|---|---|---|---|---|---|",
         *(_row(technique) for technique in TECHNIQUES.values()),
         "",
+        *_OF_ANY_FREQUENCIES,
         "## What each takes for granted, costs, and how it fails",
         "",
     ]
@@ -109,6 +110,18 @@ _INTRODUCTION = (
     "altogether (`comparisons.coded`). Where an estimator needs more harmonics than the sequence "
     "has, the daemon refuses whichever of the two was asked for last (`estimator-misfit`), and "
     "`tm.Reconstruction` raises a `ParameterError` that says how many it takes.",
+    "",
+)
+
+
+_OF_ANY_FREQUENCIES = (
+    "Two more are for [frequencies with gaps](cameras.md#fixed-frequencies), and take consecutive "
+    "ones, too; they are not held against the others here.",
+    "",
+    "| name | follows | returns | looks at |",
+    "|---|---|---|---|",
+    "| `two-returns` | least squares over all pairs of returns (`tm.two_returns`) | 2 | any |",
+    "| `unwrapped-phase` | least squares over all wrap counts (`tm.unwrap`) | 1 | any |",
     "",
 )
 

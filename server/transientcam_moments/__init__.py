@@ -41,6 +41,7 @@ from transientcam_moments.levinson import (
     moments_of,
 )
 from transientcam_moments.likelihood import Likelihood, likelihood
+from transientcam_moments.likelihood.pairs import two_returns
 from transientcam_moments.maximum_entropy import density
 from transientcam_moments.merging import merge_returns
 from transientcam_moments.modulation import modulation_gain
@@ -58,6 +59,7 @@ from transientcam_moments.sweep import (
     waveform_of,
 )
 from transientcam_moments.takes import Average, average_takes
+from transientcam_moments.unwrapping import Unwrapped, unwrap
 
 __all__ = [
     "INVALID",
@@ -82,6 +84,7 @@ __all__ = [
     "ShapeError",
     "SweepPhasors",
     "UnlabelledImages",
+    "Unwrapped",
     "average_takes",
     "bias",
     "bounds",
@@ -119,5 +122,7 @@ __all__ = [
     "smoothed_density",
     "sweep_offsets_rad",
     "sweep_phasors",
+    "two_returns",
+    "unwrap",
     "waveform_of",
 ]

@@ -24,7 +24,11 @@ class Flags(IntFlag):
     NON_FINITE = 8
     """A moment is NaN, infinite or so large that densities overflow its precision."""
     DEGENERATE = 16
-    """The Toeplitz matrix is singular or indefinite, so that the density is not determined."""
+    """The Toeplitz matrix is singular or indefinite, so that the density is not determined.
+
+    By the estimator "unwrapped-phase", which has no density: another range explains the phases
+    nearly as well, so that noise may have chosen between them.
+    """
     REPLACED = 32
     """A bad pixel, which shows the mean of its neighbours."""
     CONTRADICTORY = 64
@@ -39,7 +43,8 @@ class Flags(IntFlag):
     pixel of a thousand.
 
     Light comes back in another way than the estimate assumes, and its range may be biased. Only the
-    estimator "likelihood" says so, and where the noise of the sensor is known.
+    estimators "likelihood", "two-returns" and "unwrapped-phase" say so, and where the noise of the
+    sensor is known.
     """
 
 

@@ -9,14 +9,14 @@ from transientcam_moments._arrays import Array, namespace
 from transientcam_moments.errors import ParameterError
 from transientcam_moments.flags import Flags
 from transientcam_moments.levinson import Coefficients
-from transientcam_moments.likelihood import MODEL_ERROR, Likelihood
-from transientcam_moments.likelihood.choice import MOST_RETURNS
-from transientcam_moments.likelihood.estimate import assumed_noise, fitted
+from transientcam_moments.likelihood import MODEL_ERROR
+from transientcam_moments.likelihood.estimate import assumed_noise
 from transientcam_moments.noise.moments import MomentNoise
 from transientcam_moments.peaks import Peaks
 from transientcam_moments.pisarenko import Returns, Separation
-from transientcam_moments.reconstruction import Reconstruction
+from transientcam_moments.reconstruction import OF_ANY_MULTIPLES, Reconstruction
 from transientcam_moments.smoothing import smooth
+from transientcam_moments.unwrapping import Unwrapped
 
 
 class GappedReconstruction(Reconstruction):
@@ -24,9 +24,9 @@ class GappedReconstruction(Reconstruction):
 
     Plane k of the moments belongs to the k-th of (0, *settings.multiples). Without all multiples
     from 1 to m there is no Toeplitz matrix: nothing is biased, validity is NaN, and coefficients,
-    peaks and all densities raise ParameterError. Range and returns are those of `likelihood`, the
-    one estimator for such moments. Where b_0 was not measured, its plane is 0 and the brightness
-    is the light of the returns that were found.
+    peaks and all densities raise ParameterError. Range and returns are those of `estimate`, by one
+    of `OF_ANY_MULTIPLES`. Where b_0 was not measured, its plane is 0 and the brightness is the
+    light of the returns that were found.
     """
 
     _of_any_multiples = True
@@ -86,36 +86,37 @@ class GappedReconstruction(Reconstruction):
                 found = found | xp.where(xp.asarray(where), int(flag), 0)
         return found.astype(xp.uint8)
 
-    @cached_property
-    def likelihood(self) -> Likelihood:
-        """Few returns, or one with a tail, with what they are worth."""
+    @property
+    def _evidence(self) -> tuple[Array, MomentNoise | None, tuple[int, ...], float]:
         multiples = self.settings.multiples or ()
-        planes = self.smoothed if self._has_zeroth else self.smoothed[1:]
-        noise, error = assumed_noise(planes), 0.0
-        if self.noise is not None:
-            noise, error = MomentNoise(self.noise.variance[-len(planes) :]), MODEL_ERROR
         measured = (0, *multiples) if self._has_zeroth else multiples
-        most = min(MOST_RETURNS, len(multiples))
-        return fitted(planes, noise, self._spread, measured, most, model_error=error)
+        planes = self.smoothed[-len(measured) :]
+        if self.noise is None:
+            return planes, assumed_noise(planes), measured, 0.0
+        return planes, MomentNoise(self.noise.variance[-len(planes) :]), measured, MODEL_ERROR
 
     @cached_property
     def returns(self) -> Returns:
-        """Sharp returns and the tail of the likelihood, in as many slots as there are multiples."""
-        found = self.likelihood
+        """Sharp returns and the tail of `estimate`, in as many slots as there are multiples."""
+        found = self.estimate
         xp = namespace(found.weight)
-        missing = len(self.smoothed) - 1 - len(found.weight)
-        empty = xp.zeros((missing, *found.weight.shape[1:]), dtype=found.weight.dtype)
-        return Returns(
-            xp.concatenate([found.phase_rad, empty + np.nan]),
-            xp.concatenate([found.weight, empty]),
-            found.tail,
-            found.count,
-        )
+        if isinstance(found, Unwrapped):
+            there = (found.weight > 0).astype(np.int32)
+            phase, weight = found.phase_rad[None], found.weight[None]
+            tail, count = xp.zeros_like(found.weight), there
+        else:
+            phase, weight, tail, count = found.phase_rad, found.weight, found.tail, found.count
+        missing = len(self.smoothed) - 1 - len(weight)
+        empty = xp.zeros((missing, *weight.shape[1:]), dtype=weight.dtype)
+        phase = xp.concatenate([phase, empty + np.nan])
+        return Returns(phase, xp.concatenate([weight, empty]), tail, count)
 
     @cached_property
     def _separation(self) -> Separation:
-        if self.settings.estimator != "likelihood":
-            limit = f"likelihood, for the multiples {self.settings.multiples}"
+        if self.settings.estimator not in OF_ANY_MULTIPLES:
+            limit = (
+                f"one of {', '.join(OF_ANY_MULTIPLES)}, for the multiples {self.settings.multiples}"
+            )
             raise ParameterError("estimator", self.settings.estimator, limit)
         return super()._separation
 

@@ -27,7 +27,9 @@ from transientcam_moments.four_bucket import ZEROTH_IMAGES
 from transientcam_moments.harmonics import HarmonicCorrection
 from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.likelihood import MODEL_ERROR, Likelihood
+from transientcam_moments.likelihood.choice import MOST_RETURNS
 from transientcam_moments.likelihood.estimate import assumed_noise, fitted
+from transientcam_moments.likelihood.pairs import two_returns
 from transientcam_moments.maximum_entropy import density
 from transientcam_moments.merging import merge_returns
 from transientcam_moments.noise.moments import MomentNoise, moment_noise, smoothed_of
@@ -44,11 +46,22 @@ from transientcam_moments.pisarenko import (
 from transientcam_moments.ranging import range_m
 from transientcam_moments.repair import Repair
 from transientcam_moments.smoothing import SIGMA_PX, smooth
+from transientcam_moments.unwrapping import Unwrapped, unwrap
 
 SPOILT_IMAGES = ("keep", "repair", "fill")
 """What becomes of images that lost their synchronisation; see `Settings`."""
 
-_OWN = ("pisarenko", "maximum-entropy", "likelihood", "single-frequency", "pisarenko-merged")
+OF_ANY_MULTIPLES = ("likelihood", "two-returns", "unwrapped-phase")
+"""Estimators that serve moments of any multiples of the base frequency."""
+_OWN = (
+    "pisarenko",
+    "maximum-entropy",
+    "likelihood",
+    "single-frequency",
+    "pisarenko-merged",
+    "two-returns",
+    "unwrapped-phase",
+)
 ESTIMATORS = (
     *_OWN,
     *(
@@ -58,6 +71,11 @@ ESTIMATORS = (
     ),
 )
 """What the range may be taken from; see `transientcam_moments.comparisons`."""
+
+
+def least_harmonics(estimator: str) -> int:
+    """Return the smallest m that an estimator gives a range of."""
+    return TECHNIQUES[estimator].least_harmonics if estimator in TECHNIQUES else 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +93,7 @@ class Settings:
         Captures in the images, averaged without outliers. Raw images need it.
     multiples : tuple of int, optional
         Which multiples of the base frequency were measured, ascending; 1 to m, when left out. Only
-        "likelihood" serves others.
+        `OF_ANY_MULTIPLES` serve others.
     phases_rad : tuple of float, optional
         Of the raw images of each frequency, in their order, three or more: 0, 90, 180 and 270
         degrees, when left out.
@@ -90,8 +108,9 @@ class Settings:
         weight, or density.
     estimator : str
         What the range is taken from: "pisarenko" as the paper has it, "pisarenko-merged" (see
-        `merge_returns`), "maximum-entropy", "likelihood", "single-frequency", which is the usual
-        arg b_1, or another of the `comparisons` of moments.
+        `merge_returns`), "maximum-entropy", "likelihood", "two-returns" (see `two_returns`),
+        "unwrapped-phase" (see `unwrap`), "single-frequency", which is the usual arg b_1, or another
+        of the `comparisons` of moments.
     minimum_brightness : float
         Pixels with b_0 at or below it have no signal, in the unit of the moments.
     full_scale : float
@@ -101,8 +120,9 @@ class Settings:
         opposite images find them (`repair`), and where those don't tell also filled in from the
         frame before, or kept as they are.
     sensor : noise.Sensor, optional
-        Whose noise the images have; "likelihood" weighs the moments by it, and
-        "pisarenko-merged" merges by it; both assume some without one, see `likelihood`.
+        Whose noise the images have; "likelihood", "two-returns" and "unwrapped-phase" weigh the
+        moments by it, and "pisarenko-merged" merges by it; all assume some without one, see
+        `likelihood`.
     """
 
     base_frequency_hz: float | None = None
@@ -145,7 +165,7 @@ class Settings:
     @property
     def least_harmonics(self) -> int:
         """The smallest m that the estimator gives a range of."""
-        return TECHNIQUES[self.estimator].least_harmonics
+        return least_harmonics(self.estimator)
 
     @property
     def sampled_rad(self) -> tuple[float, ...]:
@@ -316,11 +336,15 @@ class Reconstruction:
     @cached_property
     def flags(self) -> Array:
         """Flags of every pixel, uint8 of `Flags`."""
-        if self.settings.estimator != "likelihood" or self.noise is None:
+        if self.settings.estimator not in OF_ANY_MULTIPLES or self.noise is None:
             return self._flags_of_moments
         xp = namespace(self.smoothed)
-        unexplained = self.has_range & ~self.likelihood.explained()
+        estimate = self.estimate
+        unexplained = self.has_range & ~estimate.explained()
         found = self._flags_of_moments | xp.where(unexplained, int(Flags.UNEXPLAINED), 0)
+        if isinstance(estimate, Unwrapped):
+            undetermined = self.has_range & estimate.ambiguous()
+            found = found | xp.where(undetermined, int(Flags.DEGENERATE), 0)
         return found.astype(xp.uint8)
 
     @cached_property
@@ -412,8 +436,35 @@ class Reconstruction:
     @cached_property
     def likelihood(self) -> Likelihood:
         """Few returns, or one with a tail, with what they are worth; of moments as measured."""
+        moments, noise, harmonics, error = self._evidence
+        most = MOST_RETURNS if harmonics is None else sum(j > 0 for j in harmonics)
+        most = min(MOST_RETURNS, most)
+        return fitted(moments, noise, self._spread, harmonics, most, model_error=error)
+
+    @cached_property
+    def two_returns(self) -> Likelihood:
+        """One or two returns, whichever noise asks for, with what they are worth."""
+        moments, noise, harmonics, error = self._evidence
+        return two_returns(moments, noise, harmonics=harmonics, model_error=error)
+
+    @cached_property
+    def unwrapped(self) -> Unwrapped:
+        """One return by the phases of all frequencies, and how clear it is."""
+        moments, noise, harmonics, error = self._evidence
+        return unwrap(moments, noise, harmonics=harmonics, model_error=error)
+
+    @property
+    def estimate(self) -> Likelihood | Unwrapped:
+        """That of the settings if it is one of `OF_ANY_MULTIPLES`; `likelihood` else."""
+        if self.settings.estimator == "two-returns":
+            return self.two_returns
+        return self.unwrapped if self.settings.estimator == "unwrapped-phase" else self.likelihood
+
+    @property
+    def _evidence(self) -> tuple[Array, MomentNoise | None, tuple[int, ...] | None, float]:
+        """Moments as measured, their noise and multiples, and what is wrong with them beside it."""
         error = 0.0 if self.noise is None else MODEL_ERROR  # which assumed noise is large beside
-        return fitted(self.smoothed, self.noise, self._spread, model_error=error)
+        return self.smoothed, self.noise, None, error
 
     @cached_property
     def reduced_chi_square(self) -> Array:
@@ -424,17 +475,24 @@ class Reconstruction:
 
     @cached_property
     def range_std_m(self) -> Array:
-        """Standard deviation in m of the range of `likelihood`; NaN where there is none."""
+        """Standard deviation in m of the range of `estimate`; NaN where there is none."""
         xp = namespace(self.smoothed)
-        std = self.likelihood.direct_phase_std_rad(self.settings.threshold)
+        estimate = self.estimate
+        if isinstance(estimate, Unwrapped):
+            std = estimate.phase_std_rad
+        else:
+            std = estimate.direct_phase_std_rad(self.settings.threshold)
         found = range_m(std, self._base_frequency_hz)
         return xp.where(self.has_range, found, np.nan).astype(std.dtype)
 
     @cached_property
     def _separation(self) -> Separation:
         technique = self._technique
-        if self.settings.estimator == "likelihood":
-            return self.likelihood.separate(self.settings.threshold)
+        if self.settings.estimator in OF_ANY_MULTIPLES:
+            estimate = self.estimate
+            if isinstance(estimate, Unwrapped):
+                return estimate.separate()
+            return estimate.separate(self.settings.threshold)
         if self.settings.estimator == "pisarenko-merged":
             noise = assumed_noise(self.smoothed) if self.noise is None else self.noise
             merged = merge_returns(self.returns, noise)

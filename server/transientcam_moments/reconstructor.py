@@ -21,12 +21,17 @@ from transientcam_moments.harmonics import HarmonicCorrection, checked_waveform,
 from transientcam_moments.labels import Labels
 from transientcam_moments.phase_steps import is_four_bucket
 from transientcam_moments.ranging import range_m
-from transientcam_moments.reconstruction import PassedReconstruction, Reconstruction, Settings
+from transientcam_moments.reconstruction import (
+    OF_ANY_MULTIPLES,
+    PassedReconstruction,
+    Reconstruction,
+    Settings,
+)
 from transientcam_moments.repair import Repair, repair
 from transientcam_moments.smoothing import gaussian_taps, smooth
 from transientcam_moments.takes import average_takes
 
-_BY_THE_PASS = ("pisarenko", "pisarenko-merged", "likelihood")
+_BY_THE_PASS = ("pisarenko", "pisarenko-merged", *OF_ANY_MULTIPLES)
 """Estimators that follow from the pass's returns or moments."""
 _SHAPES = 4  # of images that a reconstructor keeps prepared
 
@@ -255,7 +260,7 @@ class Reconstructor:
     # -- which way -----------------------------------------------------------------------------
     # The compiled pass serves NumPy arrays in single precision, of 64 pixels or more and an order
     # whose kernel "reconstruct" is compiled, where moments keep their harmonics and the range is
-    # Pisarenko's, or that of the likelihood, which follows from the pass's moments. It begins with
+    # Pisarenko's, or of OF_ANY_MULTIPLES, which follow from the pass's moments. It begins with
     # the raw images of one take of uint16 at four phases, as wide as its smoothing needs, or else
     # (several takes, other images, moments) behind the smoothing. All else goes stage by stage,
     # each computed when it is first read.

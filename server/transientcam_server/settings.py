@@ -10,7 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 import transientcam_moments as tm
 from transientcam.wire import FIRST_MESSAGE_WITHIN_S, MAX_SUBSCRIPTIONS
-from transientcam_moments.reconstruction import ESTIMATORS
+from transientcam_moments.comparisons import TECHNIQUES
+from transientcam_moments.reconstruction import ESTIMATORS, least_harmonics
 
 _DEFAULTS = tm.Settings()  # the paper's
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -28,7 +29,7 @@ else:
     Estimator = Literal[
         (
             "automatic",
-            *(name for name in ESTIMATORS if tm.comparisons.TECHNIQUES[name].planar),
+            *(name for name in ESTIMATORS if name not in TECHNIQUES or TECHNIQUES[name].planar),
         )
     ]
 SpoiltImages = Literal["keep", "repair", "fill"]
@@ -67,7 +68,9 @@ class ReconstructionSettings(_Group):
     least over the scenes of docs/likelihood.md together, and `pisarenko` where the noise of the
     sensor is not known, and in the daemon until the kernel is compiled; each frame names its
     `estimator`. The paper's are `pisarenko` and
-    `maximum-entropy`, the others are there for comparison."""
+    `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase` serve any set of
+    frequencies; `automatic` is `likelihood` for those with gaps. The others are there for
+    comparison."""
     minimum_brightness_dn: _Finite = Field(default=0.0, ge=0.0)
     """Pixels with no more light than this have no range."""
     spoilt_images: SpoiltImages = "repair"
@@ -90,7 +93,7 @@ class ReconstructionSettings(_Group):
     @property
     def least_harmonics(self) -> int:
         """The smallest number of harmonics that the estimator gives a range of."""
-        return tm.comparisons.TECHNIQUES[self.technique(noise_known=True)].least_harmonics
+        return least_harmonics(self.technique(noise_known=True))
 
     def for_moments(self, **others: Any) -> tm.Settings:
         """Return these settings as `tm.Settings`, together with its other ones."""

@@ -97,7 +97,7 @@ def test_what_needs_all_multiples_is_refused_by_name() -> None:
         with pytest.raises(ParameterError, match=r"multiples = \(2, 10, 15\).* 1 to m, for"):
             what()
     assert np.isnan(found.validity).all()
-    with pytest.raises(ParameterError, match="likelihood, for the multiples"):
+    with pytest.raises(ParameterError, match="unwrapped-phase, for the multiples"):
         _ = tm.reconstruct(moments((PHASE, 500.0)), settings(estimator="pisarenko")).range_m
 
 
@@ -118,6 +118,41 @@ def test_predicted_deviations_are_those_of_noisy_frames() -> None:
 
     assert found.range_m.std() == pytest.approx(np.median(found.range_std_m), rel=0.25)
     assert (found.flags & tm.Flags.UNEXPLAINED > 0).mean() < 0.02
+
+
+@pytest.mark.parametrize("estimator", ["two-returns", "unwrapped-phase"])
+@pytest.mark.parametrize("zeroth", ["estimated", "low-frequency"])
+def test_other_estimators_of_any_multiples_have_range_and_returns(
+    estimator: str, zeroth: str
+) -> None:
+    b = moments((PHASE, 500.0), zeroth=zeroth != "estimated")
+
+    found = tm.reconstruct(b, settings(estimator=estimator, zeroth=zeroth))
+
+    np.testing.assert_allclose(found.range_m, tm.range_m(PHASE, F_HZ), atol=1e-4)
+    np.testing.assert_allclose(found.direct, 500, rtol=1e-4)
+    assert not found.indirect.any()
+    assert (found.returns.count == 1).all()
+    assert found.returns.weight.shape == (3, *PHASE.shape)
+    bound = tm.range_m(0.01 / np.sqrt(sum(j * j for j in MULTIPLES)), F_HZ)
+    assert (found.range_std_m > 0.5 * bound).all()
+    assert (found.range_std_m < 1.5 * bound).all()
+
+
+def test_ambiguous_and_unexplained_phases_are_flagged() -> None:
+    sensor = tm.noise.Sensor(
+        gain_e_per_dn=9.0, full_well_e=40_000.0, read_noise_e=30.0, dark_dn=64.0, bits=12
+    )
+    stated = settings(estimator="unwrapped-phase", takes=1, sensor=sensor)
+    two = moments((PHASE, 500.0), (PHASE + 0.35, 300.0))
+    clear = tm.reconstruct(moments((PHASE, 500.0)), stated, calibration=np.ones(4))
+
+    flags = tm.reconstruct(two, stated, calibration=np.ones(4)).flags
+
+    assert not clear.flags.any()
+    assert (flags & tm.Flags.UNEXPLAINED > 0).all()
+    faint = tm.reconstruct(moments((PHASE, 3.0)), stated, calibration=np.ones(4))
+    assert (faint.flags & tm.Flags.DEGENERATE > 0).mean() > 0.9
 
 
 @pytest.mark.parametrize("multiples", [(), (0, 1), (2, 2), (3, 1), (1, 33)])

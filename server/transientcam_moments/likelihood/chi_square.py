@@ -4,8 +4,33 @@ import math
 from functools import lru_cache
 from typing import Final
 
+import numpy as np
+
+from transientcam_moments._arrays import MAX_HARMONICS, Array, namespace
+from transientcam_moments.errors import ParameterError
+
 SIGNIFICANCE: Final = 1e-3
 """Share of the pixels of which it is wrongly denied that noise explains them."""
+
+
+def checked(significance: float) -> float:
+    """Return a significance; raises ParameterError outside of 0 to 1."""
+    if not 0 < significance < 1:
+        raise ParameterError("significance", significance, "0 < significance < 1")
+    return significance
+
+
+def explained(chi_square: Array, degrees_of_freedom: Array, significance: float) -> Array:
+    """Say where chi-square (...) is not above what noise exceeds with a probability.
+
+    Without degrees of freedom nothing can contradict; NaN is not explained. Raises ParameterError
+    for a significance outside of 0 to 1.
+    """
+    xp = namespace(chi_square)
+    checked(significance)
+    limits = [chi_square_quantile(free, significance) for free in range(2 * MAX_HARMONICS + 2)]
+    limit = xp.asarray(np.array(limits))[degrees_of_freedom]
+    return (chi_square <= limit) | ((degrees_of_freedom == 0) & (chi_square >= 0))
 
 
 @lru_cache(maxsize=256)

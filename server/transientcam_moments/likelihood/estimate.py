@@ -21,7 +21,7 @@ from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.likelihood import choice
 from transientcam_moments.likelihood.arithmetic import logarithm
-from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, chi_square_quantile
+from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, explained
 from transientcam_moments.likelihood.choice import MARGIN, MOST_RETURNS, TAIL_SHAPE
 from transientcam_moments.likelihood.planar import Data, fit
 from transientcam_moments.noise.moments import MomentNoise
@@ -112,14 +112,7 @@ class Likelihood(NamedTuple):
         ParameterError
             For a significance outside of 0 to 1.
         """
-        if not 0 < significance < 1:
-            raise ParameterError("significance", significance, "0 < significance < 1")
-        xp = namespace(self.chi_square)
-        limits = [chi_square_quantile(free, significance) for free in range(2 * MAX_HARMONICS + 2)]
-        limit = xp.asarray(np.array(limits))[self.degrees_of_freedom]
-        return (self.chi_square <= limit) | (
-            (self.degrees_of_freedom == 0) & (self.chi_square >= 0)
-        )
+        return explained(self.chi_square, self.degrees_of_freedom, significance)
 
     def separate(self, threshold: float = DIRECT_THRESHOLD) -> Separation:
         """Separate direct from indirect light.
@@ -236,22 +229,36 @@ def fitted(
     if not 0 <= tail_shape <= 6:
         raise ParameterError("tail_shape", tail_shape, "0 to 6")
     in_range("model_error", model_error, 0.0, 1.0, "0 to 1")
-    places = _places(harmonics, planes.shape[0])
-    variance = _variance(noise, planes, trailing)
-    xp = namespace(planes)
-    order = max(places)
-    if places != tuple(range(order + 1)):
-        empty = xp.zeros_like(planes[0])
-        by_place = dict(zip(places, range(len(places)), strict=True))
-        dense = [by_place.get(j) for j in range(order + 1)]
-        planes = xp.stack([empty if at is None else planes[at] for at in dense])
-        variance = xp.stack([0 * variance[0] if at is None else variance[at] for at in dense])
+    planes, variance = dense(planes, noise, harmonics, trailing)
     found = _estimated(planes, variance, returns, tail_shape, float(model_error), spread=spread)
     shaped = (part.reshape((*part.shape[:-1], *trailing)) for part in found)
     return Likelihood._make([*shaped, tail_shape])
 
 
-def _places(harmonics: Sequence[int] | None, count: int) -> tuple[int, ...]:
+def dense(
+    planes: Array,
+    noise: MomentNoise | None,
+    harmonics: Sequence[int] | None,
+    trailing: tuple[int, ...],
+) -> tuple[Array, Array]:
+    """Return moments and variance (m + 1, P) with planes of zeros for what was not measured."""
+    places = places_of(harmonics, planes.shape[0])
+    variance = variance_of(noise, planes, trailing)
+    xp = namespace(planes)
+    order = max(places)
+    if places != tuple(range(order + 1)):
+        empty = xp.zeros_like(planes[0])
+        by_place = dict(zip(places, range(len(places)), strict=True))
+        place_of = [by_place.get(j) for j in range(order + 1)]
+        planes = xp.stack([empty if at is None else planes[at] for at in place_of])
+        variance = xp.stack(
+            [xp.zeros_like(variance[0]) if at is None else variance[at] for at in place_of]
+        )
+    return planes, variance
+
+
+def places_of(harmonics: Sequence[int] | None, count: int) -> tuple[int, ...]:
+    """Return the multiple of each of `count` moments; raises as `likelihood`."""
     places = tuple(range(count)) if harmonics is None else tuple(int(each) for each in harmonics)
     if len(places) != count:
         raise ShapeError("harmonics", f"{len(places)} numbers", f"one for each of {count} moments")
@@ -260,8 +267,8 @@ def _places(harmonics: Sequence[int] | None, count: int) -> tuple[int, ...]:
     return places
 
 
-def _variance(noise: MomentNoise | None, planes: Array, trailing: tuple[int, ...]) -> Array:
-    """Return the variance (N, P) of each part of the moments."""
+def variance_of(noise: MomentNoise | None, planes: Array, trailing: tuple[int, ...]) -> Array:
+    """Return the variance (N, P) of each part of the moments; raises as `likelihood`."""
     xp = namespace(planes)
     real = planes.real.dtype
     if noise is None:
@@ -297,12 +304,12 @@ def _estimate(
 ) -> tuple[Array, ...]:
     """Planar statement of `likelihood`: all harmonics from 0 on, (m + 1, P)."""
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
-        data, scale, usable = _prepared(b, variance, error)
+        data, scale, usable = prepared(b, variance, error)
         found = fit(data, returns, tail_shape)
-        return _results(found, data, scale, usable, min(returns, b.shape[0] - 1), tail_shape)
+        return results(found, data, scale, usable, min(returns, b.shape[0] - 1), tail_shape)
 
 
-def _prepared(b: Array, variance: Array, error: float) -> tuple[Data, Array, Array]:
+def prepared(b: Array, variance: Array, error: float) -> tuple[Data, Array, Array]:
     """Return data with the largest moment 1, what they were divided by, and where there is light.
 
     A pixel that cannot be used is fitted to one return, which comes to nothing.
@@ -337,7 +344,7 @@ def _prepared(b: Array, variance: Array, error: float) -> tuple[Data, Array, Arr
     return data, scale, usable
 
 
-def _results(
+def results(
     found: Array, data: Data, scale: Array, usable: Array, slots: int, tail_shape: int
 ) -> tuple[Array, ...]:
     """Return the attributes of `Likelihood` of what was found."""

@@ -1,6 +1,6 @@
 """The fits of all pixels: each model where the simpler ones leave something to explain."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,7 +55,7 @@ def fit(data: Data, most: int, shape: int) -> Array:
     found = [data.re[0]] * PLANES
     far = np.inf + 0 * data.penalty
     nothing(data.penalty, far, found)
-    one = _Returns.start(data, 1, None, far)
+    one = SharpFit.start(data, 1, None, far)
     one.offer(found, data.numbers >= 0)
     planes = xp.stack(found)
     further = min(most, m) >= 2
@@ -64,7 +64,7 @@ def fit(data: Data, most: int, shape: int) -> Array:
 
     def more(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
         found = list(planes)
-        two = _Returns.start(data, 2, before, np.inf + 0 * data.penalty)
+        two = SharpFit.start(data, 2, before, np.inf + 0 * data.penalty)
         if further:
             two.offer(found, data.numbers >= 4)
         if shape:
@@ -76,17 +76,17 @@ def fit(data: Data, most: int, shape: int) -> Array:
         def most_of_all(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
             found = list(planes)
             bar = found[SCORE] - 6 * data.penalty
-            _Returns.start(data, 3, before, bar).offer(found, data.numbers >= 6)
+            SharpFit.start(data, 3, before, bar).offer(found, data.numbers >= 6)
             return namespace(planes).stack(found)
 
         still = done[SCORE] > 6 * data.penalty
-        return _where(still, most_of_all, data, two.state(), done)
+        return where(still, most_of_all, data, two.state(), done)
 
     # chi-square cannot become less than 0: no model with more unknowns is better below
-    return _where(planes[SCORE] > 4 * data.penalty, more, data, one.state(), planes)
+    return where(planes[SCORE] > 4 * data.penalty, more, data, one.state(), planes)
 
 
-def _where(
+def where(
     mask: Array,
     function: Callable[[Data, tuple[Array, ...], Array], Array],
     data: Data,
@@ -106,7 +106,7 @@ def _where(
     return planes
 
 
-class _Returns:
+class SharpFit:
     """A fit of K sharp returns: banks, as `sharp` takes them."""
 
     cost: Array
@@ -124,25 +124,42 @@ class _Returns:
     @classmethod
     def start(
         cls, data: Data, count: int, before: tuple[Array, ...] | None, bar: Array
-    ) -> "_Returns":
+    ) -> "SharpFit":
         """Add a return to those of another fit, and fit all of them; `bar` as in `sharp.judge`."""
         fit = cls(data, count, before)
         fit.cost = fit._add()
-        damping = sharp.FIRST_DAMPING + 0 * fit.cost
+        fit.improve(STEPS[count - 1], bar)
+        return fit
+
+    @classmethod
+    def at(cls, data: Data, x: Sequence[Array], y: Sequence[Array]) -> "SharpFit":
+        """Begin with returns at points x + i y of the unit circle, and the best weights there."""
+        fit = cls(data, len(x), None)
+        fit.x, fit.y, fit.w = list(x), list(y), list(x)
+        given = (data.re, data.im, data.weight, fit.x, fit.y, fit.w)
+        sharp.weigh(fit.order, fit.returns, *given)
+        for point in zip(fit.x, fit.y, fit.w, strict=True):
+            sharp.take_away(fit.order, *point, fit.rr, fit.ri)
+        fit.cost = sharp.chi_square(fit.order, data.weight, fit.rr, fit.ri)
+        return fit
+
+    def improve(self, steps: int, bar: Array) -> None:
+        """Take at most so many steps to a lower chi-square."""
+        data = self.data
 
         def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
             x, y, w, rr, ri = (list(part) for part in state[:5])
             cost, damping = sharp.step(
-                fit.order, fit.returns, fit.unknowns, data.re, data.im, data.weight,
+                self.order, self.returns, self.unknowns, data.re, data.im, data.weight,
                 x, y, w, rr, ri, state[5], state[6], bar,
             )  # fmt: skip
             return tuple(x), tuple(y), tuple(w), tuple(rr), tuple(ri), cost, damping
 
-        banks = (tuple(part) for part in (fit.x, fit.y, fit.w, fit.rr, fit.ri))
-        state = _times(STEPS[count - 1], step, (*banks, fit.cost, damping), _moving)
-        fit.x, fit.y, fit.w, fit.rr, fit.ri = (list(part) for part in state[:5])
-        fit.cost = state[5]
-        return fit
+        banks = (tuple(part) for part in (self.x, self.y, self.w, self.rr, self.ri))
+        damping = sharp.FIRST_DAMPING + 0 * self.cost
+        state = _times(steps, step, (*banks, self.cost, damping), _moving)
+        self.x, self.y, self.w, self.rr, self.ri = (list(part) for part in state[:5])
+        self.cost = state[5]
 
     def _add(self) -> Array:
         """Put the best return for what is left in the last place; return chi-square."""
@@ -184,7 +201,7 @@ class _Returns:
         )  # fmt: skip
 
 
-def _offer_tail(data: Data, two: _Returns, shape: int, found: list[Array]) -> None:
+def _offer_tail(data: Data, two: SharpFit, shape: int, found: list[Array]) -> None:
     """Fit a return with a tail, from two returns on, and put it where it is the better model."""
     order, powers, unknowns = two.order, (0,) * shape, (0,) * 4
     mean = DELAY_RAD / shape

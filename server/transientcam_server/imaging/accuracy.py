@@ -17,7 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_moments.comparisons import TECHNIQUES
+from transientcam_moments.reconstruction import least_harmonics
 from transientcam_server.imaging.noise import moment_noise, typical_deviation
 from transientcam_server.imaging.ranging import ranges_m
 from transientcam_server.imaging.recipe import Recipe
@@ -108,6 +108,8 @@ def range_accuracy(recipe: Recipe, found: tm.Reconstruction, every_px: int = 1) 
     every_px
         One pixel in so many rows and columns is predicted, and stands for those around it.
     """
+    if not recipe.applied.sequence.sampling.consecutive:
+        return _of_gaps(found)
     grid = np.s_[..., every_px // 2 :: every_px, every_px // 2 :: every_px]
     has_range = np.asarray(found.has_range)
     seen = has_range[grid]
@@ -139,6 +141,12 @@ def _around(plane: _Array, has_range: _Array, every_px: int) -> _Array:
     return np.where(has_range, plane[np.ix_(*nearest)], np.float32(np.nan))
 
 
+def _of_gaps(found: tm.Reconstruction) -> RangeAccuracy:
+    """Return what an estimate of any multiples says of itself; nothing disagrees with it."""
+    std_m = np.asarray(found.range_std_m, dtype=np.float32)
+    return RangeAccuracy(std_m, np.full_like(std_m, np.nan), None)
+
+
 @dataclass(frozen=True, eq=False)
 class _Frame:
     """Smoothed moments (m + 1, P) of the pixels with a range, and the variance of their parts."""
@@ -165,7 +173,7 @@ class _Frame:
         if m == 1:
             return []
         own = self.recipe.technique
-        fewer = own if m > TECHNIQUES[own].least_harmonics > 0 and m > 2 else "single-frequency"
+        fewer = own if m > least_harmonics(own) and m > 2 else "single-frequency"
         ways = [(self.b[:m], self.variance[:m], fewer)]
         ways += [(self.b, self.variance, other) for other in _OTHERS if other != own]
         return [self._ranges_m(*each) for each in ways]

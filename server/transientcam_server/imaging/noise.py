@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from transientcam_moments.reconstruction import OF_ANY_MULTIPLES
 from transientcam_server.imaging.recipe import Recipe
 
 _Array = NDArray[Any]
@@ -76,15 +77,15 @@ def typical_deviation(values: _Array) -> _Array:
 def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
     """Predict the deviation of a frame's range from its own returns.
 
-    None where no pixel has a range. That of the likelihood is its own, of all pixels; of another
-    estimator it is that of Pisarenko's returns in a sample of pixels, which is cheap enough for
-    every frame.
+    None where no pixel has a range. That of `OF_ANY_MULTIPLES` is the estimate's own, of all
+    pixels; of another estimator it is that of Pisarenko's returns in a sample of pixels, which is
+    cheap enough for every frame.
     """
     if not np.asarray(found.has_range).any():
         return None
-    if recipe.technique == "likelihood":
+    if recipe.technique in OF_ANY_MULTIPLES:
         std_m = np.asarray(found.range_std_m)
-        first_order = np.asarray(found.likelihood.explained())[np.asarray(found.has_range)]
+        first_order = np.asarray(found.estimate.explained())[np.asarray(found.has_range)]
     else:
         std_m, first_order = _of_pisarenko(recipe, found)
     known = std_m[np.isfinite(std_m)]

@@ -287,7 +287,7 @@ PRODUCTS: Final[dict[str, Product]] = {
                 "accuracy",
                 _error(part),
                 of_noise=True,
-                of_toeplitz=True,
+                of_toeplitz=name != "range_std",
                 steps=_MILLIMETRES,
             )
             for name, part in (

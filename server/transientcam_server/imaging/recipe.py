@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import AppliedSequence, RawFrame, Sampling, Sequence
+from transientcam_moments.reconstruction import OF_ANY_MULTIPLES
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import Gains, nominal_gains
@@ -18,8 +19,8 @@ from transientcam_server.imaging.lens import ASSUMED_FIELD_OF_VIEW_DEG, Intrinsi
 from transientcam_server.settings import ReconstructionSettings
 
 _log = logging.getLogger(__name__)
-OF_ANY_MULTIPLES: Final = "likelihood"
-"""The estimator that does without consecutive multiples of one frequency."""
+_WITH_GAPS: Final = "likelihood"
+"""Of those that serve frequencies with gaps, the one that keeps up with a camera."""
 _UNTIL_COMPILED: Final = "pisarenko"
 """In NumPy as in compiled lanes fast enough for a camera of 163 x 120 pixels."""
 
@@ -74,17 +75,14 @@ def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, f
     Problem
         ``estimator-misfit``.
     """
-    if (
-        not sequence.sampling.consecutive
-        and settings.technique(noise_known=True) != OF_ANY_MULTIPLES
-    ):
+    if not _serves(settings, sequence.sampling):
         raise Problem(
             kinds.ESTIMATOR_MISFIT,
             f"The estimator {settings.estimator} needs consecutive multiples of one frequency, and "
             f"this camera measures the multiples {listed(sequence.multiples)}.",
             field="estimator",
             value=settings.estimator,
-            limit=OF_ANY_MULTIPLES,
+            limit=f"one of {', '.join(OF_ANY_MULTIPLES)}",
         )
     least, harmonics = settings.least_harmonics, sequence.harmonics
     if harmonics >= least:
@@ -102,15 +100,20 @@ def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, f
 
 def suited(settings: ReconstructionSettings, sampling: Sampling) -> ReconstructionSettings:
     """Return settings with an estimator that goes with the frequencies of a camera."""
-    if sampling.consecutive or settings.technique(noise_known=True) == OF_ANY_MULTIPLES:
+    if _serves(settings, sampling):
         return settings
     _log.warning(
         "the camera measures the multiples %s, which %s cannot serve: the estimator is %s",
         listed(sampling.multiples),
         settings.estimator,
-        OF_ANY_MULTIPLES,
+        _WITH_GAPS,
     )
-    return settings.model_copy(update={"estimator": OF_ANY_MULTIPLES})
+    return settings.model_copy(update={"estimator": _WITH_GAPS})
+
+
+def _serves(settings: ReconstructionSettings, sampling: Sampling) -> bool:
+    """Return whether the settings' estimator goes with the multiples that are measured."""
+    return sampling.consecutive or settings.estimator in ("automatic", *OF_ANY_MULTIPLES)
 
 
 def listed(multiples: tuple[int, ...]) -> str:
@@ -150,8 +153,9 @@ class Recipe:
     @property
     def technique(self) -> str:
         """The estimator of its frames, by its name in `transientcam_moments`."""
-        if not self.applied.sequence.sampling.consecutive:
-            return OF_ANY_MULTIPLES
+        sampling, chosen = self.applied.sequence.sampling, self.settings.estimator
+        if not sampling.consecutive:
+            return chosen if chosen in OF_ANY_MULTIPLES else _WITH_GAPS
         return self.settings.technique(noise_known=self.sensor is not None)
 
     @property

@@ -128,6 +128,22 @@ def test_fixed_frequencies_measure_the_distance(fixed: Served) -> None:
     assert not report.failed, [(each.check.name, each.reason) for each in report.failed]
 
 
+@pytest.mark.parametrize("estimator", ["two-returns", "unwrapped-phase"])
+def test_their_estimators_state_range_and_deviation(fixed: Served, estimator: str) -> None:
+    with Camera(fixed.url, timeout_s=60.0) as client:
+        client.reconstruction = {"estimator": estimator}
+        newest = client.reconstruction["reconstruction_id"]
+        frame = client.frame("range", after=client.latest(wait_s=10.0)["frame"], wait_s=10.0)
+        while frame.meta["reconstruction_id"] < newest:  # the frames on their way are older
+            frame = client.frame("range", after=frame.meta["frame"], wait_s=10.0)
+        std = client.frame("range_std").array
+        client.reconstruction = {"estimator": "automatic"}
+
+    assert frame.meta["estimator"] == estimator
+    assert frame.array == pytest.approx(FAR_M, abs=2e-3)
+    assert ((std > 0) & (std < 0.05)).all()
+
+
 def test_what_they_cannot_give_is_absent_with_the_reason(fixed: Served) -> None:
     with Camera(fixed.url, timeout_s=60.0) as client:
         absent = {each["name"]: each["reason"] for each in client.info["absent_products"]}
@@ -145,11 +161,11 @@ def test_what_they_cannot_give_is_absent_with_the_reason(fixed: Served) -> None:
 
     assert problem["field"] == "sampling"
     of_toeplitz = {"validity", "coefficients", "transient", "density_std", "cumulative", "streak"}
-    of_toeplitz |= {"bounds", "range_std", "range_bias", "range_error"}
+    of_toeplitz |= {"bounds", "range_bias", "range_error"}
     assert set(absent) == of_toeplitz | {"brightness", "uniform", "truth"}
     assert "needs consecutive multiples of one frequency" in absent["transient"]
     assert "needs a zeroth moment" in absent["brightness"]
-    assert estimator == "likelihood"
+    assert estimator == "automatic"
 
 
 def test_their_recordings_are_reconstructed_and_replayed(

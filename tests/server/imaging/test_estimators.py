@@ -15,6 +15,7 @@ from transientcam_driver import AppliedSequence, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.capture import FrameWithTruth, capture
 from transientcam_moments.comparisons import sra_table
+from transientcam_moments.reconstruction import OF_ANY_MULTIPLES
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.planning.timing import ReconstructionTimer
 from transientcam_server.settings import Estimator, ReconstructionSettings
@@ -30,7 +31,7 @@ def test_the_daemon_offers_the_techniques_that_compute_all_pixels_at_once() -> N
     }
 
     offered = ReconstructionSettings.model_json_schema()["properties"]["estimator"]["enum"]
-    assert set(offered) == planar | {"automatic"}
+    assert set(offered) == planar | set(OF_ANY_MULTIPLES) | {"automatic"}
     assert offered[:4] == ["automatic", "pisarenko", "maximum-entropy", "likelihood"]
 
 
