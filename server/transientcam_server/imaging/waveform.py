@@ -49,8 +49,8 @@ class SweepEvaluation:
         """Return the harmonics (m, K) of the takes (takes, 4 m, H, W) of each step, or None."""
         sampled = []
         for takes in steps:
-            flat = takes.reshape((*takes.shape[:2], -1))
-            sampled.append(flat[:, :, :: -(-flat.shape[2] // MOST_PIXELS)])
+            flat: _Array = takes.reshape((*takes.shape[:2], -1))
+            sampled.append(flat[:, :, :: -(-flat[0, 0].size // MOST_PIXELS)])
         below = np.array([(flat < self._full_scale).all(axis=(0, 1)) for flat in sampled])
         used = np.flatnonzero(below.all(axis=0))
         lit = np.zeros(below.shape[1], bool)
