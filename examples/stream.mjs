@@ -39,7 +39,7 @@ socket.onmessage = ({ data }) => {
       const mean = finite.reduce((sum, value) => sum + value, 0) / finite.length;
       const age_ms = Date.now() - message.meta.host_time_s * 1e3;
       console.log(`frame ${message.meta.frame}: mean ${mean.toFixed(4)} ${message.unit}, ${age_ms.toFixed(0)} ms old`);
-      // whoever acknowledges gets the newest frame next, however slow he is
+      // a client that acknowledges gets the newest frame next, however slow it is
       send({ type: "ack", frame: message.meta.frame });
       if (++received === Number(count)) socket.close(1000);
       break;

@@ -76,7 +76,7 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
 
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
-    """The directory of measurements nobody here made; tests skip where it is absent."""
+    """The directory of foreign measurements; tests skip where it is absent."""
     directory = Path(os.environ.get("TRANSIENTCAM_TEST_DATA", ROOT.parent / "shared" / "data"))
     if not directory.is_dir():
         pytest.skip(f"no measured data at {directory} (set TRANSIENTCAM_TEST_DATA)")
@@ -85,7 +85,7 @@ def data_dir() -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def data_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Keep recordings that belong to somebody out of the tests' reach, and theirs out of his."""
+    """Keep the user's recordings out of the tests' reach, and theirs out of the user's."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_DATA_HOME", str(tmp_path_factory.mktemp("data")))
         patch.delenv("STATE_DIRECTORY", raising=False)

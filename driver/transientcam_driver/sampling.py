@@ -15,7 +15,7 @@ MAX_HARMONICS = 32
 FOUR_PHASES_RAD = (0.0, math.pi / 2, math.pi, 3 * math.pi / 2)
 """Four-bucket sampling."""
 MAX_PHASES = 16
-_MAX_PHASE_RAD = 1e3  # beyond, turns cannot be told from rounding
+_MAX_PHASE_RAD = 1e3  # beyond, turns are lost in rounding
 _SAME_PHASE_RAD = 1e-6
 
 
@@ -32,7 +32,7 @@ class Sampling:
     multiples
         From 1 to 32, ascending, without a common factor; empty for 1 to m.
     phases_rad
-        From 3 to 16 different ones: what a moment and the offset of a pixel can be told from.
+        From 3 to 16 different ones: enough to solve for a moment and the offset of a pixel.
 
     Raises
     ------

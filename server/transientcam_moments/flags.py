@@ -35,7 +35,7 @@ class Flags(IntFlag):
     """The moments contradict each other by more than noise explains: something is wrong.
 
     Gains that drifted or are of another camera, light that moved while it was captured, images that
-    lost their synchronisation. Only who knows the noise can set it; never where b_0 is
+    lost their synchronisation. Set only where the noise is known; never where b_0 is
     estimated, as that makes any moments agree.
     """
     UNEXPLAINED = 128

@@ -157,7 +157,7 @@ def checked_waveform(waveform: Array) -> Array:
     """Return a waveform (m, K) as complex128, where `HarmonicCorrection` can take it out.
 
     By (1) the phase of a gain is that of u (1 + r), r the sum of |c_k / c_1| u^(k - 1) and
-    u^-(k + 1). It tells u as long as the phase of 1 + r turns more slowly than u, so that
+    u^-(k + 1). It determines u as long as the phase of 1 + r turns more slowly than u, so that
     the sum of (k - 1) |c_k| or (k + 1) |c_k| over |c_1| must be below 1.
 
     Raises

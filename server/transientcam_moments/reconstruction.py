@@ -117,7 +117,7 @@ class Settings:
         Largest value of a raw image; pixels that reach it are saturated.
     spoilt_images : {"repair", "fill", "keep"}
         What becomes of raw images that lost their synchronisation (Sec. 6): rebuilt where sums of
-        opposite images find them (`repair`), and where those don't tell also filled in from the
+        opposite images find them (`repair`), and where those don't, also filled in from the
         frame before, or kept as they are.
     sensor : noise.Sensor, optional
         Whose noise the images have; "likelihood", "two-returns" and "unwrapped-phase" weigh the
@@ -443,7 +443,7 @@ class Reconstruction:
 
     @cached_property
     def two_returns(self) -> Likelihood:
-        """One or two returns, whichever noise asks for, with what they are worth."""
+        """One or two returns, as many as the noise justifies, with what they are worth."""
         moments, noise, harmonics, error = self._evidence
         return two_returns(moments, noise, harmonics=harmonics, model_error=error)
 

@@ -36,7 +36,7 @@ class SweepPhasors(NamedTuple):
 def sweep_offsets_rad(steps: int) -> Array:
     """Return what a phase sweep of so many steps adds to the four phases: a quarter turn evenly.
 
-    Q steps tell the harmonics below 2 Q from each other.
+    Q steps separate the harmonics below 2 Q from each other.
     """
     return np.arange(steps) * (np.pi / (2 * steps))
 

@@ -177,7 +177,7 @@ class Service:
             self._executor.shutdown(wait=ended, cancel_futures=True)
 
     async def close_streams(self) -> None:
-        """Tell every stream that it ends, and give those that listen the time to hear it."""
+        """Close every stream, and give clients that still read the time to receive the reason."""
         self.planner.close()
         await self.planning.close()
         self.hub.close()
@@ -192,7 +192,7 @@ class Service:
 
     @property
     def watched(self) -> bool:
-        """Whether frames are sent to anybody or recorded."""
+        """Whether frames are sent to a client or recorded."""
         recorded = self.recordings.active_id is not None
         return recorded or bool(self.hub.clients or self.mjpeg_clients)
 

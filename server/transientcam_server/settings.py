@@ -210,7 +210,7 @@ class LimitSettings(_Group):
     """New connections a second from one address; max_connections_per_address may come at once."""
     unserved_s: _Finite = Field(default=1.0, ge=0.5, le=60.0)
     """Time without any client being served, after which the light is switched off until they are:
-    nobody could switch it off meanwhile."""
+    no client could switch it off meanwhile."""
     head_s: _Finite = Field(default=10.0, gt=0.0, le=3600.0)
     """Time for the head of a request to arrive, and for a handshake of TLS."""
     body_s: _Finite = Field(default=30.0, gt=0.0, le=3600.0)

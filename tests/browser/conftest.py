@@ -68,7 +68,7 @@ class Watch:
     refusals_expected: bool = False
 
     def on_console(self, message: ConsoleMessage) -> None:
-        """Remember errors; a request that a test wants refused is one to Chromium too."""
+        """Remember errors; a request that is refused on purpose is one to Chromium too."""
         refused = (
             self.refusals_expected and "the server responded with a status of 4" in message.text
         )
@@ -91,7 +91,7 @@ def camera() -> str:
 
 @contextmanager
 def _storing_in(directory: Path, camera: str) -> Iterator[Served]:
-    """A daemon that keeps what it stores where nobody else does."""
+    """A daemon that keeps what it stores in a directory of its own."""
     stored: dict[str, Any] = {
         "recordings": {"directory": directory / "recordings", "min_free_bytes": 0},
         "calibrations": {"directory": directory / "calibrations"},

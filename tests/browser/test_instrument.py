@@ -172,7 +172,7 @@ def test_pins_and_regions_measure_what_the_daemon_serves(page: Page, served: Ser
     expect(page.locator(".mark-region, .mark-pin")).to_have_count(0)
 
 
-def test_a_copied_link_shows_the_same_page_to_somebody_else(
+def test_a_copied_link_shows_the_same_page_to_another_user(
     page: Page, served: Served, browser: Browser
 ) -> None:
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
@@ -185,7 +185,7 @@ def test_a_copied_link_shows_the_same_page_to_somebody_else(
     choose_from(page, "Page: layout, colours, help", "Copy a link to what is shown")
     toast = page.locator(".toast", has_text="The link was copied")
     expect(toast).to_be_visible()
-    # it is told where nothing can be pressed
+    # it is announced where nothing can be pressed
     covered = toast.evaluate(
         """(toast) => { const box = toast.getBoundingClientRect();
              return [...document.querySelectorAll("button, select, input")].filter((each) => {

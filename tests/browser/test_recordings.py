@@ -39,7 +39,7 @@ def recordings(served: Served) -> list[dict[str, Any]]:
 
 
 def record(served: Served, *, frames: int, name: str = "corner") -> str:
-    """A finished recording, made by somebody else than the page."""
+    """A finished recording, made by another client than the page."""
     url = f"{served.url}/api/v1/recordings"
     started = httpx.post(url, json={"name": name, "frames": frames}).raise_for_status().json()
     recording: str = started["id"]

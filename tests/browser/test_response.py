@@ -19,7 +19,7 @@ pytestmark = pytest.mark.shared_daemon
 F_HZ = 23e6
 PIXEL = (81, 20)
 WORDS = {"biased": "Biased in", "saturated": "Saturated in", "no_signal": "No signal in"}
-# returns with a smaller share of the light are told of together
+# returns with a smaller share of the light are listed together
 WEAK_SHARE = 0.02
 
 
@@ -93,7 +93,7 @@ def strong(returns: object) -> list[dict[str, float]]:
     )
 
 
-def test_returns_truth_and_flags_are_told(page: Page, served: Served) -> None:
+def test_returns_truth_and_flags_are_listed(page: Page, served: Served) -> None:
     select(page, served)
     reported = pixel_of(served)
     truth = reported["truth"]
@@ -153,7 +153,7 @@ def hold(page: Page, served: Served) -> str:
     return held
 
 
-def test_what_is_told_beside_a_held_frame_is_of_that_frame(page: Page, served: Served) -> None:
+def test_values_beside_a_held_frame_are_of_that_frame(page: Page, served: Served) -> None:
     held = hold(page, served)
     with page.expect_response(lambda answer: f"/frames/{held}/pixel?" in answer.url):
         point_at(page, "map", *PIXEL, click=True)

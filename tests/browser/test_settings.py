@@ -49,7 +49,7 @@ def test_the_reconstruction_is_set_within_its_limits(page: Page, served: Served)
     assert reconstruction(served)["estimator"] == "automatic"
 
 
-def test_settings_that_somebody_else_changed_meanwhile_are_not_overwritten(
+def test_settings_that_another_client_changed_meanwhile_are_not_overwritten(
     page: Page, served: Served, watch: Watch
 ) -> None:
     open_page(page)

@@ -97,7 +97,7 @@ def test_the_camera_stops_and_starts_again(page: Page, served: Served) -> None:
     expect(page.locator("[data-field=state]")).to_have_text(LIVE)
 
 
-def test_a_camera_that_somebody_else_stops_and_starts_is_followed(
+def test_a_camera_that_another_client_stops_and_starts_is_followed(
     page: Page, served: Served
 ) -> None:
     open_page(page)
@@ -148,7 +148,7 @@ def test_the_sequence_is_judged_as_it_is_typed_and_set(
     )
 
 
-def test_a_sequence_that_somebody_else_sets_is_shown(page: Page, served: Served) -> None:
+def test_a_sequence_that_another_client_sets_is_shown(page: Page, served: Served) -> None:
     open_page(page)
     document = httpx.get(f"{served.url}/api/v1/sequence").json() | {"base_frequency_hz": 46e6}
     for derived in (

@@ -47,7 +47,7 @@ def test_control_is_taken_renewed_used_and_given_back(page: Page, served: Served
     assert httpx.get(f"{served.url}/api/v1/lease").json()["held"] is False
 
 
-def test_while_somebody_else_steers_controls_say_who_and_wait(page: Page, served: Served) -> None:
+def test_controls_name_another_holder_of_the_lease_and_wait(page: Page, served: Served) -> None:
     open_page(page)
     granted = lease(served, "POST", holder="the night shift", duration_s=600).json()
     edit = page.get_by_role("button", name="Edit")
@@ -64,14 +64,14 @@ def test_while_somebody_else_steers_controls_say_who_and_wait(page: Page, served
     expect(edit).to_be_enabled()
 
 
-def test_a_change_that_is_refused_for_the_lease_says_who_has_it(
+def test_a_change_that_is_refused_for_the_lease_names_its_holder(
     page: Page, served: Served, watch: Watch
 ) -> None:
     open_page(page)
     watch.refusals_expected = True
     lease(served, "POST", holder="the night shift", duration_s=600)
     expect(page.get_by_role("button", name="Stop", exact=True)).to_be_disabled()
-    # as a page that has not heard of it yet
+    # as a page that has no notice of it yet
     words = page.evaluate(
         "() => transientcam.store.api.setAcquisition(false).catch((error) => error.message)"
     )
@@ -93,7 +93,7 @@ def test_control_is_taken_over_in_both_directions(page: Page, served: Served, wa
     expect(banner).to_have_count(0)
 
 
-def test_the_light_goes_off_whoever_steers(page: Page, served: Served) -> None:
+def test_the_light_goes_off_whichever_client_has_control(page: Page, served: Served) -> None:
     open_page(page)
     lease(served, "POST", holder="the night shift", duration_s=600)
     expect(page.locator("[data-field=control]")).to_contain_text("the night shift")
@@ -146,7 +146,7 @@ def test_a_camera_that_stands_still_is_shown_by_its_last_frame(page: Page, serve
 
 @pytest.fixture
 def guarded(tmp_path: Path) -> Any:
-    """A daemon that asks for tokens, and one that it knows of each role."""
+    """A daemon that requires tokens, and a valid one of each role."""
     file = tmp_path / "tokens.json"
     tokens = {
         role: TokenFile(file).create(str(role), role, now=utc_now(), expires=None)[1]
@@ -158,7 +158,7 @@ def guarded(tmp_path: Path) -> Any:
 
 @pytest.fixture
 def page_of_guarded(browser: Browser, guarded: Any) -> Any:
-    """A page of a daemon that asks for tokens; refusals are what it is about."""
+    """A page of a daemon that requires tokens; refusals are what it is about."""
     served, tokens = guarded
     context = browser.new_context(base_url=served.url, reduced_motion="reduce")
     page = context.new_page()
@@ -175,7 +175,7 @@ def show_token(page: Page, token: str) -> None:
     dialog.get_by_role("button", name="Use this token").click()
 
 
-def test_a_service_that_asks_for_a_token_is_shown_one(page_of_guarded: Any) -> None:
+def test_a_service_that_requires_a_token_gets_one(page_of_guarded: Any) -> None:
     page, _, tokens = page_of_guarded
     page.goto("/?debug")
     dialog = page.get_by_role("dialog", name="Authentication required")
@@ -199,7 +199,7 @@ def test_a_service_that_asks_for_a_token_is_shown_one(page_of_guarded: Any) -> N
     assert page.evaluate("() => Object.values(sessionStorage).join()") == ""
 
 
-def test_a_viewer_looks_and_is_told_what_it_may_not(page_of_guarded: Any) -> None:
+def test_a_viewer_sees_what_its_role_does_not_permit(page_of_guarded: Any) -> None:
     page, _, tokens = page_of_guarded
     page.goto("/?debug")
     show_token(page, tokens[Role.VIEWER])

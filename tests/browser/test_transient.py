@@ -206,9 +206,7 @@ def test_light_passes_the_pixels_when_their_range_says(page: Page, served: Serve
     assert pictures.max() > 500
 
 
-def test_scrubbing_changes_the_picture_and_asks_the_daemon_for_nothing(
-    page: Page, watch: Watch
-) -> None:
+def test_scrubbing_changes_the_picture_without_a_request(page: Page, watch: Watch) -> None:
     open_page(page)
     slider = page.get_by_label("Time of flight")
     slider.focus()
@@ -312,7 +310,7 @@ def test_light_so_far_is_what_the_daemon_integrates(page: Page, served: Served) 
     assert expected.std() > 5
 
 
-def test_the_light_so_far_at_a_pixel_is_told(page: Page, served: Served) -> None:
+def test_the_light_so_far_at_a_pixel_is_shown(page: Page, served: Served) -> None:
     open_page(page)
     shows_frame(page, stop(served))
     page.get_by_role("tab", name="So far").click()

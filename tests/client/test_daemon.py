@@ -243,7 +243,7 @@ def test_a_wrong_change_of_a_subscription_leaves_the_stream_as_it_was(camera: Ca
         assert products[-1] == "brightness"
 
 
-def test_a_slow_reader_gets_fresh_frames_and_is_told_of_those_it_missed(camera: Camera) -> None:
+def test_a_slow_reader_gets_fresh_frames_and_notices_of_those_it_missed(camera: Camera) -> None:
     camera.sequence = _VIDEO
     with camera.stream("range", credits=1) as stream:
         first = stream.receive(timeout_s=_LONG_S)
@@ -256,7 +256,7 @@ def test_a_slow_reader_gets_fresh_frames_and_is_told_of_those_it_missed(camera: 
     assert sum(notice.details["count"] for notice in dropped) == second.frame - first.frame - 1
 
 
-def test_an_unplugged_camera_is_told_and_comes_back_by_itself(camera: Camera) -> None:
+def test_an_unplugged_camera_is_reported_and_comes_back_by_itself(camera: Camera) -> None:
     with camera.stream("range") as stream:
         stream.receive(timeout_s=_LONG_S)
         camera.cause("unplug")

@@ -38,7 +38,7 @@ def test_an_announcement_says_where_and_what() -> None:
     assert (found.serial, found.firmware, found.api, found.tls) == ("A-17", "1.2", "v1", False)
 
 
-def test_behind_tls_the_name_is_told_that_the_certificate_may_know() -> None:
+def test_behind_tls_the_address_has_the_name_that_the_certificate_may_have() -> None:
     found = read_announcement(announced("192.168.7.5", tls="1"))
 
     assert found is not None

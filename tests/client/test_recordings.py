@@ -84,7 +84,7 @@ def test_the_verb_records_nothing_into_a_file_of_another_format(
     assert len(httpx.get(f"{daemon.url}/api/v1/recordings").json()["recordings"]) == before
 
 
-def test_the_verb_records_downloads_and_tells(
+def test_the_verb_records_downloads_and_reports(
     daemon: Served, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     output = tmp_path / "a.h5"

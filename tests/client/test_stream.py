@@ -173,7 +173,7 @@ def test_a_frame_far_longer_than_the_usual_limit_of_a_message_arrives(
     assert (frame.array == 1.0).all()
 
 
-def test_notices_are_told_while_frames_are_waited_for(
+def test_notices_are_delivered_while_frames_are_waited_for(
     connect: _Connect, replay: _Start, recorded: dict[str, Recording]
 ) -> None:
     def handler(connection: ServerConnection) -> None:
@@ -191,7 +191,7 @@ def test_notices_are_told_while_frames_are_waited_for(
     assert list(client.stream.notices) == passed
 
 
-def test_no_frame_in_time_is_told_and_the_stream_stays(
+def test_no_frame_in_time_is_an_error_and_the_stream_stays(
     connect: _Connect, replay: _Start, recorded: dict[str, Recording]
 ) -> None:
     more = threading.Event()

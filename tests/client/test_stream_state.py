@@ -253,7 +253,7 @@ def test_what_would_happen_again_is_raised(
         state.retry_after_s(error)
 
 
-def test_a_reconnection_is_told_and_counts_anew(recorded: dict[str, Recording]) -> None:
+def test_a_reconnection_is_announced_and_counts_anew(recorded: dict[str, Recording]) -> None:
     state = _state(reconnect=Reconnect(first_wait_s=1.0))
     state.received(recorded["hello"].data)
     state.retry_after_s(_LOST)

@@ -43,7 +43,7 @@ def without_header(name: str) -> Breaking:
 
 
 def deaf_to(name: str) -> Breaking:
-    """Do not hear a header of any request."""
+    """Ignore a header of every request."""
     return Breaking(request=lambda headers: {k: v for k, v in headers.items() if k != name})
 
 
@@ -151,7 +151,7 @@ def _not_resuming(message: Map) -> Map:
 
 
 def _only_in_full(message: Map) -> Map | None:
-    """Hear no subscription that leaves anything out, as the later ones do."""
+    """Ignore every subscription that leaves anything out, as the later ones do."""
     return None if message.get("type") == "subscribe" and "credits" not in message else message
 
 
@@ -163,7 +163,7 @@ def _unlimited(message: Map) -> Map:
 
 
 def _in_the_address(answer: Answer) -> Answer:
-    """Let in who writes a token into the address."""
+    """Admit clients that write a token into the address."""
     return replace(answer, status=200) if "token=" in answer.query else answer
 
 

@@ -168,7 +168,7 @@ def test_what_cannot_be_read_fails_a_check_and_ends_nothing(breakable: Breakable
 def guarded(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Iterator[tuple[Breakable, dict[Role, str]]]:
-    """A daemon that asks for tokens, and a token of each role."""
+    """A daemon that requires tokens, and a token of each role."""
     path = tmp_path_factory.mktemp("tokens") / "tokens.json"
     tokens = {role: TokenFile(path).create(str(role), role, now=utc_now())[1] for role in Role}
     with breakable_daemon(

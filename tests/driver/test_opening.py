@@ -84,7 +84,7 @@ def test_a_name_that_cannot_be_read_says_why(spec: str, reason: str) -> None:
     assert repr(spec) in str(caught.value)
 
 
-def test_measured_alone_asks_for_a_file() -> None:
+def test_measured_alone_requires_a_file() -> None:
     with pytest.raises(SceneError, match=r"measured:PATH\.npz with a file"):
         open_camera("sim:measured")
 

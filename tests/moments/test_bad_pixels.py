@@ -137,7 +137,7 @@ def test_a_reconstruction_replaces_and_flags_bad_pixels() -> None:
     np.testing.assert_array_equal(found.moments[:, ~mask], untouched.moments[:, ~mask])
 
 
-def test_a_reconstruction_tells_how_many_images_it_left_out() -> None:
+def test_a_reconstruction_states_how_many_images_it_left_out() -> None:
     noise = np.random.default_rng(0).normal(0, 1, (60, *SHAPE))
     images = images_of(2.0, takes=10) + noise
     images[13] *= 0.7  # two takes, one image each

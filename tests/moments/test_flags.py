@@ -28,7 +28,7 @@ def test_contradicting_moments_are_degenerate_and_negative_light_is_none() -> No
 
 
 @pytest.mark.parametrize("bad", [np.inf, -np.inf, complex(0, np.nan), complex(1, np.inf)])
-def test_any_moment_that_is_no_number_is_told(bad: complex) -> None:
+def test_any_moment_that_is_no_number_is_flagged(bad: complex) -> None:
     for plane in range(3):
         b = np.ones((3, 2), complex) * [[1], [0.2], [0.1]]
         b[plane, 1] = bad

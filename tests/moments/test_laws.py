@@ -101,7 +101,7 @@ def test_uniform_light_raises_the_eigenvalue_and_leaves_the_returns(
 
 @given(seeds, orders)
 @settings(deadline=None)
-def test_biasing_moves_moments_as_little_as_any_validity_asks_for(seed: int, m: int) -> None:
+def test_biasing_moves_moments_as_little_as_any_validity_requires(seed: int, m: int) -> None:
     b = oracles.random_moments(np.random.default_rng(seed), m, 6, noise=0.3)
 
     moments, biased = tm.bias(b, 0.01)

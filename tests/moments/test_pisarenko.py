@@ -89,7 +89,7 @@ def test_returns_are_those_of_eigenvector_and_companion_roots(m: int) -> None:
 
 
 @pytest.mark.parametrize("dtype", [np.complex64, np.complex128])
-def test_the_uniform_part_is_told_from_the_returns(dtype: type) -> None:
+def test_the_uniform_part_is_separated_from_the_returns(dtype: type) -> None:
     phase, weight = np.array([[0.5], [2.0]]), np.array([[3.0], [1.0]])
     b = oracles.moments_of_returns(phase, weight, 2)
     b[0] += 0.25
@@ -132,7 +132,7 @@ def test_contradicting_moments_have_a_negative_uniform_part() -> None:
     assert found.phase_rad[0] == 0
 
 
-def test_dark_and_invalid_pixels_have_no_returns_and_hurt_nobody() -> None:
+def test_dark_and_invalid_pixels_have_no_returns_and_disturb_no_others() -> None:
     b = np.array([[1, 0, np.nan, 1, np.inf], [0.5, 0, 0.1, np.inf, 0]], complex)
 
     found = tm.pisarenko(b)

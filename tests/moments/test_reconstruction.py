@@ -169,7 +169,7 @@ def test_an_unmeasured_zeroth_moment_is_estimated() -> None:
     assert np.all(result.flags == 0)
 
 
-def test_a_pixel_without_light_or_with_nan_has_no_range_and_hurts_nobody() -> None:
+def test_a_pixel_without_light_or_with_nan_has_no_range_and_disturbs_no_other() -> None:
     b, _, _ = scene(3)
     clean = tm.reconstruct(b, PLAIN)
     poisoned = b.copy()

@@ -129,8 +129,8 @@ def test_a_sweep_finds_the_fourier_coefficients_of_a_square_wave() -> None:
     np.testing.assert_allclose(found, [expected], atol=1e-12)
 
 
-def test_what_a_sweep_cannot_tell_is_folded_onto_its_mirror_image() -> None:
-    content = {1: 1.0, 3: 0.1, 2 * 4 + 1: 0.02}  # four steps tell harmonics up to 7
+def test_what_a_sweep_cannot_separate_is_folded_onto_its_mirror_image() -> None:
+    content = {1: 1.0, 3: 0.1, 2 * 4 + 1: 0.02}  # four steps separate harmonics up to 7
     phasors = np.array(
         [[[phasor(content, d, dict.fromkeys(content, 1.0))]] for d in tm.sweep_offsets_rad(4)]
     )

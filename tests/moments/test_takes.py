@@ -47,7 +47,7 @@ def test_a_tenth_of_outliers_is_found_as_the_paper_meets_them() -> None:
     assert np.abs(average.images - scene).max() < 5 * 2 / np.sqrt(30)
 
 
-def test_two_takes_cannot_tell_who_is_wrong() -> None:
+def test_two_takes_do_not_show_which_one_is_wrong() -> None:
     images, _ = takes(2)
     images[1] += 1000
 

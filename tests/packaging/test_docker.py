@@ -45,11 +45,11 @@ def test_a_camera_s_container_can_write_nowhere_but_where_it_has_to(name: str) -
 
 
 @pytest.mark.parametrize("name", ["simulated", "usb"])
-def test_who_asks_for_no_token_is_reached_from_this_machine_alone(name: str) -> None:
+def test_a_service_without_tokens_is_reached_from_this_machine_alone(name: str) -> None:
     assert services()[name]["ports"] == ["127.0.0.1:8000:8000"]
 
 
-def test_who_is_reached_by_others_asks_for_tokens_behind_tls() -> None:
+def test_a_service_that_others_reach_requires_tokens_behind_tls() -> None:
     service = services()["camera-behind-tls"]
 
     assert "ports" not in service
@@ -68,7 +68,7 @@ def test_the_settings_of_a_container_are_settings(name: str) -> None:
 
     try:
         settings = load_settings({}, environment=environment)
-    except SettingsError as error:  # nobody has made a token yet
+    except SettingsError as error:  # there is no token yet
         (mistake,) = error.mistakes
         assert mistake.place == "TRANSIENTCAM_HOST"
         assert "token create" in mistake.reason
@@ -78,7 +78,7 @@ def test_the_settings_of_a_container_are_settings(name: str) -> None:
         assert settings.camera in ("sim:mirrors", "usb")
 
 
-def test_the_image_alone_lets_nobody_in_without_a_token() -> None:
+def test_the_image_alone_admits_no_client_without_a_token() -> None:
     with pytest.raises(SettingsError, match="clients will need a token"):
         load_settings({}, environment=image_environment())
 
@@ -94,7 +94,7 @@ def test_usb_comes_by_a_rule_that_replugging_survives() -> None:
     assert "/dev/bus/usb:/dev/bus/usb" in usb["volumes"]
 
 
-def test_the_image_runs_as_somebody_and_is_asked_whether_it_is_ready() -> None:
+def test_the_image_runs_as_a_user_of_its_own_and_has_a_readiness_check() -> None:
     text = (_DOCKER / "Dockerfile").read_text()
 
     assert re.search(r"^USER 10001:10001$", text, re.MULTILINE)

@@ -1,4 +1,4 @@
-"""A daemon for each test that asks for one, and a client that holds its answers to the contract."""
+"""A daemon for each test that uses it, and a client that holds its answers to the contract."""
 
 from collections.abc import Iterator
 

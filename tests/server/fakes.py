@@ -10,7 +10,7 @@ from transientcam_server.imaging.products import PRODUCTS
 
 
 def fake_frame(number: int, *, device_time_s: float | None = None, lost_images: int = 0) -> Frame:
-    """A frame that knows its number and time, which is all that a hub asks of it."""
+    """A frame that knows its number and time, which is all that a hub needs."""
     time_s = number / 10.0 if device_time_s is None else device_time_s
     raw = SimpleNamespace(device_time_s=time_s, lost_images=lost_images)
     return cast("Frame", SimpleNamespace(number=number, raw=raw))

@@ -76,7 +76,7 @@ def test_unplugged_again_and_again_under_load_it_comes_back_and_nothing_grows(
             first = number
         after = http.get("sequence").json()
         document = stopped(http, recording)
-        # whoever recorded may not have gone yet
+        # the recorder's thread and file may not be gone yet
         left = threading.active_count() - threads, open_descriptors() - descriptors
 
     assert max(left) <= 1
@@ -92,7 +92,7 @@ def test_unplugged_again_and_again_under_load_it_comes_back_and_nothing_grows(
 
 @pytest.fixture
 def jump(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
-    """Let the clock of the host jump, for whoever looks at it from now on."""
+    """Let the clock of the host jump, for every later reading."""
     real, offset_s = time.time, [0.0]
     monkeypatch.setattr(time, "time", lambda: real() + offset_s[0])
 
@@ -125,7 +125,7 @@ def test_a_clock_that_jumps_ends_no_lease_no_stream_and_no_recording(
     numbers = [each.meta["frame"] for each in following]
     assert numbers == sorted(set(numbers))
     times_s = [each.meta["device_time_s"] for each in following]
-    assert times_s == sorted(set(times_s))  # by a clock that nobody sets
+    assert times_s == sorted(set(times_s))  # by a clock that is never set
     assert held["held"]
     assert 0.0 < held["expires_in_s"] <= 600.0
     assert ready.status_code == 200

@@ -96,7 +96,7 @@ def test_each_line_names_the_request_it_is_about() -> None:
     assert [each["request_id"] for each in documents] == [each["message"] for each in documents]
 
 
-def test_libraries_that_tell_headers_stay_quiet_at_debug() -> None:
+def test_libraries_that_log_headers_stay_quiet_at_debug() -> None:
     stream = io.StringIO()
     logs.configure(level="debug", form="json", stream=stream)
 

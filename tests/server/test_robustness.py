@@ -59,7 +59,7 @@ def never_reading(url: str, *products: str) -> Iterator[socket.socket]:
         yield connection
 
 
-def test_a_client_that_never_reads_loses_frames_and_nobody_else_does(served: Served) -> None:
+def test_a_client_that_never_reads_loses_frames_and_no_other_does(served: Served) -> None:
     hub = served.service.hub
     with (
         streaming(served.stream_url) as healthy,
@@ -98,7 +98,7 @@ def test_a_client_that_never_reads_does_not_delay_the_shutdown() -> None:
 
 
 @pytest.mark.parametrize("name", ["corrupt-image", "drop-image"])
-def test_a_spoilt_image_costs_its_frame_and_is_told(
+def test_a_spoilt_image_costs_its_frame_and_is_reported(
     served: Served, http: httpx.Client, name: str
 ) -> None:
     with streaming(served.stream_url) as client:
@@ -130,7 +130,7 @@ def test_the_frame_after_a_lost_image_says_so_in_its_meta(
     assert lost[-1] >= 1
 
 
-def test_an_unplugged_camera_is_told_and_comes_back_by_itself(
+def test_an_unplugged_camera_is_reported_and_comes_back_by_itself(
     served: Served, http: httpx.Client
 ) -> None:
     with streaming(served.stream_url) as client:
@@ -213,7 +213,7 @@ def test_a_product_that_fails_fails_alone(served: Served, http: httpx.Client) ->
     assert healthy.status_code == 200
 
 
-def test_a_failing_product_is_told_once_and_again_only_after_it_worked(served: Served) -> None:
+def test_a_failing_product_is_reported_once_and_again_only_after_it_worked(served: Served) -> None:
     products = served.service.pipeline.products
     working = products["direct"]
     broken = replace(working, compute=_break)
@@ -267,7 +267,7 @@ def test_a_failing_report_of_a_frame_does_not_end_the_acquisition(served: Served
     wait_until(lambda: acquisition.status().frames > frames)
 
 
-def test_a_viewer_that_is_stuck_is_gone_after_a_while_and_everybody_else_stays() -> None:
+def test_a_viewer_that_is_stuck_is_disconnected_after_a_while_and_all_others_stay() -> None:
     from tests.serving import serving
 
     with serving("sim:mirrors?noise=off", limits={"stalled_s": 0.2}) as daemon:

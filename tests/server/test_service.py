@@ -65,7 +65,7 @@ def test_channels_are_described_with_the_present_sequence(steady_daemon: Served)
     assert described.dtype == "<u2"
 
 
-def test_the_loop_is_left_to_requests_where_nobody_watches() -> None:
+def test_the_loop_is_left_to_requests_without_viewers() -> None:
     with serving("sim:wall?noise=off") as daemon:
         before = daemon.service.watched
         with streaming(daemon.stream_url) as client:

@@ -106,7 +106,7 @@ class CalibrationCapture:
         Further entries of the file, as JSON; its id does not depend on them.
     waveform
         complex128 (m, K): odd harmonics 3, 5, ... of the modulation at each frequency relative to
-        the fundamental, from a phase sweep; None where there was none, or it told nothing.
+        the fundamental, from a phase sweep; None without a usable one.
     """
 
     images: NDArray[np.float32]

@@ -16,12 +16,12 @@ from transientcam_driver.sequence import Sequence
 SWEEP_STEPS = 16
 """Phase offsets of a sweep, a quarter of a turn in all: 64 phases."""
 LEAST_TAKES = 30
-"""A calibration with fewer has no sweep: its steps would have too few takes to tell outliers."""
+"""A calibration with fewer has no sweep: its steps would have too few takes to find outliers."""
 _TAKES_SHARE = 10  # of the takes of a calibration, each step of the sweep has one in so many
 
 Waveform = Callable[[Iterator[NDArray[np.uint16]]], NDArray[Any] | None]
 """From the takes (takes, 4 m, H, W) at each step to the harmonics (m, K) relative to the
-fundamental, complex; None where they cannot be told."""
+fundamental, complex; None where they cannot be determined."""
 
 
 @dataclass(frozen=True, slots=True)

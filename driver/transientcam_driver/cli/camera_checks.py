@@ -14,7 +14,7 @@ from transientcam_driver.opening import open_camera, plugin_of
 Reported = tuple[str, str, str, str | None]
 
 _FRAMES: Final = 3
-_REPORT: Final = "send this whole report, with --json, to whoever maintains the plug-in"
+_REPORT: Final = "send this whole report, with --json, to the maintainer of the plug-in"
 
 
 def checks(spec: str) -> Iterator[Reported]:

@@ -154,7 +154,7 @@ def _find_on_network() -> Iterator[FoundCamera]:
 
 
 def _facts(name: CameraName) -> Iterator[tuple[str, str]]:
-    """Read what whoever maintains this driver asks the first owner of a camera for."""
+    """Read what the maintainer of this driver needs to know of a real camera."""
     if name.address == EMULATED:
         return
     _require_real(name)

@@ -40,7 +40,7 @@ MAX_FREQUENCY_HZ: Final = 28e6
 SETTLE_S: Final = 0.1
 """What the vendor's client waits for behind each change of the frequency."""
 READOUT_S: Final = 10e-3
-"""Of one image of the four, on its way: an assumption, nobody has measured it."""
+"""Of one image of the four, on its way: an assumption, not measured."""
 _LONGEST_US: Final = 0xFFFF
 _GRAYSCALE_US: Final = 25  # of an image that is not taken; the vendor's first value
 _CODE_OF_24_MHZ: Final = 1

@@ -1,4 +1,4 @@
-"""Lanes that calls look for and do not find: made ready on a thread, which nobody waits for."""
+"""Lanes that a call does not find: made ready on a background thread, which no call waits for."""
 
 import logging
 import threading

@@ -26,8 +26,8 @@ class Code:
     Attributes
     ----------
     contents : array, shape (K), complex
-        Of its harmonics 1 .. K: R(phi) = Re sum_k contents_k exp(i k phi). A constant part tells
-        nothing of time and is left away.
+        Of its harmonics 1 .. K: R(phi) = Re sum_k contents_k exp(i k phi). A constant part
+        has no information on time and is left out.
     """
 
     contents: Complex

@@ -30,7 +30,7 @@ class Estimate(ABC):
 
     @abstractmethod
     def separate(self, threshold: float = DIRECT_THRESHOLD) -> Separation:
-        """Tell the first return from all later ones; see `transientcam_moments.separate`."""
+        """Separate the first return from all later ones; see `transientcam_moments.separate`."""
 
     def first_phase_rad(self, threshold: float = DIRECT_THRESHOLD) -> Real:
         """Return the phase (...) of the first return, or peak, of a share of the strongest one's.
@@ -71,7 +71,7 @@ class SparseEstimate(Estimate):
         return come
 
     def separate(self, threshold: float = DIRECT_THRESHOLD) -> Separation:
-        """Tell the first return from all later ones."""
+        """Separate the first return from all later ones."""
         count = np.count_nonzero(self.weight, axis=0)
         return separate(Returns(self.phase_rad, self.weight, self.uniform, count), threshold)
 
@@ -108,7 +108,7 @@ class GridEstimate(Estimate):
         return result
 
     def separate(self, threshold: float = DIRECT_THRESHOLD) -> Separation:
-        """Tell the light of the first peak, from valley to valley, from all other light.
+        """Separate the light of the first peak, from valley to valley, from all other light.
 
         A peak is a local maximum around the turn; its phase is that of the parabola through it and
         its neighbours.
@@ -138,7 +138,7 @@ class MaximumEntropyEstimate(Estimate):
         return come
 
     def separate(self, threshold: float = DIRECT_THRESHOLD) -> Separation:
-        """Tell the light of the first peak, from valley to valley, from all other light."""
+        """Separate the light of the first peak, from valley to valley, from all other light."""
         edges = np.arange(GRID_PHASES + 1) * (_FULL_TURN / GRID_PHASES)
         light = np.diff(self.cumulative(edges), axis=0)  # in bins: peaks may be sharper than them
         found = GridEstimate(light * (GRID_PHASES / _FULL_TURN)).separate(threshold)
@@ -177,7 +177,7 @@ class LikelihoodEstimate(Estimate):
         return come
 
     def separate(self, threshold: float = DIRECT_THRESHOLD) -> Separation:
-        """Tell the first return from all later light."""
+        """Separate the first return from all later light."""
         return self.likelihood.separate(threshold)
 
 

@@ -19,7 +19,7 @@ class Technique:
         Where it comes from. "After ..." says that it follows what is known of a publication whose
         text was not at hand, not that it is the authors' implementation.
     returns
-        The most returns that it tells apart, as a function of m in words; "density" where it
+        The most returns that it separates, as a function of m in words; "density" where it
         gives no returns but light over time.
     frequencies
         What it needs to be measured, in words.

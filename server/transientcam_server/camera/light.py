@@ -1,4 +1,4 @@
-"""When the light may not stay on: nobody could switch it off, or who was responsible is gone.
+"""When the light may not stay on: no client could switch it off, or the lease has lapsed.
 
 The event loop that serves clients writes here, the thread that owns the camera reads: the light
 does not depend on the loop.

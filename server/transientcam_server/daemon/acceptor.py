@@ -135,7 +135,7 @@ class Acceptor:
             self._pause.cancel()
         self._loop.remove_reader(self._listener)
         if self._tls is not None:
-            # without TLS they are done at once; uvloop would not tell their protocols of the end
+            # without TLS they are done at once; uvloop would not notify their protocols
             for task in self._handshakes:
                 task.cancel()
         await asyncio.gather(*self._handshakes, return_exceptions=True)
@@ -168,7 +168,7 @@ class Acceptor:
         connection.close()
 
     def _refusal(self, problem: Problem) -> bytes:
-        """Return an answer that a flood asks for again and again."""
+        """Return an answer that a flood requests again and again."""
         known = self._refusals.get(problem.detail)
         if known is None:
             if len(self._refusals) >= _REMEMBERED_ADDRESSES:

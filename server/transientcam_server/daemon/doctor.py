@@ -147,7 +147,7 @@ def _port(settings: Settings) -> Reported:
         who = _who_answers(settings)
         if who is not None:
             return "ok", "port", who, None
-        return "fault", "port", str(error), f"ss -ltnp 'sport = {settings.port}' names who has it"
+        return "fault", "port", str(error), f"ss -ltnp 'sport = {settings.port}' names the process"
     return "ok", "port", f"{settings.host}, port {settings.port} is free", None
 
 

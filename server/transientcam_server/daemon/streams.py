@@ -23,7 +23,7 @@ LARGE_BYTES: Final = 1 << 16
 """Messages from this length on are written as they are."""
 KIB: Final = 1024
 LINGER_S: Final = 1.0
-"""What a client that sends too much is told has so long to reach it."""
+"""Time for the error to reach a client that sends too much."""
 
 
 class Conversation(ServerProtocol):

@@ -16,7 +16,7 @@ BURST_S: Final = 0.01
 SLICE_S: Final = 0.001
 """Processor time after which the rest of the loop has its turn."""
 MOST_DEBT_S: Final = 0.1
-"""What a single step took beyond this is forgiven: nobody waits for long because of it."""
+"""What a single step took beyond this is forgiven: no client waits long because of it."""
 MOST_LEAD_S: Final = 1.0
 """The same, of what one address has had before the others."""
 _LEAST_PAUSE_S: Final = 0.001
@@ -102,7 +102,7 @@ class Turns:
     def run(self, account: Account, work: Callable[[], None]) -> bool:
         """Do as `Account.run` says."""
         if not self._waiting and self._slice_s > 0.0 and self._has_time():
-            self._now_s = max(self._now_s, account.had_s)  # where nobody waits, nobody had more
+            self._now_s = max(self._now_s, account.had_s)  # none waits, so none had more
             self.count(account, work)
             if self._later is None:
                 self._later = self._loop.call_soon(self._serve)

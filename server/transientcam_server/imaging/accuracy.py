@@ -26,7 +26,7 @@ _Array = NDArray[Any]
 OUTLIER_DEVIATIONS: Final = 5.0
 """A range further off than so many times the error of the median pixel is an outlier."""
 NEIGHBOURS_PX: Final = 5
-"""Side of the square of pixels whose median tells bias from noise."""
+"""Side of the square of pixels whose median separates bias from noise."""
 DRAWS: Final = 4
 """Noisy copies of a frame."""
 SPARSE_PX: Final = 4

@@ -12,7 +12,7 @@ from transientcam_driver.calibration import LEAST_TAKES, SWEEP_STEPS
 
 _Array = NDArray[Any]
 COUNT: Final = SWEEP_STEPS - 2
-"""Harmonics 3, 5, ..: those above 2 steps - 3 are not told from as many above 2 steps."""
+"""Harmonics 3, 5, ..: those above 2 steps - 3 are aliases of as many above 2 steps."""
 SWEEP_ON_A_SCENE: Final = "the phase sweep was measured on a scene"
 """Why its harmonics are not kept: where several returns meet, they are not those of one."""
 LIT_SHARE: Final = 0.5

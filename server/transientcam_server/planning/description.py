@@ -96,7 +96,7 @@ def describe(
     settings
         Biasing and threshold.
     coarse
-        Frames at a low frequency; they tell brightness from ambient light and resolve ambiguity.
+        Frames at a low frequency, for ambient light and ambiguity of the range.
     ambient_dn_per_s
         Light that is not the camera's, where that is known.
 

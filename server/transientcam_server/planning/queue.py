@@ -1,4 +1,4 @@
-"""Who plans next: one plan is computed at a time, few are next, and frames go first.
+"""The queue of plans: one is computed at a time, few may wait, and frames go first.
 
 What plans is pure Python in large part: beside it, on another thread, whatever else holds the
 interpreter's lock for a moment waits for it, above all frames and their clients.

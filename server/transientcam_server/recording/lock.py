@@ -66,7 +66,7 @@ def create(path: Path) -> Lock:
 
 
 def take(path: Path) -> Lock:
-    """Lock an unfinished file that nobody writes.
+    """Lock an unfinished file that no process writes.
 
     Raises
     ------

@@ -64,7 +64,7 @@ def recover_all(parts: list[Path], *, stop: Callable[[], bool] = lambda: False) 
 
 
 def unfinished(directory: Path) -> list[Path]:
-    """Return the unfinished recordings of a directory that nobody writes.
+    """Return the unfinished recordings of a directory that no process writes.
 
     Copies that a recovery left unfinished are deleted where the recording itself is gone.
     """

@@ -140,7 +140,7 @@ def test_a_verb_without_its_packages_says_what_to_install(
     ("module", "remedy"),
     [("matplotlib.figure", ": pip install 'transientcam[plot]'"), ("unheard_of", "")],
 )
-def test_a_package_that_is_missed_only_later_is_told_too(
+def test_a_package_that_is_missing_only_later_is_reported_too(
     module: str, remedy: str, install: _Install, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def fail() -> None:

@@ -101,7 +101,7 @@ def test_an_empty_bus_and_a_silent_network_are_no_failure(
     assert "No camera announces itself on the network." in words
 
 
-def test_the_network_is_asked_as_told_or_not_at_all(
+def test_the_network_is_searched_as_requested_or_not_at_all(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     asked: list[dict[str, Any]] = []
@@ -119,7 +119,7 @@ def test_the_network_is_asked_as_told_or_not_at_all(
     assert "announces itself on the network" not in words
 
 
-def test_a_missing_libusb_is_told_beside_the_others(
+def test_a_missing_libusb_is_reported_beside_the_others(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def missing() -> None:
@@ -141,7 +141,7 @@ def test_a_missing_libusb_is_told_beside_the_others(
         (ModuleNotFoundError("no", name="zeroconf"), "pip install 'transientcam[discovery]'"),
     ],
 )
-def test_a_network_that_cannot_be_asked_is_told_beside_usb(
+def test_a_network_that_cannot_be_searched_is_reported_beside_usb(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     error: Exception,

@@ -124,7 +124,7 @@ def test_what_the_operating_system_said_is_found_below_what_libraries_made_of_it
     assert str(translate(error, _URL)) == f"No camera answers at {_URL}: No route to host"
 
 
-def test_a_refused_handshake_is_the_problem_its_body_tells() -> None:
+def test_a_refused_handshake_is_the_problem_in_its_body() -> None:
     body = b'{"type": "/problems/subprotocol-required", "detail": "Offer it.", "field": "f"}'
     headers = Headers({"content-type": "application/problem+json; charset=utf-8"})
 

@@ -91,7 +91,7 @@ def test_a_thread_that_waits_for_data_blocks_no_writer(
     assert reading() == b"hello"
 
 
-def test_who_waits_for_data_returns_when_another_thread_closes(
+def test_a_waiting_reader_returns_when_another_thread_closes(
     shared: SharedSocket, beside: Beside
 ) -> None:
     def read() -> bytes:

@@ -299,7 +299,7 @@ def test_what_unpacks_to_too_much_is_not_unpacked(
         CalibrationCapture.load(path, max_bytes=1000)
 
 
-def test_one_who_ends_it_is_heard_while_no_frame_comes(
+def test_it_can_be_ended_while_no_frame_comes(
     camera: Camera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Enough(Exception):  # noqa: N818 - nothing has failed

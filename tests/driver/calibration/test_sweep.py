@@ -83,7 +83,7 @@ def test_a_camera_that_cannot_shift_its_phases_is_not_swept() -> None:
     assert swept.steps == []
 
 
-def test_too_few_takes_to_tell_outliers_have_no_sweep() -> None:
+def test_too_few_takes_to_find_outliers_have_no_sweep() -> None:
     with Bench().open(SEQUENCE) as camera:
         assert capture_calibration(camera, takes=29, waveform=Swept()).waveform is None
 

@@ -161,7 +161,7 @@ def test_capabilities_with_fields_appended_by_a_later_firmware_are_read() -> Non
     assert unpack_capabilities(bytes(longer)) == CAPABILITIES
 
 
-def test_another_protocol_version_asks_for_new_firmware() -> None:
+def test_another_protocol_version_requires_new_firmware() -> None:
     old = pack_capabilities(replace(CAPABILITIES, protocol_version=0))
 
     with pytest.raises(FirmwareTooOld, match="version 0 found, version 1 needed"):

@@ -22,7 +22,7 @@ class Emulation:
 
 
 def emulation(*, host: str = "127.0.0.1", fixed_ports: bool = False) -> Emulation:
-    """Start an emulated camera; whoever does closes its device."""
+    """Start an emulated camera; the caller closes its device."""
     ports = {"control_port": CONTROL_PORT, "data_port": DATA_PORT} if fixed_ports else {}
     device, simulation = build_tofcam660(
         without_noise(find_scene("wall")), seed=1, clock=RealClock(), host=host, **ports

@@ -28,7 +28,7 @@ class Step:
 
 
 def steps(data_dir: Path) -> Iterator[Step]:
-    """Yield every command; entries that only say what the client was told are left out."""
+    """Yield every command; entries that only repeat what the client received are left out."""
     recorded = json.loads((data_dir / "tofcam660" / "session.json").read_text())
     for entry in recorded["exchange"]:
         if "command" in entry:

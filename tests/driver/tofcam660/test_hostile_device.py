@@ -83,7 +83,7 @@ def test_what_is_no_answer_ends_the_connection_with_a_reason(
             control.exchange(Command.READ_CHIP)
 
 
-def test_nobody_at_an_address_is_no_camera() -> None:
+def test_an_address_without_a_device_is_no_camera() -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     with pytest.raises(CameraNotFound, match=f"no camera answers at 127.0.0.1:{port}"):

@@ -1,4 +1,4 @@
-"""Cameras that expose on request: order, settling, losses, and no light that nobody asked for."""
+"""Cameras that expose on request: order, settling, losses, and no unrequested light."""
 
 from dataclasses import replace
 

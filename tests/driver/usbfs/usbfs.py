@@ -202,7 +202,7 @@ class UsbfsMount:
         self._full = not reapable
 
     def _announce(self, action: str) -> None:
-        """Send a message in the format of libudev's monitor to all who listen."""
+        """Send a message in the format of libudev's monitor to all listeners."""
         self._events += 1
         text = (
             f"ACTION={action}\nDEVPATH={DEVICE_PATH}\nSUBSYSTEM=usb\nSEQNUM={self._events}\n"

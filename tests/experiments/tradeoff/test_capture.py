@@ -14,7 +14,7 @@ from transientcam_server.settings import ReconstructionSettings
 
 def test_repeatability_of_normal_ranges_is_their_deviation() -> None:
     ranges = np.random.default_rng(0).normal(2.0, 0.03, (4, 20_000))
-    ranges[0, :50] += 5.0  # a few strays tell nothing of a typical pixel
+    ranges[0, :50] += 5.0  # a few strays say nothing of a typical pixel
     ranges[:, -7] = np.nan
 
     assert capture.repeatability(ranges) == pytest.approx(0.03, rel=0.02)

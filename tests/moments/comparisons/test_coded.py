@@ -100,7 +100,7 @@ def test_continuous_light_falls_apart_into_returns() -> None:
     assert come == pytest.approx(1 - np.exp(-np.array([0.5, 1.0, 2.1]) / 0.5), abs=0.1)
 
 
-def test_a_code_that_is_repeated_faster_tells_more_with_the_same_shifts() -> None:
+def test_a_code_that_is_repeated_faster_resolves_more_with_the_same_shifts() -> None:
     # harmonics of a coarse waveform at several frequencies: what a camera with few shifts can do
     code = Code(np.array([1.0, 0.0, 0.3, 0.0, 0.15], complex))
     orders = np.repeat(np.arange(1, 9), 2)

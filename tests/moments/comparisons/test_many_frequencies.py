@@ -1,4 +1,4 @@
-"""Techniques that want many frequencies, or high ones."""
+"""Techniques that need many frequencies, or high ones."""
 
 import numpy as np
 import pytest

@@ -128,12 +128,12 @@ def test_the_matrix_pencil_needs_more_moments_than_pisarenko() -> None:
     assert np.abs(left[1:]).max() > 0.2
 
 
-def test_the_matrix_pencil_refuses_more_returns_than_it_can_tell() -> None:
+def test_the_matrix_pencil_refuses_more_returns_than_it_can_separate() -> None:
     with pytest.raises(tm.ParameterError, match="returns"):
         matrix_pencil(np.ones((5, 1)), returns=2)
 
 
-def test_exact_moments_with_a_uniform_part_do_not_disturb_those_who_ignore_it() -> None:
+def test_exact_moments_with_a_uniform_part_do_not_disturb_techniques_that_ignore_it() -> None:
     phase, weight = np.array([1.0, 3.0]), np.array([1.0, 0.5])
     b = oracles.moments_of_returns(phase, weight, 6)
     b[0] += 5.0

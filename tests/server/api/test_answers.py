@@ -71,7 +71,7 @@ def test_a_large_answer_in_a_format_that_is_made_whole_is_refused(stopped: Serve
 
 
 def wait_for_room(daemon: Served) -> None:
-    """Wait until answers that nobody reads any more are not counted any more."""
+    """Wait until answers without a reader are not counted any more."""
     with httpx.Client(base_url=daemon.url, timeout=60.0) as client:
         statuses = iter(
             lambda: client.get(f"{LATEST}/transient", params={"bins": 61}).status_code, 200
@@ -79,7 +79,7 @@ def wait_for_room(daemon: Served) -> None:
         assert set(statuses) <= {503}
 
 
-def test_readers_who_read_nothing_leave_no_room_until_they_are_gone(stopped: Served) -> None:
+def test_readers_that_read_nothing_leave_no_room_until_they_are_gone(stopped: Served) -> None:
     address = urlsplit(stopped.url)
     assert address.port is not None
     request = f"GET {LATEST}/transient?bins=400 HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()

@@ -1,4 +1,4 @@
-"""What a scrape tells, and that it stays small."""
+"""The contents of a scrape, and that it stays small."""
 
 import time
 from pathlib import Path

@@ -10,7 +10,7 @@ from transientcam_server.broadcast.outbox import Close, Outbox
 from transientcam_server.errors.exceptions import Problem
 
 
-def test_everybody_gets_the_frame_and_the_news_but_not_before_they_subscribed() -> None:
+def test_every_subscriber_gets_frames_and_notices_but_not_before_it_subscribed() -> None:
     def test() -> None:
         hub = Hub()
         early, late = subscribed(), Outbox(depth=2)
@@ -27,7 +27,7 @@ def test_everybody_gets_the_frame_and_the_news_but_not_before_they_subscribed() 
     run(test)
 
 
-def test_one_who_left_gets_nothing_more() -> None:
+def test_a_subscriber_that_left_gets_nothing_more() -> None:
     def test() -> None:
         hub = Hub()
         outbox = subscribed()
@@ -43,7 +43,7 @@ def test_one_who_left_gets_nothing_more() -> None:
     run(test)
 
 
-def test_closing_says_goodbye_to_all_and_to_those_who_come_later() -> None:
+def test_closing_sends_a_close_to_all_and_to_later_subscribers() -> None:
     def test() -> None:
         hub = Hub()
         early, late = subscribed(), Outbox(depth=2)

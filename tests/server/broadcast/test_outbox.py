@@ -30,7 +30,7 @@ def test_the_newest_frames_wait_and_the_dropped_ones_are_counted() -> None:
     run(test)
 
 
-def test_nothing_is_dropped_from_one_who_keeps_up() -> None:
+def test_nothing_is_dropped_from_a_client_that_keeps_up() -> None:
     def test() -> None:
         outbox = subscribed()
         for number in range(1, 6):
@@ -102,7 +102,7 @@ def test_messages_and_frames_keep_their_order_otherwise() -> None:
     run(test)
 
 
-def test_one_who_reads_no_messages_is_told_goodbye_instead_of_filling_the_memory() -> None:
+def test_a_client_that_reads_no_messages_is_closed_instead_of_filling_the_memory() -> None:
     def test() -> None:
         outbox = subscribed()
         for _ in range(MAX_WAITING_MESSAGES + 1):
@@ -213,7 +213,7 @@ def reported(items: list[Item]) -> list[dict[str, Any]]:
     return [dict(item.details) for item in items if isinstance(item, wire.Notice)]
 
 
-def test_who_resumes_gets_every_frame_from_there_and_then_the_newest() -> None:
+def test_a_resuming_client_gets_every_frame_from_there_and_then_the_newest() -> None:
     def test() -> None:
         outbox, past = subscribed(), FakePast(3, 7)
         outbox.resume(past, start=5)
@@ -243,7 +243,7 @@ def test_frames_that_come_while_a_client_resumes_have_their_turn_in_the_past() -
     run(test)
 
 
-def test_what_the_past_loses_meanwhile_is_told_as_a_gap_in_its_place() -> None:
+def test_what_the_past_loses_meanwhile_is_reported_as_a_gap_in_its_place() -> None:
     def test() -> None:
         outbox, past = subscribed(), FakePast(1, 9)
         outbox.resume(past, start=1)
@@ -261,7 +261,7 @@ def test_what_the_past_loses_meanwhile_is_told_as_a_gap_in_its_place() -> None:
 
 
 @pytest.mark.parametrize("last", [None, 4])
-def test_a_start_in_the_future_is_told_and_not_waited_for(last: int | None) -> None:
+def test_a_start_in_the_future_is_reported_and_not_waited_for(last: int | None) -> None:
     def test() -> None:
         outbox = subscribed()
         outbox.resume(FakePast(last, last), start=100)

@@ -144,7 +144,7 @@ def test_a_change_of_a_sequence_that_was_changed_meanwhile_is_refused() -> None:
         assert late.value.running == first == one.camera.applied
 
 
-def test_a_refused_command_is_answered_to_who_gave_it_and_changes_nothing() -> None:
+def test_a_refused_command_raises_in_its_caller_and_changes_nothing() -> None:
     with running() as one:
         future = one.acquisition.configure(Sequence(harmonics=31))
         with pytest.raises(SequenceError):

@@ -96,7 +96,7 @@ def test_jobs_run_one_at_a_time_in_their_order() -> None:
     with_manager(main)
 
 
-def test_one_that_runs_hears_that_it_should_end_where_it_reports() -> None:
+def test_a_running_job_is_cancelled_where_it_reports_progress() -> None:
     async def main(manager: Jobs, reports: list[tuple[str, str]]) -> None:
         begun = threading.Event()
 

@@ -186,7 +186,7 @@ def test_taking_over_is_no_lapse_and_says_from_whom(
     assert news == [("granted", "anna", None), ("taken-over", "bert", "anna")]
 
 
-def test_nobody_of_a_lower_rank_takes_it_over(manager: LeaseManager) -> None:
+def test_no_client_of_a_lower_rank_takes_it_over(manager: LeaseManager) -> None:
     grant(manager, rank=3)
 
     assert refusal(lambda: grant(manager, "bert", rank=2, takeover=True)).kind.slug == "lease-held"

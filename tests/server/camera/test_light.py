@@ -1,4 +1,4 @@
-"""The light's guard, by a clock that the test moves, and the thread of the camera that asks it."""
+"""The light's guard, by a clock that the test moves, and the thread of the camera that reads it."""
 
 import queue
 from collections.abc import Callable

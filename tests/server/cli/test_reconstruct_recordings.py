@@ -65,7 +65,7 @@ def test_another_suffix_is_refused_before_anything_is_computed(
     assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
 
 
-def test_a_recording_is_reconstructed_with_what_was_recorded_unless_told_otherwise(
+def test_a_recording_is_reconstructed_with_what_was_recorded_unless_settings_are_given(
     tmp_path: Path,
 ) -> None:
     source = record(tmp_path / "a.h5", 1, reconstruction={"bias": 0.05, "smoothing_px": 0.9})

@@ -32,7 +32,7 @@ class Loop:
         return self.call_later(0.0, callback)
 
     def turn(self) -> None:
-        """Do what is due, and nothing of what that asks for."""
+        """Do what is due, and nothing of what that schedules."""
         due = [each for each in self.due if each.due_s <= self.now_s]
         self.due = [each for each in self.due if each not in due]
         for each in due:

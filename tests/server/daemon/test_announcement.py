@@ -1,4 +1,4 @@
-"""The service on the local network; on the loopback interface, so that nobody else hears of it."""
+"""The service on the local network; on the loopback interface, out of reach of others."""
 
 import socket
 import time
@@ -18,7 +18,7 @@ LOOPBACK = ["127.0.0.1"]
 
 
 def found_at(url: str, *, patience_s: float = 20.0) -> FoundCamera | None:
-    """Listen until a camera at this address is heard of; another test's may be there, too."""
+    """Listen until a camera at this address is announced; another test's may be there, too."""
     ends_s = time.monotonic() + patience_s
     while time.monotonic() < ends_s:
         for each in discover(timeout_s=0.4, interfaces=LOOPBACK):
@@ -109,7 +109,7 @@ def test_a_name_fits_into_one_label_of_a_domain_name() -> None:
     assert len(_instance("ü" * 60).encode()) <= 63
 
 
-def test_who_is_found_by_name_is_served_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_service_found_by_name_is_served_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(socket, "gethostname", lambda: "Bench-2.lab.example")
     with serving("sim:wall", host="0.0.0.0", insecure=True, announce="off") as served:
         port = served.settings.port or served.url.rpartition(":")[2]

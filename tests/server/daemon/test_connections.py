@@ -172,7 +172,7 @@ def test_one_connection_too_many_is_refused_and_one_that_ends_makes_room() -> No
 
         silent[0].close()
         with httpx.Client(base_url=served.url) as client:
-            # the service hears of the end a moment later
+            # the service sees the end a moment later
             statuses = iter(lambda: client.get("/livez").status_code, 200)
             assert set(statuses) <= {503}
 
@@ -187,7 +187,7 @@ def test_one_address_does_not_take_all_of_them() -> None:
         client.subscribe("flags")
         with raw(served) as refused:
             status, document = problem(rest_of(refused))
-        # whoever has sent something already may see a reset before the answer
+        # a client that has sent something already may see a reset before the answer
         with pytest.raises((WebSocketException, OSError)), streaming(served.stream_url):
             pass
         assert client.frame().product == "flags"

@@ -1,4 +1,4 @@
-"""What the server tells `transientcam doctor`."""
+"""The server's checks of `transientcam doctor`."""
 
 import resource
 import shutil

@@ -229,7 +229,7 @@ def test_the_light_is_off_after_the_service() -> None:
             server.run([listener])
         service: Service = app.state.service
 
-        assert service.acquisition.status().running  # nobody asked for a pause
+        assert service.acquisition.status().running  # no pause was requested
         assert not camera.status().light_on
 
 

@@ -71,7 +71,7 @@ def test_a_flood_is_cut_after_the_first_portion_beyond_the_rate(
     assert max(handled) <= PORTION_BYTES // len(frame(PONG)) + 1
 
 
-def test_it_hears_why_it_was_cut(daemon: Served) -> None:
+def test_a_client_that_is_cut_off_receives_the_reason(daemon: Served) -> None:
     with opened(daemon.stream_url) as connection:
         connection.send(frame(BINARY, SUBSCRIBE))
         connection.until(BINARY)

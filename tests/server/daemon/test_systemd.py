@@ -1,4 +1,4 @@
-"""What systemd hears, through a socket that stands in for its own."""
+"""Notifications of systemd, through a socket that stands in for its own."""
 
 import asyncio
 import json
@@ -191,7 +191,7 @@ def test_the_manager_is_read_from_the_environment(
     assert ServiceManager.of(variables, pid=7) == expected
 
 
-def test_a_watchdog_hears_of_us_several_times_before_it_bites() -> None:
+def test_the_watchdog_is_fed_several_times_within_its_limit() -> None:
     assert ServiceManager("/s", 30.0).every_s == pytest.approx(10.0)
     assert ServiceManager("/s", 3.0).every_s == pytest.approx(1.0)
     assert ServiceManager("/s", 3600.0).every_s == 10.0

@@ -61,7 +61,7 @@ def test_an_address_has_no_more_for_having_more_connections_or_dearer_requests()
     assert one.had * STEP_S == pytest.approx(many.had * 4 * STEP_S, rel=0.05)
 
 
-def test_who_comes_now_and_then_waits_for_one_turn_of_each_other_address_at_most() -> None:
+def test_an_occasional_address_waits_for_one_turn_of_each_other_address_at_most() -> None:
     loop = Loop()
     turns = loop.turns()
     for address in range(16):
@@ -105,7 +105,7 @@ def test_the_rest_of_the_loop_has_its_turn_between() -> None:
     assert len(at) == 10
 
 
-def test_a_single_step_that_took_long_holds_nobody_up_for_long() -> None:
+def test_a_single_step_that_took_long_delays_no_address_for_long() -> None:
     loop = Loop()
     turns = loop.turns()
     heavy, light = turns.account("heavy"), turns.account("light")

@@ -1,7 +1,7 @@
 """Let coverage guide the bytes that the targets are given; the first one says which target.
 
 ``python -m tests.server.fuzzing.coverage_guided [options of libFuzzer] [CORPUS]`` goes on until
-somebody ends it, or as long as ``-runs`` says; what it finds it writes to a file.
+it is interrupted, or as long as ``-runs`` says; what it finds it writes to a file.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""Recordings of strangers in a service's directory: listed, described, read, replayed, deleted.
+"""Crafted recordings in a service's directory: listed, described, read, replayed, deleted.
 
 ``python -m tests.server.fuzzing.recordings DIRECTORY FIRST LAST EVERY`` tries these cases in
 a process that libhdf5 may crash, and writes a line of JSON before and after each. Every so many

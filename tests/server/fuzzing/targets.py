@@ -1,4 +1,4 @@
-"""What reads bytes of strangers: each takes any bytes, and raises nothing but what it says."""
+"""The parsers of untrusted bytes: each takes any, and raises only what its docstring says."""
 
 import contextlib
 import tempfile

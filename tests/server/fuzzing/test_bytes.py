@@ -1,4 +1,4 @@
-"""Bytes of strangers: nothing is raised but what is said, whatever they are."""
+"""Untrusted bytes: whatever they are, only documented errors are raised."""
 
 import io
 import os

@@ -1,4 +1,4 @@
-"""Requests that nobody thought of: every answer is one that the OpenAPI document has."""
+"""Generated requests: every answer is one that the OpenAPI document has."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Recordings of strangers harm nobody: not the process, not the list, not the good ones."""
+"""Crafted recordings do no harm: not to the process, not to the list, not to the good ones."""
 
 import json
 import os

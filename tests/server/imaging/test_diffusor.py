@@ -1,4 +1,4 @@
-"""A diffusor is told from a scene, by images made here from the equations of the measurement."""
+"""A diffusor is distinguished from a scene, by images made from the measurement's equations."""
 
 from collections.abc import Callable
 from dataclasses import replace

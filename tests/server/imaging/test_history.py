@@ -164,7 +164,7 @@ def test_the_newest_seconds_hold_one_sequence() -> None:
     assert [each.number for each in history.newest(100.0)] == [4, 5]
 
 
-def test_what_there_is_and_may_be_is_told() -> None:
+def test_what_is_kept_and_its_limits_are_stated() -> None:
     assert filled(30, max_bytes=550).to_document() == {
         "first": 26,
         "last": 30,

@@ -1,4 +1,4 @@
-"""Where the pixels look, and who says so."""
+"""Where the pixels look, and by which source."""
 
 from dataclasses import asdict
 from typing import Any

@@ -122,7 +122,7 @@ def reconstruction(b: NDArray[np.complex64], zeroth: str) -> tm.Reconstruction:
     return tm.reconstruct(b, tm.Settings(smoothing_sigma_px=0.0, zeroth=zeroth))
 
 
-def test_what_contradicts_itself_is_told_from_what_noise_biased() -> None:
+def test_contradictions_are_distinguished_from_what_noise_biased() -> None:
     """The exact moments of one return have no uniform part: biased, and right."""
     b = moments((0.0, 0.0, 0.0, 0.0))
     b[2, :20] *= 1.5

@@ -1,4 +1,4 @@
-"""Each thing is computed once for all who ask, on workers, and only when somebody does."""
+"""Each thing is computed once for all requests, on workers, and only when requested."""
 
 import asyncio
 import io
@@ -91,7 +91,7 @@ def with_frame(
     asyncio.run(main())
 
 
-def test_nothing_is_computed_that_nobody_asks_for(
+def test_nothing_is_computed_that_is_not_requested(
     camera: Camera, raw: RawFrame, calls: list[str]
 ) -> None:
     async def test(pipeline: Pipeline, frame: Frame) -> None:
@@ -105,7 +105,7 @@ def test_nothing_is_computed_that_nobody_asks_for(
     with_frame(camera, raw, test)
 
 
-def test_all_who_ask_at_once_share_one_computation_and_the_same_bytes(
+def test_simultaneous_requests_share_one_computation_and_the_same_bytes(
     camera: Camera, raw: RawFrame, calls: list[str]
 ) -> None:
     async def test(pipeline: Pipeline, frame: Frame) -> None:
@@ -176,7 +176,7 @@ def test_arrays_travel_in_the_type_of_the_contract_whatever_they_were_computed_i
     with_frame(camera, raw, test)
 
 
-def test_the_meta_tells_what_the_computation_took_and_found(camera: Camera, raw: RawFrame) -> None:
+def test_the_meta_states_what_the_computation_took_and_found(camera: Camera, raw: RawFrame) -> None:
     async def test(pipeline: Pipeline, frame: Frame) -> None:
         await frame.product(pipeline.product("range"))
         meta = frame.meta()
@@ -198,7 +198,7 @@ def test_frames_are_counted_from_one(camera: Camera, raw: RawFrame) -> None:
     with_frame(camera, raw, test)
 
 
-def test_one_who_stops_waiting_does_not_stop_it_for_the_others(
+def test_a_caller_that_stops_waiting_does_not_stop_it_for_the_others(
     camera: Camera, raw: RawFrame
 ) -> None:
     async def test(pipeline: Pipeline, frame: Frame) -> None:
@@ -213,7 +213,7 @@ def test_one_who_stops_waiting_does_not_stop_it_for_the_others(
     with_frame(camera, raw, test)
 
 
-def test_a_failure_is_told_to_all_who_ask_and_logged_once(
+def test_a_failure_raises_in_all_callers_and_is_logged_once(
     camera: Camera, raw: RawFrame, caplog: pytest.LogCaptureFixture
 ) -> None:
     def fail(*_: Any) -> Any:

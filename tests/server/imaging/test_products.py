@@ -99,7 +99,7 @@ def test_brightness_is_all_the_light_there_is(served: Served, still: httpx.Clien
 
     brightness = npy(still, "brightness")
 
-    # the zeroth moment is measured at 0.9 MHz and then raised where the bias asks for it
+    # the zeroth moment is measured at 0.9 MHz and then raised where the bias needs it
     np.testing.assert_allclose(
         np.median(brightness / smoothed(truth.brightness).real), 1.0, atol=0.02
     )

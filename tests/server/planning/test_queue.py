@@ -126,7 +126,7 @@ def test_the_end_does_not_wait_for_what_is_computed() -> None:
         assert each.kind is kinds.SHUTTING_DOWN
 
 
-def test_a_request_that_is_refused_is_told_when_to_ask_again() -> None:
+def test_a_refused_request_is_answered_with_the_time_to_retry() -> None:
     refusal = problem_response(PlanningQueue(Workers(Held(), count=2))._busy("a"))
 
     assert (refusal.status_code, refusal.headers["Retry-After"]) == (503, str(RETRY_AFTER_S))
@@ -173,7 +173,7 @@ def test_a_plan_now_and_then_does_not_rest_and_many_keep_to_the_share() -> None:
     assert len(day.waited_s) == rested
 
 
-def test_nothing_rests_while_nobody_watches_and_no_debt_is_left_behind() -> None:
+def test_nothing_rests_without_viewers_and_no_debt_is_left_behind() -> None:
     day, share = Day(), 1.0
     allowance = Allowance(lambda: share, at_once_s=0.0, now_s=lambda: day.now_s)
     rest = Rest(allowance, day.wait, cpu_s=lambda: day.computed_s)

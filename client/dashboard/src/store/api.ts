@@ -72,7 +72,7 @@ export const liveFrame = (number: number): string => `/frames/${number}`;
 
 export class Api {
   readonly credentials: Credentials;
-  /** Told of every refusal, before whoever asked is. */
+  /** Called with every refusal, before the request rejects. */
   onRefusal: ((problem: Problem) => void) | null = null;
   readonly #fetch: Fetch;
 
@@ -96,7 +96,7 @@ export class Api {
     return this.#json("PUT", "/acquisition", { body: { running } }) as Promise<AcquisitionDocument>;
   }
 
-  /** Stops the capture and switches the light off, whoever controls the camera. */
+  /** Stops the capture and switches the light off, whichever client controls the camera. */
   safeOff(): Promise<AcquisitionDocument> {
     return this.#json("POST", "/acquisition/safe-off") as Promise<AcquisitionDocument>;
   }
@@ -195,7 +195,7 @@ export class Api {
     return { document: (await answer.json()) as ReconstructionDocument, tag: answer.headers.get("ETag") };
   }
 
-  /** Changes how frames are computed, unless somebody else has since the version with `tag`. */
+  /** Changes how frames are computed, unless another client has since the version with `tag`. */
   setReconstruction(settings: Readonly<Record<string, unknown>>, tag: string | null): Promise<ReconstructionDocument> {
     const headers = tag === null ? {} : { "If-Match": tag };
     return this.#json("PUT", "/reconstruction", { body: settings, headers }) as Promise<ReconstructionDocument>;

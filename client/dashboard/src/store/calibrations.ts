@@ -78,7 +78,7 @@ export class Calibrations {
     await this.refresh();
   }
 
-  /** Somebody else may have begun to measure. */
+  /** Another client may have begun to measure. */
   async #findJob(): Promise<void> {
     if (this.job.peek() !== null) return;
     try {

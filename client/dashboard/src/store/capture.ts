@@ -6,7 +6,7 @@ const WAIT_S = 10;
 /**
  * Stops the camera, has it capture one frame and stops it again; resolves to the frame's number.
  *
- * `capture_s` is how long one takes. Whatever happens, the camera is told to stop.
+ * `capture_s` is how long one takes. Whatever happens, a stop is sent to the camera.
  */
 export async function captureOne(api: Api, capture_s: number): Promise<number> {
   await api.setAcquisition(false);

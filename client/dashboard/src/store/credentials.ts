@@ -14,7 +14,7 @@ export class Credentials {
   readonly token = signal<string | null>(null);
   /** The lease that this page holds; null while it holds none. */
   readonly leaseId = signal<string | null>(null);
-  /** Why the service let nobody in with what was shown; null while it does. */
+  /** Why the service refused the credentials; null while it accepts them. */
   readonly refused = signal<Problem | null>(null);
   readonly #shelf: Shelf | null;
 

@@ -18,7 +18,7 @@ export interface Happening {
 /** Only so many are kept. */
 const MOST = 100;
 
-/** How long what comes in bursts is told by one happening. */
+/** How long events that come in bursts are shown as one. */
 const BURST_S = 30;
 
 export class Events {
@@ -32,7 +32,7 @@ export class Events {
   }
 
   /**
-   * Tells of something that comes in bursts: what comes within `BURST_S` of the first is told by the same happening.
+   * Shows events that come in bursts: those within `BURST_S` of the first are shown as one.
    *
    * `words` makes the sentence of how many there were.
    */
@@ -129,6 +129,6 @@ function leaseWords({ change, holder, from }: Extract<Notice, { kind: "lease-cha
     case "lapsed":
       return "Control has lapsed: its holder did not renew it.";
     default:
-      return "Control was given back: everybody may change things.";
+      return "Control was given back: every client may change things.";
   }
 }

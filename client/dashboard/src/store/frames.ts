@@ -23,11 +23,11 @@ export interface Frame {
 /**
  * The newest frame of each product, and which products are wanted.
  *
- * Views ask for products and give them back; what is asked for by somebody is streamed. At most one frame
+ * Views ask for products and give them back; what any view asks for is streamed. At most one frame
  * of a product is kept, so memory does not grow with time.
  */
 export class Frames {
-  /** Products that somebody looks at, sorted. */
+  /** Products that a view shows, sorted. */
   readonly wanted = signal<readonly string[]>([]);
   readonly #claims = new Map<string, number>();
   readonly #newest = new Map<string, Signal<Frame | null>>();
@@ -63,7 +63,7 @@ export class Frames {
   #release(product: string): void {
     this.#claims.delete(product);
     const newest = this.#newest.get(product);
-    if (newest !== undefined) newest.value = null; // its memory, and nobody is shown an old picture later
+    if (newest !== undefined) newest.value = null; // its memory, and no view shows an old picture later
   }
 
   #publish(): void {

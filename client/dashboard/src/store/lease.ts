@@ -15,13 +15,13 @@ const DURATION_S = 90;
 const RENEW_S = 20;
 /** How soon a renewal that did not reach the service is tried again. */
 const RETRY_S = 3;
-/** How often somebody else's lease is looked at: renewals are told to nobody. */
+/** How often another client's lease is read: renewals send no notice. */
 const LOOK_S = 5;
 
 /**
  * The lease as this page sees it: taken, renewed while the page steers, given back.
  *
- * Without a lease anybody may change anything as long as nobody holds one.
+ * While no client holds a lease, every client may change anything.
  */
 export class Lease {
   readonly control = signal<Control>({ kind: "unknown" });
@@ -35,7 +35,7 @@ export class Lease {
   readonly #api: Api;
   readonly #now_s: () => number;
   #changing = false;
-  /** Somebody wanted to look meanwhile. */
+  /** Another read was requested meanwhile. */
   #missed = false;
   /** The lease that this page held is over, and who has one now is not known yet. */
   #orphaned = false;
@@ -76,7 +76,7 @@ export class Lease {
     });
   }
 
-  /** Gives the lease back from a page that is being closed; nobody hears the answer. */
+  /** Gives the lease back from a page that is being closed; the answer is ignored. */
   abandon(): void {
     if (this.#api.credentials.leaseId.peek() !== null) this.#api.releaseLease(true).catch(() => undefined);
   }
@@ -131,10 +131,10 @@ export class Lease {
       this.#orphaned = false;
       this.lost.value = held ? `${holder} has taken over control.` : "This page's control has lapsed.";
     } else if (!held && this.control.peek().kind === "other") {
-      this.lost.value = null; // whoever took control gave it back
+      this.lost.value = null; // the client that took control gave it back
     }
     if (!held) this.control.value = { kind: "nobody" };
-    else this.control.value = { kind: this.#api.credentials.leaseId.peek() === null ? "other" : "us", holder: holder ?? "Somebody", expires_s };
+    else this.control.value = { kind: this.#api.credentials.leaseId.peek() === null ? "other" : "us", holder: holder ?? "Another client", expires_s };
   }
 
   #arm(control: Control, within_s = Infinity): void {

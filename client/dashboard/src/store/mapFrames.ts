@@ -6,7 +6,7 @@ import { type MapProduct } from "../views/map/catalogue";
 import type { Frame, Frames } from "./frames";
 import type { Noises } from "./noise";
 
-/** The newest frame of a map; null until one arrived. Computed only while somebody looks. */
+/** The newest frame of a map; null until one arrived. Computed only while a view shows it. */
 export function mapFrame(frames: Frames, noises: Noises, { product, unit, scatterOf }: MapProduct): ReadonlySignal<Frame | null> {
   if (scatterOf === undefined) return frames.of(product);
   const [noise, measured] = [noises.of(scatterOf), frames.of(scatterOf)];

@@ -5,7 +5,7 @@ import type { Frame, Frames } from "./frames";
 
 /** Frames that count; older ones fade. */
 export const WINDOW = 30;
-/** Fewest frames that a deviation is told of. */
+/** Fewest frames that a deviation is computed from. */
 export const FEWEST = 5;
 
 /**

@@ -79,7 +79,7 @@ function lookText(product: string, { colours, kind, limits }: LookChoice): strin
   return [product, colours, kind, ...ends].join(",");
 }
 
-/** The whole address of what is shown, with layout, colours, scales and limits, to be given to somebody else. */
+/** The whole address of what is shown, with layout, colours, scales and limits, for another user. */
 export function linkTo(target: Window, store: Store): string {
   const looks = Object.fromEntries([...store.looks.all].filter(([, look]) => look.chosen).map(([product, look]) => [product, look.choice]));
   const whole = new URL(target.location.href);
@@ -153,7 +153,7 @@ function go(store: Store, { map, pixel, time_ns, view, recording, frame, layout,
   if (time_ns === undefined) return;
   store.player.playing.value = false;
   const end = effect(() => {
-    // A time is a share of the period, which the service tells.
+    // A time is a share of the period, which comes from the service.
     if (store.sequence.value === null) return;
     store.player.seek((time_ns * 1e-9) / store.period_s.peek());
     queueMicrotask(() => {
@@ -179,7 +179,7 @@ async function open(store: Store, recording: string, frame: number | undefined):
   }
 }
 
-/** Waits until somebody shows a token, or another one. */
+/** Waits until the user enters a token, or another one. */
 function tokenOf({ api: { credentials } }: Store): Promise<void> {
   const before = credentials.token.peek();
   return new Promise((resolve) => {

@@ -27,7 +27,7 @@ export class Reconstruction {
     }
   }
 
-  /** Sets what is given, everything else to its default; unless somebody else has changed it since `tag`. */
+  /** Sets what is given, everything else to its default; unless another client has changed it since `tag`. */
   async set(settings: Readonly<Record<string, unknown>>, tag: string | null): Promise<void> {
     try {
       await this.#api.setReconstruction(settings, tag);

@@ -46,7 +46,7 @@ export function flowTrouble({ rate_hz, latency_s, last_s }: Flow, expected_hz: n
 /** What the page knows of connection, camera and the flow of frames. Times are of this page's clock. */
 export class Status {
   readonly connection = signal<Connection>({ kind: "connecting" });
-  /** What the camera is doing; null until it was told. */
+  /** What the camera is doing; null until that is known. */
   readonly cameraState = signal<CameraState | null>(null);
   /** Whether the camera is taking frames; null while that is not known. */
   readonly running = computed(() => {
@@ -103,7 +103,7 @@ export class Status {
     if (shown?.frame === meta.frame) return;
     this.newest.value = meta;
     this.#last_s.value = now_s;
-    // Frames that were on their way when the camera went tell nothing of how fast it is; neither does the first,
+    // Frames that were on their way when the camera went say nothing of how fast it is; neither does the first,
     // which may be old.
     if (this.cameraLoss.peek() !== null || shown === null) return;
     const latency_s = now_s - meta.host_time_s;
@@ -116,7 +116,7 @@ export class Status {
     this.rate_hz.value = span_s > 0 ? (this.#arrivals.length - 1) / span_s : null;
   }
 
-  /** A frame of a recording is on screen: it tells nothing of how fast the camera is. */
+  /** A frame of a recording is on screen: it says nothing of how fast the camera is. */
   frameReplayed(meta: FrameMeta, encode_s: number): void {
     this.newest.value = meta;
     this.encode_s.value = encode_s;

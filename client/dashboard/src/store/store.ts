@@ -48,9 +48,9 @@ export class Store {
   /** What happened. */
   readonly events = new Events();
   readonly shelf: Shelf | null;
-  /** The sequence in use, told by the service; null before. */
+  /** The sequence in use, by the service; null until it is known. */
   readonly sequence = signal<AppliedSequence | null>(null);
-  /** What the camera is and can do; null before the service told. */
+  /** What the camera is and can do; null until it is known. */
   readonly camera = signal<CameraDocument | null>(null);
   /** The page keeps the frame it shows although newer ones exist. */
   readonly held = signal(false);
@@ -120,7 +120,7 @@ export function isField(value: unknown): value is number {
   return aNumber(value) && value >= 5 && value <= 150;
 }
 
-/** Whether the system is dark, as the browser tells; null outside of one. */
+/** Whether the system is dark, by the browser; null outside of one. */
 function systemScheme(): MediaQueryList | null {
   return typeof matchMedia === "undefined" ? null : matchMedia("(prefers-color-scheme: dark)");
 }

@@ -49,7 +49,7 @@ export class StreamClient {
     store.replay.loader = (path, products) => this.#bring(path, products);
   }
 
-  /** Connects, and keeps streaming what the store's views want. */
+  /** Connects, and keeps streaming what the store's views need. */
   open(url: string): void {
     const { token } = this.#store.api.credentials;
     let known = this.#store.frames.wanted.peek();
@@ -156,7 +156,7 @@ export class StreamClient {
   }
 
   #complain({ problem }: ErrorMessage): void {
-    // Who is not let in is asked for a token, and a complaint beside that says nothing more.
+    // A refused user is asked for a token; an error beside that would say nothing more.
     if (TOKEN_PROBLEMS.includes(kindOf(problem))) this.#store.api.credentials.refused.value = problem;
     else this.#store.status.unreadable.value = problem.detail ?? problem.title ?? null;
   }
@@ -213,7 +213,7 @@ export class StreamClient {
     if (sequence !== null) this.#store.sequence.value = sequence;
   }
 
-  /** What the stream does not tell: what the camera is and can do. */
+  /** What the stream does not say: what the camera is and can do. */
   async #readCamera(): Promise<void> {
     if (this.#asking) return;
     this.#asking = true;
@@ -245,7 +245,7 @@ export class StreamClient {
     }
     this.#store.status.encode_s.value = encode_s;
     this.#pending.clear();
-    // Somebody else may have started the camera; or this frame was on its way when it stopped. It knows.
+    // Another client may have started the camera; or this frame was on its way when it stopped: read the state.
     if (this.#store.status.cameraState.peek() !== "streaming") void this.#readCamera();
     this.#send({ type: "acknowledge", frame: newest });
   }

@@ -47,7 +47,7 @@ export const CREDITS = 2;
 
 const FIRST_RETRY_S = 0.5;
 const LONGEST_RETRY_S = 8;
-/** The service lets nobody in without a token that it knows. */
+/** The service admits no client without a valid token. */
 const NOT_LET_IN = 4003;
 /** Silence after which the service is asked whether it is still there. */
 const SILENCE_S = 3;
@@ -82,7 +82,7 @@ export class StreamConnection {
   authenticate(token: string | null): void {
     if (token === this.#token) return;
     this.#token = token;
-    // Who is connected may stay; a token that is given up, or another one, must count at once.
+    // A connected client may stay; a token that is given up, or another one, must count at once.
     if (this.#socket !== null) this.#drop();
     else if (this.#timer === null && !this.#refused) return;
     this.retryNow();

@@ -76,7 +76,7 @@ export interface CameraDocument {
   readonly reason: string | null;
   readonly simulated: boolean;
   readonly capabilities: Readonly<Record<string, unknown>>;
-  /** Where its pixels look, in pixels, and who says so; of the whole frame. */
+  /** Where its pixels look, in pixels, and by which source; of the whole frame. */
   readonly intrinsics?: Intrinsics;
 }
 
@@ -88,7 +88,7 @@ export interface Intrinsics {
   readonly cy: number;
   readonly width: number;
   readonly height: number;
-  /** "assumed" where nobody knows. */
+  /** "assumed" where it is unknown. */
   readonly source: string;
 }
 
@@ -259,7 +259,7 @@ export function decodeMessage(buffer: ArrayBuffer): ServerMessage | null {
 /** What is asked for where nothing is looked at, so that frames and their figures come all the same: the smallest. */
 export const LEAST_PRODUCTS: readonly string[] = ["flags"];
 
-/** The first message of a client, and every later change of what it wants: frames from the next one on. */
+/** The first message of a client, and every later change of its subscription: frames from the next one on. */
 export function encodeSubscribe(products: readonly string[], credits: number, token: string | null = null): Uint8Array<ArrayBuffer> {
   const wanted = products.length === 0 ? LEAST_PRODUCTS : products;
   return encode({

@@ -4,7 +4,7 @@ import { useEffect, useRef } from "preact/hooks";
 interface DialogProps {
   readonly open: boolean;
   readonly title: string;
-  /** Set by whoever leaves: by Escape, by a click beside it, or by what is inside. */
+  /** Called when the user leaves: by Escape, by a click beside it, or by what is inside. */
   readonly onClose: () => void;
   readonly children: ComponentChildren;
 }

@@ -20,7 +20,7 @@ const STOPS = {
     "3b4cc0 4c66d6 5f7fe8 7396f5 88abfd 9dbdff b1cbfc c4d5f3 d5dbe5 e4d9d2 f0cdbb f6bea4 f7aa8c f39475 e97a5f dc5d4a ca3b37 b40426",
 } as const;
 
-/** Colours of what lies below and above a scale: told from its ends, without outshining the picture. */
+/** Colours of what lies below and above a scale: distinct from its ends, without outshining the picture. */
 const BEYOND: Readonly<Record<keyof typeof STOPS, readonly [under: string, over: string]>> = {
   viridis: ["1c0029", "fffbd5"],
   cividis: ["000914", "fffac9"],

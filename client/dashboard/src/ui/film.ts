@@ -2,7 +2,7 @@
 
 export type FilmKind = "webm" | "gif";
 
-/** Somebody's wish to end a film early, and how far it is. */
+/** Whether the user cancelled a film, and how far it is. */
 export interface Progress {
   readonly cancelled: boolean;
   /** Takes the share that is done, 0 to 1. */

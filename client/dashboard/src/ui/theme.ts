@@ -5,7 +5,7 @@ import { oneOf, remembered, type Shelf } from "../store/settings";
 export const THEMES = ["auto", "light", "dark"] as const;
 export type ThemeChoice = (typeof THEMES)[number];
 
-/** Light or dark: as the system has it, unless somebody chose. */
+/** Light or dark: as the system has it, unless the user chose. */
 export class Theme {
   readonly choice: Signal<ThemeChoice>;
   readonly dark: ReadonlySignal<boolean>;

@@ -107,7 +107,7 @@ class Exchange:
     def history(self) -> tuple[float, NDArray[np.float64]]:
         """Irradiance (N, T) over time in bins of ``BIN_S``, and the time of the first bin's start.
 
-        Of the first bounces only; who reads it scales it to the light of all. Light is moved by
+        Of the first bounces only; the caller scales it to the light of all. Light is moved by
         whole bins, so that each bounce is off by half a bin at most.
         """
         shift = np.rint(self.distance_m / (SPEED_OF_LIGHT_M_S * BIN_S)).astype(np.intp)

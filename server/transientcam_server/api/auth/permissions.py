@@ -88,7 +88,7 @@ async def _principal(request: Request) -> Principal:
 
 
 PrincipalOf = Annotated[Principal, Depends(_principal)]
-"""Who sent a request."""
+"""The client that sent a request."""
 
 
 def describe(app: FastAPI, routers: Iterable[APIRouter], *, prefix: str) -> None:

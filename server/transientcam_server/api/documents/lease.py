@@ -22,7 +22,7 @@ class LeaseDocument(Document):
     held: bool
     """Whether a client does; where none does, every client may."""
     holder: str | None = None
-    """What the one who does calls itself."""
+    """The name that the holder gave itself."""
     expires_in_s: float | None = None
     """How long the lease lasts unless it is renewed."""
     duration_s: float | None = None

@@ -69,8 +69,8 @@ async def read_job(
 async def cancel_job(service: ServiceOf, job: _Job, request: Request) -> JobDocument:
     """Cancel a job, which ends as soon as it can; it stays listed, and an ended one as it is.
 
-    A plan changes nothing, and may be cancelled by whoever may ask for one; another job by whoever
-    may change the camera.
+    A plan changes nothing, and may be cancelled by every client that may request one; another job
+    by those that may change the camera.
     """
     if service.jobs.get(job).kind != PLAN:
         require(request, service, TO_CHANGE)

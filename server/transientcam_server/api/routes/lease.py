@@ -45,7 +45,7 @@ async def read_lease(service: ServiceOf) -> LeaseDocument:
 async def take_lease(
     service: ServiceOf, principal: PrincipalOf, response: Response, wanted: LeaseRequest
 ) -> GrantedLeaseDocument:
-    """Let only those change anything who send this lease's id, until it is given back or lapses.
+    """Let only requests with this lease's id change anything, until it is given back or lapses.
 
     Renew it well before it expires. Without a lease every client may change anything as long as no
     other holds one.

@@ -1,4 +1,4 @@
-"""Who gets in: over HTTP and over the stream, on a real daemon."""
+"""Authentication: over HTTP and over the stream, on a real daemon."""
 
 import logging
 from collections.abc import Iterator
@@ -35,7 +35,7 @@ def tokens(file: TokenFile) -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def daemon(file: TokenFile, tokens: dict[str, str]) -> Iterator[Served]:
-    """A daemon that asks everybody for a token."""
+    """A daemon that requires a token of every client."""
     with serving("sim:mirrors?noise=off", require_token=True, tokens_file=file.path) as served:
         served.start_all_workers()
         yield served

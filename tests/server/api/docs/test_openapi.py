@@ -10,7 +10,7 @@ from fastapi import FastAPI
 from transientcam_server.api.docs.openapi import Interface
 
 
-def test_it_is_made_once_for_all_who_wait_and_not_on_the_loop() -> None:
+def test_it_is_made_once_for_all_callers_and_not_on_the_loop() -> None:
     app = FastAPI()
     made: list[int] = []
     document: dict[str, Any] = {"paths": {"/å": {}}}

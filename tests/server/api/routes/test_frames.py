@@ -126,7 +126,7 @@ def test_a_suffix_names_the_format_whatever_is_accepted(steady: httpx.Client, su
     assert response.headers["content-type"] == types[suffix]
 
 
-def test_npy_and_png_tell_frame_unit_and_meta_in_headers(steady: httpx.Client) -> None:
+def test_npy_and_png_have_frame_unit_and_meta_in_headers(steady: httpx.Client) -> None:
     wait_for_frame(steady)
     array = steady.get(f"{LATEST}/range.npy")
     image = steady.get(f"{LATEST}/range.png")

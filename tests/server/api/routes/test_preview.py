@@ -1,4 +1,4 @@
-"""The film for people: motion JPEG, for as long as somebody looks."""
+"""The preview: motion JPEG, for as long as a viewer is connected."""
 
 import io
 import socket
@@ -82,7 +82,7 @@ def test_a_rate_leaves_frames_out(http: httpx.Client) -> None:
     assert min(np.diff(numbers)) >= 2
 
 
-def test_who_does_not_read_delays_no_other_and_has_nothing_made_ahead(
+def test_a_viewer_that_does_not_read_delays_no_other_and_has_nothing_made_ahead(
     served: Served, http: httpx.Client
 ) -> None:
     address = urlsplit(served.url)
@@ -94,7 +94,7 @@ def test_who_does_not_read_delays_no_other_and_has_nothing_made_ahead(
     assert nobody_looks(served)
 
 
-def test_who_goes_while_nothing_is_captured_is_missed_at_once(
+def test_a_viewer_that_leaves_while_the_capture_is_stopped_is_noticed_at_once(
     served: Served, http: httpx.Client
 ) -> None:
     with http.stream("GET", PREVIEW) as response:
@@ -118,7 +118,7 @@ def test_a_film_ends_with_the_service() -> None:
     client.close()
 
 
-def test_those_who_are_shown_a_film_count_among_the_clients_of_the_stream() -> None:
+def test_viewers_of_the_preview_count_among_the_clients_of_the_stream() -> None:
     with (
         serving("sim:mirrors?noise=off", stream={"max_clients": 1}) as daemon,
         httpx.Client(base_url=daemon.url, timeout=30.0) as http,

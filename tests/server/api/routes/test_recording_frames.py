@@ -251,7 +251,7 @@ def test_few_recordings_stay_opened_and_no_file_does(
     assert list(opened) == ["b", "c"]
     assert all(len(each._frames) <= 2 for each in opened.values())
     for name in ("a", "b", "c"):
-        h5py.File(directory / f"{name}.h5", "r+").close()  # refused while anybody has it open
+        h5py.File(directory / f"{name}.h5", "r+").close()  # refused while any reader has it open
 
 
 def test_a_timeline_of_a_long_recording_is_thinned_out() -> None:

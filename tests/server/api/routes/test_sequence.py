@@ -170,7 +170,9 @@ def test_a_change_of_a_sequence_that_was_changed_meanwhile_is_refused(http: http
     assert http.put(PATH, json=VIDEO, headers={"If-Match": "*"}).status_code == 200
 
 
-def test_of_two_who_change_the_same_sequence_at_once_one_is_refused(http: httpx.Client) -> None:
+def test_of_two_clients_that_change_the_same_sequence_at_once_one_is_refused(
+    http: httpx.Client,
+) -> None:
     tag = http.get(PATH).headers["etag"]
 
     def change(takes: int) -> int:

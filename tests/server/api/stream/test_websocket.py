@@ -238,7 +238,7 @@ def test_thin_encodings_arrive_as_the_same_arrays_within_their_error(served: Ser
     assert thin.extra["median_error"] < thin.extra["max_error"] < 2.0 * error.max()
 
 
-def test_clients_who_want_the_same_share_a_channel_number_and_others_do_not(
+def test_clients_with_the_same_subscription_share_a_channel_number_and_others_do_not(
     served: Served,
 ) -> None:
     with streaming(served.stream_url) as one, streaming(served.stream_url) as other:
@@ -293,7 +293,7 @@ def test_a_changed_sequence_is_reported_before_its_first_frame(served: Served) -
     assert channel.shape == frame.array.shape == (5, 120, 163)
 
 
-def test_frames_come_at_the_rate_of_the_camera_and_none_goes_missing_untold(
+def test_frames_come_at_the_rate_of_the_camera_and_every_missing_one_is_reported(
     served: Served,
 ) -> None:
     served.service.acquisition.configure(Sequence.from_document(VIDEO)).result(10.0)

@@ -68,7 +68,7 @@ def test_a_png_of_light_is_rounded_to_digital_numbers() -> None:
     np.testing.assert_array_equal(image, [[0, 1], [0, 65535]])
 
 
-def test_a_coloured_png_tells_values_apart_and_no_value_from_all() -> None:
+def test_a_coloured_png_distinguishes_values_and_no_value_from_all() -> None:
     range_m = np.array([[0.1, 3.0, 6.0, np.nan]], dtype=np.float32)
 
     image = np.asarray(Image.open(io.BytesIO(encoded(COLOUR_PNG, "range", range_m))).convert("RGB"))

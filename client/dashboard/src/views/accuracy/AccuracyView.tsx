@@ -17,7 +17,7 @@ import { goalWords } from "./words";
 /** What accuracy costs in time on the scene before the camera, and the way to a better sequence. */
 export function AccuracyView() {
   const store = useStore();
-  useProducts(["range_error"]); // its frames tell how well the camera does now
+  useProducts(["range_error"]); // its frames say how well the camera does now
   const tradeoff = useSignal<Tradeoff | null>(null);
   const chosen = useSignal<Choice | null>(null);
   const busy = useSignal<string | null>(null);

@@ -24,7 +24,7 @@ export function endsOf({ front }: Tradeoff, now: Standing | null): Ends {
   return { time: scale(times), error: scale(errors) };
 }
 
-/** Where the camera stands: by the frame on screen, or by that which the front was predicted with; null if neither tells. */
+/** Where the camera stands: by the frame on screen, or by that which the front was predicted with; null if neither is known. */
 export function standingOf(meta: FrameMeta | null, sequence: AppliedSequence | null, { current }: Pick<Tradeoff, "current">): Standing | null {
   const live = meta?.accuracy?.range_error_m ?? null;
   if (live !== null && sequence !== null && sequence.sequence_id === meta?.sequence_id) {

@@ -1,7 +1,7 @@
 import type { ColourMapName } from "../../ui/colourMaps";
 import type { ScaleKind } from "../../ui/scale";
 
-/** A map of one number a pixel, and how it is shown unless somebody chose otherwise. */
+/** A map of one number a pixel, and how it is shown unless the user chose otherwise. */
 export interface MapProduct {
   readonly product: string;
   readonly name: string;

@@ -121,7 +121,7 @@ export class PointScene {
     this.#draw();
   }
 
-  /** Draws now, for whoever reads the canvas in this task. */
+  /** Draws now, for a caller that reads the canvas in this task. */
   drawNow(): void {
     cancelAnimationFrame(this.#asked);
     this.#asked = 0;

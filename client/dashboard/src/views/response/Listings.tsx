@@ -14,7 +14,7 @@ export function Found({ told, held, flags, returns }: { told: PixelDocument | nu
     <>
       {held !== null && held !== told.meta.frame && (
         <p class="quiet">
-          The service tells of frame {told.meta.frame}; the curves are of frame {held}, which is held.
+          These values are of frame {told.meta.frame}; the curves are of frame {held}, which is held.
         </p>
       )}
       <ReturnTable told={told} history={returns} />

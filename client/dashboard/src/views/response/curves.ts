@@ -8,7 +8,7 @@ import type { PixelDocument } from "../../stream/protocol";
 export type Aspect = "density" | "bounds" | "cumulative";
 export type Truth = NonNullable<PixelDocument["truth"]>;
 
-/** Curves over the same times; what they are is told by their aspect. */
+/** Curves over the same times; their aspect says what they are. */
 export interface Curves {
   readonly aspect: Aspect;
   readonly time_ns: Float64Array;

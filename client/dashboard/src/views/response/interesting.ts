@@ -1,4 +1,4 @@
-/** Which pixel is worth looking at before anybody chose one. */
+/** Which pixel is worth looking at before the user chose one. */
 import { peaks } from "../../physics/impulseResponse";
 import type { Coefficients } from "../../physics/maximumEntropy";
 import type { Pixel } from "../../store/pixel";

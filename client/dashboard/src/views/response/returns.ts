@@ -1,11 +1,11 @@
 /** The returns of one pixel beside what is true, and how they scatter from look to look. */
 import type { PixelDocument, Return } from "../../stream/protocol";
 
-/** Returns with less than this share of the light are told of together. */
+/** Returns with less than this share of the light are listed together. */
 const WEAK_SHARE = 0.02;
 /** A return of a look before is the same one where it came within this time: 1 ns is 15 cm. */
 const SAME_S = 1e-9;
-/** Looks that count, and the fewest that a deviation is told of. */
+/** Looks that count, and the fewest that a deviation is computed from. */
 export const LOOKS = 30;
 const FEWEST = 5;
 

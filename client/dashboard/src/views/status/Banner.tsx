@@ -12,7 +12,7 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
     return (
       <div class="banner" role="alert" data-banner="token">
         <p>
-          <strong>Not let in.</strong> This service asks for a token.
+          <strong>Not let in.</strong> This service requires a token.
         </p>
         <button type="button" onClick={() => (asksForToken.value = true)}>
           Enter a token
@@ -59,7 +59,7 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
   return <Unreadable />;
 }
 
-/** What is told by a title, as a sentence. */
+/** A title, as a sentence. */
 function sentence(words: string): string {
   return /[.!?]$/.test(words) ? words : `${words}.`;
 }

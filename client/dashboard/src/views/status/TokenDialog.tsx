@@ -36,7 +36,7 @@ function TokenForm({ onDone }: { onDone: () => void }) {
       <p class={known && problem !== null ? "refusal" : ""} data-field="token-words">
         {known && problem !== null && kindOf(problem) === "token-refused"
           ? "The service does not know this token: it may be mistyped, revoked or expired."
-          : "The service asks everybody for a token. Whoever runs it makes one with transientcam token create."}
+          : "The service requires a token. Its operator makes one with transientcam token create."}
       </p>
       <label class="field">
         <span>Token</span>
