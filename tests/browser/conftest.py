@@ -1,4 +1,4 @@
-"""Debian's Chromium on the real page of a real daemon; a page that complains fails its test."""
+"""Debian's Chromium on the real page of a real daemon; a page that logs an error fails its test."""
 
 import os
 import shutil
@@ -173,7 +173,7 @@ def watch(served: Served) -> Watch:
 
 @pytest.fixture
 def page(browser: Browser, served: Served, watch: Watch) -> Iterator[Page]:
-    """A fresh page, at rest until the test opens it; it may not complain until the test ends."""
+    """A fresh page, at rest until the test opens it; it may log no error until the test ends."""
     context = browser.new_context(
         viewport={"width": 1280, "height": 800}, reduced_motion="reduce", base_url=served.url
     )

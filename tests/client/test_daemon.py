@@ -305,7 +305,7 @@ def test_a_stream_survives_a_restart_of_the_daemon() -> None:
         assert frame.product == "range"
 
 
-def test_a_daemon_that_stops_says_goodbye() -> None:
+def test_a_daemon_that_stops_closes_its_streams() -> None:
     with serving("sim:mirrors?noise=off") as daemon:
         client = Camera(daemon.url, timeout_s=20.0)
         stream = client.stream("range")

@@ -29,7 +29,7 @@ class Mount(Protocol):
         """Try to open the camera as another program would."""
 
     def wait(self) -> None:
-        """Give news of a plug the time to travel."""
+        """Give the event of a plug the time to arrive."""
 
     @property
     def lit(self) -> bool: ...

@@ -191,7 +191,7 @@ def a_closed_camera_is_dark_and_free(bench: Bench) -> None:
 
 
 def _reconnect(camera: Camera) -> None:
-    """Try until the news of the cable has travelled."""
+    """Try until the event of the cable has arrived."""
     pause = threading.Event()
     for _ in range(TRIES):
         try:

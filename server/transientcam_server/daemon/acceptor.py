@@ -31,7 +31,7 @@ _REMEMBERED_ADDRESSES: Final = 1024
 
 
 class Admission:
-    """Decides which connections are let in.
+    """Decides which connections are accepted.
 
     Parameters
     ----------

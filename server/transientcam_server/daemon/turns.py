@@ -16,7 +16,7 @@ BURST_S: Final = 0.01
 SLICE_S: Final = 0.001
 """Processor time after which the rest of the loop has its turn."""
 MOST_DEBT_S: Final = 0.1
-"""What a single step took beyond this is forgiven: no client waits long because of it."""
+"""What a single step took beyond this is not counted: no client waits long because of it."""
 MOST_LEAD_S: Final = 1.0
 """The same, of what one address has had before the others."""
 _LEAST_PAUSE_S: Final = 0.001

@@ -1,7 +1,7 @@
 """A process that owns cameras on behalf of a test: pickled requests in, pickled answers out.
 
 ``python client.py N`` keeps N descriptors open: umockdev names the socket of a monitor after its
-descriptor, so that two processes with equal ones take the news of plugs from each other.
+descriptor, so that two processes with equal ones take the events of plugs from each other.
 """
 
 import os

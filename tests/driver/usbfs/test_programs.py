@@ -103,7 +103,7 @@ def test_the_light_goes_off_when_the_program_dies(usb_camera: EmulatedCamera) ->
         time.sleep(0.05)
 
 
-def test_lsusb_reads_every_descriptor_without_complaint(idle_camera: EmulatedCamera) -> None:
+def test_lsusb_reads_every_descriptor_without_a_warning(idle_camera: EmulatedCamera) -> None:
     lsusb = shutil.which("lsusb", path=os.environ.get("PATH", "") + ":/usr/sbin:/sbin")
     if lsusb is None:
         skip_or_fail("lsusb missing: apt install usbutils")

@@ -49,7 +49,7 @@ def clear(client: httpx.Client) -> None:
 
 
 def tell(url: str, left_out: str = ENDLESS, until: str | None = None) -> dict[str, Any]:
-    """Tell stories to a daemon, and return how often what was answered and what was wrong."""
+    """Run stateful tests on a daemon, and return the count of each answer, and the failures."""
     answers: collections.Counter[str] = collections.Counter()
     wrong: list[str] = []
     config = SchemathesisConfig.from_path(CONFIG)

@@ -365,7 +365,7 @@ def test_messages_of_any_content_are_answered_and_the_stream_goes_on(
     assert not failures(caplog)
 
 
-def test_the_service_ends_while_a_client_that_reads_nothing_says_goodbye(
+def test_the_service_ends_while_a_client_that_reads_nothing_closes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     streams: list[BoundedStream] = []
