@@ -36,9 +36,10 @@ In the daemon `reconstruction.estimator` is `automatic`: the likelihood, and Pis
 until its compiled lane is ready and where the noise is not known; each frame names its
 `estimator`. Over all captures of the table "All captures" the likelihood errs least, in median,
 90 % and RMSE together; in some, as the composite of measured responses, maximum entropy errs less.
-The product `reduced_chi_square` comes from it, whatever the estimator is; the flag `unexplained`
-and `predicted_range_std_m` where it is the estimator. Elsewhere NumPy computes the same, more
-slowly, until the lane is ready: no frame waits for a compiler.
+The product `reduced_chi_square` comes from it, unless the estimator is `two-returns` or
+`unwrapped-phase`, which have one of their own; the flag `unexplained` and `predicted_range_std_m`
+where it is the estimator. Elsewhere NumPy computes the same, more slowly, until the lane is ready:
+no frame waits for a compiler.
 
 A camera's moments have errors beside noise: what calibration leaves, and light of no model. The
 daemon adds 0.4 % of the largest moment to the deviation (`model_error`), so that captures of many

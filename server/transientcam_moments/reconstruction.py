@@ -468,9 +468,9 @@ class Reconstruction:
 
     @cached_property
     def reduced_chi_square(self) -> Array:
-        """Chi-square of `likelihood` over its degrees of freedom; NaN without a range or any."""
+        """Chi-square of `estimate` over its degrees of freedom; NaN without a range or any."""
         xp = namespace(self.smoothed)
-        found = self.likelihood.reduced_chi_square
+        found = self.estimate.reduced_chi_square
         return xp.where(self.has_range, found, np.nan).astype(found.dtype)
 
     @cached_property

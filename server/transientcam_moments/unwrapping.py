@@ -18,7 +18,7 @@ from transientcam_moments._arrays import (
 )
 from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError
-from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, checked, explained
+from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, checked, explained, reduced
 from transientcam_moments.likelihood.estimate import places_of, variance_of
 from transientcam_moments.noise.moments import MomentNoise
 from transientcam_moments.pisarenko import Separation
@@ -59,6 +59,11 @@ class Unwrapped(NamedTuple):
     def __repr__(self) -> str:
         """State the shapes and spans of its arrays."""
         return summary(self)
+
+    @property
+    def reduced_chi_square(self) -> Array:
+        """Chi-square of the phases over its degrees of freedom; NaN where there are none."""
+        return reduced(self.chi_square, self.degrees_of_freedom)
 
     def ambiguous(self, significance: float = SIGNIFICANCE) -> Array:
         """Say where noise may have taken another hypothesis for the right one.

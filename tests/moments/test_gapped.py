@@ -155,6 +155,26 @@ def test_ambiguous_and_unexplained_phases_are_flagged() -> None:
     assert (faint.flags & tm.Flags.DEGENERATE > 0).mean() > 0.9
 
 
+def test_the_misfit_is_that_of_the_estimator_in_use() -> None:
+    # three returns explain this pair as well, and leave the likelihood no degree of freedom
+    b = moments((PHASE, 500.0), (PHASE + 1.1, 210.0))
+    misfit = {
+        name: tm.reconstruct(b, settings(estimator=name)).reduced_chi_square
+        for name in ("likelihood", "two-returns", "unwrapped-phase")
+    }
+    tried = np.linspace(0, 2 * np.pi, 20_000, endpoint=False)[:, None, None]
+    std = 0.01 * np.maximum(abs(b.real), abs(b.imag)).max(axis=0)
+    one_return = sum(
+        (abs(plane) / std * np.angle(plane * np.exp(-1j * j * tried))) ** 2
+        for j, plane in zip(MULTIPLES, b[1:], strict=True)
+    )
+
+    assert np.isnan(misfit["likelihood"]).all()
+    assert (misfit["two-returns"] < 1e-6).all()
+    expected = np.min(one_return, axis=0) / 2  # three phases, one unknown
+    np.testing.assert_allclose(misfit["unwrapped-phase"], expected, rtol=1e-3)
+
+
 @pytest.mark.parametrize("multiples", [(), (0, 1), (2, 2), (3, 1), (1, 33)])
 def test_multiples_that_are_none_are_refused(multiples: tuple[int, ...]) -> None:
     with pytest.raises(ParameterError, match="multiples"):

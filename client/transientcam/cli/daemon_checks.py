@@ -2,7 +2,7 @@
 
 import ssl
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime, timedelta
 from email.utils import parsedate_to_datetime
 from importlib.metadata import version
@@ -12,7 +12,7 @@ from typing import Any, Final
 import httpx
 
 from transientcam.camera import Camera
-from transientcam.cli.findings import Finding
+from transientcam.cli.findings import Finding, absent_in_words
 from transientcam.errors import FrameTimeout, ProblemError, TransientcamError
 from transientcam.transport import http_options, parse_address, translated
 
@@ -136,12 +136,21 @@ def _camera(camera: Camera, seconds: float) -> Iterator[Finding]:
         yield Finding("fault", "camera", f"{name}: {about['reason']}", "plug it in again")
         return
     yield Finding("ok", "camera", name)
+    yield from _products(camera.info)
     if not camera.acquisition["running"]:
         message = "the capture is stopped, so nothing can be measured"
         remedy = 'PUT /api/v1/acquisition {"running": true} starts it'
         yield Finding("warning", "stream", message, remedy)
         return
     yield _stream(camera, seconds)
+
+
+def _products(info: Mapping[str, Any]) -> Iterator[Finding]:
+    """List what this camera cannot give; older daemons do not say."""
+    if "absent_products" in info:
+        absent = {each["name"]: each["reason"] for each in info["absent_products"]}
+        for message in absent_in_words(absent):
+            yield Finding("ok", "products", message)
 
 
 def _stream(camera: Camera, seconds: float) -> Finding:

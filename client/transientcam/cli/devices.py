@@ -21,6 +21,10 @@ from transientcam.errors import CommandUnavailable, ServerUnreachable
 
 GROUP: Final = "transientcam.cameras"
 _VERB: Final = "devices"
+_PRODUCTS: Final = (
+    "Products that one cannot give: transientcam doctor --camera CAMERA (its light goes on), "
+    "or transientcam doctor ADDRESS for one on the network"
+)
 
 
 def devices(
@@ -34,7 +38,12 @@ def devices(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """List the cameras that each plug-in finds, those on the network, and how to open each."""
+    """List the cameras that each plug-in finds, those on the network, and how to open each.
+
+    Nothing is opened for that, so that neither frequencies nor products are known:
+    `transientcam doctor --camera CAMERA`, or `transientcam doctor URL` for one on the network,
+    lists the products that it cannot give, each with the reason.
+    """
     document = {**_found(network=network), "network": [], "network_problem": None}
     console = Console(stderr=True)
     if network:
@@ -116,6 +125,8 @@ def _print(document: dict[str, Any], *, network: bool) -> None:
     elif network:
         message = document["network_problem"] or "No camera announces itself on the network."
         console.print(escape(message), soft_wrap=True)
+    if cameras or announced:
+        console.print(_PRODUCTS, soft_wrap=True)
     if document["simulated"]:
         simulated = ", ".join(document["simulated"])
         console.print(f"Simulated ones: {simulated} (transientcam scenes)", soft_wrap=True)

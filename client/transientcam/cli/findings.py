@@ -6,7 +6,7 @@ message, remedy)``. One of the group ``transientcam.camera-checks`` takes a came
 Only installed packages have any.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import entry_points
@@ -56,6 +56,17 @@ def of_this_machine(config: Path | None) -> Iterator[Finding]:
 def of_camera(spec: str) -> Iterator[Finding]:
     """Run the checks of one camera, of every package that has any."""
     yield from _installed(CAMERA_GROUP, spec)
+
+
+def absent_in_words(reasons: Mapping[str, str]) -> Iterator[str]:
+    """Yield a sentence for each reason why products are absent, with the names of these."""
+    names: dict[str, list[str]] = {}
+    for product, reason in reasons.items():
+        names.setdefault(reason, []).append(product)
+    if not names:
+        yield "all of them can be had"
+    for reason, products in names.items():
+        yield f"no {', '.join(products)}: {reason}"
 
 
 def _installed(group: str, argument: object) -> Iterator[Finding]:

@@ -71,7 +71,8 @@ PRODUCTS: Final[dict[str, Product]] = {
             "1",
             _IMAGE,
             "<f4",
-            "misfit of the likelihood estimate over noise: about 1 where it explains the moments",
+            "misfit over noise, about 1 where the moments are explained: of two-returns or "
+            "unwrapped-phase where that is the estimator, of the likelihood else",
         ),
         Product("flags", "1", _IMAGE, "|u1", "what was wrong with a pixel; 0 for nothing"),
         Product(

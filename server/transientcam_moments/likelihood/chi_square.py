@@ -33,6 +33,14 @@ def explained(chi_square: Array, degrees_of_freedom: Array, significance: float)
     return (chi_square <= limit) | ((degrees_of_freedom == 0) & (chi_square >= 0))
 
 
+def reduced(chi_square: Array, degrees_of_freedom: Array) -> Array:
+    """Return chi-square (...) over its degrees of freedom; NaN where there are none."""
+    xp = namespace(chi_square)
+    there = degrees_of_freedom > 0
+    usable = xp.where(there, degrees_of_freedom, 1).astype(chi_square.dtype)
+    return xp.where(there, chi_square / usable, np.nan).astype(chi_square.dtype)
+
+
 @lru_cache(maxsize=256)
 def chi_square_quantile(free: int, significance: float) -> float:
     """Return what chi-square of so many degrees of freedom exceeds with a given probability.

@@ -21,7 +21,7 @@ from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.likelihood import choice
 from transientcam_moments.likelihood.arithmetic import logarithm
-from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, explained
+from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, explained, reduced
 from transientcam_moments.likelihood.choice import MARGIN, MOST_RETURNS, TAIL_SHAPE
 from transientcam_moments.likelihood.planar import Data, fit
 from transientcam_moments.noise.moments import MomentNoise
@@ -88,10 +88,7 @@ class Likelihood(NamedTuple):
     @property
     def reduced_chi_square(self) -> Array:
         """Chi-square over its degrees of freedom; NaN where there are none."""
-        xp = namespace(self.chi_square)
-        free = self.degrees_of_freedom
-        usable = xp.where(free > 0, free, 1).astype(self.chi_square.dtype)
-        return xp.where(free > 0, self.chi_square / usable, np.nan).astype(self.chi_square.dtype)
+        return reduced(self.chi_square, self.degrees_of_freedom)
 
     def explained(self, significance: float = SIGNIFICANCE) -> Array:
         """Say where the model explains the moments.

@@ -19,7 +19,7 @@ from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.lens import Intrinsics
 from transientcam_server.imaging.products import PRODUCTS, Product
 from transientcam_server.imaging.recipe import Recipe, SettingsVersion
-from transientcam_server.imaging.requirements import unmet
+from transientcam_server.imaging.requirements import absent_products
 from transientcam_server.imaging.workers import Workers
 from transientcam_server.settings import ReconstructionSettings
 
@@ -77,19 +77,14 @@ class Pipeline:
         self._frames = 0
         self._last: RawFrame | None = None
         self._recipe: Recipe | None = None
-        lacking = {name: self._lacks(product) for name, product in PRODUCTS.items()}
-        self.absent = {name: reason for name, reason in lacking.items() if reason is not None}
+        self.absent = absent_products(
+            camera.capabilities,
+            truth_known=self._truth is not None,
+            noise_known=sensor is not None,
+        )
         self.products: dict[str, Product] = {
             name: product for name, product in PRODUCTS.items() if name not in self.absent
         }
-
-    def _lacks(self, product: Product) -> str | None:
-        """Return why frames of this camera do not have a product; None where they do."""
-        if product.needs == "truth" and self._truth is None:
-            return "only a simulated camera knows the true range"
-        if product.of_noise and self._sensor is None:
-            return "the noise of this camera's sensor is not known"
-        return unmet(product, self._capabilities.sampling, self._capabilities.zeroths)
 
     def frame(self, raw: RawFrame, applied: AppliedSequence) -> Frame:
         """Return the next frame, counted from 1."""

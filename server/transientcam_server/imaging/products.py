@@ -298,7 +298,7 @@ PRODUCTS: Final[dict[str, Product]] = {
         ),
         Product(
             _WIRE["reduced_chi_square"],
-            "likelihood",
+            "misfit",
             _property("reduced_chi_square"),
             of_noise=True,
             steps=Steps(1e2, "1e-2"),

@@ -1,10 +1,34 @@
-"""What products need of the frequencies that a camera measures."""
+"""What products need of a camera: its frequencies, its noise, and the truth of a simulation."""
 
 from collections.abc import Collection
 
-from transientcam_driver import Sampling
-from transientcam_server.imaging.products import Product
+from transientcam_driver import Capabilities, Sampling
+from transientcam_server.imaging.products import PRODUCTS, Product
 from transientcam_server.imaging.recipe import listed
+
+
+def absent_products(
+    capabilities: Capabilities, *, truth_known: bool, noise_known: bool
+) -> dict[str, str]:
+    """Return the products that frames of a camera do not have, each with the reason.
+
+    Parameters
+    ----------
+    truth_known
+        Whether a simulation knows the true range.
+    noise_known
+        Whether the noise of the sensor is known.
+    """
+
+    def lacks(product: Product) -> str | None:
+        if product.needs == "truth" and not truth_known:
+            return "only a simulated camera knows the true range"
+        if product.of_noise and not noise_known:
+            return "the noise of this camera's sensor is not known"
+        return unmet(product, capabilities.sampling, capabilities.zeroths)
+
+    reasons = {name: lacks(product) for name, product in PRODUCTS.items()}
+    return {name: reason for name, reason in reasons.items() if reason is not None}
 
 
 def unmet(product: Product, sampling: Sampling, zeroths: Collection[str]) -> str | None:

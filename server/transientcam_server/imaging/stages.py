@@ -19,7 +19,7 @@ STAGES: Final[dict[str, tuple[str, ...]]] = {
     "moments": ("moments",),
     "returns": ("returns", "direct", "range_m"),
     "coefficients": ("coefficients",),
-    "likelihood": ("likelihood",),
+    "misfit": ("reduced_chi_square",),
 }
 """Properties of `tm.Reconstruction` that each stage computes, in the order they build on."""
 _BITS: Final = {str(flag.name).lower(): np.uint8(flag) for flag in tm.Flags if flag}

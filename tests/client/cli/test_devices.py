@@ -64,6 +64,7 @@ def test_cameras_are_listed_by_the_name_that_opens_them(
     assert "usb:A-17 A-17 AMCW lidar /dev/bus/usb/001/004" in words
     assert "/dev/bus/usb/001/005: no permission to open it" in words
     assert "http://192.168.7.5:8000 B-3 1.2 lidar B-3" in words
+    assert "Products that one cannot give: transientcam doctor --camera CAMERA" in words
     assert "sim:mirrors" in words
 
 

@@ -140,9 +140,11 @@ def test_a_daemon_that_streams_is_in_order(
 
     assert code == 0
     checked = [each["check"] for each in document["findings"]]
-    assert checked[2:] == ["reachable", "versions", "ready", "clock", "camera", "stream"]
+    of_daemon = ["reachable", "versions", "ready", "clock", "camera", "products", "stream"]
+    assert checked[2:] == of_daemon
     assert {of(document, each)["level"] for each in checked[2:-1]} == {"ok"}
     assert "SIM-" in of(document, "camera")["message"]
+    assert of(document, "products")["message"] == "all of them can be had"
     assert of(document, "stream")["message"].startswith("range at ")
 
 

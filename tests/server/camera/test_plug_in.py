@@ -2,7 +2,9 @@
 
 import json
 import sys
+import tomllib
 from collections.abc import Iterator
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,7 @@ import pytest
 from tests.server.camera.plug_in import block, install
 from tests.serving import Served, serving
 from transientcam import Camera
+from transientcam.cli import findings
 from transientcam.cli import run as command
 from transientcam.conformance import Device, Report, chosen
 from transientcam.conformance import run as check
@@ -20,6 +23,11 @@ from transientcam_driver.contract import CLAUSES, Bench, Clause, ContractSkipped
 
 DISTANCE_M = 2.5
 FAR_M = 12.5
+PROJECT = Path(__file__).parents[3] / "pyproject.toml"
+OF_CONSECUTIVE_MULTIPLES = (
+    *("validity", "range_bias", "range_error", "coefficients", "transient", "density_std"),
+    *("cumulative", "streak", "bounds"),
+)
 # the others record, replay, or wait for long; they do not depend on the camera
 GROUPS = ("parameters", "tags")
 
@@ -86,6 +94,39 @@ def test_the_doctor_reports_on_it(wall: Path, capsys: pytest.CaptureFixture[str]
     assert faults["verdict"] == "fault"
 
 
+def of_products(printed: str) -> dict[str, str]:
+    """Return the reasons that `doctor --json` gives, by the products that are absent."""
+    found = json.loads(printed)["findings"]
+    messages = [each["message"] for each in found if each["check"] == "products"]
+    return dict(each.removeprefix("no ").split(": ", 1) for each in messages)
+
+
+@pytest.mark.parametrize("frequencies", ["free", "fixed"])
+def test_the_doctor_lists_what_it_cannot_give(
+    wall: Path,
+    frequencies: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    offered = tomllib.loads(PROJECT.read_text())["project"]["entry-points"][findings.CAMERA_GROUP]
+    server = EntryPoint("server", offered["server"], findings.CAMERA_GROUP)
+    monkeypatch.setattr(findings, "entry_points", lambda group: [server])
+
+    assert command(["doctor", "--camera", f"wall:{wall}?frequencies={frequencies}", "--json"]) == 0
+    reasons = of_products(capsys.readouterr().out)
+    assert command(["doctor", "--camera", f"wall:{wall}.gone", "--json"]) == 1
+
+    assert "can do cannot be read" in capsys.readouterr().out
+    assert reasons.pop("truth") == "only a simulated camera knows the true range"
+    if frequencies == "free":
+        assert not reasons
+    else:
+        assert set(reasons) == {"uniform, brightness", ", ".join(OF_CONSECUTIVE_MULTIPLES)}
+        assert all(
+            "this camera measures the multiples 2, 10 and 15" in why for why in reasons.values()
+        )
+
+
 def test_its_daemon_measures_the_distance_and_passes_the_checks(wall: Path) -> None:
     with serving(f"wall:{wall}", sequence={"base_frequency_hz": 20e6}) as daemon:
         with Camera(daemon.url, timeout_s=60.0) as client:
@@ -144,7 +185,9 @@ def test_their_estimators_state_range_and_deviation(fixed: Served, estimator: st
     assert ((std > 0) & (std < 0.05)).all()
 
 
-def test_what_they_cannot_give_is_absent_with_the_reason(fixed: Served) -> None:
+def test_what_they_cannot_give_is_absent_with_the_reason(
+    fixed: Served, capsys: pytest.CaptureFixture[str]
+) -> None:
     with Camera(fixed.url, timeout_s=60.0) as client:
         absent = {each["name"]: each["reason"] for each in client.info["absent_products"]}
         with client.stream("validity") as frames, pytest.raises(ProblemError, match="2, 10 and 15"):
@@ -160,9 +203,10 @@ def test_what_they_cannot_give_is_absent_with_the_reason(fixed: Served) -> None:
         device.refusal(pixel, 409, "estimator-misfit")
 
     assert problem["field"] == "sampling"
-    of_toeplitz = {"validity", "coefficients", "transient", "density_std", "cumulative", "streak"}
-    of_toeplitz |= {"bounds", "range_bias", "range_error"}
-    assert set(absent) == of_toeplitz | {"brightness", "uniform", "truth"}
+    assert set(absent) == {*OF_CONSECUTIVE_MULTIPLES, "brightness", "uniform", "truth"}
+    assert command(["doctor", fixed.url, "--seconds", "0.1", "--json"]) == 0
+    told = of_products(capsys.readouterr().out)
+    assert {name: why for names, why in told.items() for name in names.split(", ")} == absent
     assert "needs consecutive multiples of one frequency" in absent["transient"]
     assert "needs a zeroth moment" in absent["brightness"]
     assert estimator == "automatic"

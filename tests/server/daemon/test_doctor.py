@@ -132,7 +132,10 @@ def test_too_few_descriptors_for_the_connections_allowed_are_reported(
     assert "ulimit -n 576" in str(remedy)
 
 
-def test_a_port_that_another_program_has_is_a_fault(tmp_path: Path) -> None:
+def test_a_port_that_another_program_has_is_a_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(doctor, "_ASK_S", 0.05)  # it never answers
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
         other.close()
@@ -145,7 +148,7 @@ def test_a_port_that_another_program_has_is_a_fault(tmp_path: Path) -> None:
 
 
 def test_a_port_that_a_daemon_has_already_is_none(tmp_path: Path) -> None:
-    with serving() as served:
+    with serving("sim:wall?noise=off") as served:
         port = served.url.rpartition(":")[2]
         level, _, message, _ = found(settings(tmp_path, f"port = {port}\n"))["port"]
 
