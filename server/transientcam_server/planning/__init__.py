@@ -1,8 +1,8 @@
 """Which sequence and estimator to take: for a target accuracy, or for a budget of time.
 
-A look at the scene (`Planner.look`) gives `SceneStatistics`; a `Predictor` draws noise, bias and
-outliers of any sequence from those; a `Planner` recommends the best for a `Goal` (`Plan`), or
-returns all that no other beats.
+A look at the scene (`Planner.look`) gives `SceneStatistics`, from which a `Planner` predicts noise,
+bias and outliers of any sequence, recommends the best for a `Goal` (`Plan`), or returns all that no
+other beats.
 """
 
 from transientcam_server.planning.front import FrontCache
@@ -10,7 +10,6 @@ from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.looks import Looks
 from transientcam_server.planning.plan import Plan
 from transientcam_server.planning.planner import Planner
-from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.scene import SceneStatistics, uniform_scene
 
@@ -20,7 +19,6 @@ __all__ = [
     "Looks",
     "Plan",
     "Planner",
-    "Predictor",
     "Progress",
     "SceneStatistics",
     "uniform_scene",

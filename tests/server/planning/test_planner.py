@@ -23,14 +23,13 @@ from transientcam_server.planning import (
     Goal,
     Plan,
     Planner,
-    Predictor,
     SceneStatistics,
     uniform_scene,
 )
 from transientcam_server.planning.families import EXPOSURES, HARMONICS, TAKES, families
 from transientcam_server.planning.measures import pixel_errors
 from transientcam_server.planning.plan import plan
-from transientcam_server.planning.prediction import Figure, Prediction
+from transientcam_server.planning.prediction import Figure, Prediction, Predictor
 from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.resolving import both_found
 from transientcam_server.planning.search import Search

@@ -42,17 +42,17 @@ class BudgetDocument(_Asked):
 class GivenReturnDocument(_Asked):
     """Light that comes back from one range."""
 
-    range_m: float = Field(gt=0)
-    weight: float = Field(default=1.0, gt=0)
+    range_m: float = Field(gt=0, le=1e6)
+    weight: float = Field(default=1.0, gt=0, le=1e6)
     """Relative to the others."""
 
 
 class SceneDocument(_Asked):
     """A scene of equal pixels."""
 
-    brightness_dn_per_s: float = Field(gt=0)
+    brightness_dn_per_s: float = Field(gt=0, le=1e12)
     """Zeroth moment in DN for each second of exposure."""
-    ambient_dn_per_s: float = Field(default=0.0, ge=0)
+    ambient_dn_per_s: float = Field(default=0.0, ge=0, le=1e12)
     """Light that is not the camera's, in DN an image for each second of exposure."""
     returns: list[GivenReturnDocument] = Field(
         default_factory=lambda: [GivenReturnDocument(range_m=2.0)], min_length=1, max_length=32
