@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, 
 from tests.serving import Served, serving
 
 # A laden machine takes its time; nothing here is about how long.
-_PATIENCE_MS = 20_000
+_PATIENCE_MS = 60_000
 expect.set_options(timeout=_PATIENCE_MS)
 
 MIRRORS = "sim:mirrors?noise=off"

@@ -63,6 +63,8 @@ def test_the_cable_is_pulled_and_plugged_in_again(page: Page, served: Served) ->
     open_page(page)
     choose(page, "sequence", "Simulated scene")
     panel = page.locator(".panel-simulation")
+    # buttons move when the table of effects arrives
+    expect(panel.locator("[data-effect]").first).to_be_visible(timeout=PATIENCE_MS)
     expect(panel.get_by_role("button", name="Plug in")).to_be_disabled()
     panel.get_by_role("button", name="Unplug").click()
     expect(page.locator("[data-field=state]")).to_have_text("Camera lost")
@@ -76,7 +78,9 @@ def test_a_lost_image_is_counted(page: Page, served: Served) -> None:
     open_page(page)
     choose(page, "sequence", "Simulated scene")
     before = page.evaluate("() => transientcam.store.status.lostImages.peek()")
-    page.locator(".panel-simulation").get_by_role("button", name="Lose an image").click()
+    panel = page.locator(".panel-simulation")
+    expect(panel.locator("[data-effect]").first).to_be_visible(timeout=PATIENCE_MS)
+    panel.get_by_role("button", name="Lose an image").click()
     page.wait_for_function(
         "(before) => transientcam.store.status.lostImages.peek() > before", arg=before
     )

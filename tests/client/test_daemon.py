@@ -197,10 +197,11 @@ def test_a_rate_can_be_limited(camera: Camera) -> None:
     with camera.stream("range", max_rate_hz=4.0) as stream:
         frames = [stream.receive(timeout_s=_LONG_S) for _ in range(4)]
 
+    # a laden machine gives fewer, and never more
     times_s = [frame.meta["device_time_s"] for frame in frames]
     period_s = camera.sequence["capture_s"]
     assert (np.diff(times_s) > 0.25 - 2 * period_s).all()
-    assert np.mean(np.diff(times_s)) == pytest.approx(0.25, abs=period_s)
+    assert np.mean(np.diff(times_s)) > 0.25 - period_s
 
 
 def test_a_change_of_the_sequence_is_announced_with_the_new_channels(camera: Camera) -> None:

@@ -60,12 +60,13 @@ def tell(url: str, left_out: str = LEFT_OUT, until: str | None = None) -> dict[s
 
     class Stories(workflow):  # type: ignore[misc]  # its class is made while it runs
         def validate_response(self, response: Any, case: Any, **kwargs: Any) -> None:
-            answers[f"{case.method} {case.operation.path} {response.status_code}"] += 1
+            answered = f"{case.method} {case.operation.path} {response.status_code}"
+            answers[answered] += 1
             # never read again: by then the daemon would be another
             try:
                 super().validate_response(response, case, **kwargs)
             except FailureGroup as group:
-                wrong.extend(map(str, group.exceptions))
+                wrong.extend(f"{answered}: {each}" for each in group.exceptions)
 
     with httpx.Client(base_url=f"{url}/api/v1/", timeout=60.0) as client:
         for number in range(STORIES):
