@@ -32,7 +32,7 @@ SIZES: Final = ((163, 120), (640, 480))
 HARMONICS: Final = (3, 4, 8)
 BASE_HZ: Final = {3: 23e6, 4: 23e6, 8: 11.5e6}
 RECORDED_FRAMES: Final = 4
-PACED_HZ: Final = {163: 10.0, 640: 2.0}
+PACED_HZ: Final = {163: 10.0, 640: 1.0}
 """Rate at which the cost of a frame is measured: one that every daemon keeps up with."""
 OFFERED_HZ: Final = {163: 600.0, 640: 120.0}
 """Rate that no daemon keeps up with, for the frames a second that it delivers at most."""

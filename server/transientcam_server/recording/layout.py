@@ -21,8 +21,10 @@ from transientcam_server.imaging.calibration import Gains
 from transientcam_server.imaging.labelling import Column, image_columns, moment_columns
 from transientcam_server.imaging.waveform import usable
 from transientcam_server.recording import swmr
+
 from transientcam_server.recording.storage import MAX_CHUNK_BYTES, Storage
 
+_LONGEST_S: Final = 1e12  # of a recording
 FORMAT: Final = "transientcam recording"
 FORMAT_VERSION: Final = 1
 SUFFIX: Final = ".h5"
@@ -353,8 +355,10 @@ def read_end(storage: Storage) -> dict[str, Any]:
     for name in ("reason", "problem"):
         if not isinstance(end.get(name), str | None):
             raise ValueError(f"end.{name} is {end[name]!r}")
-    if "duration_s" in end and type(end["duration_s"]) not in (int, float):
-        raise ValueError(f"end.duration_s is {end['duration_s']!r}")
+    duration_s = end.get("duration_s", 0.0)
+    # a whole number of JSON may be larger than any float
+    if type(duration_s) not in (int, float) or not 0.0 <= duration_s <= _LONGEST_S:
+        raise ValueError(f"end.duration_s is {duration_s!r:.40}")
     return end
 
 

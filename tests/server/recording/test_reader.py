@@ -247,6 +247,11 @@ CRAFTED: dict[str, tuple[Callable[[Any], object], str]] = {
         "host_time_s is nan",
     ),
     "a duration in words": (lambda file: end(file, '{"duration_s":"abc"}'), "end.duration_s"),
+    "a duration beyond all floats": (
+        lambda file: end(file, '{"duration_s":1' + 400 * "0" + "}"),
+        "end.duration_s",
+    ),
+    "a duration before the start": (lambda file: end(file, '{"duration_s":-1}'), "end.duration_s"),
     "a reason in a list": (lambda file: end(file, '{"reason":[1]}'), "end.reason"),
     "versions in a list": (
         lambda file: file.attrs.__setitem__("versions", "[1]"),
