@@ -21,7 +21,6 @@ from transientcam_server.imaging.calibration import Gains
 from transientcam_server.imaging.labelling import Column, image_columns, moment_columns
 from transientcam_server.imaging.waveform import usable
 from transientcam_server.recording import swmr
-
 from transientcam_server.recording.storage import MAX_CHUNK_BYTES, Storage
 
 _LONGEST_S: Final = 1e12  # of a recording
