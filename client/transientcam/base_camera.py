@@ -97,8 +97,8 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
 
         ::
 
-        job = camera.start_plan({"range_error_m": 0.005})
-        plan = camera.wait_for(job["id"], on_progress=print)["result"]
+            job = camera.start_plan({"range_error_m": 0.005})
+            plan = camera.wait_for(job["id"], on_progress=print)["result"]
         """
         return self._ask(
             planning.start_plan(target=target, budget=budget, fixed=fixed, estimator=estimator)

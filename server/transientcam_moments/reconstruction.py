@@ -437,8 +437,9 @@ class Reconstruction:
     def likelihood(self) -> Likelihood:
         """Few returns, or one with a tail, with what they are worth; of moments as measured."""
         moments, noise, harmonics, error = self._evidence
-        most = MOST_RETURNS if harmonics is None else sum(j > 0 for j in harmonics)
-        most = min(MOST_RETURNS, most)
+        most = MOST_RETURNS
+        if harmonics is not None:
+            most = min(most, sum(j > 0 for j in harmonics))
         return fitted(moments, noise, self._spread, harmonics, most, model_error=error)
 
     @cached_property

@@ -158,7 +158,7 @@ def _unwrap(b: Array, variance: Array, multiples: list[int], error: float) -> tu
     """Return the attributes of `Unwrapped` of planes (N, P)."""
     xp = namespace(b)
     divisor = math.gcd(*multiples)
-    reduced = [j // divisor for j in multiples]
+    coprime = [j // divisor for j in multiples]
     with np.errstate(all="ignore"):  # pixels that cannot be used are computed along
         seen = (variance > 0) & (variance < np.inf)
         size = xp.where(seen, abs(b), 0)
@@ -167,11 +167,11 @@ def _unwrap(b: Array, variance: Array, multiples: list[int], error: float) -> tu
         inverse = xp.where(seen & usable, 1 / (variance + (error * largest) ** 2), 0)
         precision = xp.where(usable, inverse * size * size, 0)
         angle = xp.where(seen & usable, xp.arctan2(b.imag, b.real), 0)
-        std = 1 / xp.sqrt(_sum(j * j * each for j, each in zip(reduced, precision, strict=True)))
-        best, phase, second = _search(list(angle), list(precision), reduced, SAME_DEVIATIONS * std)
+        std = 1 / xp.sqrt(_sum(j * j * each for j, each in zip(coprime, precision, strict=True)))
+        best, phase, second = _search(list(angle), list(precision), coprime, SAME_DEVIATIONS * std)
         turned = _sum(
             weight * (plane.real * xp.cos(j * phase) + plane.imag * xp.sin(j * phase))
-            for j, weight, plane in zip(reduced, inverse, b, strict=True)
+            for j, weight, plane in zip(coprime, inverse, b, strict=True)
         )
         light = xp.where(usable, turned / _sum(inverse), 0)
         free = xp.where(usable, seen.sum(axis=0) - 1, 0)

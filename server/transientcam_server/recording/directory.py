@@ -49,14 +49,13 @@ class Directory:
         except OSError:
             return []
         suffixes = (layout.SUFFIX, layout.PART_SUFFIX)
-        return [
-            path
-            for path in entries
-            if path.name.endswith(suffixes)
-            and _ID.fullmatch(id_of(path))
-            and path.is_file()
-            and not path.is_symlink()
-        ]
+        named = {
+            path for path in entries if path.name.endswith(suffixes) and _ID.fullmatch(id_of(path))
+        }
+        found = {path for path in named if _is_plain(path)}
+        # what was unfinished when it was listed may have been finished, and renamed, since
+        finished = {self.new(id_of(path)) for path in named - found}
+        return [*found, *(path for path in finished - found if _is_plain(path))]
 
     def ids(self) -> set[str]:
         """Return the ids of all recordings."""
@@ -86,6 +85,11 @@ class Directory:
             for each in (part, path.with_name(path.name + SCRATCH_SUFFIX), path):
                 each.unlink(missing_ok=True)
             swmr.synchronise(self.path)
+
+
+def _is_plain(path: Path) -> bool:
+    """Return whether it is a file of its own, and no link to one."""
+    return path.is_file() and not path.is_symlink()
 
 
 def id_of(path: Path) -> str:
