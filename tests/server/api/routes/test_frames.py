@@ -143,11 +143,10 @@ def test_npy_and_png_have_frame_unit_and_meta_in_headers(steady: httpx.Client) -
 
 
 def test_a_png_of_range_is_its_npy_in_millimetres(http: httpx.Client) -> None:
-    http.put("/api/v1/acquisition", json={"running": False})  # so that both are of one frame
-    wait_for_frame(http)
+    frame = f"/api/v1/frames/{wait_for_frame(http)['frame']}"
 
-    range_m = npy(http.get(f"{LATEST}/range.npy"))
-    image = np.asarray(Image.open(io.BytesIO(http.get(f"{LATEST}/range.png").content)))
+    range_m = npy(http.get(f"{frame}/range.npy"))
+    image = np.asarray(Image.open(io.BytesIO(http.get(f"{frame}/range.png").content)))
 
     np.testing.assert_array_equal(image, np.rint(np.nan_to_num(range_m.astype(float)) * 1e3))
 
