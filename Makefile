@@ -12,7 +12,7 @@ DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f 
 DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test check bench paper docs clean dashboard debian-packages \
+.PHONY: help serve test check bench paper docs docs-site dist clean dashboard debian-packages \
 	check-pyright check-mypy check-style check-dashboard
 
 help:  ## Say what each target does
@@ -56,6 +56,14 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 	$(BIN)/python -m benchmarks.dashboard --hours 0.1 --write
 	$(BIN)/python -m benchmarks.pictures
 	$(BIN)/transientcam paper -o docs
+
+docs-site: .venv/test.stamp  ## Write the documentation as a site: open build/site/index.html
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs build/site
+
+# The time of the last commit stands for now, so that the same commit gives the same bytes.
+dist: .venv/test.stamp dashboard  ## Build the sdist and, from it, the wheel (dist/)
+	SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) \
+		$(BIN)/python -m build --no-isolation --outdir dist
 
 clean:  ## Remove everything that was built or installed here
 	rm -rf .venv build dist client/dashboard/node_modules $(dir $(PAGE))

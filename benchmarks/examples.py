@@ -54,7 +54,7 @@ _FIXED: Final[dict[str, Any]] = {
     "history": _HISTORY,
     "kernels": {"enabled": True},
     "recordings": _RECORDED | {"frames": 4},
-    "versions": {"transientcam": "0.1.0", "h5py": "3.16.0", "numpy": "2.4.6"},
+    "versions": {"transientcam": "0.2.0", "h5py": "3.16.0", "numpy": "2.4.6"},
     "calibrations": _CALIBRATED,
     "CalibrationDocument": _CALIBRATED,
     "HistoryDocument": _HISTORY,

@@ -8,6 +8,8 @@ export default defineConfig({
   build: {
     // The wheel carries what stands here; the daemon serves it at `/`.
     outDir: "../../server/transientcam_server/static",
+    // What of others the page carries, each with its SPDX identifier and the text of its licence.
+    license: { fileName: "licences.json" },
     emptyOutDir: true,
     target: "es2022",
     // A data: URL would need its own line in the Content-Security-Policy.
