@@ -1,4 +1,4 @@
-"""What a camera reports about itself: gains of its pixels and its lens, as its maker measured them."""
+"""What a camera reports about itself: gains of its pixels, and its lens."""
 
 import math
 from dataclasses import dataclass
@@ -63,10 +63,12 @@ class Lens:
             with np.errstate(all="ignore"):  # where there is no ray
                 x = x - (yy * x_off - xy * y_off) / determinant
                 y = y - (xx * y_off - yx * x_off) / determinant
-            if np.nanmax(np.hypot(x_off, y_off)) < _CLOSE:
+            if not (np.hypot(x_off, y_off) > _CLOSE).any():
                 break
-        (x_back, y_back), _ = self._distorted(x, y)
+        (x_back, y_back), (xx, xy, yx, yy) = self._distorted(x, y)
         found = np.hypot(x_back - xd, y_back - yd) < 1e3 * _CLOSE
+        # no ray of the far side of a fold, which is mirrored
+        found &= (xx * yy > xy * yx) & (x * xd + y * yd >= 0)
         return np.where(found, x, np.nan), np.where(found, y, np.nan)
 
     def _distorted(

@@ -2,6 +2,6 @@
 
 ``packets`` finds sub-images in the packets of the isochronous endpoint, ``codes`` decodes them,
 ``measurement`` puts them in the order of a frame, ``tables`` and ``parameters`` read what the
-camera knows about itself; ``encoder`` goes the other way. All of these are pure. The bytes are those
-that OpenKinect/libfreenect2 accepts.
+camera knows about itself; ``encoder`` goes the other way. All of these are pure. The bytes are
+those that OpenKinect/libfreenect2 accepts.
 """

@@ -58,7 +58,7 @@ def _dn_of_code() -> NDArray[np.uint16]:
 
 @cache
 def _code_of_half_counts() -> NDArray[np.uint16]:
-    """Return the nearest code of each magnitude in steps of 1/2: where two are as near, they meet."""
+    """Return the nearest code of each magnitude, by twice the magnitude: codes meet at halves."""
     levels = magnitudes()
     between = (levels[1:] + levels[:-1]) / 2
     halves = np.arange(2 * LARGEST + 1) / 2

@@ -112,8 +112,9 @@ class Assembler:
             return None
         self._buffer += packet
         if len(self._buffer) > _TOTAL:
+            self.torn += not self._overflown
             self._overflown = True
-            del self._buffer[:-FOOTER_BYTES]
+            del self._buffer[:-FOOTER_BYTES]  # the end may still be a footer
         footer = Footer.of_tail(self._buffer)
         if footer is None:
             if len(self._buffer) == _TOTAL:
@@ -125,7 +126,7 @@ class Assembler:
         return found
 
     def _begin_sub_image(self, *, torn: bool) -> None:
-        self.torn += torn
+        self.torn += torn and not self._overflown  # which is counted already
         self._buffer.clear()
         self._overflown = False
 

@@ -20,8 +20,8 @@ ROWS: Final[Mapping[Rows, str]] = {
     "bottom": "the principal point is counted from the bottom row of the image: so do the CPU and "
     "OpenGL processors of libfreenect2",
 }
-"""The two ways to read ``cy``. Depths differ by up to 2 % at the border; whichever bends a flat wall
-less is right."""
+"""The two ways to read ``cy``. Depths differ by up to 2 % at the border; the one that bends a flat
+wall less is right."""
 _LAYOUT: Final = struct.Struct("<23f")  # fx fy 0 cx cy k1 k2 p1 p2 k3, 13 unused
 
 

@@ -17,6 +17,7 @@ from transientcam_driver.errors import (
     ImagesLost,
     NotStreaming,
 )
+from transientcam_driver.factory import FactoryCalibration
 from transientcam_driver.handle import Simulation
 from transientcam_driver.protocol import DeviceState, Status
 from transientcam_driver.protocol.status import StatusFlag
@@ -56,6 +57,8 @@ class TriggeredCamera:
     CameraError
         As ``connect``.
     """
+
+    factory: FactoryCalibration | None = None
 
     def __init__(
         self,

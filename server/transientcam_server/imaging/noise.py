@@ -134,7 +134,7 @@ def _of_pixels(recipe: Recipe, brightness: _Array) -> tm.noise.MomentNoise:
     return tm.noise.moment_noise(
         brightness,
         recipe.sensor,
-        calibration=recipe.nominal_gains,
+        calibration=recipe.noise_gains,
         zeroth=sequence.zeroth,
         takes=sequence.takes,
         phases_rad=sequence.sampling.phases_rad,

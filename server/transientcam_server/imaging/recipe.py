@@ -14,7 +14,7 @@ from transientcam_driver import AppliedSequence, RawFrame, Sampling, Sequence
 from transientcam_moments.reconstruction import OF_ANY_MULTIPLES
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.calibration import Gains, nominal_gains
+from transientcam_server.imaging.calibration import FACTORY_ID, Gains, nominal_gains
 from transientcam_server.imaging.lens import ASSUMED_FIELD_OF_VIEW_DEG, Intrinsics
 from transientcam_server.settings import ReconstructionSettings
 
@@ -184,6 +184,16 @@ class Recipe:
     def nominal_gains(self) -> NDArray[np.complex128]:
         """The gains (m + 1,) that sub-phases and the camera's delay alone give."""
         return nominal_gains(self.applied.sequence, delay_s=self.applied.delay_s)
+
+    @cached_property
+    def noise_gains(self) -> NDArray[Any]:
+        """The gains (m + 1,) that noise is predicted with, of all pixels.
+
+        They are the nominal ones also with a measured calibration, whose pixels differ by their
+        noise, too.
+        """
+        factory = self.gains is not None and self.gains.id == FACTORY_ID
+        return self.gains.sizes if factory and self.gains is not None else self.nominal_gains
 
     def reconstruct(self, raw: RawFrame, previous: RawFrame | None = None) -> tm.Reconstruction:
         """Return the reconstruction of a capture; it computes what is read of it.

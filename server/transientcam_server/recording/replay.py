@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from transientcam_driver import (
     AppliedSequence,
     Camera,
@@ -16,6 +18,7 @@ from transientcam_driver import (
     CameraState,
     Capabilities,
     Counters,
+    FactoryCalibration,
     FrameTimeout,
     NotStreaming,
     RawFrame,
@@ -27,6 +30,7 @@ from transientcam_driver import (
 from transientcam_driver.clock import Clock, RealClock
 from transientcam_driver.protocol import DeviceState
 from transientcam_driver.protocol.status import StatusFlag
+from transientcam_server.imaging.calibration import FACTORY_ID
 from transientcam_server.recording.reader import Recording
 
 LOOP_BYTES: Final = 256 * 1024**2
@@ -106,6 +110,14 @@ class ReplayCamera:
     def capabilities(self) -> Capabilities:
         """Those of the camera that was recorded."""
         return self._recording.header.capabilities
+
+    @property
+    def factory(self) -> FactoryCalibration | None:
+        """What that camera reported of its pixels, if they were recorded with it."""
+        gains = self._recording.header.gains
+        if gains is None or gains.id != FACTORY_ID:
+            return None
+        return FactoryCalibration(gains.planes.astype(np.complex64, copy=False))
 
     @property
     def intrinsics(self) -> Mapping[str, Any] | None:
