@@ -109,13 +109,13 @@ class UsbLink:
 
     def write(self, data: bytes) -> None:
         """Send a request to the command endpoint."""
-        with self._translated("a request"):
-            self._opened().bulkWrite(_COMMANDS, data, timeout=_TIMEOUT_MS)
+        with self._bulk("a request", _COMMANDS) as handle:
+            handle.bulkWrite(_COMMANDS, data, timeout=_TIMEOUT_MS)
 
     def read(self, most_bytes: int) -> bytes:
         """Return the next transfer of the answer endpoint."""
-        with self._translated("an answer"):
-            return bytes(self._opened().bulkRead(_ANSWERS, most_bytes, timeout=_TIMEOUT_MS))
+        with self._bulk("an answer", _ANSWERS) as handle:
+            return bytes(handle.bulkRead(_ANSWERS, most_bytes, timeout=_TIMEOUT_MS))
 
     def set_suspended(self, suspended: bool) -> None:
         """Suspend the function of the depth camera, or wake it up."""
@@ -196,6 +196,17 @@ class UsbLink:
     def _request(self, kind: int, request: int, value: int, index: int = 0) -> None:
         with self._translated("a control request"):
             self._opened().controlWrite(kind, request, value, index, b"", timeout=_TIMEOUT_MS)
+
+    @contextmanager
+    def _bulk(self, action: str, endpoint: int) -> Iterator[Any]:
+        """Around a bulk transfer: after a stall the endpoint can be used again."""
+        handle = self._opened()
+        with self._translated(action):
+            try:
+                yield handle
+            except self._usb1.USBErrorPipe:
+                handle.clearHalt(endpoint)
+                raise
 
     def _opened(self) -> Any:
         if self._handle is None:
