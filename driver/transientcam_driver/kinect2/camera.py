@@ -38,7 +38,7 @@ class Kinect2Camera:
     """A `Camera` of a Kinect v2.
 
     It captures at 16, 80 and 120 MHz, three phases each, 30 times a second; ``takes`` is the one
-    choice: so many frames in a row make one. The camera has no watchdog of its own: while it is
+    choice: so many of its frames make one. The camera has no watchdog of its own: while it is
     started and no frame is read for ``unread_s``, a thread here switches it off, and the next
     ``read_frame`` on again.
 

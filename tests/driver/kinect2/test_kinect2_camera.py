@@ -48,7 +48,7 @@ def test_rows_can_be_counted_from_the_bottom() -> None:
         assert camera.factory.lens == LENS.lens("bottom")
 
 
-def test_takes_are_frames_in_a_row() -> None:
+def test_takes_are_frames_of_the_device() -> None:
     with camera_of(emulated()) as camera:
         applied = camera.configure(camera.capabilities.sequence_of({"takes": 3}))
         camera.start()
@@ -56,7 +56,7 @@ def test_takes_are_frames_in_a_row() -> None:
 
     assert frame.labels == applied.labels
     assert np.array_equal(frame.by_take, np.stack([IMAGES] * 3))
-    assert frame.capture_s > 2 / 30
+    assert frame.capture_s > 1 / 30
     assert applied.frame_rate_hz == pytest.approx(10.0, rel=1e-5)
 
 
