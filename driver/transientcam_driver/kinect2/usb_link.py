@@ -37,8 +37,8 @@ _COMMANDS, _ANSWERS, _DEPTH = 0x02, 0x81, 0x84
 _CONTROL, _STREAM = 0, 1  # interfaces
 _TIMEOUT_MS: Final = 1000
 _EVENTS_S: Final = 0.1
-_TO_DEVICE, _TO_INTERFACE = 0x00, 0x01
-_SET_FEATURE, _SET_ISOCH_DELAY = 0x03, 0x31  # USB 3.2, tables 9-5, 9-7
+_TO_DEVICE, _TO_INTERFACE, _FROM_INTERFACE = 0x00, 0x01, 0x81
+_SET_FEATURE, _GET_INTERFACE, _SET_ISOCH_DELAY = 0x03, 0x0A, 0x31  # USB 3.2, table 9-5
 _FUNCTION_SUSPEND, _U1_ENABLE, _U2_ENABLE = 0, 48, 49
 _SUSPEND_AND_WAKE: Final = 0x0300  # USB 3.2, table 9-8, of interface 0
 _ISOCH_DELAY_NS: Final = 40
@@ -96,6 +96,7 @@ class UsbLink:
         self._transfers: list[Any] = []
         self._in_flight = 0
         self._stopping = False
+        self._gone = False
         self._thread: threading.Thread | None = None
         self._handle: Any = None
         try:
@@ -124,8 +125,12 @@ class UsbLink:
 
     def set_stream_enabled(self, enabled: bool) -> None:
         """Give the depth endpoint its bandwidth, or take it away."""
+        handle = self._opened()
         with self._translated("setting the alternate setting"):
-            self._opened().setInterfaceAltSetting(_STREAM, int(enabled))
+            # libusb 1.0.26 unlocks what it has not locked where the device is gone, and aborts at
+            # its close: look first
+            handle.controlRead(_FROM_INTERFACE, _GET_INTERFACE, 0, _STREAM, 1, timeout=_TIMEOUT_MS)
+            handle.setInterfaceAltSetting(_STREAM, int(enabled))
 
     def start_images(self, received: PacketTaker, failed: FailureTaker) -> None:
         """Keep transfers in flight, and hand over every packet of them.
@@ -209,8 +214,8 @@ class UsbLink:
                 raise
 
     def _opened(self) -> Any:
-        if self._handle is None:
-            raise CameraLost("it is closed")
+        if self._handle is None or self._gone:
+            raise CameraLost("it is not plugged in any more")
         return self._handle
 
     # --- transfers ---------------------------------------------------------------------------
@@ -244,6 +249,7 @@ class UsbLink:
         else:
             received(b"")
         gone = status == self._usb1.TRANSFER_NO_DEVICE
+        self._gone |= gone
         if (gone or not self._submitted(transfer)) and not self._in_flight:
             failed(CameraLost("it was unplugged" if gone else "no transfer can be submitted"))
 

@@ -29,7 +29,7 @@ _ISO_URB, _CONTROL_URB, _BULK_URB = 0, 2, 3
 _URB_BYTES, _PACKET = 56, struct.Struct("<III")
 _COUNT_AT = 36
 _SETUP = struct.Struct("<BBHHH")
-_GET_DESCRIPTOR, _STRING = 6, 3
+_GET_DESCRIPTOR, _STRING, _GET_INTERFACE = 6, 3, 10
 _SET_FEATURE, _FUNCTION_SUSPEND = 3, 0
 _MOST_WAITING = 400
 
@@ -215,6 +215,9 @@ class Usb3Client(Client):
         if request == _GET_DESCRIPTOR and value >> 8 == _STRING:
             urb.data = self._device.strings[value & 0xFF]
             urb.actual = len(urb.data)
+            urb.buffer += _SETUP.size
+        elif request == _GET_INTERFACE:
+            urb.data, urb.actual = bytes([self._usb.streaming]), 1
             urb.buffer += _SETUP.size
         elif (kind, request, value) == (1, _SET_FEATURE, _FUNCTION_SUSPEND):
             self._linked().set_suspended(bool(index))
