@@ -10,7 +10,7 @@ from typing import Final
 
 from rich.console import Console
 
-from benchmarks.kinect2 import decoding, returns
+from benchmarks.kinect2 import corner, decoding, returns
 from benchmarks.machine import machine
 
 PAGE: Final = Path(__file__).parents[2] / "docs" / "kinect2.md"
@@ -23,8 +23,10 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help=f"write them into docs/{PAGE.name}")
     write = parser.parse_args().write
     console = Console(width=140)
+    seen = corner.captured()
     tables = []
     for make in (
+        lambda: corner.table(seen),
         returns.two_returns,
         returns.separations,
         returns.enough,
@@ -35,6 +37,7 @@ def main() -> None:
         tables.append(make())
         tables[-1].show(console)
     if write:
+        corner.draw(seen, PAGE.parent / "figures" / "kinect2-corner.png")
         before, rest = PAGE.read_text(encoding="utf-8").split(_MARKS[0])
         _, after = rest.split(_MARKS[1])
         body = "\n".join(each.markdown() for each in tables)

@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import NOISY_STD, ROUNDING, TOO_LONG
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array, Scene, load, noise
 from benchmarks.tables import Table, verdict
@@ -16,14 +17,6 @@ from transientcam_moments.comparisons.sra import sra
 GROSS_M: Final = 0.05
 RATIOS: Final = (0.1, 0.25, 0.5, 0.8)
 APART_M: Final = (0.1, 0.3, 0.6, 1.2, 2.4)
-# median errors in mm by ratio and separation, of libfreenect2's CPU processor @ fd64c5d on pixels
-# made as here; None where most are void (OpenKinect/libfreenect2, run once for this table)
-LIBFREENECT2_MM: Final = (
-    (8, 20, 14, 4, 16),
-    (18, 46, 37, 12, 40),
-    (30, 83, 77, 33, None),
-    (40, 117, 144, None, None),
-)
 _DRAWS: Final = 200
 _AMPLITUDE: Final = 600.0
 _SRA_BINS: Final = 1024
@@ -120,16 +113,19 @@ def separations() -> Table:
     moments = _through_codes(_AMPLITUDE * (waves[0] + ratio * waves[1]))
     found = tm.two_returns(moments, noise(ROUNDING), harmonics=MULTIPLES)
     off_mm = 1e3 * np.abs(RADIAN_M * np.asarray(found.separate().phase_rad) - first_m)
-    for row, theirs, each in zip(np.median(off_mm, axis=2), LIBFREENECT2_MM, RATIOS, strict=True):
+    path_m = libfreenect2.path_m(moments)
+    theirs_mm = 1e3 * np.where(path_m > 0, path_m / TOO_LONG / 2 - first_m, np.inf)
+    medians = np.median(off_mm, axis=2), np.median(theirs_mm, axis=2)
+    for ours, theirs, each in zip(*medians, RATIOS, strict=True):
         texts = (
-            f"{ours:.1f} mm ({'void' if their is None else f'{their} mm'})"
-            for ours, their in zip(row, theirs, strict=True)
+            f"{mine:.1f} mm ({f'{their:+.0f} mm' if np.isfinite(their) else 'void'})"
+            for mine, their in zip(ours, theirs, strict=True)
         )
         made.rows.append((f"{each:g}", *texts))
     made.notes.append(
-        f"First return at 1 to 5 m, {_AMPLITUDE:g} counts, no noise but that of the codes. "
-        "libfreenect2's processor was run once on pixels of the same kind; its error changes its "
-        "sign with the separation, so that no calibration takes it away."
+        f"First return at 1 to 5 m, {_AMPLITUDE:g} counts, no noise but that of the codes. Of "
+        "`tm.two_returns` the absolute error, of libfreenect2 with its sign, which changes with "
+        "the separation: no calibration takes it away. Void is where half of the pixels are."
     )
     return made
 

@@ -18,7 +18,7 @@ from transientcam_driver.kinect2.layout import (
     SUB_IMAGES,
     WIDTH,
 )
-from transientcam_driver.kinect2.parameters import DepthParameters, Rows
+from transientcam_driver.kinect2.parameters import LIGHT_X_M, DepthParameters, Rows
 from transientcam_driver.kinect2.tables import P0Tables
 
 Array = NDArray[Any]
@@ -72,12 +72,16 @@ class Scene:
 
     def z_mm(self, path_m: Array, rows: Rows) -> Array:
         """Return the depth of points at the end of paths (N, 510), in mm, without approximation."""
-        lens = self.parameters.lens(rows)
-        x, y = (each[self.rows, 1:-1] for each in lens.slopes(WIDTH, HEIGHT))
+        x, y = self.slopes(rows)
         length = np.sqrt(x * x + y * y + 1)
-        square = path_m * path_m - lens.light_x_m**2
-        distance_m = square / (2 * (path_m - lens.light_x_m * x / length))
+        square = path_m * path_m - LIGHT_X_M**2
+        distance_m = square / (2 * (path_m - LIGHT_X_M * x / length))
         return np.asarray(1e3 * distance_m / length)
+
+    def slopes(self, rows: Rows) -> tuple[Array, Array]:
+        """Return x and y (N, 510) of the rays (x, y, 1)."""
+        x, y = self.parameters.lens(rows).slopes(WIDTH, HEIGHT)
+        return x[self.rows, 1:-1], y[self.rows, 1:-1]
 
 
 def load(name: str) -> Scene:
