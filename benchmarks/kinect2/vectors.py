@@ -18,8 +18,9 @@ from transientcam_driver.kinect2.layout import (
     SUB_IMAGES,
     WIDTH,
 )
-from transientcam_driver.kinect2.parameters import LIGHT_X_M, DepthParameters, Rows
+from transientcam_driver.kinect2.parameters import DepthParameters, Rows
 from transientcam_driver.kinect2.tables import P0Tables
+from transientcam_server.imaging.lens import Intrinsics
 
 Array = NDArray[Any]
 MULTIPLES: Final = SAMPLING.multiples
@@ -71,12 +72,12 @@ class Scene:
         return every[..., columns]
 
     def z_mm(self, path_m: Array, rows: Rows) -> Array:
-        """Return the depth of points at the end of paths (N, 510), in mm, without approximation."""
-        x, y = self.slopes(rows)
-        length = np.sqrt(x * x + y * y + 1)
-        square = path_m * path_m - LIGHT_X_M**2
-        distance_m = square / (2 * (path_m - LIGHT_X_M * x / length))
-        return np.asarray(1e3 * distance_m / length)
+        """Return the depth of points at the end of paths (N, 510), in mm."""
+        lens = self.parameters.lens(rows)
+        intrinsics = Intrinsics.of_lens(lens, width=WIDTH, height=HEIGHT, source="camera")
+        range_m = np.full((HEIGHT, WIDTH), np.nan)
+        range_m[self.rows, 1:-1] = path_m / 2
+        return 1e3 * intrinsics.points(range_m)[2, self.rows, 1:-1]
 
     def slopes(self, rows: Rows) -> tuple[Array, Array]:
         """Return x and y (N, 510) of the rays (x, y, 1)."""
