@@ -3,11 +3,13 @@
 import hashlib
 import json
 import os
+import struct
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,7 +17,9 @@ import pytest
 from tests.driver.kinect2.standing import SERIAL, STILL, emulated
 from tests.driver.kinect2.usb3 import Usb3Mount
 from tests.driver.usbfs.processes import PRELOAD, missing_libraries, skip_or_fail
+from transientcam_driver import CameraError
 from transientcam_driver.kinect2 import measurement
+from transientcam_driver.kinect2.usb_link import require_bandwidth
 
 PROGRAM = Path(__file__).parent / "usb_program.py"
 
@@ -69,6 +73,26 @@ def program() -> Iterator[Program]:
             mount.close()
 
 
+def port(speed: int, per_interval: int) -> SimpleNamespace:
+    """A device as the package usb1 describes it."""
+    companion = struct.pack("<BBBBH", 6, 0x30, 15, 0, per_interval)
+    endpoint = SimpleNamespace(getAddress=lambda: 0x84, getExtra=lambda: [b"\2\x77", companion])
+    return SimpleNamespace(
+        getDeviceSpeed=lambda: speed,
+        getBusNumber=lambda: 2,
+        getDeviceAddress=lambda: 7,
+        iterSettings=lambda: [[], [endpoint]],
+    )
+
+
+def test_a_port_without_the_bandwidth_is_refused() -> None:
+    require_bandwidth(port(4, 0x8400))
+    with pytest.raises(CameraError, match="/dev/bus/usb/002/007 is on a port slower than USB 3"):
+        require_bandwidth(port(3, 0x8400))
+    with pytest.raises(CameraError, match="33791 bytes an interval, and 33792 are needed"):
+        require_bandwidth(port(4, 0x83FF))
+
+
 def test_frames_travel_through_isochronous_transfers_of_the_real_libusb(program: Program) -> None:
     camera = program.mount.device.camera
     shown = hashlib.sha256(measurement.images(STILL.data).tobytes()).hexdigest()
@@ -76,6 +100,12 @@ def test_frames_travel_through_isochronous_transfers_of_the_real_libusb(program:
     assert program.do("list") == [[f"kinect2:{SERIAL}", None]]
     assert program.do("open") == [SERIAL, "2.3.3913.7"]
     assert not camera.lit
+
+    program.mount.memory_bytes = 4_000_000
+    assert "usbfs_memory_mb is too small" in str(program.do("start"))
+    assert not camera.lit
+    program.mount.memory_bytes = None
+
     for _ in range(2):  # it can be started again
         assert program.do("start") == "streaming"
         assert camera.lit

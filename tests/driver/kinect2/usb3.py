@@ -145,8 +145,10 @@ class Usb3Client(Client):
             (count,) = struct.unpack_from("<i", raw, _COUNT_AT)
             raw += self.read_memory(address + _URB_BYTES, count * _PACKET.size)
             with self._device.changed:
-                urb = Urb(address, raw, kind, buffer, length)
-                self.in_flight[address] = urb
+                held = length + sum(each.length for each in self.in_flight.values())
+                if self._mount.memory_bytes is not None and held > self._mount.memory_bytes:
+                    raise Refused(errno.ENOMEM)
+                self.in_flight[address] = Urb(address, raw, kind, buffer, length)
                 self._device.changed.notify_all()
             return
         urb = Urb(address, raw, kind, buffer, length)
