@@ -24,8 +24,8 @@ from transientcam_driver.kinect2.frames import UNKNOWN_C, FrameMaker
 from transientcam_driver.kinect2.intake import Arrival, Intake
 from transientcam_driver.kinect2.parameters import DepthParameters, Rows
 from transientcam_driver.kinect2.tables import P0Tables
-from transientcam_driver.protocol import DeviceState, Status
-from transientcam_driver.protocol.status import StatusFlag
+from transientcam_driver.kinect2.watch import Watch
+from transientcam_driver.protocol import Status
 from transientcam_driver.receiving import Counters, RawFrame
 from transientcam_driver.sequence import Sequence
 
@@ -55,7 +55,7 @@ class Kinect2Camera:
     silence_s
         Without a whole frame for so long the camera is lost.
     unread_s
-        Without a reader for so long the light goes off.
+        Without a reader for so long, or twice as long, the light goes off.
     on_close
         Called once the device was given back.
     now_s
@@ -84,7 +84,6 @@ class Kinect2Camera:
         self._connect = connect
         self._clock = clock or RealClock()
         self._silence_s = silence_s
-        self._unread_s = unread_s
         self._on_close = on_close
         self._now_s = now_s
         self._since_s = self._clock.now_s()
@@ -95,7 +94,6 @@ class Kinect2Camera:
         self._closed = False
         self._resume = False
         self._lit = False
-        self._reads = 0
         self._heard = 0, 0.0  # whole images, and when their count had last changed
         self._device = connect(None)
         try:
@@ -112,9 +110,7 @@ class Kinect2Camera:
             self._device.close()
             raise
         self._state = CameraState.IDLE
-        self._end_of_watch = threading.Event()
-        self._watch = threading.Thread(target=self._watch_reader, name="kinect2", daemon=True)
-        self._watch.start()
+        self._watch = Watch(unread_s, self._unread)
 
     # --- state -------------------------------------------------------------------------------
 
@@ -143,17 +139,12 @@ class Kinect2Camera:
             self._require_connected()
             if not self._lit:
                 self._asked(self._device.check)
-            streaming = self._state is CameraState.STREAMING
-            flags = StatusFlag.INTERLOCK_CLOSED
-            return Status(
-                state=DeviceState.STREAMING if streaming else DeviceState.IDLE,
-                flags=flags | StatusFlag.LIGHT_ON if self._lit else flags,
+            return Status.of_host(
+                streaming=self._state is CameraState.STREAMING,
+                light_on=self._lit,
                 epoch=self._applied.epoch,
                 next_image=self.counters.images + self.counters.lost,
                 device_time_s=self.device_time_s(),
-                dropped_images=0,
-                fifo_bytes=0,
-                fifo_high_water_bytes=0,
                 temperature_c=UNKNOWN_C,
             )
 
@@ -177,6 +168,7 @@ class Kinect2Camera:
         """Switch the light on and capture frames back to back."""
         with self._control:
             self._require_connected()
+            self._watch.note()
             self._light_on()
             self._resume = True
 
@@ -211,10 +203,9 @@ class Kinect2Camera:
             if self._closed:
                 return
             self._closed = True
-            self._end_of_watch.set()
             self._state = CameraState.DISCONNECTED
             self._intake.end()
-        self._watch.join()
+        self._watch.close()
         with self._reading, self._control:
             self._lit = False
             self._device.close()
@@ -261,7 +252,7 @@ class Kinect2Camera:
             self._require_connected()
             if self._state is not CameraState.STREAMING:
                 raise NotStreaming(self._state)
-            self._reads += 1
+            self._watch.note()
             self._light_on()
 
     def _take(self, timeout_s: float) -> Arrival | None:
@@ -321,6 +312,13 @@ class Kinect2Camera:
         self._asked(self._device.stop)
         self._lit = False
 
+    def _unread(self) -> None:
+        """Switch the light off that nobody needs; the next `read_frame` needs it again."""
+        with self._control:
+            if self._lit:
+                with suppress(CameraError):  # the next request fails in the same way
+                    self._light_off()
+
     def _lose(self) -> None:
         """Mark the camera as gone, and switch off what still answers."""
         self._state = CameraState.DISCONNECTED
@@ -344,14 +342,3 @@ class Kinect2Camera:
         self._require_open()
         if self._state is CameraState.DISCONNECTED:
             raise CameraLost("it is disconnected")
-
-    # --- the thread that watches whether frames are read ---------------------------------------
-
-    def _watch_reader(self) -> None:
-        reads = -1
-        while not self._end_of_watch.wait(self._unread_s):
-            with self._control:
-                if self._lit and self._reads == reads:
-                    with suppress(CameraError):  # the next request fails in the same way
-                        self._light_off()
-                reads = self._reads

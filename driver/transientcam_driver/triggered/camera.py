@@ -19,8 +19,7 @@ from transientcam_driver.errors import (
 )
 from transientcam_driver.factory import FactoryCalibration
 from transientcam_driver.handle import Simulation
-from transientcam_driver.protocol import DeviceState, Status
-from transientcam_driver.protocol.status import StatusFlag
+from transientcam_driver.protocol import Status
 from transientcam_driver.receiving import Counters, RawFrame
 from transientcam_driver.sequence import Sequence
 from transientcam_driver.triggered.device import TriggeredDevice
@@ -120,16 +119,12 @@ class TriggeredCamera:
             self._require_connected()
             temperature_c = self._asked(self._device.temperature_c)
             streaming = self._state is CameraState.STREAMING
-            flags = StatusFlag.INTERLOCK_CLOSED
-            return Status(
-                state=DeviceState.STREAMING if streaming else DeviceState.IDLE,
-                flags=flags | StatusFlag.LIGHT_ON if streaming else flags,
+            return Status.of_host(
+                streaming=streaming,
+                light_on=streaming,
                 epoch=self._applied.epoch,
                 next_image=self.counters.images + self.counters.lost,
                 device_time_s=self.device_time_s(),
-                dropped_images=0,
-                fifo_bytes=0,
-                fifo_high_water_bytes=0,
                 temperature_c=temperature_c,
             )
 

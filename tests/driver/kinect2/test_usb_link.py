@@ -19,7 +19,7 @@ from tests.driver.kinect2.usb3 import Usb3Mount
 from tests.driver.usbfs.processes import PRELOAD, missing_libraries, skip_or_fail
 from transientcam_driver import CameraError
 from transientcam_driver.kinect2 import measurement
-from transientcam_driver.kinect2.usb_link import require_bandwidth
+from transientcam_driver.kinect2.usb_port import require_bandwidth
 
 PROGRAM = Path(__file__).parent / "usb_program.py"
 
