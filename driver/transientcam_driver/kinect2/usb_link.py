@@ -121,7 +121,7 @@ class UsbLink:
             if not self._submitted(transfer):
                 break
             self._transfers.append(transfer)
-        self._thread = threading.Thread(target=self._handle_events, name="kinect2-usb")
+        self._thread = threading.Thread(target=self._handle_events, name="kinect2-usb", daemon=True)
         self._thread.start()
         enough = min(self._count, LEAST_TRANSFERS)
         if len(self._transfers) < enough:

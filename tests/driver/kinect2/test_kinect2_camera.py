@@ -38,6 +38,7 @@ def test_a_frame_is_what_the_device_sent_with_the_gains_and_the_lens_it_reports(
     assert np.array_equal(frame.images, IMAGES)
     labels = [(label.frequency_hz, round(label.phase_rad, 3)) for label in frame.labels]
     assert labels == [(f, p) for f in (16e6, 80e6, 120e6) for p in (0.0, 2.094, 4.189)]
+    assert camera.factory is not None
     assert camera.factory.gains is not None
     assert np.array_equal(camera.factory.gains, TABLES.gains())
     assert camera.factory.lens == LENS.lens("top")
@@ -45,6 +46,7 @@ def test_a_frame_is_what_the_device_sent_with_the_gains_and_the_lens_it_reports(
 
 def test_rows_can_be_counted_from_the_bottom() -> None:
     with camera_of(emulated(), rows="bottom") as camera:
+        assert camera.factory is not None
         assert camera.factory.lens == LENS.lens("bottom")
 
 
@@ -101,6 +103,20 @@ def test_the_light_goes_off_where_nobody_reads_and_on_again_where_somebody_does(
         assert not camera.status().light_on
         assert camera.state == "streaming"
         camera.read_frame(timeout_s=READ_S)
+
+
+def test_the_light_goes_off_where_a_program_ends_without_closing_the_camera() -> None:
+    device = emulated()
+    camera = camera_of(device)
+    camera.start()
+    camera.read_frame(timeout_s=READ_S)
+    assert camera._release.atexit
+
+    with pytest.warns(ResourceWarning, match="left open"):
+        camera._release()
+
+    assert not device.lit
+    camera.close()
 
 
 class Silent:
