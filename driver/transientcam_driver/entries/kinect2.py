@@ -31,7 +31,8 @@ _OPTIONS: Final = {
 
 
 def _rows(name: CameraName) -> Rows:
-    rows: Any = name.choice("rows", get_args(Rows))
+    chosen: Any = name.choice("rows", get_args(Rows))
+    rows: Rows = chosen
     return rows
 
 

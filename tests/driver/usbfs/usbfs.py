@@ -196,7 +196,8 @@ class UsbfsMount:
         threading.Thread(target=self._accept, args=(self._listener,)).start()
 
     def _string(self, index: int) -> str:
-        return self.device.strings[index][2:].decode("utf-16-le") + "\n"
+        descriptor: bytes = self.device.strings[index]
+        return descriptor[2:].decode("utf-16-le") + "\n"
 
     def _withdraw(self) -> None:
         self._listener.shutdown(socket.SHUT_RDWR)

@@ -1,9 +1,11 @@
 """The emulated Kinect v2: what its pixels measure, and which requests it takes."""
 
 import struct
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.errors import TransferStalled
@@ -11,15 +13,17 @@ from transientcam_driver.kinect2 import commands, measurement
 from transientcam_driver.kinect2.codes import SATURATED_DN
 from transientcam_driver.kinect2.commands import Request
 from transientcam_driver.kinect2.tables import P0Tables
+from transientcam_driver.sensor import Sensor
 from transientcam_driver.simulation.build import find_scene
 from transientcam_driver.simulation.kinect2 import EmulatedFirmware, build_kinect2
 
 SPEED_OF_LIGHT_M_S = 299_792_458.0
+TwoFrames = tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any], Sensor]
 PATCH = np.s_[:, 180:240, 220:290]
 
 
 @pytest.fixture(scope="module")
-def two_frames() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
+def two_frames() -> TwoFrames:
     device, simulation = build_kinect2(find_scene("wall"), seed=1, clock=VirtualClock())
     frames = [
         measurement.images(device._pixels.sub_images(number, device_time_s=number / 30))
@@ -35,7 +39,7 @@ def two_frames() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]
 
 
 def test_phases_are_those_of_the_path_and_of_the_tables_that_the_camera_reports(
-    two_frames: tuple[np.ndarray, ...],
+    two_frames: TwoFrames,
 ) -> None:
     one, _, p0, path_m, _ = two_frames
     # sample k = g Re(b exp(i (2 pi k / 3 - P0))), b = a exp(2 pi i f D / c); images are at
@@ -54,7 +58,7 @@ def test_phases_are_those_of_the_path_and_of_the_tables_that_the_camera_reports(
 
 
 def test_noise_is_that_of_the_sensor_that_the_simulation_states(
-    two_frames: tuple[np.ndarray, ...],
+    two_frames: TwoFrames,
 ) -> None:
     one, other, _, _, sensor = two_frames
     amplitude = np.abs(one[0] + one[1] * np.exp(2j * np.pi / 3) + one[2] * np.exp(4j * np.pi / 3))
@@ -69,7 +73,7 @@ def test_noise_is_that_of_the_sensor_that_the_simulation_states(
     assert found_dn2 == pytest.approx(expected_dn2, rel=0.15)
 
 
-def _step(image: np.ndarray) -> np.ndarray:
+def _step(image: NDArray[Any]) -> NDArray[Any]:
     """Distance of neighbouring codes at a sample, by the table of the notes."""
     size = np.abs(image - (1 << 14))
     return np.where(size < 256, 1.0, 2.0 ** (np.floor(np.log2(np.maximum(size, 256))) - 7))
