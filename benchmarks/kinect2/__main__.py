@@ -23,10 +23,8 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help=f"write them into docs/{PAGE.name}")
     write = parser.parse_args().write
     console = Console(width=140)
-    seen = corner.captured()
     tables = []
     for make in (
-        lambda: corner.table(seen),
         returns.two_returns,
         returns.separations,
         returns.enough,
@@ -36,6 +34,9 @@ def main() -> None:
     ):
         tables.append(make())
         tables[-1].show(console)
+    seen = corner.captured()
+    tables.insert(0, corner.table(seen))
+    tables[0].show(console)
     if write:
         corner.draw(seen, PAGE.parent / "figures" / "kinect2-corner.png")
         before, rest = PAGE.read_text(encoding="utf-8").split(_MARKS[0])

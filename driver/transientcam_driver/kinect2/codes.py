@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from transientcam_driver.kinect2.layout import (
     CODE_BITS,
     HEIGHT,
-    ROW_BYTES,
     SUB_IMAGE_BYTES,
     WIDTH,
 )
@@ -131,17 +130,27 @@ def sub_images(samples: NDArray[np.floating] | NDArray[np.integer]) -> NDArray[n
     """
     if samples.shape[1:] != (HEIGHT, WIDTH):
         raise ValueError(f"samples of shape {samples.shape}, not (N, {HEIGHT}, {WIDTH})")
-    size = np.abs(samples)
-    fits = size <= LARGEST  # false for NaN
-    code = _code_of_half_counts()[(2 * np.where(fits, size, 0)).astype(np.intp)]
-    code += np.where((samples < 0) & (code > 0), _SIGN, 0).astype(np.uint16)
-    code[~fits] = SATURATED_CODE
-    code[:, :, [0, -1]] = 0
-    code[:, HEIGHT // 2 :] = code[:, : HEIGHT // 2 - 1 : -1].copy()
-    lanes = code.reshape((-1, WIDTH // _LANES, _LANES)).swapaxes(1, 2)
-    places = np.arange(CODE_BITS, dtype=np.uint16)
-    bits = (np.ascontiguousarray(lanes)[..., None] >> places) & 1
-    packed = np.packbits(
-        bits.astype(np.uint8).reshape((-1, WIDTH * CODE_BITS)), axis=1, bitorder="little"
-    )
-    return packed.reshape((len(samples), HEIGHT * ROW_BYTES))
+    packed = np.empty((len(samples), SUB_IMAGE_BYTES), np.uint8)
+    for sub_image, image in zip(packed, samples, strict=True):  # one at a time stays in cache
+        size = np.abs(image)
+        fits = size <= LARGEST  # false for NaN
+        code = _code_of_half_counts()[(2 * np.where(fits, size, 0)).astype(np.intp)]
+        code[(image < 0) & (code > 0)] += _SIGN
+        code[~fits] = SATURATED_CODE
+        code[:, [0, -1]] = 0
+        code[HEIGHT // 2 :] = code[: HEIGHT // 2 - 1 : -1].copy()
+        sub_image[:] = _octets(code.reshape((HEIGHT, _GROUPS, _GROUP, _LANES)))
+    return packed
+
+
+def _octets(codes: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    """Return the bytes of one sub-image of codes (424, groups, group, lanes), as stored."""
+    planes = np.zeros((CODE_BITS + 1, HEIGHT, _GROUPS, _LANES), np.uint16)
+    for k in range(_GROUP):
+        first, shift = divmod(CODE_BITS * k, 8)
+        code = codes[:, :, k]
+        planes[first] |= code << shift
+        planes[first + 1] |= code >> (8 - shift)
+        if shift + CODE_BITS > 16:
+            planes[first + 2] |= code >> (16 - shift)
+    return planes[:CODE_BITS].transpose((1, 3, 2, 0)).astype(np.uint8).ravel()

@@ -55,6 +55,9 @@ export class Events {
   }
 }
 
+/** Gains without a calibration, by the id that frames carry. */
+const UNMEASURED: Readonly<Record<string, string | undefined>> = { nominal: "Nominal gains", factory: "The gains that the camera reports" };
+
 /** Why a recording ended, in words. */
 export const END_REASONS: Readonly<Record<string, string | undefined>> = {
   stopped: "stopped",
@@ -101,8 +104,8 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
       return { words: `The camera stands before ${notice.scene}${chosen.length > 0 ? `, with ${chosen.join(", ")}` : ""}.`, tone: "plain" };
     }
     case "calibration-changed":
-      return notice.calibration_id === "nominal"
-        ? { words: `Nominal gains are used from now on.${notice.reason ? ` ${notice.reason}` : ""}`, tone: notice.reason ? "bad" : "plain" }
+      return UNMEASURED[notice.calibration_id] !== undefined
+        ? { words: `${UNMEASURED[notice.calibration_id]} are used from now on.${notice.reason ? ` ${notice.reason}` : ""}`, tone: notice.reason ? "bad" : "plain" }
         : { words: `The calibration ${notice.calibration_id} is used from now on.`, tone: "good" };
     case "lease-changed":
       return { words: leaseWords(notice), tone: "plain" };
