@@ -87,8 +87,7 @@ def _opened(serial: str | None, pause: Callable[[float], None], transfers: int) 
 
 def _link(node: str, transfers: int) -> UsbLink:
     """Claim the camera at a node, with a context of its own."""
-    context = libusb().USBContext()
-    context.open()
+    context = _opened_context()
     for device in _kinects(context):
         if node_of(device) == node:
             return UsbLink(context, device, transfers=transfers)
@@ -98,10 +97,15 @@ def _link(node: str, transfers: int) -> UsbLink:
 
 @contextmanager
 def _context() -> Iterator[Any]:
-    context = libusb().USBContext()
-    context.open()
-    with closing(context):
+    with closing(_opened_context()) as context:
         yield context
+
+
+def _opened_context() -> Any:
+    context = libusb().USBContext()
+    with translated("looking for cameras", "/dev/bus/usb"):  # a container may have no USB at all
+        context.open()
+    return context
 
 
 def _kinects(context: Any) -> list[Any]:

@@ -196,6 +196,8 @@ class UsbLink:
 
     def _submitted(self, transfer: Any) -> bool:
         with self._lock:
+            if self._stopping:
+                return False
             try:
                 transfer.submit()
             except self._usb1.USBError:
@@ -219,7 +221,8 @@ class UsbLink:
             received(b"")
         gone = status == self._usb1.TRANSFER_NO_DEVICE
         self._gone |= gone
-        if (gone or not self._submitted(transfer)) and not self._in_flight:
+        sent = not gone and self._submitted(transfer)
+        if not (sent or self._in_flight or self._stopping):
             failed(CameraLost("it was unplugged" if gone else "no transfer can be submitted"))
 
     @contextmanager
