@@ -7,8 +7,13 @@ from typing import Any, Final, get_args
 
 from transientcam_driver.camera import Camera
 from transientcam_driver.clock import Clock
-from transientcam_driver.entries.sim import SCENE_OPTIONS, SimulatedScene
-from transientcam_driver.errors import CameraError, SpecError
+from transientcam_driver.entries.emulated import (
+    EMULATED,
+    OF_EMULATION,
+    require_no_emulation,
+    simulated_scene,
+)
+from transientcam_driver.errors import CameraError
 from transientcam_driver.kinect2.camera import Kinect2Camera
 from transientcam_driver.kinect2.device import Kinect2
 from transientcam_driver.kinect2.finding import PRODUCT, facts, list_kinects, open_kinect2
@@ -17,30 +22,17 @@ from transientcam_driver.kinect2.usb_link import LEAST_TRANSFERS, TRANSFERS
 from transientcam_driver.plugin import CameraName, CameraPlugin, FoundCamera
 from transientcam_driver.simulation.kinect2 import build_kinect2
 
-EMULATED: Final = "emulated"
-DEFAULT_SCENE: Final = "hall"
 _EMULATED_SILENCE_S: Final = 60.0
 """An emulated camera may compute for seconds what a scene looks like."""
 _OPTIONS: Final = {
     "rows": "top or bottom: from where the camera counts its principal point (docs/cameras.md)",
     "transfers": f"isochronous transfers in flight, a millisecond each; {TRANSFERS} without it",
 }
-_OF_EMULATION: Final = {"scene": f"of the emulation, {DEFAULT_SCENE} without it", **SCENE_OPTIONS}
-
-
-def simulated_scene(name: CameraName) -> SimulatedScene:
-    """Return the scene in front of an emulated camera.
-
-    Raises
-    ------
-    SpecError
-        Naming the part that is not valid.
-    """
-    return SimulatedScene.of(name, name.options.get("scene", DEFAULT_SCENE))
 
 
 def _rows(name: CameraName) -> Rows:
-    rows: Any = name.choice("rows", get_args(Rows))
+    chosen: Any = name.choice("rows", get_args(Rows))
+    rows: Rows = chosen
     return rows
 
 
@@ -60,7 +52,7 @@ def _open(name: CameraName, clock: Clock) -> Camera:
 
 
 def _real(name: CameraName, serial: str | None) -> Kinect2:
-    _require_real(name)
+    require_no_emulation(name)
     return open_kinect2(
         serial or name.address or None, pause=time.sleep, transfers=_transfers(name)
     )
@@ -70,18 +62,12 @@ def _transfers(name: CameraName) -> int:
     return name.integer("transfers", TRANSFERS, least=LEAST_TRANSFERS, most=1000)
 
 
-def _require_real(name: CameraName) -> None:
-    for option in name.options:
-        if option in _OF_EMULATION:
-            raise SpecError(name.spec, f"{option} belongs to kinect2:{EMULATED}")
-
-
 def _check(name: CameraName) -> None:
     _rows(name), _transfers(name)
     if name.address == EMULATED:
         simulated_scene(name).load()
     else:
-        _require_real(name)
+        require_no_emulation(name)
 
 
 def _find() -> Iterator[FoundCamera]:
@@ -106,5 +92,5 @@ PLUGIN: Final = CameraPlugin(
     find=_find,
     check=_check,
     facts=_facts,
-    options={**_OPTIONS, **_OF_EMULATION},
+    options={**_OPTIONS, **OF_EMULATION},
 )

@@ -1,16 +1,16 @@
 """A Kinect v2 as a `Camera`: a stream that is on or off, and nothing else to choose."""
 
-import threading
 import time
+import warnings
+import weakref
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
 from transientcam_driver.camera import CameraState
-from transientcam_driver.capabilities import AppliedSequence, Capabilities
+from transientcam_driver.capabilities import AppliedSequence
 from transientcam_driver.clock import Clock, RealClock
 from transientcam_driver.errors import (
-    CameraClosed,
     CameraError,
     CameraLost,
     FrameTimeout,
@@ -18,15 +18,16 @@ from transientcam_driver.errors import (
 )
 from transientcam_driver.factory import FactoryCalibration
 from transientcam_driver.handle import Simulation
+from transientcam_driver.host_camera import HostCamera
 from transientcam_driver.kinect2.abilities import UNREAD_S, capabilities_of
 from transientcam_driver.kinect2.device import Kinect2
 from transientcam_driver.kinect2.frames import UNKNOWN_C, FrameMaker
 from transientcam_driver.kinect2.intake import Arrival, Intake
 from transientcam_driver.kinect2.parameters import DepthParameters, Rows
 from transientcam_driver.kinect2.tables import P0Tables
-from transientcam_driver.protocol import DeviceState, Status
-from transientcam_driver.protocol.status import StatusFlag
-from transientcam_driver.receiving import Counters, RawFrame
+from transientcam_driver.kinect2.watch import Watch
+from transientcam_driver.protocol import Status
+from transientcam_driver.receiving import RawFrame
 from transientcam_driver.sequence import Sequence
 
 SILENCE_S: Final = 2.0
@@ -34,11 +35,11 @@ READ_S: Final = 0.1
 """Longest wait for a frame in one go: how long a loss may stay unnoticed."""
 
 
-class Kinect2Camera:
+class Kinect2Camera(HostCamera):
     """A `Camera` of a Kinect v2.
 
     It captures at 16, 80 and 120 MHz, three phases each, 30 times a second; ``takes`` is the one
-    choice: so many frames in a row make one. The camera has no watchdog of its own: while it is
+    choice: so many of its frames make one. The camera has no watchdog of its own: while it is
     started and no frame is read for ``unread_s``, a thread here switches it off, and the next
     ``read_frame`` on again.
 
@@ -55,9 +56,7 @@ class Kinect2Camera:
     silence_s
         Without a whole frame for so long the camera is lost.
     unread_s
-        Without a reader for so long the light goes off.
-    on_close
-        Called once the device was given back.
+        Without a reader for so long, or twice as long, the light goes off.
     now_s
         Monotonic time, by which waits end.
 
@@ -76,28 +75,17 @@ class Kinect2Camera:
         simulation: Simulation | None = None,
         silence_s: float = SILENCE_S,
         unread_s: float = UNREAD_S,
-        on_close: Callable[[], None] = lambda: None,
         now_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.simulation = simulation
-        self.counters = Counters()
+        super().__init__(clock or RealClock(), simulation)
         self._connect = connect
-        self._clock = clock or RealClock()
         self._silence_s = silence_s
-        self._unread_s = unread_s
-        self._on_close = on_close
         self._now_s = now_s
-        self._since_s = self._clock.now_s()
-        self._control = threading.RLock()  # requests and the state; never held by a link's thread
-        self._reading = threading.Lock()  # held by the reader
         self._intake = Intake(self.counters, self._clock)
         self._frames = FrameMaker(self._since_s)
-        self._closed = False
-        self._resume = False
         self._lit = False
-        self._reads = 0
         self._heard = 0, 0.0  # whole images, and when their count had last changed
-        self._device = connect(None)
+        self._own(connect(None))
         try:
             identity = self._device.identity
             self._capabilities = capabilities_of(identity)
@@ -109,33 +97,13 @@ class Kinect2Camera:
                 self._capabilities.nearest(Sequence()), epoch=1
             )
         except BaseException:
+            self._release.detach()
             self._device.close()
             raise
         self._state = CameraState.IDLE
-        self._end_of_watch = threading.Event()
-        self._watch = threading.Thread(target=self._watch_reader, name="kinect2", daemon=True)
-        self._watch.start()
+        self._watch = Watch(unread_s, self._unread)
 
     # --- state -------------------------------------------------------------------------------
-
-    @property
-    def capabilities(self) -> Capabilities:
-        """What the camera can do."""
-        return self._capabilities
-
-    @property
-    def state(self) -> CameraState:
-        """Where the camera stands."""
-        return self._state
-
-    @property
-    def applied(self) -> AppliedSequence:
-        """What is set."""
-        return self._applied
-
-    def device_time_s(self) -> float:
-        """Time since the camera was opened, by this machine's clock."""
-        return self._clock.now_s() - self._since_s
 
     def status(self) -> Status:
         """Return what is known here; a camera that does not stream is asked whether it is there."""
@@ -143,25 +111,16 @@ class Kinect2Camera:
             self._require_connected()
             if not self._lit:
                 self._asked(self._device.check)
-            streaming = self._state is CameraState.STREAMING
-            flags = StatusFlag.INTERLOCK_CLOSED
-            return Status(
-                state=DeviceState.STREAMING if streaming else DeviceState.IDLE,
-                flags=flags | StatusFlag.LIGHT_ON if self._lit else flags,
+            return Status.of_host(
+                streaming=self._state is CameraState.STREAMING,
+                light_on=self._lit,
                 epoch=self._applied.epoch,
                 next_image=self.counters.images + self.counters.lost,
                 device_time_s=self.device_time_s(),
-                dropped_images=0,
-                fifo_bytes=0,
-                fifo_high_water_bytes=0,
                 temperature_c=UNKNOWN_C,
             )
 
     # --- sequence and light ------------------------------------------------------------------
-
-    def validate(self, sequence: Sequence) -> AppliedSequence:
-        """Return what would be set; the epoch is 0."""
-        return self._capabilities.apply(sequence)
 
     def configure(self, sequence: Sequence) -> AppliedSequence:
         """Set how many takes make a frame; those of the frame begun are dropped."""
@@ -177,6 +136,7 @@ class Kinect2Camera:
         """Switch the light on and capture frames back to back."""
         with self._control:
             self._require_connected()
+            self._watch.note()
             self._light_on()
             self._resume = True
 
@@ -188,17 +148,15 @@ class Kinect2Camera:
             self._state = CameraState.IDLE
             self._light_off()
 
-    def safe_off(self) -> None:
-        """As ``stop``."""
-        self.stop()
-
     def reconnect(self) -> None:
         """After CameraLost: find the same camera again, restore the sequence, resume streaming."""
         with self._reading, self._control:
             self._require_open()
             if self._state is not CameraState.DISCONNECTED:
                 return
-            self._device = self._connect(self._capabilities.serial)
+            device = self._connect(self._capabilities.serial)
+            self._release.detach()
+            self._own(device)
             epoch = self._applied.epoch + 1
             self._applied = self._capabilities.apply(self._applied.sequence, epoch=epoch)
             self._state = CameraState.IDLE
@@ -211,20 +169,13 @@ class Kinect2Camera:
             if self._closed:
                 return
             self._closed = True
-            self._end_of_watch.set()
             self._state = CameraState.DISCONNECTED
             self._intake.end()
-        self._watch.join()
+        self._watch.close()
         with self._reading, self._control:
             self._lit = False
+            self._release.detach()
             self._device.close()
-            self._on_close()
-
-    def __enter__(self) -> "Kinect2Camera":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     # --- frames ------------------------------------------------------------------------------
 
@@ -250,10 +201,10 @@ class Kinect2Camera:
                     frame = self._collected(arrival)
                     if frame is not None:
                         return frame
-                elif left_s <= 0:
+                    continue
+                self._check_silence()
+                if left_s <= 0:
                     raise FrameTimeout(timeout_s)
-                else:
-                    self._check_silence()
 
     def _keep_lit(self) -> None:
         """Switch the light on again where nothing was read for too long."""
@@ -261,7 +212,7 @@ class Kinect2Camera:
             self._require_connected()
             if self._state is not CameraState.STREAMING:
                 raise NotStreaming(self._state)
-            self._reads += 1
+            self._watch.note()
             self._light_on()
 
     def _take(self, timeout_s: float) -> Arrival | None:
@@ -298,12 +249,18 @@ class Kinect2Camera:
             self._require_connected()
             if not self._lit:
                 return
-            self._asked(self._device.check)
-            self._lose()
+            try:
+                self._device.check()
+            finally:
+                self._lose()
         pieces = f"{self.counters.resyncs} pieces of images" if self.counters.resyncs else "nothing"
         raise CameraLost(
             f"no whole frame within {self._silence_s:g} s ({pieces} since it was opened)"
         )
+
+    def _own(self, device: Kinect2) -> None:
+        self._device = device
+        self._release = weakref.finalize(self, _left_open, device)
 
     # --- under _control ----------------------------------------------------------------------
 
@@ -321,6 +278,13 @@ class Kinect2Camera:
         self._asked(self._device.stop)
         self._lit = False
 
+    def _unread(self) -> None:
+        """Switch the light off that nobody needs; the next `read_frame` needs it again."""
+        with self._control:
+            if self._lit:
+                with suppress(CameraError):  # the next request fails in the same way
+                    self._light_off()
+
     def _lose(self) -> None:
         """Mark the camera as gone, and switch off what still answers."""
         self._state = CameraState.DISCONNECTED
@@ -336,22 +300,8 @@ class Kinect2Camera:
             self._lose()
             raise
 
-    def _require_open(self) -> None:
-        if self._closed:
-            raise CameraClosed
 
-    def _require_connected(self) -> None:
-        self._require_open()
-        if self._state is CameraState.DISCONNECTED:
-            raise CameraLost("it is disconnected")
-
-    # --- the thread that watches whether frames are read ---------------------------------------
-
-    def _watch_reader(self) -> None:
-        reads = -1
-        while not self._end_of_watch.wait(self._unread_s):
-            with self._control:
-                if self._lit and self._reads == reads:
-                    with suppress(CameraError):  # the next request fails in the same way
-                        self._light_off()
-                reads = self._reads
+def _left_open(device: Kinect2) -> None:
+    """Light off when the interpreter ends without close()."""
+    warnings.warn("a camera was left open; use close() or `with`", ResourceWarning, stacklevel=2)
+    device.close()

@@ -11,7 +11,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from transientcam_driver.errors import CameraError, CameraLost, CameraNotFound, ProtocolError
+from transientcam_driver.errors import (
+    CameraError,
+    CameraLost,
+    CameraNotFound,
+    DeviceRefused,
+    ProtocolError,
+    TransferStalled,
+)
 from transientcam_driver.kinect2 import commands
 from transientcam_driver.kinect2.commands import Request
 from transientcam_driver.kinect2.link import FailureTaker, Link, PacketTaker
@@ -184,13 +191,14 @@ class Kinect2:
     def _do(self, request: Request) -> bytes:
         """Send a request, and return its answer; empty for a request without one."""
         sequence, self._sequence = self._sequence, (self._sequence + 1) % (1 << 32)
-        self._link.write(request.pack(sequence))
-        answer = b""
-        if request.most_bytes:
-            answer = self._link.read(request.most_bytes)
+        try:
+            self._link.write(request.pack(sequence))
+            answer = self._link.read(request.most_bytes) if request.most_bytes else b""
             if commands.is_completion(answer):
                 raise ProtocolError(f"{request.name} was completed without an answer")
-        completion = self._link.read(commands.COMPLETION_BYTES)
+            completion = self._link.read(commands.COMPLETION_BYTES)
+        except TransferStalled as error:
+            raise DeviceRefused(request.name, "STALL", "it stalled the transfer") from error
         completed = commands.completed_sequence(completion, request)
         if completed != sequence:
             # libfreenect2 goes on, too: whether all firmwares count alike is not known

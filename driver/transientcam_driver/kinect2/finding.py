@@ -8,14 +8,8 @@ from transientcam_driver.errors import CameraError, CameraLost, CameraNotFound
 from transientcam_driver.kinect2.device import Kinect2
 from transientcam_driver.kinect2.link import PRODUCT_IDS, VENDOR_ID
 from transientcam_driver.kinect2.parameters import DepthParameters
-from transientcam_driver.kinect2.usb_link import (
-    TRANSFERS,
-    UsbLink,
-    libusb,
-    node_of,
-    require_bandwidth,
-    translated,
-)
+from transientcam_driver.kinect2.usb_link import TRANSFERS, UsbLink
+from transientcam_driver.kinect2.usb_port import libusb, node_of, require_bandwidth, translated
 from transientcam_driver.plugin import FoundCamera
 
 PRODUCT: Final = "Microsoft Kinect v2"

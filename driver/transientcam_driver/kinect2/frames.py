@@ -1,4 +1,4 @@
-"""From what arrived to frames: so many takes in a row, with the camera's times."""
+"""From what arrived to frames: decoded, so many takes in one, with the camera's times."""
 
 from typing import Final
 
@@ -9,7 +9,6 @@ from transientcam_driver.capabilities import AppliedSequence
 from transientcam_driver.kinect2 import measurement
 from transientcam_driver.kinect2.abilities import FRAME_RATE_HZ
 from transientcam_driver.kinect2.intake import Arrival
-from transientcam_driver.kinect2.layout import MEASURED
 from transientcam_driver.kinect2.packets import TICK_S
 from transientcam_driver.receiving import RawFrame
 
@@ -19,7 +18,7 @@ _TICKS: Final = 1 << 32
 
 
 class FrameMaker:
-    """Decodes what arrived, and collects takes; a loss begins the frame anew.
+    """Decodes what arrived, and collects takes; between two of them some may be lost.
 
     Times are those of the stream's timestamps. Since no request for the camera's clock is known,
     the first frame of a run has the time of its arrival, less what a frame takes.
@@ -50,11 +49,8 @@ class FrameMaker:
     def push(self, arrival: Arrival, applied: AppliedSequence) -> RawFrame | None:
         """Add what arrived; return the frame that it completes, if any."""
         begin_s = self._begin_s(arrival)
-        if arrival.lost:
-            lost = arrival.lost + MEASURED * len(self._takes)
-            self._number += -(-lost // applied.images)
-            self._lost += lost
-            self._takes = []
+        self._lost += arrival.lost
+        self._number += -(-arrival.lost // applied.images)
         self._takes.append((begin_s, measurement.images(arrival.sub_images.data)))
         if len(self._takes) < applied.sequence.takes:
             return None
@@ -81,7 +77,7 @@ class FrameMaker:
         """Return when a frame began."""
         timestamp, last = arrival.sub_images.timestamp, self._timestamp
         self._timestamp = timestamp
-        step = 0 if last is None else (timestamp - last) % _TICKS
+        step = 0 if last is None else max(1, (timestamp - last) % _TICKS)
         if last is None or step > _TICKS // 2:  # the stream began anew
             arrived_s = arrival.now_s - self._since_s - 1 / FRAME_RATE_HZ
             self._time_s = max(arrived_s, self._time_s + TICK_S)

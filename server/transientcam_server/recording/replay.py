@@ -28,8 +28,6 @@ from transientcam_driver import (
     Status,
 )
 from transientcam_driver.clock import Clock, RealClock
-from transientcam_driver.protocol import DeviceState
-from transientcam_driver.protocol.status import StatusFlag
 from transientcam_server.imaging.calibration import FACTORY_ID
 from transientcam_server.recording.reader import Recording
 
@@ -183,16 +181,12 @@ class ReplayCamera:
         with self._changed:
             self._require_open()
             self._require_more()
-            streaming = self._state is CameraState.STREAMING
-            return Status(
-                state=DeviceState.STREAMING if streaming else DeviceState.IDLE,
-                flags=StatusFlag.INTERLOCK_CLOSED,
+            return Status.of_host(
+                streaming=self._state is CameraState.STREAMING,
+                light_on=False,
                 epoch=self.applied.epoch,
                 next_image=self._index * self.applied.images,
                 device_time_s=self.device_time_s(),
-                dropped_images=0,
-                fifo_bytes=0,
-                fifo_high_water_bytes=0,
                 temperature_c=self._temperature_c,
             )
 

@@ -131,14 +131,19 @@ class EmulatedKinect2:
 
     # --- images ------------------------------------------------------------------------------
 
-    def wait_for_frame(self, due_s: float, wanted: Callable[[], bool]) -> float | None:
-        """Wait until a frame is due; return when the next one is, None if none is wanted."""
+    def wait_for_frame(self, due_s: float | None, wanted: Callable[[], bool]) -> float | None:
+        """Wait until a frame is due, now without a time; return when the next one is.
+
+        None if none is wanted any more.
+        """
         with self.changed:
             while wanted():
                 now_s = self._clock.now_s()
-                if now_s >= due_s:
-                    return max(due_s, now_s - PERIOD_S) + PERIOD_S
-                self._clock.wait(self.changed, due_s - now_s)
+                begin_s = now_s if due_s is None else due_s
+                if now_s >= begin_s:
+                    late = now_s - begin_s > PERIOD_S / 2
+                    return PERIOD_S + (now_s if late else begin_s)
+                self._clock.wait(self.changed, begin_s - now_s)
             return None
 
     def frame(self) -> Iterator[bytes]:

@@ -23,8 +23,8 @@ class Plug(Protocol):
         """Take note that a link was closed."""
         ...
 
-    def wait_for_frame(self, due_s: float, wanted: Callable[[], bool]) -> float | None:
-        """Wait until a frame is due; return when the next one is, None if none is wanted."""
+    def wait_for_frame(self, due_s: float | None, wanted: Callable[[], bool]) -> float | None:
+        """Wait until a frame is due, now without a time; return when the next one is."""
         ...
 
     def frame(self) -> Iterator[bytes]:
@@ -94,7 +94,7 @@ class EmulatedLink:
         def wanted() -> bool:
             return self._thread is own and self._plug.is_at(self)
 
-        due_s: float | None = 0.0
+        due_s: float | None = None
         while (due_s := self._plug.wait_for_frame(due_s, wanted)) is not None:
             if not (self._enabled and self._plug.firmware.lit):
                 continue
