@@ -18,7 +18,8 @@ GROSS_M: Final = 0.05
 RATIOS: Final = (0.1, 0.25, 0.5, 0.8)
 APART_M: Final = (0.1, 0.3, 0.6, 1.2, 2.4)
 _DRAWS: Final = 200
-_AMPLITUDE: Final = 600.0
+_AMPLITUDE: Final = 200.0
+"""In counts; at more, libfreenect2 takes a smaller difference of phases for void."""
 _SRA_BINS: Final = 1024
 _SRA_BLOCKS: Final = 12
 """Of the blocks every so many are given to SRA, which takes 50 ms each."""
