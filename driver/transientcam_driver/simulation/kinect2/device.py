@@ -13,7 +13,7 @@ from transientcam_driver.kinect2 import encoder
 from transientcam_driver.kinect2.abilities import FRAME_RATE_HZ
 from transientcam_driver.kinect2.layout import MEASURED
 from transientcam_driver.kinect2.packets import TICK_S
-from transientcam_driver.simulation.device import Fault
+from transientcam_driver.simulation.device import Fault, PendingFaults
 from transientcam_driver.simulation.kinect2.firmware import EmulatedFirmware
 from transientcam_driver.simulation.kinect2.link import EmulatedLink
 
@@ -49,7 +49,7 @@ class EmulatedKinect2:
         self._power_on = power_on
         self._pixels = pixels
         self._clock = clock
-        self._faults = {Fault.DROP: 0, Fault.CORRUPT_PIXELS: 0}
+        self._faults = PendingFaults("Kinect v2", Fault.DROP, Fault.CORRUPT_PIXELS)
         self._link: EmulatedLink | None = None
         self._since_s = clock.now_s()
         self._frame = 0
@@ -114,10 +114,8 @@ class EmulatedKinect2:
         CameraError
             This camera knows no such fault.
         """
-        if fault not in self._faults:
-            raise CameraError(f"the emulated Kinect v2 knows no fault {fault!r}")
         with self.changed:
-            self._faults[fault] += images
+            self._faults.inject(fault, images)
 
     def set_interlock(self, *, closed: bool) -> None:
         """Refuse: there is none.
@@ -156,17 +154,13 @@ class EmulatedKinect2:
         packets = encoder.packets(sub_images, sequence=number % _NUMBERS, timestamp=timestamp)
         image = place = 0
         for packet in packets:
-            fault = self._fault() if (place, image < MEASURED) == (_SPOILT_PACKET, True) else None
-            if fault is Fault.CORRUPT_PIXELS:
+            spoilt = place == _SPOILT_PACKET and image < MEASURED
+            if spoilt and self._takes(Fault.CORRUPT_PIXELS):
                 yield packet[: len(packet) // 2]
-            elif fault is None:
+            elif not (spoilt and self._takes(Fault.DROP)):
                 yield packet
             image, place = (image, place + 1) if packet else (image + 1, 0)
 
-    def _fault(self) -> Fault | None:
+    def _takes(self, fault: Fault) -> bool:
         with self.changed:
-            for fault, images in self._faults.items():
-                if images:
-                    self._faults[fault] -= 1
-                    return fault
-            return None
+            return self._faults.take(fault)
