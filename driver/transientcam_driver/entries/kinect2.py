@@ -63,7 +63,8 @@ def _transfers(name: CameraName) -> int:
 
 
 def _check(name: CameraName) -> None:
-    _rows(name), _transfers(name)
+    _rows(name)
+    _transfers(name)
     if name.address == EMULATED:
         simulated_scene(name).load()
     else:
