@@ -47,7 +47,7 @@ def _apart_rad(cycles: Array) -> Array:
     line = np.array(MULTIPLES) / math.hypot(*MULTIPLES)
     along = np.tensordot(line, cycles, axes=1)
     across = (cycles**2).sum(axis=0) - along**2
-    return 2 * np.pi * np.sqrt(np.maximum(across, 0))
+    return np.asarray(2 * np.pi * np.sqrt(np.maximum(across, 0)))
 
 
 def _tolerance_rad(amplitude: Array) -> Array:
