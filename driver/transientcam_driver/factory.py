@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+_Array = NDArray[Any]
 _STEPS: Final = 30
 _CLOSE: Final = 1e-12
 
@@ -44,7 +45,7 @@ class Lens:
         if len(self.distortion) not in (0, 5):
             raise ValueError(f"distortion has 5 coefficients or none, not {len(self.distortion)}")
 
-    def slopes(self, width: int, height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def slopes(self, width: int, height: int) -> tuple[_Array, _Array]:
         """Return x and y (H, W) of the rays (x, y, 1) of all pixels, without distortion.
 
         By Newton's method in two dimensions. NaN where distortion folds the image back, so that
@@ -55,7 +56,8 @@ class Lens:
         )
         if not any(self.distortion):
             return xd, yd
-        x, y = xd.copy(), yd.copy()
+        x: _Array = xd.copy()
+        y: _Array = yd.copy()
         for _ in range(_STEPS):
             (x_off, y_off), (xx, xy, yx, yy) = self._distorted(x, y)
             x_off, y_off = x_off - xd, y_off - yd
@@ -71,9 +73,7 @@ class Lens:
         found &= (xx * yy > xy * yx) & (x * xd + y * yd >= 0)
         return np.where(found, x, np.nan), np.where(found, y, np.nan)
 
-    def _distorted(
-        self, x: NDArray[np.float64], y: NDArray[np.float64]
-    ) -> tuple[tuple[NDArray[np.float64], ...], tuple[NDArray[np.float64], ...]]:
+    def _distorted(self, x: _Array, y: _Array) -> tuple[tuple[_Array, ...], tuple[_Array, ...]]:
         """Return xd and yd, and their derivatives by x and y in the order xx, xy, yx, yy."""
         k1, k2, p1, p2, k3 = self.distortion
         with np.errstate(all="ignore"):
