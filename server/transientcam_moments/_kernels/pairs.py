@@ -30,7 +30,7 @@ __all__ = ["pairs_lane", "portable"]  # which gives the fits' arithmetic its mea
 def _project(
     order: Any, turns: Any, data_r: Any, data_i: Any, weight: Any, along: Any, alike: Any
 ) -> None:
-    """Put the moments' projections on returns at the phases of the grid in `along`.
+    """Put the moments' projections on returns at the phases of the grid in `along`, twice over.
 
     In `alike`, what returns so many steps apart have in common, from 0 to half a turn.
     """
@@ -45,82 +45,90 @@ def _project(
             c, s = turns[0, (j * g) % count], turns[1, (j * g) % count]
             found = found + weight[j] * (data_r[j] * c + data_i[j] * s)
             common = common + weight[j] * c
-        along[g] = found * inverse
+        along[g], along[count + g] = found * inverse, found * inverse
         alike[g] = common * inverse
 
 
 @njit(forceinline=True, error_model="numpy")
 def _fill_row(count: int, apart: int, along: Any, alike: Any, rows: Any) -> None:
     """Put what pairs so many steps apart explain in their row, by the first one's phase."""
-    row = (apart % 3) * count
+    row = (apart % 3) * (count + 2) + 1
     s = alike[apart]
     inverse = simd.select(s * s < COINCIDE, 1.0 / (1.0 - s * s), 0.0)
     for g in range(count):
-        other = g + apart if g + apart < count else g + apart - count
-        a, b = along[g], along[other]
+        a, b = along[g], along[g + apart]
         left_a, left_b = a - s * b, b - s * a  # in the signs of the weights
         explained = (a * left_a + b * left_b) * inverse
         rows[row + g] = simd.select((left_a > 0.0) & (left_b > 0.0), explained, 0.0)
+    rows[row - 1], rows[row + count] = rows[row + count - 1], rows[row]
 
 
 @njit(forceinline=True, error_model="numpy")
-def _keep_peaks(count: int, apart: int, rows: Any, gains: Any, first: Any, second: Any) -> None:
-    """Insert the pairs of a row that explain more than those beside them, the best ones first."""
-    row = (apart % 3) * count
-    before, after = ((apart + 2) % 3) * count, ((apart + 1) % 3) * count
+def _keep_peaks(count: int, apart: int, rows: Any, gains: Any, pairs: Any) -> None:
+    """Insert the pairs of a row that explain more than those beside them, the best ones first.
+
+    A pair is its steps apart times the phases of the grid, and the place of its first phase.
+    """
+    width = count + 2
+    row = (apart % 3) * width + 1
+    before, after = (apart + 2) % 3 * width + 1, (apart + 1) % 3 * width + 1
     for g in range(count):
         gain = rows[row + g]
         peak = gain > gains[STARTS - 1]
         if not simd.some(peak):
             continue
-        peak = peak & (gain >= rows[row + (g + 1 if g + 1 < count else 0)])
-        peak = peak & (gain >= rows[row + (g - 1 if g > 0 else count - 1)])
+        peak = peak & (gain >= rows[row + g + 1]) & (gain >= rows[row + g - 1])
         if apart > 1:
             peak = peak & (gain >= rows[before + g])
         if apart < count // 2:
             peak = peak & (gain >= rows[after + g])
         if not simd.some(peak):
             continue
-        other = g + apart if g + apart < count else g + apart - count
         gain = simd.select(peak, gain, 0.0)
-        a, b = 0.0 * gain + float(g), 0.0 * gain + float(other)
+        pair = 0.0 * gain + float(apart * count + g)
         for k in range(STARTS):
             better = gain > gains[k]
             gain, gains[k] = (
                 simd.select(better, gains[k], gain),
                 simd.select(better, gain, gains[k]),
             )
-            a, first[k] = simd.select(better, first[k], a), simd.select(better, a, first[k])
-            b, second[k] = simd.select(better, second[k], b), simd.select(better, b, second[k])
+            pair, pairs[k] = (
+                simd.select(better, pairs[k], pair),
+                simd.select(better, pair, pairs[k]),
+            )
 
 
 @njit(error_model="numpy")
 def _search(
     order: Any, turns: Any, data_r: Any, data_i: Any, weight: Any, along: Any, alike: Any,
-    rows: Any, gains: Any, first: Any, second: Any,
+    rows: Any, gains: Any, pairs: Any,
 ) -> None:  # fmt: skip
-    """Put the places on the grid of the pairs that explain most in `first` and `second`."""
+    """Put the pairs on the grid that explain most in `pairs`."""
     count = turns.shape[1]
     half = count // 2
     zero = 0.0 * weight[0]
     for k in range(STARTS):
-        gains[k], first[k], second[k] = zero, zero, zero + float(half)
+        gains[k], pairs[k] = zero, zero + float(half * count)
     _project(order, turns, data_r, data_i, weight, along, alike)
     for apart in range(1, half + 2):
         if apart <= half:
             _fill_row(count, apart, along, alike, rows)
         if apart > 1:
-            _keep_peaks(count, apart - 1, rows, gains, first, second)
+            _keep_peaks(count, apart - 1, rows, gains, pairs)
 
 
 @njit(forceinline=True, error_model="numpy")
-def _point(turns: Any, place: Any) -> Any:
-    """Return the point of the unit circle at a place on the grid."""
-    x, y = 0.0 * place, 0.0 * place
-    for g in range(turns.shape[1]):
-        here = place == float(g)
-        x, y = simd.select(here, turns[0, g], x), simd.select(here, turns[1, g], y)
-    return x, y
+def _begin(turns: Any, pair: Any, room: Any, x: Any, y: Any) -> None:
+    """Put the points of the unit circle of a pair on the grid in `x` and `y`."""
+    count = turns.shape[1]
+    simd.store(room[0], 0, pair)
+    for i in range(room.shape[1]):
+        apart, first = divmod(int(room[0, i]), count)
+        for k in range(2):
+            room[2 * k, i] = turns[0, (first + k * apart) % count]
+            room[2 * k + 1, i] = turns[1, (first + k * apart) % count]
+    for k in range(2):
+        x[k], y[k] = simd.load(pair, room[2 * k], 0), simd.load(pair, room[2 * k + 1], 0)
 
 
 @njit(error_model="numpy")
@@ -160,11 +168,11 @@ def fit_pairs(
     weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
     x, y, w = simd.registers(one, (), 2), simd.registers(one, (), 2), simd.registers(one, (), 2)
     bx, by = simd.registers(one, (), 2), simd.registers(one, (), 2)
-    # 8 m phases, or 24: (m + 4)^2 are enough, and (m + 12)^2 for three rows of them
-    along, alike = simd.matrix(one, order, 4), simd.matrix(one, order, 4)
+    # 8 m phases, or 24: (m + 8)^2 are enough for two turns, and (m + 12)^2 for three rows
+    along, alike = simd.matrix(one, order, 8), simd.matrix(one, order, 4)
     rows = simd.matrix(one, order, 12)
-    gains, first = simd.registers(one, (), 12), simd.registers(one, (), 12)
-    second = simd.registers(one, (), 12)
+    gains, pairs = simd.registers(one, (), 16), simd.registers(one, (), 16)
+    room = np.empty((4, step), turns.dtype)
     for left in range(start, stop, step):
         p = min(left, stop - step)
         scale, numbers, usable = prepare(order, b, variance, error, p, one, data_r, data_i, weight)
@@ -179,11 +187,10 @@ def fit_pairs(
         choice.offer_returns(order, (0,), (0, 0), weight, x, y, w, cost, penalty, one > 0.0, found)
         more = (found[SCORE] > 4.0 * penalty) & (numbers >= 4.0)
         if simd.some(more):
-            _search(order, turns, data_r, data_i, weight, along, alike, rows, gains, first, second)
+            _search(order, turns, data_r, data_i, weight, along, alike, rows, gains, pairs)
             best = far
             for k in range(STARTS):
-                x[0], y[0] = _point(turns, first[k])
-                x[1], y[1] = _point(turns, second[k])
+                _begin(turns, pairs[k], room, x, y)
                 cost = _polish(order, FIRST_STEPS, data_r, data_i, weight, x, y, w, rr, ri, more)
                 better = cost < best
                 best = simd.select(better, cost, best)

@@ -23,7 +23,7 @@ from transientcam_moments.noise.moments import MomentNoise
 PHASES_PER_PERIOD: Final = 8
 """Of the grid, in a period of the highest frequency. With 4, one pair in 25 that is 3 to 8 m apart
 at 16, 80 and 120 MHz is not among the starts; docs/cameras.md has what is left."""
-STARTS: Final = 12
+STARTS: Final = 16
 """Pairs of each pixel that are polished."""
 FIRST_STEPS: Final = 6
 """Of each start; the best one alone takes more."""
@@ -80,7 +80,7 @@ def two_returns(
     Notes
     -----
     Weighted least squares of b_j = w_1 exp(i j phi_1) + w_2 exp(i j phi_2), w >= 0. The weights are
-    eliminated at each pair of a grid of 8 phases a period of the highest frequency; the 12 pairs
+    eliminated at each pair of a grid of 8 phases a period of the highest frequency; the 16 pairs
     that explain most, and more than those beside them, are polished by the steps of `likelihood`.
     In single precision a compiled lane does the same; see `kernels`.
     """
