@@ -108,8 +108,8 @@ def table() -> Table:
         f"estimators are given {LEAST_NOISE:.1%}. `likelihood` has three returns or a tail, or two "
         "returns alone. The range is within 1 and 5 cm of the nearer return. Single returns are "
         f"split where more is found. Another pair is one whose nearer return is over {WRONG_M:g} m "
-        "off; it fits better where it leaves less than the true pair, fitted from its true ranges on: "
-        "which of the two was there, these moments do not say."
+        "off; it fits better where it leaves less than the true pair, fitted from its true ranges "
+        "on: which of the two was there, these moments do not say."
     )
     return made
 
