@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+_Array = NDArray[Any]
 _STEPS: Final = 30
 _CLOSE: Final = 1e-12
 
@@ -44,7 +45,7 @@ class Lens:
         if len(self.distortion) not in (0, 5):
             raise ValueError(f"distortion has 5 coefficients or none, not {len(self.distortion)}")
 
-    def slopes(self, width: int, height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def slopes(self, width: int, height: int) -> tuple[_Array, _Array]:
         """Return x and y (H, W) of the rays (x, y, 1) of all pixels, without distortion.
 
         By Newton's method in two dimensions. NaN where distortion folds the image back, so that
@@ -55,36 +56,34 @@ class Lens:
         )
         if not any(self.distortion):
             return xd, yd
-        x, y = xd.copy(), yd.copy()
-        for _ in range(_STEPS):
-            (x_off, y_off), (xx, xy, yx, yy) = self._distorted(x, y)
-            x_off, y_off = x_off - xd, y_off - yd
-            determinant = xx * yy - xy * yx
-            with np.errstate(all="ignore"):  # where there is no ray
+        x: _Array = xd.copy()
+        y: _Array = yd.copy()
+        with np.errstate(all="ignore"):  # where there is no ray
+            for _ in range(_STEPS):
+                (x_off, y_off), (xx, xy, yx, yy) = self._distorted(x, y)
+                x_off, y_off = x_off - xd, y_off - yd
+                determinant = xx * yy - xy * yx
                 x = x - (yy * x_off - xy * y_off) / determinant
                 y = y - (xx * y_off - yx * x_off) / determinant
-            if not (np.hypot(x_off, y_off) > _CLOSE).any():
-                break
-        (x_back, y_back), (xx, xy, yx, yy) = self._distorted(x, y)
-        found = np.hypot(x_back - xd, y_back - yd) < 1e3 * _CLOSE
-        # no ray of the far side of a fold, which is mirrored
-        found &= (xx * yy > xy * yx) & (x * xd + y * yd >= 0)
+                if not (np.hypot(x_off, y_off) > _CLOSE).any():
+                    break
+            (x_back, y_back), (xx, xy, yx, yy) = self._distorted(x, y)
+            found = np.hypot(x_back - xd, y_back - yd) < 1e3 * _CLOSE
+            # no ray of the far side of a fold, which is mirrored
+            found &= (xx * yy > xy * yx) & (x * xd + y * yd >= 0)
         return np.where(found, x, np.nan), np.where(found, y, np.nan)
 
-    def _distorted(
-        self, x: NDArray[np.float64], y: NDArray[np.float64]
-    ) -> tuple[tuple[NDArray[np.float64], ...], tuple[NDArray[np.float64], ...]]:
+    def _distorted(self, x: _Array, y: _Array) -> tuple[tuple[_Array, ...], tuple[_Array, ...]]:
         """Return xd and yd, and their derivatives by x and y in the order xx, xy, yx, yy."""
         k1, k2, p1, p2, k3 = self.distortion
-        with np.errstate(all="ignore"):
-            square = x * x + y * y
-            radial = 1 + square * (k1 + square * (k2 + square * k3))
-            slope = 2 * (k1 + square * (2 * k2 + square * 3 * k3))
-            xd = x * radial + 2 * p1 * x * y + p2 * (square + 2 * x * x)
-            yd = y * radial + p1 * (square + 2 * y * y) + 2 * p2 * x * y
-            cross = x * y * slope + 2 * p1 * x + 2 * p2 * y
-            xx = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
-            yy = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
+        square = x * x + y * y
+        radial = 1 + square * (k1 + square * (k2 + square * k3))
+        slope = 2 * (k1 + square * (2 * k2 + square * 3 * k3))
+        xd = x * radial + 2 * p1 * x * y + p2 * (square + 2 * x * x)
+        yd = y * radial + p1 * (square + 2 * y * y) + 2 * p2 * x * y
+        cross = x * y * slope + 2 * p1 * x + 2 * p2 * y
+        xx = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
+        yy = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
         return (xd, yd), (xx, cross, cross, yy)
 
 

@@ -26,4 +26,4 @@ def images(sub_images: NDArray[np.uint8]) -> NDArray[np.uint16]:
     ValueError
         For data of another shape.
     """
-    return codes.images(sub_images)[list(IN_ORDER)]
+    return codes.images(sub_images[list(IN_ORDER)])
