@@ -241,8 +241,8 @@ def report(
         f"{machine()}.",
         "",
         "The daemon replays a short recording in a loop from memory, so nothing is simulated. One",
-        "viewer reads the range, and one pixel of direct, indirect and coefficients, so that these",
-        "are computed whole, too. *Processor time* is what a frame takes beyond a daemon that",
+        "viewer reads the range, and one pixel of direct, indirect and coefficients, which are",
+        "reconstructed for all pixels, too. *Processor time* is what a frame takes beyond a daemon that",
         "replays without a viewer, at a rate that both keep up with; *frames/s* is what the viewer",
         "gets where far more frames are offered. The viewer runs on the same two cores.",
         f"Each figure is one run of {duration_s:g} s; at 640 x 480 that is "

@@ -223,7 +223,7 @@ def _flat(brightness: Array, trailing: tuple[int, ...]) -> Array:
     brightness = as_array(brightness)
     if tuple(brightness.shape) != trailing:
         found = f"of shape {tuple(brightness.shape)}"
-        raise ShapeError("brightness", found, f"of shape {trailing}")
+        raise ShapeError("brightness", found, str(trailing))
     return brightness.reshape(-1)
 
 
