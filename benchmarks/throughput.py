@@ -242,9 +242,9 @@ def report(
         "",
         "The daemon replays a short recording in a loop from memory, so nothing is simulated. One",
         "viewer reads the range, and one pixel of direct, indirect and coefficients, which are",
-        "reconstructed for all pixels, too. *Processor time* is what a frame takes beyond a daemon that",
-        "replays without a viewer, at a rate that both keep up with; *frames/s* is what the viewer",
-        "gets where far more frames are offered. The viewer runs on the same two cores.",
+        "reconstructed for all pixels, too. *Processor time* is what a frame takes beyond a daemon",
+        "that replays without a viewer, at a rate that both keep up with; *frames/s* is what the",
+        "viewer gets where far more frames are offered. The viewer runs on the same two cores.",
         f"Each figure is one run of {duration_s:g} s; at 640 x 480 that is "
         f"{PACED_HZ[640] * duration_s:.0f} frames, so expect some 20 % either way there.",
         "The estimator is Pisarenko's, or the likelihood where that is said.",

@@ -174,7 +174,5 @@ def test_a_brightness_takes_the_place_of_b_0(dtype: type) -> None:
 
 def test_a_brightness_of_other_pixels_is_refused() -> None:
     b = oracles.random_moments(np.random.default_rng(5), 3, 40)
-    with pytest.raises(
-        tm.ShapeError, match=r"brightness is of shape \(39,\), expected \(40,\)"
-    ):
+    with pytest.raises(tm.ShapeError, match=r"brightness is of shape \(39,\), expected \(40,\)"):
         tm.levinson(b, brightness=b[0, :39].real)
