@@ -1,7 +1,10 @@
 """Levinson's recursion and its inverses."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments import oracles
@@ -160,7 +163,8 @@ def test_wrong_shapes_are_refused() -> None:
 
 @pytest.mark.parametrize("dtype", [np.complex64, np.complex128])
 def test_a_brightness_takes_the_place_of_b_0(dtype: type) -> None:
-    b = oracles.random_moments(np.random.default_rng(5), 3, 40).reshape(4, 5, 8).astype(dtype)
+    moments = oracles.random_moments(np.random.default_rng(5), 3, 40).reshape(4, 5, 8)
+    b: NDArray[Any] = moments.astype(dtype)
     raised = 1.2 * b[0].real
 
     found = tm.levinson(b, brightness=raised)
