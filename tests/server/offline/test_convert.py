@@ -138,7 +138,7 @@ def test_mcap_has_an_image_a_topic_with_its_label_and_time(source: Path, tmp_pat
         (attachment,) = reader.iter_attachments()
         found = [
             (schema.name, channel, message)
-            for schema, channel, message in reader.iter_messages(topics=["/raw/001"])
+            for schema, channel, message in reader.iter_messages(topics=["/raw/image_001"])
             if schema is not None
         ]
     assert json.loads(metadata.metadata["sequence"])["harmonics"] == 2

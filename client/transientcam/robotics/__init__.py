@@ -1,0 +1,34 @@
+"""Frames as messages of robot software: images, points, lens and pose, for viewers and files.
+
+`messages` says what is sent, in nobody's format; `foxglove_messages` puts it into Foxglove's.
+"""
+
+from transientcam.robotics.messages import (
+    CAMERA_FRAME,
+    DEPTH,
+    OPTICAL_FRAME,
+    Calibration,
+    Image,
+    Message,
+    Pinhole,
+    Points,
+    Transform,
+    messages_of,
+    products_of,
+    viewable,
+)
+
+__all__ = [
+    "CAMERA_FRAME",
+    "DEPTH",
+    "OPTICAL_FRAME",
+    "Calibration",
+    "Image",
+    "Message",
+    "Pinhole",
+    "Points",
+    "Transform",
+    "messages_of",
+    "products_of",
+    "viewable",
+]
