@@ -1,6 +1,7 @@
 """Frames as messages of robot software: images, points, lens and pose, for viewers and files.
 
-`messages` says what is sent, in nobody's format; `foxglove_messages` puts it into Foxglove's.
+`messages` says what is sent, in nobody's format; `foxglove_messages` puts them into Foxglove's, and
+`foxglove_bridge` serves them live.
 """
 
 from transientcam.robotics.messages import (
@@ -15,6 +16,7 @@ from transientcam.robotics.messages import (
     Transform,
     messages_of,
     products_of,
+    topics_of,
     viewable,
 )
 
@@ -30,5 +32,6 @@ __all__ = [
     "Transform",
     "messages_of",
     "products_of",
+    "topics_of",
     "viewable",
 ]

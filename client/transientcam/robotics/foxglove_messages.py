@@ -28,6 +28,7 @@ from transientcam.robotics.messages import (
     Transform,
 )
 
+PROTOBUF: Final = "protobuf"
 _FLOAT_BYTES: Final = 4
 
 
@@ -37,6 +38,19 @@ class Encoded(NamedTuple):
     schema: Schema
     message_encoding: str
     data: bytes
+
+
+_KINDS: Final = {
+    Image: RawImage,
+    Points: PointCloud,
+    Calibration: CameraCalibration,
+    Transform: FrameTransforms,
+}
+
+
+def schema_of(kind: type[Message]) -> Schema:
+    """Return the schema of a kind of messages."""
+    return _KINDS[kind].get_schema()
 
 
 def encode(message: Message, time_ns: int) -> Encoded:
@@ -52,7 +66,7 @@ def encode(message: Message, time_ns: int) -> Encoded:
             found = _calibration(message, stamp)
         case Transform():
             found = _transform(message, stamp)
-    return Encoded(found.get_schema(), "protobuf", found.encode())
+    return Encoded(found.get_schema(), PROTOBUF, found.encode())
 
 
 def _image(message: Image, stamp: Timestamp) -> RawImage:

@@ -116,16 +116,24 @@ def viewable(product: str) -> bool:
     )
 
 
-def products_of(topics: Iterable[str]) -> set[str]:
-    """Return the products that topics show; lens and pose need none."""
+def topics_of(product: str) -> dict[str, type[Message]]:
+    """Return the topics that show a product (raw images excepted), and what is on each."""
+    if product == "pointcloud":
+        return {DEPTH: Image, Points.topic: Points}
+    return {f"/{product}": Image}
+
+
+def products_of(topics: Iterable[str]) -> tuple[str, ...]:
+    """Return the products that topics show, points last; lens and pose need none."""
     products: set[str] = set()
     for topic in topics:
-        if topic in (DEPTH, Points.topic):
-            # points are coloured by the light of the first return
-            products |= {"pointcloud"} | ({"direct"} if topic == Points.topic else set())
+        if topic == Points.topic:
+            products |= {"pointcloud", "direct"}  # points are coloured by the direct light
+        elif topic == DEPTH:
+            products.add("pointcloud")
         elif topic not in (Calibration.topic, Transform.topic):
-            products.add(topic.split("/")[1])
-    return products
+            products.add(topic.removeprefix("/"))
+    return tuple(sorted(products, key=lambda name: (name == "pointcloud", name)))
 
 
 def messages_of(
