@@ -7,7 +7,7 @@ import typer
 from rich.console import Console
 
 from transientcam.camera import Camera
-from transientcam.cli.options import JsonOption, ProductsArgument, TokenOption, UrlArgument
+from transientcam.cli.options import JsonOption, TokenOption, UrlArgument
 from transientcam.robotics.foxglove_bridge import SHOWN, FoxgloveBridge
 from transientcam.robotics.reports import Report
 
@@ -16,22 +16,27 @@ _STYLES = {"info": "green", "warning": "yellow", "error": "red"}
 
 def foxglove(
     url: UrlArgument,
-    products: ProductsArgument = None,
+    products: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="What can be looked at; range, direct, indirect, brightness and pointcloud, if "
+            "nothing is named."
+        ),
+    ] = None,
     host: Annotated[
         str,
         typer.Option(help="Where to serve viewers; whoever reaches it sees the frames."),
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 for any that is free.")] = 8765,
     max_rate_hz: Annotated[
-        float, typer.Option(help="No more frames a second than this; what is shown, not captured.")
+        float, typer.Option(min=0.01, help="No more frames a second than this are shown.")
     ] = 10.0,
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show a camera live in Foxglove, until interrupted: images, points, lens and pose.
 
-    It only subscribes, and only to what somebody looks at. Without products: range, direct,
-    indirect, brightness and pointcloud.
+    It only subscribes, and only to what somebody looks at.
     """
     console = Console(stderr=True)
 

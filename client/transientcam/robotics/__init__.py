@@ -6,7 +6,6 @@
 
 from transientcam.robotics.messages import (
     CAMERA_FRAME,
-    DEPTH,
     OPTICAL_FRAME,
     Calibration,
     Image,
@@ -15,14 +14,11 @@ from transientcam.robotics.messages import (
     Points,
     Transform,
     messages_of,
-    products_of,
-    topics_of,
     viewable,
 )
 
 __all__ = [
     "CAMERA_FRAME",
-    "DEPTH",
     "OPTICAL_FRAME",
     "Calibration",
     "Image",
@@ -31,7 +27,5 @@ __all__ = [
     "Points",
     "Transform",
     "messages_of",
-    "products_of",
-    "topics_of",
     "viewable",
 ]
