@@ -38,6 +38,8 @@ from transientcam.wire import PRODUCTS, Notice
 SHOWN: Final = ("range", "direct", "indirect", "brightness", "pointcloud")
 """Products that viewers can choose from, if nothing else is said."""
 RETRY_S: Final = 2.0
+DROPPED_EVERY_NS: Final = 5 * 10**9
+"""How often the count of dropped frames is shown; it changes with each of them."""
 _BACKLOG: Final = 32
 """Messages kept for a viewer that is too slow; the oldest are dropped."""
 _FIXED: Final = frozenset((Transform.topic, Calibration.topic))
@@ -67,7 +69,7 @@ class FoxgloveBridge:
     on_report
         Called with what viewers are shown, too: losses and lost connections.
     now_ns
-        Unix time in ns, of what is sent without a frame.
+        Unix time in ns: of what is sent without a frame, and between reports of dropped ones.
 
     Raises
     ------
@@ -99,6 +101,7 @@ class FoxgloveBridge:
         self._on_report = on_report
         self._now_ns = now_ns
         self._last_report: Report | None = None
+        self._dropped_ns = 0
         self._watching = Watching()
         self._stream: Stream | None = None
         self._ask_lens()
@@ -211,8 +214,14 @@ class FoxgloveBridge:
     def _noticed(self, notice: Notice) -> None:
         self._lens_is_old |= notice.kind in _LENS_MAY_CHANGE
         report = report_of(notice)
-        if report is not None:
-            self._report(report)
+        if report is None:
+            return
+        if report.about == "dropped":
+            now_ns = self._now_ns()
+            if now_ns - self._dropped_ns < DROPPED_EVERY_NS:
+                return
+            self._dropped_ns = now_ns
+        self._report(report)
 
     def _report(self, report: Report) -> None:
         if report != self._last_report:

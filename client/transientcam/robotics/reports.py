@@ -42,7 +42,7 @@ _REPORTS: Final[Mapping[str, Callable[[Mapping[str, Any]], Report]]] = {
     "dropped": lambda said: Report(
         "warning",
         "dropped",
-        f"{said['total']} frames dropped: this program or its network is too slow",
+        f"{said['total']} frames dropped so far: this program or its network is too slow",
     ),
     "lost-images": lambda said: Report(
         "warning", "lost-images", f"{said['count']} images lost before frame {said['frame']}"

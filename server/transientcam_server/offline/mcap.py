@@ -76,10 +76,9 @@ def write_mcap(
 def lens_of(recording: Recording) -> Pinhole:
     """Return the lens that a recording holds, or one that is assumed."""
     size, camera = recording.header.capabilities, recording.header.camera
-    known = known_intrinsics(
+    return known_intrinsics(
         LensSettings(), width=size.width, height=size.height, recorded=camera.get("intrinsics")
     )
-    return Pinhole(**{name: getattr(known, name) for name in Pinhole.__slots__})
 
 
 def _frames(

@@ -1,6 +1,7 @@
 """Messages as ROS 2 programs have them, in CDR with their definitions; needs rosbags, not ROS."""
 
 import json
+from collections.abc import Callable
 from functools import cache
 from typing import Any, Final
 
@@ -50,15 +51,7 @@ def quality_of_service(message: Message) -> dict[str, str]:
 
 def encode(message: Message, time_ns: int) -> Encoded:
     """Return a message in CDR, stamped with ``time_ns`` (Unix time)."""
-    match message:
-        case Image():
-            found = _image(message, time_ns)
-        case Points():
-            found = _points(message, time_ns)
-        case Calibration():
-            found = _calibration(message, time_ns)
-        case Transform():
-            found = _transform(message, time_ns)
+    found = _MAKERS[type(message)](message, time_ns)
     name = found.__msgtype__
     return Encoded(_schema(name), "cdr", bytes(_STORE.serialize_cdr(found, name)))
 
@@ -159,3 +152,11 @@ def _transform(message: Transform, time_ns: int) -> Any:
         transform=transform,
     )
     return _made("tf2_msgs/msg/TFMessage", transforms=[stamped])
+
+
+_MAKERS: Final[dict[type[Message], Callable[[Any, int], Any]]] = {
+    Image: _image,
+    Points: _points,
+    Calibration: _calibration,
+    Transform: _transform,
+}

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tests.client.robotics.viewer import viewing
 from tests.serving import Served, serving
-from transientcam import Camera, ParameterError
+from transientcam import Camera, Notice, ParameterError
 from transientcam.cli import foxglove as verb
 from transientcam.robotics.foxglove_bridge import FoxgloveBridge
 from transientcam.robotics.reports import Report
@@ -137,6 +137,23 @@ def test_viewers_are_shown_that_the_camera_is_gone_and_see_it_again() -> None:
         with serving(SPEC, port=port):
             assert viewer.status("connected to the camera again")["id"] == "connection"
             assert viewer.message("/brightness").decoded.width == 163
+
+
+def test_dropped_frames_are_counted_for_viewers_every_few_seconds(served: Served) -> None:
+    times_ns = iter([10 * 10**9, 12 * 10**9, 16 * 10**9])
+    reports: list[Report] = []
+    with (
+        Camera(served.url, timeout_s=60.0) as camera,
+        FoxgloveBridge(
+            camera, port=0, on_report=reports.append, now_ns=lambda: next(times_ns)
+        ) as bridge,
+        viewing(bridge.port) as viewer,
+    ):
+        for total in (1, 2, 3):
+            bridge._noticed(Notice("dropped", {"channel": 0, "count": 1, "total": total}))
+        assert viewer.status("1 frames dropped")["level"] == 1
+        assert viewer.status("3 frames dropped")["id"] == "dropped"
+    assert [report.text.split()[0] for report in reports] == ["1", "3"]
 
 
 @pytest.mark.parametrize("product", ["raw", "transient", "moments", "nothing"])

@@ -1,7 +1,6 @@
 """Recordings as .mcap: read back by other people's readers, and held against the recording."""
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 
 import transientcam
 from tests.server.recording.made import HEIGHT, WIDTH, frame, record
-from transientcam_server.errors.exceptions import InputError, MissingExtra
+from transientcam_server.errors.exceptions import InputError
 from transientcam_server.offline import convert_recording
 from transientcam_server.offline.mcap import PRODUCTS
 from transientcam_server.recording import Recording
@@ -219,14 +218,3 @@ def test_what_no_message_can_hold_is_refused_with_what_can(
 def test_other_formats_hold_raw_images_only(source: Path, tmp_path: Path) -> None:
     with Recording(source) as recording, pytest.raises(InputError, match="reconstruct"):
         convert_recording(recording, tmp_path / "a.npz", products=["range"])
-
-
-def test_without_the_library_for_ros_its_extra_is_named(
-    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "rosbags", None)
-    with (
-        Recording(source) as recording,
-        pytest.raises(MissingExtra, match=r"ROS 2 needs rosbags: .*transientcam\[convert\]"),
-    ):
-        convert_recording(recording, tmp_path / "a.mcap", schemas="ros2")
