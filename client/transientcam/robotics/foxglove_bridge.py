@@ -23,6 +23,7 @@ from transientcam.frame import Frame
 from transientcam.robotics.foxglove_messages import PROTOBUF, encode, schema_of
 from transientcam.robotics.messages import (
     Calibration,
+    Message,
     Pinhole,
     Transform,
     messages_of,
@@ -108,7 +109,10 @@ class FoxgloveBridge:
         self._newest = 0
         self._direct: Frame | None = None
         self._context = foxglove.Context()
-        kinds = {Transform.topic: Transform, Calibration.topic: Calibration}
+        kinds: dict[str, type[Message]] = {
+            Transform.topic: Transform,
+            Calibration.topic: Calibration,
+        }
         for name in products:
             kinds |= topics_of(name)
         self._channels = {
