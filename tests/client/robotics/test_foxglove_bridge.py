@@ -28,7 +28,8 @@ WAIT_S = 120.0
 def served() -> Iterator[Served]:
     with serving(SPEC) as daemon, Camera(daemon.url, timeout_s=60.0) as camera:
         camera.sequence = SEQUENCE
-        camera.frame("range", wait_s=60.0)
+        with camera.stream("range") as stream:
+            stream.receive(timeout_s=WAIT_S)
         yield daemon
 
 
