@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
+import httpx
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -33,15 +34,32 @@ def served() -> Iterator[Served]:
         yield daemon
 
 
+@pytest.fixture
+def silent() -> Iterator[Camera]:
+    """A camera that says its lens, and nothing else."""
+    lens = {"fx": 3.0, "fy": 4.0, "cx": 1.0, "cy": 2.0, "width": 5, "height": 6, "source": "scene"}
+    answer = httpx.Response(200, json={"intrinsics": lens})
+    with Camera("http://silent", transport=httpx.MockTransport(lambda request: answer)) as camera:
+        yield camera
+
+
 @contextmanager
 def bridged(url: str, **options: Any) -> Iterator[tuple[FoxgloveBridge, queue.Queue[Report]]]:
     reports: queue.Queue[Report] = queue.Queue()
-    with Camera(url, timeout_s=60.0) as camera:
-        bridge = FoxgloveBridge(camera, port=0, on_report=reports.put, **options)
+    with (
+        Camera(url, timeout_s=60.0) as camera,
+        running(camera, on_report=reports.put, **options) as bridge,
+    ):
+        yield bridge, reports
+
+
+@contextmanager
+def running(camera: Camera, **options: Any) -> Iterator[FoxgloveBridge]:
+    with FoxgloveBridge(camera, port=0, **options) as bridge:
         thread = threading.Thread(target=bridge.run, name="bridge")
         thread.start()
         try:
-            yield bridge, reports
+            yield bridge
         finally:
             bridge.close()
             thread.join()
@@ -115,15 +133,17 @@ def test_a_viewer_that_leaves_without_a_word_is_no_longer_served(served: Served)
         said(reports, "nobody looks")
 
 
-def test_lens_and_pose_can_be_looked_at_alone(served: Served) -> None:
+def test_lens_and_pose_can_be_looked_at_alone(silent: Camera) -> None:
+    reports: list[Report] = []
     with (
-        bridged(served.url, now_ns=lambda: 5 * 10**9) as (bridge, reports),
+        running(silent, on_report=reports.append, now_ns=lambda: 5 * 10**9) as bridge,
         viewing(bridge.port) as viewer,
     ):
-        viewer.subscribe("/tf_static")
-        found = viewer.message("/tf_static")
-    assert found.time_ns == found.decoded.transforms[0].timestamp.ToNanoseconds() == 5 * 10**9
-    assert reports.empty()
+        viewer.subscribe("/tf_static", "/camera_info")
+        pose, lens = viewer.message("/tf_static"), viewer.message("/camera_info")
+    assert pose.time_ns == pose.decoded.transforms[0].timestamp.ToNanoseconds() == 5 * 10**9
+    assert list(lens.decoded.K) == [3.0, 0.0, 1.0, 0.0, 4.0, 2.0, 0.0, 0.0, 1.0]
+    assert reports == []
 
 
 def test_viewers_are_shown_that_the_camera_is_gone_and_see_it_again() -> None:
@@ -140,13 +160,12 @@ def test_viewers_are_shown_that_the_camera_is_gone_and_see_it_again() -> None:
             assert viewer.message("/brightness").decoded.width == 163
 
 
-def test_dropped_frames_are_counted_for_viewers_every_few_seconds(served: Served) -> None:
+def test_dropped_frames_are_counted_for_viewers_every_few_seconds(silent: Camera) -> None:
     times_ns = iter([10 * 10**9, 12 * 10**9, 16 * 10**9])
     reports: list[Report] = []
     with (
-        Camera(served.url, timeout_s=60.0) as camera,
         FoxgloveBridge(
-            camera, port=0, on_report=reports.append, now_ns=lambda: next(times_ns)
+            silent, port=0, on_report=reports.append, now_ns=lambda: next(times_ns)
         ) as bridge,
         viewing(bridge.port) as viewer,
     ):
@@ -158,16 +177,16 @@ def test_dropped_frames_are_counted_for_viewers_every_few_seconds(served: Served
 
 
 @pytest.mark.parametrize("product", ["raw", "transient", "moments", "nothing"])
-def test_what_is_no_image_and_no_points_is_refused(served: Served, product: str) -> None:
-    with Camera(served.url) as camera, pytest.raises(ParameterError, match="pointcloud"):
-        FoxgloveBridge(camera, products=["range", product], port=0)
+def test_what_is_no_image_and_no_points_is_refused(silent: Camera, product: str) -> None:
+    with pytest.raises(ParameterError, match="pointcloud"):
+        FoxgloveBridge(silent, products=["range", product], port=0)
 
 
-def test_a_taken_port_is_named(served: Served) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken, Camera(served.url) as camera:
+def test_a_taken_port_is_named(silent: Camera) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(OSError, match=f"127.0.0.1:{port}"):
-            FoxgloveBridge(camera, port=port)
+            FoxgloveBridge(silent, port=port)
 
 
 def test_the_verb_says_where_to_connect(
