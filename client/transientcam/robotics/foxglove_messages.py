@@ -1,5 +1,6 @@
 """Messages in Foxglove's schemas (protobuf); needs foxglove-sdk."""
 
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -40,17 +41,17 @@ class Encoded(NamedTuple):
     data: bytes
 
 
-_KINDS: Final = {
-    Image: RawImage,
-    Points: PointCloud,
-    Calibration: CameraCalibration,
-    Transform: FrameTransforms,
+_SCHEMAS: Final[dict[type[Message], Callable[[], Schema]]] = {
+    Image: RawImage.get_schema,
+    Points: PointCloud.get_schema,
+    Calibration: CameraCalibration.get_schema,
+    Transform: FrameTransforms.get_schema,
 }
 
 
 def schema_of(kind: type[Message]) -> Schema:
     """Return the schema of a kind of messages."""
-    return _KINDS[kind].get_schema()
+    return _SCHEMAS[kind]()
 
 
 def encode(message: Message, time_ns: int) -> Encoded:

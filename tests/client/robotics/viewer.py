@@ -15,6 +15,7 @@ from typing import Any
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
 
 _MESSAGE = struct.Struct("<BIQ")
 _WAIT_S = 120.0
@@ -112,9 +113,6 @@ class Viewer:
 @contextmanager
 def viewing(port: int) -> Iterator[Viewer]:
     """Connect a viewer until the end of the block."""
-    with connect(
-        f"ws://127.0.0.1:{port}",
-        subprotocols=["foxglove.sdk.v1"],
-        max_size=None,  # type: ignore[list-item]
-    ) as connection:
+    spoken = [Subprotocol("foxglove.sdk.v1")]
+    with connect(f"ws://127.0.0.1:{port}", subprotocols=spoken, max_size=None) as connection:
         yield Viewer(connection)
