@@ -10,6 +10,7 @@ from typing import Any, Final, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam.robotics import Pinhole
 from transientcam_driver import Lens
 from transientcam_server.settings import LensSettings
 
@@ -19,18 +20,14 @@ Source = Literal["settings", "camera", "scene", "recording", "assumed"]
 
 
 @dataclass(frozen=True, slots=True)
-class Intrinsics:
-    """A pinhole camera: pixel (column, row) looks along ((c - cx) / fx, (r - cy) / fy, 1).
+class Intrinsics(Pinhole):
+    """A pinhole camera, and what the service computes with it.
 
-    Whole numbers are the centres of pixels. x points right, y down, z where the camera looks. With
+    x points right, y down, z where the camera looks. With
     a distortion the pixel looks along the ray that the lens bends there, see `Lens`.
 
     Attributes
     ----------
-    fx, fy, cx, cy
-        Focal lengths and principal point, in pixels.
-    width, height
-        Of the frame they belong to.
     source
         Where they come from: the ``settings`` of the service, the ``camera`` itself, the simulated
         ``scene``, the ``recording``, or none of these (``assumed``).
@@ -38,12 +35,6 @@ class Intrinsics:
         As of `Lens`.
     """
 
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    width: int
-    height: int
     source: Source = "assumed"
     distortion: tuple[float, ...] = ()
     light_x_m: float = 0.0
