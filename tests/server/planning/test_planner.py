@@ -289,7 +289,13 @@ def test_lines_fall_onto_the_bias(capabilities: Capabilities) -> None:
     goal = Goal()
     search = Search(goal, families(goal, predictor, capabilities), predictor, lambda *_: 1e-3)
 
-    front = search.front("range_error_m")
+    *so_far, front = search.fronts("range_error_m")
+    ends = front[0].applied.capture_s, front[-1].applied.capture_s
+    for part in so_far[1:]:
+        times_s = [choice.applied.capture_s for choice in part]
+        assert times_s == sorted(times_s)
+        assert (times_s[0], times_s[-1]) == ends, "both ends first, then what is between"
+    assert [len(part) for part in so_far] == sorted(len(part) for part in so_far)
     lines = search.lines(front)
 
     times_s = [choice.applied.capture_s for choice in front]

@@ -2,8 +2,8 @@
 
 import asyncio
 import threading
-from collections.abc import Awaitable, Callable
-from typing import Annotated, Any, Final, Literal
+from collections.abc import Awaitable, Callable, Coroutine
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 from fastapi import APIRouter, Query, Request, Response, status
 
@@ -34,6 +34,18 @@ _REFUSALS: Final = (
     kinds.SHUTTING_DOWN,
     kinds.PLANNING_BUSY,
 )
+_FRONT_REFUSALS: Final = (
+    kinds.INVALID_REQUEST,
+    kinds.TARGET_UNREACHABLE,
+    kinds.NO_FRAME_YET,
+    kinds.SHUTTING_DOWN,
+    kinds.PLANNING_BUSY,
+)
+_By = Annotated[
+    Literal["range_error_m", "range_std_m", "bound_width"],
+    Query(description="the accuracy that capture time is held against"),
+]
+_T = TypeVar("_T")
 
 
 @router.post(
@@ -64,7 +76,10 @@ async def make_plan(service: ServiceOf, request: PlanRequest, http: Request) -> 
             raise _left()
 
     try:
-        return await _planned(service, request, goal, _address(http), Progress(go_on), has_left)
+        made = await _unless_ended(
+            _planned(service, request, goal, _address(http), Progress(go_on)), has_left
+        )
+        return PlanDocument.model_validate(made)
     finally:
         left.set()
 
@@ -87,12 +102,10 @@ async def start_plan(
     goal, address = _goal(service, request), _address(http)
 
     async def work(job: Job) -> dict[str, Any]:
-        async def ask() -> None:
-            job.report(job.progress, job.step)
-
-        progress = Progress(job.report)
-        made = await _planned(service, request, goal, address, progress, ask)
-        return made.model_dump(mode="json")
+        made = await _unless_ended(
+            _planned(service, request, goal, address, Progress(job.report)), _asking(job)
+        )
+        return PlanDocument.model_validate(made).model_dump(mode="json")
 
     return jobs.accepted(service.jobs.start(jobs.PLAN, work, in_turn=False), response)
 
@@ -119,28 +132,31 @@ def _left() -> Problem:
     return Problem(kinds.SHUTTING_DOWN, "The client left before the plan was made.")
 
 
-async def _planned(
-    service: Service,
-    request: PlanRequest,
-    goal: Goal,
-    address: str,
-    progress: Progress,
-    ask: Callable[[], Awaitable[None]],
-) -> PlanDocument:
-    """Plan once there is a place for the address; what ``ask`` raises in between ends it."""
-    task = asyncio.ensure_future(_in_place(service, request, goal, address, progress))
+def _asking(job: Job) -> Callable[[], Awaitable[None]]:
+    """Return what raises once the job is cancelled, also while nothing reports its progress."""
+
+    async def ask() -> None:
+        job.report(job.progress, job.step)
+
+    return ask
+
+
+async def _unless_ended(work: Coroutine[Any, Any, _T], ask: Callable[[], Awaitable[None]]) -> _T:
+    """Return the result of ``work``; what ``ask`` raises in between ends it."""
+    task = asyncio.ensure_future(work)
     try:
         while not task.done():
             await asyncio.wait({task}, timeout=_ASK_EVERY_S)
             await ask()
-        return PlanDocument.model_validate(task.result())
+        return task.result()
     finally:
         task.cancel()
 
 
-async def _in_place(
+async def _planned(
     service: Service, request: PlanRequest, goal: Goal, address: str, progress: Progress
 ) -> dict[str, Any]:
+    """Plan once there is a place for the address."""
     async with service.planning.place_of(address):
         scene = await _scene(service, request, goal.base, progress.part(0.0, _LOOKED))
         made = progress.part(_LOOKED, 1.0)
@@ -150,26 +166,64 @@ async def _in_place(
 @router.get(
     "/tradeoff",
     summary="What accuracy costs on this scene",
-    responses=documented(
-        kinds.INVALID_REQUEST,
-        kinds.TARGET_UNREACHABLE,
-        kinds.NO_FRAME_YET,
-        kinds.SHUTTING_DOWN,
-        kinds.PLANNING_BUSY,
-    ),
+    responses=documented(*_FRONT_REFUSALS),
 )
 async def read_tradeoff(
     service: ServiceOf,
     http: Request,
-    by: Annotated[
-        Literal["range_error_m", "range_std_m", "bound_width"],
-        Query(description="the accuracy that capture time is held against"),
-    ] = "range_error_m",
+    by: _By = "range_error_m",
 ) -> TradeoffDocument:
-    """Return the Pareto front for the scene, its lines, and where the current frame stands."""
-    async with service.planning.place_of(_address(http)):
+    """Return the Pareto front for the scene, its lines, and where the current frame stands.
+
+    `POST /tradeoff/jobs` reports its progress.
+    """
+    return TradeoffDocument.model_validate(await _front(service, _address(http), by))
+
+
+@router.post(
+    "/tradeoff/jobs",
+    status_code=status.HTTP_202_ACCEPTED,
+    summary="Predict what accuracy costs as a job, with progress",
+    responses=jobs.ACCEPTED | documented(*_FRONT_REFUSALS, kinds.TOO_MANY_JOBS),
+)
+@needs(Role.VIEWER, lease=False)
+async def start_tradeoff(
+    service: ServiceOf, http: Request, response: Response, by: _By = "range_error_m"
+) -> JobDocument:
+    """Begin to predict the front that `GET /tradeoff` answers with, which is the `result`.
+
+    While the job runs the result is the front so far: its ends first, then what is between, without
+    lines. It goes on when the client leaves; `POST /jobs/{job}/cancel` ends it.
+    """
+    address = _address(http)
+
+    async def work(job: Job) -> dict[str, Any]:
+        def so_far(document: dict[str, Any]) -> None:
+            job.result = _front_json(document)
+
+        made = await _unless_ended(
+            _front(service, address, by, Progress(job.report), so_far), _asking(job)
+        )
+        return _front_json(made)
+
+    return jobs.accepted(service.jobs.start(jobs.TRADEOFF, work, in_turn=False), response)
+
+
+def _front_json(document: dict[str, Any]) -> dict[str, Any]:
+    return TradeoffDocument.model_validate(document).model_dump(mode="json")
+
+
+async def _front(
+    service: Service,
+    address: str,
+    by: str,
+    progress: Progress | None = None,
+    so_far: Callable[[dict[str, Any]], None] = lambda document: None,
+) -> dict[str, Any]:
+    """Predict the front once there is a place for the address."""
+    async with service.planning.place_of(address):
         frame = await service.hub.newest(after=0, wait_s=_FRAME_WITHIN_S)
-        return TradeoffDocument.model_validate(await service.fronts.of(frame, by))
+        return await service.fronts.of(frame, by, progress, so_far)
 
 
 async def _scene(

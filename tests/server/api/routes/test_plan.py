@@ -143,6 +143,53 @@ def test_the_front_falls_and_the_current_frame_says_where_it_stands(
     assert 0 < accuracy["range_bias_m"] <= accuracy["range_error_m"] < 0.2
     assert 0 <= accuracy["outlier_share"] < 0.5
 
+    response = noisy.post("/api/v1/tradeoff/jobs")
+    job = end_of(noisy, response.json())
+    assert response.status_code == 202
+    assert (job["kind"], job["state"], job["progress"]) == ("tradeoff", "done", 1.0)
+    assert {name: job["result"][name] for name in ("front", "lines", "summary")} == {
+        name: answer[name] for name in ("front", "lines", "summary")
+    }
+
+
+def test_a_front_is_read_while_it_is_computed_and_cancelled_without_the_lease(
+    noisy: httpx.Client, noisy_daemon: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    began, ended, pause = threading.Event(), threading.Event(), threading.Event()
+
+    def endless(
+        goal: object, scene: object, progress: Progress, so_far: Callable[[dict[str, Any]], None]
+    ) -> None:
+        so_far({"front": [], "lines": [], "summary": "One of many."})
+        progress.at(0.5, "sequences for the front")
+        began.set()
+        try:
+            while True:
+                progress()
+                pause.wait(0.01)
+        except JobCancelled:
+            ended.set()
+            raise
+
+    monkeypatch.setattr(noisy_daemon.service.planner, "tradeoff_document", endless)
+    noisy_daemon.service.fronts.forget()
+    lease = noisy.post("/api/v1/lease", json={"holder": "test", "duration_s": 60}).json()
+    try:
+        job = noisy.post("/api/v1/tradeoff/jobs", params={"by": "range_std_m"}).json()
+        assert began.wait(60)
+        running = noisy.get(f"/api/v1/jobs/{job['id']}").json()
+
+        noisy.post(f"/api/v1/jobs/{job['id']}/cancel")
+
+        assert ended.wait(60)
+        assert 0.5 < running["progress"] < 1
+        assert running["result"]["summary"] == "One of many."
+        assert running["result"]["current"]["capture_s"] > 0
+        cancelled = end_of(noisy, job)
+        assert (cancelled["state"], cancelled["result"]) == ("cancelled", running["result"])
+    finally:
+        noisy.delete("/api/v1/lease", headers={LEASE_HEADER: lease["lease_id"]})
+
 
 def test_a_client_that_leaves_ends_the_work(
     noisy: httpx.Client, noisy_daemon: Served, monkeypatch: pytest.MonkeyPatch
