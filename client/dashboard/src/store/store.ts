@@ -3,6 +3,7 @@ import { createContext } from "preact";
 import { useContext } from "preact/hooks";
 
 import type { AppliedSequence, CameraDocument } from "../stream/protocol";
+import { Accuracy } from "./accuracy";
 import { Api, kindOf } from "./api";
 import { Calibrations } from "./calibrations";
 import { Caller } from "./caller";
@@ -15,6 +16,7 @@ import { Measures } from "./measures";
 import { Noises } from "./noise";
 import type { Pixel } from "./pixel";
 import { Player } from "./player";
+import { Sequencing } from "./sequencing";
 import { aNumber, browserShelf, oneOf, remembered, sessionShelf, type Shelf } from "./settings";
 import { isLayout, OVERVIEW, type Layout } from "../views/layout";
 import { MAP_PRODUCTS } from "../views/map/catalogue";
@@ -50,6 +52,10 @@ export class Store {
   readonly shelf: Shelf | null;
   /** The sequence in use, by the service; null until it is known. */
   readonly sequence = signal<AppliedSequence | null>(null);
+  /** Changes it. */
+  readonly sequencing: Sequencing;
+  /** What accuracy costs in time. */
+  readonly accuracy: Accuracy;
   /** What the camera is and can do; null until it is known. */
   readonly camera = signal<CameraDocument | null>(null);
   /** The page keeps the frame it shows although newer ones exist. */
@@ -101,6 +107,8 @@ export class Store {
     this.reconstruction = new Reconstruction(api);
     this.calibrations = new Calibrations(api);
     this.simulation = new Simulation(api);
+    this.sequencing = new Sequencing(api, this.events, this.sequence);
+    this.accuracy = new Accuracy(api);
     this.replay = new Replay(api, this.frames, this.status);
     api.onRefusal = (problem) => {
       this.lease.refused(kindOf(problem));

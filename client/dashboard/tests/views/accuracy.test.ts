@@ -1,8 +1,8 @@
 import { describe, expect, test } from "vitest";
 
 import type { AppliedSequence, Choice, FrameMeta, Tradeoff } from "../../src/stream/protocol";
-import { endsOf, marksOf, nearest, placeOf, sameSequence, standingOf } from "../../src/views/accuracy/place";
-import { goalWords } from "../../src/views/accuracy/words";
+import { endsOf, marksOf, nearest, placeOf, sameSequence, standingOf, stepOf } from "../../src/views/sequence/place";
+import { goalWords } from "../../src/views/sequence/goals";
 
 const choice = (capture_s: number, median: number): Choice =>
   ({ capture_s, sequence: { takes: capture_s }, predicted: { range_error_m: { median, low: 0.9 * median, high: 1.1 * median, p90: 2 * median } } }) as unknown as Choice;
@@ -52,6 +52,14 @@ test("two choices are the same where their sequences are", () => {
   expect(sameSequence(null, null)).toBe(false);
 });
 
+test("a time stands between the points of the front by its logarithm, and not beyond their ends", () => {
+  const front = [choice(0.1, 4), choice(0.4, 2), choice(6.4, 1)];
+  expect(front.map(({ capture_s }) => stepOf(front, capture_s))).toEqual([0, 1, 2]);
+  expect(stepOf(front, 0.2)).toBeCloseTo(0.5, 12);
+  expect(stepOf(front, 3.2)).toBeCloseTo(1.75, 12);
+  expect([stepOf(front, 0.01), stepOf(front, 60)]).toEqual([0, 2]);
+});
+
 test("a click means the nearest point within reach", () => {
   const points = [{ x: 10, y: 10 }, { x: 18, y: 10 }];
   expect(nearest(points, 15, 12)).toBe(points[1]);
@@ -63,6 +71,8 @@ test("a click means the nearest point within reach", () => {
 test("a goal that cannot be reached is refused in the names and units of the form", () => {
   const detail = "This cannot be reached on this scene: frame_rate_hz = 30. The best frame_rate_hz is 19.94.";
   expect(goalWords({ detail })).toBe("This cannot be reached on this scene: frame rate of 30.0\u202fHz. The best frame rate is 19.9\u202fHz.");
+  const off = "This cannot be reached on this scene: range_error_m = 1e-09. The best range_error_m is 0.0015.";
+  expect(goalWords({ detail: off })).toBe("This cannot be reached on this scene: error of the range of 1.00\u202fnm. The best error of the range is 1.50\u202fmm.");
   const other = "This cannot be reached on this scene: range_std_m = 0.0001. The best range_std_m is 2.5e-04.";
   expect(goalWords({ detail: other })).toBe("This cannot be reached on this scene: deviation of the range of 100\u202fµm. The best deviation of the range is 250\u202fµm.");
 });

@@ -6,7 +6,7 @@ import { engineering } from "../../ui/format";
 import { useSize } from "../../ui/hooks";
 import { endsOf, marksOf, nearest, placeOf, sameSequence, standingOf, type Standing } from "./place";
 
-const MARGIN = { left: 52, right: 14, top: 14, bottom: 36 };
+const MARGIN = { left: 52, right: 14, top: 14, bottom: 50 };
 
 const STEPS: Readonly<Record<string, number | undefined>> = { ArrowRight: 1, ArrowLeft: -1, Enter: 0, " ": 0 };
 
@@ -62,6 +62,9 @@ export function FrontPlot({ tradeoff, now, chosen, onChoose }: FrontPlotProps) {
               <text x={x(place)} y={height - MARGIN.bottom + 14} text-anchor="middle">
                 {engineering(value, "s", 1)}
               </text>
+              <text x={x(place)} y={height - MARGIN.bottom + 28} text-anchor="middle">
+                {engineering(1 / value, "Hz", 1)}
+              </text>
             </g>
           ))}
           {marksOf(ends.error).map(({ value, place }) => (
@@ -73,7 +76,7 @@ export function FrontPlot({ tradeoff, now, chosen, onChoose }: FrontPlotProps) {
             </g>
           ))}
           <text class="front-axis" x={MARGIN.left + inner.width / 2} y={height - 4} text-anchor="middle">
-            time of one capture
+            time of one capture, and captures a second
           </text>
           <text class="front-axis" x={MARGIN.left + 6} y={MARGIN.top + 8}>
             error of the range: noise and bias

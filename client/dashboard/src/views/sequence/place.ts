@@ -44,6 +44,14 @@ export function marksOf(scale: Scale): { value: number; place: number }[] {
   return ticks(scale, 6).map((value) => ({ value, place: fraction(scale, value) }));
 }
 
+/** Where a time stands among the points of a front, in steps from the first: between two by its logarithm. */
+export function stepOf(front: readonly Choice[], capture_s: number): number {
+  const after = front.findIndex((choice) => choice.capture_s >= capture_s);
+  if (after <= 0) return after < 0 ? front.length - 1 : 0;
+  const [low, high] = [front[after - 1].capture_s, front[after].capture_s];
+  return after - 1 + Math.log(capture_s / low) / Math.log(high / low);
+}
+
 /** Whether two choices are the same sequence. */
 export function sameSequence(a: Choice | null, b: Choice | null): boolean {
   return a !== null && b !== null && JSON.stringify(a.sequence) === JSON.stringify(b.sequence);
