@@ -228,7 +228,7 @@ def test_panels_are_moved_added_closed_and_resized_and_stay_so(page: Page, serve
         return views
 
     assert shown() == ["map", "transient", "response", "sequence"]
-    choose(page, "map", "Sequence")
+    choose(page, "map", "Sequence and accuracy")
     assert shown() == ["sequence", "transient", "response", "map"]
     choose(page, "map", "Close")
     choose(page, "response", "Streak →")

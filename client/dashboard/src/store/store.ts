@@ -21,6 +21,7 @@ import { aNumber, browserShelf, oneOf, remembered, sessionShelf, type Shelf } fr
 import { isLayout, OVERVIEW, type Layout } from "../views/layout";
 import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
+import { TransientLook } from "../views/transient/look";
 import { Reconstruction } from "./reconstruction";
 import { Recordings } from "./recordings";
 import { Replay } from "./replay";
@@ -76,6 +77,8 @@ export class Store {
   readonly player = new Player(this.period_s);
   /** A calibration has the camera for itself, so that no frames come. */
   readonly calibrating = computed(() => this.status.cameraState.value === "calibrating" || this.calibrations.job.value?.state === "running");
+  /** How light in flight is shown. */
+  readonly light: TransientLook;
   /** What only the service knows of the selected pixel. */
   readonly details: Details;
   readonly theme: Theme;
@@ -115,6 +118,7 @@ export class Store {
       if (problem.status === 401) this.asksForToken.value = true;
     };
     this.details = new Details(api);
+    this.light = new TransientLook(this.frames.of("coefficients"), shelf);
     this.mapProduct = remembered(shelf, "map.product", "range", oneOf(MAP_PRODUCTS.map(({ product }) => product)));
     this.field_deg = remembered(shelf, "points.field_deg", 45, isField);
     this.looks = new Looks(this.frames, this.noises, shelf);

@@ -13,7 +13,7 @@ const TRADEOFF = {
 
 describe("the plot of accuracy against time", () => {
   test("holds the front with its uncertainty and where the camera stands", () => {
-    const ends = endsOf(TRADEOFF, { capture_s: 20, range_error_m: 0.2 });
+    const ends = endsOf({ ...TRADEOFF, current: { capture_s: 20, meta: { accuracy: { range_error_m: 0.2 } } } } as unknown as Tradeoff);
     for (const [capture_s, range_error_m] of [[0.05, 0.044], [5, 0.00036], [20, 0.2]]) {
       const { x, y } = placeOf(ends, capture_s, range_error_m);
       expect(Math.min(x, y)).toBeGreaterThan(0);
@@ -22,27 +22,36 @@ describe("the plot of accuracy against time", () => {
   });
 
   test("is logarithmic: equal factors are equal ways", () => {
-    const ends = endsOf(TRADEOFF, null);
+    const ends = endsOf(TRADEOFF);
     const [a, b, c] = [0.1, 0.4, 1.6].map((capture_s) => placeOf(ends, capture_s, 0.01).x);
     expect(b - a).toBeCloseTo(c - b, 12);
-    expect(marksOf(ends.time).map(({ value }) => value)).toContainEqual(expect.closeTo(1, 9));
+    expect(marksOf(ends.time, 0).map(({ value }) => value)).toContainEqual(expect.closeTo(1, 9));
+  });
+
+  test("writes numbers beside its axes only where they have room", () => {
+    const { time } = endsOf(TRADEOFF);
+    const [all, some] = [marksOf(time, 0), marksOf(time, 0.3)];
+    expect(some.length).toBeLessThan(all.length);
+    some.slice(1).forEach(({ place }, n) => expect(place - some[n].place).toBeGreaterThanOrEqual(0.3));
   });
 });
 
 describe("where the camera stands", () => {
-  const meta = (sequence_id: number, median: number | null): FrameMeta =>
-    ({ sequence_id, accuracy: median === null ? null : { range_error_m: median } }) as unknown as FrameMeta;
-  const sequence = { sequence_id: 2, capture_s: 0.2 } as AppliedSequence;
+  const meta = (sequence_id: number, range_error_m: number | null): FrameMeta => ({ sequence_id, accuracy: { range_error_m } }) as unknown as FrameMeta;
+  const inUse = (sequence_id: number, takes = 3): AppliedSequence => ({ sequence_id, takes, capture_s: 0.2 }) as AppliedSequence;
+  const tradeoff = { ...TRADEOFF, current: { capture_s: 0.09, meta: meta(1, 0.011) } } as Tradeoff;
 
   test("is told by the newest frame of the sequence in use", () => {
-    expect(standingOf(meta(2, 0.005), sequence, TRADEOFF)).toEqual({ capture_s: 0.2, range_error_m: 0.005 });
+    expect(standingOf(meta(2, 0.005), inUse(2), tradeoff)).toEqual({ capture_s: 0.2, range_error_m: 0.005 });
   });
 
-  test("is that of the prediction's own frame where the newest does not tell or is of another sequence", () => {
-    const oneFrequency = { sequence_id: 2, accuracy: { range_error_m: null } } as unknown as FrameMeta;
-    for (const newest of [null, meta(1, 0.005), meta(2, null), oneFrequency]) {
-      expect(standingOf(newest, sequence, TRADEOFF)).toEqual({ capture_s: 0.09, range_error_m: 0.011 });
-    }
+  test("is that of the frame of the prediction where the newest does not tell and the sequence is still the same", () => {
+    for (const newest of [null, meta(1, null), meta(0, 0.005)]) expect(standingOf(newest, inUse(1), tradeoff)?.range_error_m).toBe(0.011);
+  });
+
+  test("is never told by a frame of another sequence: it is as predicted, or not known", () => {
+    expect(standingOf(meta(1, 0.005), inUse(2, 5), tradeoff)).toEqual({ capture_s: 0.2, range_error_m: 0.0004 });
+    expect(standingOf(meta(1, 0.005), inUse(2), tradeoff)).toBeNull();
   });
 });
 

@@ -2,7 +2,7 @@ import { useStore } from "../../store/store";
 import type { AppliedSequence, Choice } from "../../stream/protocol";
 import { engineering, fixed } from "../../ui/format";
 import { useProducts } from "../../ui/hooks";
-import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
+import { Obstacle, Steer } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
 import { ChoiceFacts } from "./ChoiceFacts";
 import { Finding } from "./Finding";
@@ -39,15 +39,10 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
   return (
     <div class="accuracy" data-predicted={tradeoff !== null}>
       {tradeoff !== null && <FrontPlot tradeoff={tradeoff} now={now} chosen={looked} onChoose={look} />}
-      <div class="accuracy-side">
+      <div class="accuracy-control">
         <p class="accuracy-figures">{looked === null ? <NowFigures applied={applied} error_m={now?.range_error_m ?? null} truth_m={truth_m} /> : <LookedFigures choice={looked} />}</p>
-        <FrontSlider front={tradeoff?.front ?? []} now={now} looked={looked} onLook={look} onRelease={() => void apply()} />
-        {tradeoff === null && accuracy.job.value === null && accuracy.problem.value === null ? (
-          <p class="finding quiet">Predict shows what each sequence would give on this scene: some seconds of work for the service.</p>
-        ) : (
-          <Finding />
-        )}
-        <TaskLine task={task} field="apply-status" />
+        <FrontSlider front={tradeoff?.front ?? []} now_s={applied.capture_s} looked={looked} onLook={look} onRelease={() => void apply()} />
+        <Finding task={task} />
         {tradeoff !== null && <Obstacle />}
         {looked !== null && (
           <div class="accuracy-actions">
@@ -59,6 +54,8 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
             </Steer>
           </div>
         )}
+      </div>
+      <div class="accuracy-facts">
         {looked === null ? <Summary applied={applied} /> : <ChoiceFacts choice={looked} />}
         <details class="accuracy-goal">
           <summary>Plan for a target</summary>
@@ -80,10 +77,11 @@ function LookedFigures({ choice }: { choice: Choice }) {
 
 /** How well the camera does now; noise and bias together once that is known, and where the truth is known how far it is off. */
 function NowFigures({ applied, error_m, truth_m }: { applied: AppliedSequence; error_m: number | null; truth_m: number | null }) {
-  const { status } = useStore();
+  const newest = useStore().status.newest.value;
+  const noise_m = newest?.sequence_id === applied.sequence_id ? newest.predicted_range_std_m?.median : null;
   return (
     <>
-      <strong data-field="now_range_error_m">± {engineering(error_m ?? status.newest.value?.predicted_range_std_m?.median, "m", 2)}</strong> <span>{engineering(applied.capture_s, "s")}</span> <span>{fixed(applied.frame_rate_hz, 1, "Hz")}</span>{" "}
+      <strong data-field="now_range_error_m">± {engineering(error_m ?? noise_m, "m", 2)}</strong> <span>{engineering(applied.capture_s, "s")}</span> <span>{fixed(applied.frame_rate_hz, 1, "Hz")}</span>{" "}
       <span class="quiet">
         now
         {truth_m !== null && `, ${engineering(truth_m, "m", 2)} off the truth`}

@@ -1,9 +1,11 @@
 import { useStore } from "../../store/store";
-import { NOTHING } from "../../ui/format";
+import type { Task } from "../../ui/useTask";
 import { goalWords } from "./goals";
 
-/** How far the service is with what was asked, and the way to end it; else what came of it. Its height stays. */
-export function Finding() {
+const HINT = "Predict shows what each sequence would give on this scene: some seconds of work for the service.";
+
+/** How far the service is with what was asked, and the way to end it; else what came of it, or of setting a sequence. Its height stays. */
+export function Finding({ task }: { task: Task }) {
   const { accuracy } = useStore();
   const job = accuracy.job.value;
   const problem = accuracy.problem.value;
@@ -21,10 +23,11 @@ export function Finding() {
       </div>
     );
   }
-  const words = problem !== null ? goalWords(problem) : accuracy.outdated.value ? "The scene changed since: predict again." : (accuracy.tradeoff.value?.summary ?? NOTHING);
+  const refusal = task.refusal.value ?? (problem === null ? null : goalWords(problem));
+  const found = accuracy.outdated.value ? "The scene changed since: predict again." : (accuracy.tradeoff.value?.summary ?? HINT);
   return (
-    <p class={problem === null ? "finding quiet" : "finding refusal"} role="status" data-field="accuracy-status">
-      {words}
+    <p class={refusal === null ? "finding quiet" : "finding refusal"} role="status" data-field="accuracy-status">
+      {task.busy.value ?? refusal ?? found}
     </p>
   );
 }

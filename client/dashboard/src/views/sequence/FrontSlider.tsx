@@ -2,13 +2,13 @@ import { useRef } from "preact/hooks";
 
 import type { Choice } from "../../stream/protocol";
 import { engineering, fixed } from "../../ui/format";
-import { sameSequence, stepOf, type Standing } from "./place";
+import { sameSequence, stepOf } from "./place";
 
 interface FrontSliderProps {
   /** By rising time and falling error. */
   readonly front: readonly Choice[];
-  /** What the camera measures with. */
-  readonly now: Standing | null;
+  /** Time of a capture with the sequence in use. */
+  readonly now_s: number;
   readonly looked: Choice | null;
   readonly onLook: (choice: Choice) => void;
   /** The slider was let go at what is looked at. */
@@ -19,7 +19,7 @@ interface FrontSliderProps {
 const MOVING: readonly string[] = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"];
 
 /** From fast to accurate along the front, a step a point; where the camera stands now is marked on it. */
-export function FrontSlider({ front, now, looked, onLook, onRelease }: FrontSliderProps) {
+export function FrontSlider({ front, now_s, looked, onLook, onRelease }: FrontSliderProps) {
   const moved = useRef(false);
   const key = useRef(false);
   const release = (): void => {
@@ -29,7 +29,7 @@ export function FrontSlider({ front, now, looked, onLook, onRelease }: FrontSlid
     onRelease();
   };
   const last = front.length - 1;
-  const ghost = now === null || last < 1 ? null : stepOf(front, now.capture_s);
+  const ghost = last < 1 ? null : stepOf(front, now_s);
   const at = front.findIndex((choice) => sameSequence(choice, looked));
   const step = at >= 0 ? at : looked !== null && last > 0 ? Math.round(stepOf(front, looked.capture_s)) : Math.round(ghost ?? 0);
   return (

@@ -24,8 +24,8 @@ export function SequenceView() {
                 Undo
               </Steer>
             )}
-            <button type="button" disabled={accuracy.job.value !== null} onClick={() => void accuracy.predict()}>
-              {accuracy.tradeoff.value === null ? "Predict" : "Predict again"}
+            <button type="button" title="What accuracy costs in time on the scene before the camera, now" disabled={accuracy.job.value !== null} onClick={() => void accuracy.predict()}>
+              Predict
             </button>
             <Steer title="Change what the camera measures with" onClick={() => (editing.value = true)}>
               Edit

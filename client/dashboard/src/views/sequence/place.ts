@@ -15,33 +15,40 @@ export interface Standing {
 /** Room around what is shown, as a factor. */
 const ROOM = 1.25;
 
-/** Scales, in s and m, that hold the front and where the camera stands now. */
-export function endsOf({ front }: Tradeoff, now: Standing | null): Ends {
-  const times = [...(now === null ? [] : [now.capture_s]), ...front.map(({ capture_s }) => capture_s)];
+/** Scales, in s and m, that hold the front and the frame beside which it was predicted: what follows trembles, and the axes must not. */
+export function endsOf({ front, current }: Tradeoff): Ends {
+  const times = [current.capture_s, ...front.map(({ capture_s }) => capture_s)];
   const errors = front.flatMap(({ predicted }) => [predicted.range_error_m.low, predicted.range_error_m.high, predicted.range_error_m.median]);
-  if (now !== null) errors.push(now.range_error_m);
+  const then = current.meta.accuracy?.range_error_m ?? null;
+  if (then !== null) errors.push(then);
   const scale = (values: readonly number[]): Scale => ({ low: Math.min(...values) / ROOM, high: Math.max(...values) * ROOM, kind: "logarithmic" });
   return { time: scale(times), error: scale(errors) };
 }
 
-/** Where the camera stands: by the frame on screen, or by that which the front was predicted with; null if neither is known. */
-export function standingOf(meta: FrameMeta | null, sequence: AppliedSequence | null, { current }: Pick<Tradeoff, "current">): Standing | null {
-  const live = meta?.accuracy?.range_error_m ?? null;
-  if (live !== null && sequence !== null && sequence.sequence_id === meta?.sequence_id) {
-    return { capture_s: sequence.capture_s, range_error_m: live };
-  }
-  const then = current.meta.accuracy?.range_error_m ?? null;
-  return then === null ? null : { capture_s: current.capture_s, range_error_m: then };
+/** Where the camera stands with a sequence: by the frame on screen, or by that which the front was predicted beside, or as predicted. */
+export function standingOf(meta: FrameMeta | null, sequence: AppliedSequence, { current, front }: Tradeoff): Standing | null {
+  const ofIt = [meta, current.meta].find((each) => each?.sequence_id === sequence.sequence_id && each.accuracy?.range_error_m != null);
+  const predicted = front.find((choice) => FIELDS.every((field) => choice.sequence[field] === sequence[field]));
+  const range_error_m = ofIt?.accuracy?.range_error_m ?? predicted?.predicted.range_error_m.median ?? null;
+  return range_error_m === null ? null : { capture_s: sequence.capture_s, range_error_m };
 }
+
+/** What makes two sequences the same, of those that differ in nothing else. */
+const FIELDS = ["base_frequency_hz", "harmonics", "zeroth", "exposure_s", "takes"] as const;
 
 /** Place of a choice, 0 to 1 from the left and from the bottom. */
 export function placeOf({ time, error }: Ends, capture_s: number, range_error_m: number): { x: number; y: number } {
   return { x: fraction(time, capture_s), y: fraction(error, range_error_m) };
 }
 
-/** Round numbers along a scale. */
-export function marksOf(scale: Scale): { value: number; place: number }[] {
-  return ticks(scale, 6).map((value) => ({ value, place: fraction(scale, value) }));
+/** Round numbers along a scale, with at least this share of it between two. */
+export function marksOf(scale: Scale, apart: number): { value: number; place: number }[] {
+  const marks: { value: number; place: number }[] = [];
+  for (const value of ticks(scale, 6)) {
+    const place = fraction(scale, value);
+    if (marks.length === 0 || place - marks[marks.length - 1].place >= apart) marks.push({ value, place });
+  }
+  return marks;
 }
 
 /** Where a time stands among the points of a front, in steps from the first: between two by its logarithm. */

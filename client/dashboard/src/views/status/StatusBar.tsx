@@ -71,7 +71,7 @@ function Performance() {
   const error = useComputed(() => deviation(status.newest.value?.accuracy?.range_error_m ?? status.newest.value?.predicted_range_std_m?.median, "m"));
   const open = (): void => {
     alone.value = alone.peek() === "sequence" ? null : "sequence";
-    if (alone.peek() !== null && accuracy.tradeoff.peek() === null && status.running.peek() === true) void accuracy.predict();
+    if (alone.peek() !== null && accuracy.tradeoff.peek() === null && status.newest.peek() !== null) void accuracy.predict();
   };
   return (
     <button
