@@ -15,7 +15,7 @@ import numpy as np
 from rich.console import Console
 
 import transientcam_moments as tm
-from benchmarks import camera_estimates
+from benchmarks import camera_estimates, camera_pairs
 from benchmarks.camera_estimates import FIRST_M, NOISE, RATIO
 from benchmarks.tables import Table
 from transientcam_driver import Sequence, SubPhases, open_camera
@@ -115,7 +115,9 @@ def main() -> None:
         Console(width=140).print(camera_estimates.cost())
         return
     estimates = camera_estimates.table()
-    estimates.show(Console(width=140))
+    pairs = camera_pairs.table()
+    for each in (estimates, pairs):
+        each.show(Console(width=140))
     made = table()
     made.notes.append("")
     made.notes.append(frame_of_hall())
@@ -124,7 +126,9 @@ def main() -> None:
         text = PAGE.read_text(encoding="utf-8")
         before, rest = text.split(_MARKS[0])
         _, after = rest.split(_MARKS[1])
-        body = "\n".join(each.markdown().replace("## ", "### ", 1) for each in (estimates, made))
+        body = "\n".join(
+            each.markdown().replace("## ", "### ", 1) for each in (estimates, pairs, made)
+        )
         written = "Written by `python -m benchmarks.cameras --write`; no machine has a part in it."
         page = f"{before}{_MARKS[0]}\n{body}\n{written}\n{_MARKS[1]}{after}"
         PAGE.write_text(page, encoding="utf-8")

@@ -29,7 +29,7 @@ from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.likelihood import MODEL_ERROR, Likelihood
 from transientcam_moments.likelihood.choice import MOST_RETURNS
 from transientcam_moments.likelihood.estimate import assumed_noise, fitted
-from transientcam_moments.likelihood.pairs import two_returns
+from transientcam_moments.likelihood.pairs import fitted_pairs
 from transientcam_moments.maximum_entropy import density
 from transientcam_moments.merging import merge_returns
 from transientcam_moments.noise.moments import MomentNoise, moment_noise, smoothed_of
@@ -446,7 +446,7 @@ class Reconstruction:
     def two_returns(self) -> Likelihood:
         """One or two returns, as many as the noise justifies, with what they are worth."""
         moments, noise, harmonics, error = self._evidence
-        return two_returns(moments, noise, harmonics=harmonics, model_error=error)
+        return fitted_pairs(moments, noise, self._spread, harmonics, error)
 
     @cached_property
     def unwrapped(self) -> Unwrapped:

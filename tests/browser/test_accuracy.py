@@ -1,7 +1,6 @@
 """The panel of sequence and accuracy: the front, the slider along it, plans, and the way back."""
 
 import threading
-from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -49,13 +48,13 @@ def test_the_front_fills_and_its_slider_sets_a_sequence_that_can_be_undone(
     go_on = threading.Event()
     computed = served.service.planner.tradeoff_document
 
-    def held_up(goal: Any, scene: Any, progress: Progress, so_far: Callable[..., None]) -> Any:
-        def shown(document: dict[str, Any]) -> None:
-            so_far(document)
+    def held_up(goal: Any, scene: Any, progress: Progress) -> Any:
+        def show(document: dict[str, Any]) -> None:
+            progress.show(document)
             if len(document["front"]) > 2:
                 assert go_on.wait(120)
 
-        return computed(goal, scene, progress, shown)
+        return computed(goal, scene, progress.part(0.0, 1.0, show=show))
 
     monkeypatch.setattr(served.service.planner, "tradeoff_document", held_up)
     open_page(page)
@@ -65,7 +64,7 @@ def test_the_front_fills_and_its_slider_sets_a_sequence_that_can_be_undone(
     points = page.locator(".front-point")
     expect(points).to_have_count(3)
     status = page.locator(f"{PANEL} [data-field=accuracy-status]")
-    expect(status).to_contain_text("sequences for the front")
+    expect(status).to_contain_text("captures of")
     expect(status.get_by_role("button", name="Cancel")).to_be_visible()
     go_on.set()
     expect(status.get_by_role("progressbar")).to_have_count(0)

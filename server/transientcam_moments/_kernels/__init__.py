@@ -31,6 +31,8 @@ isn't finite
 ``likelihood(b (m+1, P), variance (m+1, P), returns, tail_shape) -> attributes of Likelihood``,
 or None for other than the usual models
 
+``pairs(b (m+1, P), variance (m+1, P), error) -> attributes of Likelihood``, of two returns
+
 ``harmonics(given, current, polynomial (m+1, P), mixed (K m, P), inverse (m, P), orders) ->
 following (m+1, P), misfit (P)``, or None for orders above 31
 

@@ -49,7 +49,7 @@ _INTERLEAVE = 2
 
 
 @njit(forceinline=True, error_model="numpy")
-def _prepare(
+def prepare(
     order: Any, b: Any, variance: Any, error: float, p: int, one: Any, data_r: Any, data_i: Any,
     weight: Any,
 ) -> Any:  # fmt: skip
@@ -86,7 +86,7 @@ def _prepare(
 
 
 @njit(error_model="numpy")
-def _fit(
+def fit(
     order: Any, returns: Any, unknowns: Any, steps: int, cosine: float, sine: float, data_r: Any,
     data_i: Any, weight: Any, x: Any, y: Any, w: Any, rr: Any, ri: Any, active: Any, bar: Any,
 ) -> Any:  # fmt: skip
@@ -148,7 +148,7 @@ def _fit_tail(
 
 
 @njit(forceinline=True, error_model="numpy")
-def _write(
+def write(
     slots: Any, found: Any, scale: Any, numbers: Any, usable: Any, p: int, planes: Any, free: Any,
     count: Any,
 ) -> None:  # fmt: skip
@@ -222,19 +222,19 @@ def fit_returns(
     x, y, w = simd.registers(one, (), 3), simd.registers(one, (), 3), simd.registers(one, (), 3)
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        scale, numbers, usable = _prepare(order, b, variance, error, p, one, data_r, data_i, weight)
+        scale, numbers, usable = prepare(order, b, variance, error, p, one, data_r, data_i, weight)
         penalty = logarithm(numbers) + MARGIN
         choice.nothing(one, far, found)
         for j in range(m + 1):
             rr[j], ri[j] = data_r[j], data_i[j]
-        cost = _fit(
+        cost = fit(
             order, (0,), (0, 0), STEPS[0], cosine, sine, data_r, data_i, weight, x, y, w, rr, ri,
             usable, far,
         )  # fmt: skip
         choice.offer_returns(order, (0,), (0, 0), weight, x, y, w, cost, penalty, one > 0.0, found)
         more = found[SCORE] > 4.0 * penalty
         if m >= 2 and simd.some(more):
-            cost = _fit(
+            cost = fit(
                 order, (0, 0), (0, 0, 0, 0), STEPS[1], cosine, sine, data_r, data_i, weight, x, y,
                 w, rr, ri, more, far,
             )  # fmt: skip
@@ -248,7 +248,7 @@ def fit_returns(
             )  # fmt: skip
             more = more & (found[SCORE] > 6.0 * penalty) & (numbers >= 6.0)
             if m >= 3 and simd.some(more):
-                cost = _fit(
+                cost = fit(
                     order, (0, 0, 0), (0, 0, 0, 0, 0, 0), STEPS[2], cosine, sine, data_r, data_i,
                     weight, x, y, w, rr, ri, more, found[SCORE] - 6.0 * penalty,
                 )  # fmt: skip
@@ -256,7 +256,7 @@ def fit_returns(
                     order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, x, y, w, cost, penalty, more,
                     found,
                 )  # fmt: skip
-        _write(slots, found, scale, numbers, usable, p, planes, free, count)
+        write(slots, found, scale, numbers, usable, p, planes, free, count)
 
 
 def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:

@@ -16,8 +16,6 @@ from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.queue import PlanningQueue
 
 KEPT_S: Final = 10.0
-_LOOKED: Final = 0.3
-"""Share of the time of a front after which the scene was looked at."""
 _WIDE: Final = 1e9  # a target that every sequence reaches: it only requests the prediction
 
 
@@ -52,29 +50,24 @@ class FrontCache:
         self._predicting = asyncio.Lock()
 
     async def of(
-        self,
-        frame: Frame,
-        by: str,
-        progress: Progress | None = None,
-        so_far: Callable[[dict[str, Any]], None] = lambda document: None,
+        self, frame: Frame, by: str, looking: Progress, predicting: Progress
     ) -> dict[str, Any]:
         """Return the front compared by target ``by``, and the frame's own place, as JSON.
 
-        ``so_far`` receives the same document while the front is computed, from the thread that
-        does; what is raised by ``progress`` ends the work.
+        ``predicting`` shows the same document with the front so far; what either progress raises
+        ends the work, unless it is done.
         """
         around = {
             "compared_by": by,
             "scene_of_frame": frame.number,
             "current": await self._current(frame),
         }
+        shown = predicting.part(0.0, 1.0, show=lambda part: predicting.show(around | part))
         async with self._predicting:
             cached = self._cached.get(by)
             made_with = frame.raw.epoch, frame.recipe.settings_version
             if cached is None or cached.made_with != made_with or self._clock() > cached.until_s:
-                document = await self._predicted(
-                    frame, by, progress or Progress(), lambda part: so_far(around | part)
-                )
+                document = await self._predicted(frame, by, looking, shown)
                 cached = _CachedFront(made_with, frame.number, self._clock() + KEPT_S, document)
                 self._cached[by] = cached
         return around | {"scene_of_frame": cached.frame} | cached.document
@@ -85,11 +78,7 @@ class FrontCache:
         self._looks.forget()
 
     async def _predicted(
-        self,
-        frame: Frame,
-        by: str,
-        progress: Progress,
-        so_far: Callable[[dict[str, Any]], None],
+        self, frame: Frame, by: str, looking: Progress, predicting: Progress
     ) -> dict[str, Any]:
         base = frame.recipe.applied.sequence
         if self._looks.needs_frame:
@@ -97,15 +86,13 @@ class FrontCache:
         else:
             frequency_hz = base.base_frequency_hz
             base = Sequence(base_frequency_hz=frequency_hz, sub_phases=base.sub_phases)
-            scene = await self._looks.of_twin(base, None, progress.part(0.0, _LOOKED))
+            scene = await self._looks.of_twin(base, None, looking)
         goal = Goal(
             base=base,
             range_std_m=_WIDE if by == "range_std_m" else None,
             bound_width=_WIDE if by == "bound_width" else None,
         )
-        return await self._queue.run(
-            self._planner.tradeoff_document, goal, scene, progress.part(_LOOKED, 1.0), so_far
-        )
+        return await self._queue.run(self._planner.tradeoff_document, goal, scene, predicting)
 
     async def _current(self, frame: Frame) -> dict[str, Any]:
         found = await frame.reconstruction("returns")

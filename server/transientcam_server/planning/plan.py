@@ -151,10 +151,8 @@ def in_a_sentence(front: list[Choice]) -> str:
     )
     if not ruled:
         return f"Noise rules everywhere: more time buys accuracy; {best}."
-    return (
-        f"From {_time_in_words(ruled[-1].applied.capture_s)} on bias rules and more time buys little; "
-        f"{best}."
-    )
+    since = _time_in_words(ruled[-1].applied.capture_s)
+    return f"From {since} on bias rules and more time buys little; {best}."
 
 
 def _time_in_words(time_s: float) -> str:

@@ -21,7 +21,7 @@ from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.queue import Allowance, Rest
 from transientcam_server.planning.scene import SceneStatistics
-from transientcam_server.planning.search import ON_FRONT, Line, Search
+from transientcam_server.planning.search import Line, Search
 from transientcam_server.planning.timing import ReconstructionTimer
 from transientcam_server.settings import ReconstructionSettings
 
@@ -106,25 +106,21 @@ class Planner:
         return families(goal, self._predictor(scene), self._capabilities)
 
     def tradeoff_document(
-        self,
-        goal: Goal,
-        scene: SceneStatistics,
-        progress: Progress | None = None,
-        so_far: Callable[[dict[str, Any]], None] = lambda document: None,
+        self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
     ) -> dict[str, Any]:
         """Return all that no other beats, and the lines they lie on, as JSON: seconds of work.
 
-        ``so_far`` receives the same document, without lines, after each point of the front; what is
-        raised by ``progress`` ends the work.
+        ``progress`` shows the same document, without lines, after each point of the front; what it
+        raises ends the work.
         """
         progress = progress or Progress()
         predictor = self._predictor(scene, progress)
         found = families(goal, predictor, self._capabilities)
         search = Search(goal, found, predictor, self._computing)
         choices: list[Choice] = []
-        for done, choices in enumerate(search.fronts(goal.leading), start=1):
-            progress.at(done / (ON_FRONT + 1), "sequences for the front")
-            so_far(_front_document(choices, []))
+        for choices in search.fronts(goal.leading, progress.part(0.0, 0.8)):
+            progress.show(_front_document(choices, []))
+        progress.at(0.8, "lines")
         return _front_document(choices, search.lines(choices))
 
     def close(self) -> None:

@@ -14,6 +14,7 @@ from transientcam_server.planning.families import Family, Member
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.pareto import front
 from transientcam_server.planning.prediction import Predictor
+from transientcam_server.planning.progress import Progress
 
 Timed = Callable[[Sequence, str], float]
 """Computing time in s of a frame of a sequence with an estimator."""
@@ -176,19 +177,21 @@ class Search:
         choices = [self.choice(each.family, each.member) for each in found[:contenders]]
         return min(choices, key=lambda choice: choice.error(leading), default=None)
 
-    def fronts(self, leading: str) -> Iterator[list[Choice]]:
+    def fronts(self, leading: str, progress: Progress | None = None) -> Iterator[list[Choice]]:
         """Yield the finest choices within rising times, without those that others beat.
 
         After each time the front so far, the last time the whole; the ends come first and then what
         is between, so that early ones show all of it coarsely.
         """
+        progress = progress or Progress()
         shortest_s = self.families[0].members[0].capture_s
         longest_s = max(family.members[-1].capture_s for family in self.families)
         longest_s = min(max(LONGEST_S, shortest_s), longest_s)
         ratio = (longest_s / shortest_s) ** (1 / (ON_FRONT - 1))
         times_s = [shortest_s * ratio**k * (1 + 1e-9) for k in range(ON_FRONT)]
         choices = []
-        for k in _coarse_to_fine(ON_FRONT):
+        for done, k in enumerate(_coarse_to_fine(ON_FRONT)):
+            progress.at(done / ON_FRONT, f"captures of {times_s[k] * 1e3:.3g} ms")
             choice = self.finest(leading, times_s[k], contenders=1)
             if choice is not None:
                 choices.append(choice)
