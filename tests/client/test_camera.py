@@ -94,7 +94,7 @@ _CALLS: dict[
     "start a tradeoff": (
         lambda c: c.start_tradeoff("range_std_m"),
         lambda c: c.start_tradeoff("range_std_m"),
-        ("POST", "tradeoff/jobs", "by=range_std_m", None),
+        ("POST", "tradeoff/jobs", "", {"by": "range_std_m"}),
     ),
     "reconstruction": (
         lambda c: c.reconstruction,

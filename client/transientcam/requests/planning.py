@@ -34,4 +34,4 @@ def tradeoff(by: str) -> Request[dict[str, Any]]:
 
 def start_tradeoff(by: str) -> Request[dict[str, Any]]:
     """Build the request for the job that finds these."""
-    return document("tradeoff/jobs", method="POST", params=[("by", by)])
+    return document("tradeoff/jobs", method="POST", body={"by": by})

@@ -156,10 +156,13 @@ def _polish(
 
 @njit(nogil=True, error_model="numpy")
 def fit_pairs(
-    order: Any, cosine: float, sine: float, turns: Any, b: Any, variance: Any, error: float,
-    planes: Any, free: Any, count: Any, start: int, stop: int,
+    order: Any, starts: Any, cosine: float, sine: float, turns: Any, b: Any, variance: Any,
+    error: float, planes: Any, free: Any, count: Any, start: int, stop: int,
 ) -> None:  # fmt: skip
-    """Write the estimate of the pixels start..stop; two returns where one leaves enough."""
+    """Write the estimate of the pixels start..stop; two returns where one leaves enough.
+
+    ``starts`` is a tuple of length `STARTS`.
+    """
     m = len(order)
     one = simd.ones(variance, 1)
     step, far = simd.width(one), simd.infinity(one)
@@ -171,7 +174,7 @@ def fit_pairs(
     # 8 m phases, or 24: (m + 8)^2 are enough for two turns, and (m + 12)^2 for three rows
     along, alike = simd.matrix(one, order, 8), simd.matrix(one, order, 4)
     rows = simd.matrix(one, order, 12)
-    gains, pairs = simd.registers(one, (), 16), simd.registers(one, (), 16)
+    gains, pairs = simd.registers(one, starts, 0), simd.registers(one, starts, 0)
     room = np.empty((4, step), turns.dtype)
     for left in range(start, stop, step):
         p = min(left, stop - step)
@@ -206,12 +209,12 @@ def fit_pairs(
 
 def pairs_lane(m: int, precision: str) -> Callable[..., Any]:
     """Compile the estimate of order m, 2 or more; see the table in ``_kernels``."""
-    order = (0,) * m
+    order, starts = (0,) * m, (0,) * STARTS
     real, cplx = real_arrays(precision), complex_arrays(precision)
     run = entry(
         fit_pairs,
-        order_type(m), REAL, REAL, real[2], cplx[2], real[2], REAL, real[2], COUNTS, COUNTS,
-        PIXELS, PIXELS,
+        order_type(m), order_type(STARTS), REAL, REAL, real[2], cplx[2], real[2], REAL, real[2],
+        COUNTS, COUNTS, PIXELS, PIXELS,
     )  # fmt: skip
     turn = 2 * np.pi / choice.phases_of(m)
     cosine, sine = float(np.cos(turn)), float(np.sin(turn))
@@ -225,7 +228,10 @@ def pairs_lane(m: int, precision: str) -> Callable[..., Any]:
         free, count = np.empty(pixels, np.int32), np.empty(pixels, np.int32)
 
         def part(start: int, stop: int) -> None:
-            run(order, cosine, sine, turns, moments, noise, error, planes, free, count, start, stop)
+            run(
+                order, starts, cosine, sine, turns, moments, noise, error, planes, free, count,
+                start, stop,
+            )  # fmt: skip
 
         spread(part, pixels)
         return (*(planes[2 * k : 2 * k + 2] for k in range(4)), *planes[8:], free, count)

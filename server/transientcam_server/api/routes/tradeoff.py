@@ -1,7 +1,7 @@
 """Accuracy and time: all that no other sequence beats on the scene before the camera."""
 
 from functools import partial
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final
 
 from fastapi import APIRouter, Query, Request, Response, status
 
@@ -10,7 +10,11 @@ from transientcam_server.api.auth import Role
 from transientcam_server.api.auth.permissions import needs
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.job import JobDocument
-from transientcam_server.api.documents.plan import TradeoffDocument
+from transientcam_server.api.documents.plan import (
+    AccuracyName,
+    TradeoffDocument,
+    TradeoffRequest,
+)
 from transientcam_server.api.problems import documented
 from transientcam_server.api.routes import jobs
 from transientcam_server.errors import kinds
@@ -27,10 +31,6 @@ _REFUSALS: Final = (
     kinds.SHUTTING_DOWN,
     kinds.PLANNING_BUSY,
 )
-_By = Annotated[
-    Literal["range_error_m", "range_std_m", "bound_width"],
-    Query(description="the accuracy that capture time is held against"),
-]
 
 
 @router.get(
@@ -39,7 +39,11 @@ _By = Annotated[
     responses=documented(*_REFUSALS),
 )
 async def read_tradeoff(
-    service: ServiceOf, http: Request, by: _By = "range_error_m"
+    service: ServiceOf,
+    http: Request,
+    by: Annotated[
+        AccuracyName, Query(description="the accuracy that capture time is held against")
+    ] = "range_error_m",
 ) -> TradeoffDocument:
     """Return the Pareto front for the scene, its lines, and where the current frame stands.
 
@@ -53,19 +57,19 @@ async def read_tradeoff(
     "/tradeoff/jobs",
     status_code=status.HTTP_202_ACCEPTED,
     summary="Compute what accuracy costs as a job, with progress",
-    responses=jobs.ACCEPTED | documented(*_REFUSALS, kinds.TOO_MANY_JOBS),
+    responses=jobs.ACCEPTED | documented(*_REFUSALS, kinds.BAD_REQUEST, kinds.TOO_MANY_JOBS),
 )
 @needs(Role.VIEWER, lease=False)
 async def start_tradeoff(
-    service: ServiceOf, http: Request, response: Response, by: _By = "range_error_m"
+    service: ServiceOf, http: Request, response: Response, request: TradeoffRequest | None = None
 ) -> JobDocument:
     """Begin to compute what `GET /tradeoff` answers with, which is the `result` of the job.
 
     While the job runs the result is the front so far: its ends first, then what is between, without
-    lines.
-    What that would be refused with is the `problem` of the job. It goes on when the client leaves;
+    lines. What that would be refused with is the `problem` of the job. It goes on when the client leaves;
     `POST /jobs/{job}/cancel` ends it.
     """
+    by = (request or TradeoffRequest()).by
     return planned.as_job(service, KIND, _work(service, by, http), response)
 
 

@@ -13,6 +13,7 @@ import pytest
 
 from tests.server.contract import hold_to_contract
 from tests.serving import Served, serving
+from transientcam import Camera
 from transientcam.wire import LEASE_HEADER
 from transientcam_server.errors.exceptions import JobCancelled, Problem
 from transientcam_server.planning import Progress
@@ -148,7 +149,7 @@ def test_the_front_falls_and_the_current_frame_says_where_it_stands(
 
 
 class Endless:
-    """Work that reports where it is, and goes on until that raises."""
+    """Work in pure Python that reports where it is, and goes on until that raises."""
 
     def __init__(self) -> None:
         self.began, self.ended = threading.Event(), threading.Event()
@@ -159,7 +160,8 @@ class Endless:
         progress.show({"summary": "One of many."})
         self.began.set()
         try:
-            while not self.ended.wait(0.01):
+            while not self.ended.is_set():
+                sum(k * k for k in range(10_000))
                 progress()
         except (Problem, JobCancelled) as error:
             self.raised = error
@@ -259,6 +261,25 @@ def test_what_is_planned_is_cancelled_without_the_lease_and_reports_its_steps(
         assert (ended["state"], ended["result"]) == ("cancelled", running["result"])
     finally:
         noisy.delete("/api/v1/lease", headers={LEASE_HEADER: lease["lease_id"]})
+
+
+def test_a_viewer_has_new_frames_while_something_is_planned(
+    noisy: httpx.Client, noisy_daemon: Served, endless: tuple[str, Endless]
+) -> None:
+    what, work = endless
+    body = {"target": {"range_error_m": 0.01}} if what == "plan" else None
+    with Camera(noisy_daemon.url, timeout_s=60.0) as camera, camera.stream("range") as stream:
+        frames = iter(stream)
+        numbers = [next(frames).meta["frame"]]
+        job = noisy.post(f"/api/v1/{what}/jobs", json=body).json()
+        assert work.began.wait(60)
+
+        numbers += [next(frames).meta["frame"] for _ in range(10)]
+
+        assert not work.ended.is_set()
+        noisy.post(f"/api/v1/jobs/{job['id']}/cancel")
+        assert end_of(noisy, job)["state"] == "cancelled"
+    assert numbers == sorted(set(numbers))
 
 
 def test_errors_of_the_range_cost_nothing_until_a_client_requests_them(
