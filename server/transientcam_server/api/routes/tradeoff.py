@@ -66,8 +66,8 @@ async def start_tradeoff(
     """Begin to compute what `GET /tradeoff` answers with, which is the `result` of the job.
 
     While the job runs the result is the front so far: its ends first, then what is between, without
-    lines. What that would be refused with is the `problem` of the job. It goes on when the client leaves;
-    `POST /jobs/{job}/cancel` ends it.
+    lines. What that would be refused with is the `problem` of the job. It goes on when the client
+    leaves; `POST /jobs/{job}/cancel` ends it.
     """
     by = (request or TradeoffRequest()).by
     return planned.as_job(service, KIND, _work(service, by, http), response)
