@@ -24,7 +24,7 @@ PANEL = ".panel-sequence"
 def few_families(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is searched is no concern of the page's: little, so that it is found quickly."""
     families = import_module("transientcam_server.planning.families")  # not the function
-    monkeypatch.setattr(families, "HARMONICS", (1, 3))
+    monkeypatch.setattr(families, "HARMONICS", (1, 4))
     monkeypatch.setattr(families, "FREQUENCY_FACTORS", (1.0,))
     monkeypatch.setattr(families, "SEARCHED", ("single-frequency", "maximum-entropy"))
 

@@ -113,12 +113,12 @@ export class PointScene {
     this.#draw();
   }
 
-  /** Looks from the side, so that depth is seen. */
+  /** Looks from behind the camera and from its side, so that depth and the camera are seen. */
   aside(): void {
     this.#eye = false;
     const distance = this.#distance();
-    this.#controls.target.set(0, 0, -distance);
-    this.#camera.position.set(0.5 * distance, 0.3 * distance, -0.05 * distance);
+    this.#controls.target.set(0, 0, -0.6 * distance);
+    this.#camera.position.set(0.75 * distance, 0.45 * distance, 0.45 * distance);
     this.#fit();
     this.#controls.update();
     this.#draw();

@@ -3,7 +3,7 @@ import { BufferAttribute, BufferGeometry, DepthTexture, Mesh, NearestFilter, NoB
 
 /** How far away neighbours are, in CSS px, and how dark a step of twice the distance makes. */
 const REACH_PX = 1.5;
-const STRENGTH = 10;
+const STRENGTH = 4;
 
 const VERTEX = "void main() { gl_Position = vec4(position.xy, 0.0, 1.0); }";
 
