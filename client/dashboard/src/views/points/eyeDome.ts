@@ -14,22 +14,26 @@ uniform float near;
 uniform float far;
 uniform int reach;
 
-float logarithmicDepth(ivec2 at) {
-  float depth = texelFetch(depths, clamp(at, ivec2(0), textureSize(depths, 0) - 1), 0).r;
+float depthAt(ivec2 at) {
+  return texelFetch(depths, clamp(at, ivec2(0), textureSize(depths, 0) - 1), 0).r;
+}
+
+float logarithm(float depth) {
   return log2(near * far / (far - depth * (far - near)));
 }
 
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
-  float own = logarithmicDepth(at);
+  gl_FragColor = texelFetch(colours, at, 0);
+  float depth = depthAt(at);
+  if (depth >= 1.0) return;  // nothing is there
+  float own = logarithm(depth);
   float behind = 0.0;
-  for (int x = -1; x <= 1; x++) {
-    for (int y = -1; y <= 1; y++) {
-      behind += max(0.0, own - logarithmicDepth(at + reach * ivec2(x, y)));
-    }
+  for (int step = -1; step <= 1; step += 2) {
+    behind += max(0.0, own - logarithm(depthAt(at + ivec2(step * reach, 0))));
+    behind += max(0.0, own - logarithm(depthAt(at + ivec2(0, step * reach))));
   }
-  vec4 colour = texelFetch(colours, at, 0);
-  gl_FragColor = vec4(colour.rgb * exp(-${STRENGTH.toFixed(1)} * behind / 8.0), colour.a);
+  gl_FragColor.rgb *= exp(-${STRENGTH.toFixed(1)} * behind / 4.0);
 }`;
 
 export class EyeDome {
