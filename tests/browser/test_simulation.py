@@ -27,7 +27,11 @@ def simulated(served: Served) -> dict[str, Any]:
 def test_the_camera_is_put_before_another_scene(page: Page, served: Served) -> None:
     open_page(page)
     held_up: list[Route] = []
-    page.route("**/simulation/explain", held_up.append)
+
+    def hold(route: Route) -> None:
+        held_up.append(route)
+
+    page.route("**/simulation/explain", hold)
     choose(page, "sequence", "Simulated scene")
     panel = page.locator(".panel-simulation")
     scene = panel.get_by_label("Scene")

@@ -21,8 +21,8 @@ export function pointUnder(positions: Float32Array, count: number, matrix: Array
     if (at === null) continue;
     const apart = Math.hypot(at.x - place.x, at.y - place.y);
     if (apart > REACH_PX) continue;
-    // A surface across the view has many points in reach: a pixel off counts as much as 1 % further away.
-    const cost = Math.log(at.depth) + 0.01 * apart;
+    // A surface has many points in reach, and some stray before it: a pixel off counts as much as 3 % further away.
+    const cost = Math.log(at.depth) + 0.03 * apart;
     if (cost < least) [found, least] = [n, cost];
   }
   return found;
