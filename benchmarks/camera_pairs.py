@@ -1,5 +1,6 @@
 """Which pair of returns estimators find at frequencies with gaps, and which fit better."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -51,7 +52,7 @@ class Pixels:
         """Return how far the nearer return is off (P)."""
         period_m = 2 * np.pi * _RADIAN_M
         off_m = np.asarray(found.separate().phase_rad) * _RADIAN_M - self.range_m[0]
-        return np.abs((off_m + period_m / 2) % period_m - period_m / 2)
+        return np.asarray(np.abs((off_m + period_m / 2) % period_m - period_m / 2))
 
     def least_chi_square(self) -> NDArray[Any]:
         """Return chi-square (P) of the true pair, once it has been fitted to the noise."""
@@ -84,7 +85,7 @@ def table() -> Table:
     shares = ("1 cm", "5 cm", "split", "another pair", "that fits better")
     columns = ("returns", "noise", "estimator", *shares)
     made = Table("Two returns at 16, 80 and 120 MHz: shares of the pixels", columns)
-    estimators = {
+    estimators: dict[str, Callable[[Pixels], tm.Likelihood]] = {
         "`two-returns`": lambda each: tm.two_returns(each.b, each.noise, harmonics=MULTIPLES),
         "`likelihood`": lambda each: tm.likelihood(
             each.b, each.noise, harmonics=MULTIPLES, threads=1

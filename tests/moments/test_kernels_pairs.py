@@ -25,7 +25,7 @@ def moments_of(first: np.ndarray, second: np.ndarray, ratio: np.ndarray) -> np.n
     j = np.array(MULTIPLES)[:, None]
     noise = np.random.default_rng(6).normal(0, STD, (2, len(MULTIPLES), len(first)))
     b = np.exp(1j * j * first) + ratio * np.exp(1j * j * second) + noise[0] + 1j * noise[1]
-    return b.astype(np.complex64)
+    return np.asarray(b, np.complex64)
 
 
 def random_pairs(pixels: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -49,7 +49,7 @@ _INTERLEAVE = 2
 
 
 @njit(forceinline=True, error_model="numpy")
-def prepare(
+def _prepare(
     order: Any, b: Any, variance: Any, error: float, p: int, one: Any, data_r: Any, data_i: Any,
     weight: Any,
 ) -> Any:  # fmt: skip
@@ -86,7 +86,7 @@ def prepare(
 
 
 @njit(error_model="numpy")
-def fit(
+def _fit(
     order: Any, returns: Any, unknowns: Any, steps: int, cosine: float, sine: float, data_r: Any,
     data_i: Any, weight: Any, x: Any, y: Any, w: Any, rr: Any, ri: Any, active: Any, bar: Any,
 ) -> Any:  # fmt: skip
@@ -207,6 +207,26 @@ def write(
     simd.store(count, p, there)
 
 
+@njit(forceinline=True, error_model="numpy")
+def fit_one(
+    order: Any, cosine: float, sine: float, b: Any, variance: Any, error: float, p: int, one: Any,
+    data_r: Any, data_i: Any, weight: Any, x: Any, y: Any, w: Any, rr: Any, ri: Any, found: Any,
+) -> Any:  # fmt: skip
+    """Load pixels and put one return in `found`; return their scale, numbers, use and penalty."""
+    far = simd.infinity(one)
+    scale, numbers, usable = _prepare(order, b, variance, error, p, one, data_r, data_i, weight)
+    penalty = logarithm(numbers) + MARGIN
+    choice.nothing(one, far, found)
+    for j in range(len(order) + 1):
+        rr[j], ri[j] = data_r[j], data_i[j]
+    cost = _fit(
+        order, (0,), (0, 0), STEPS[0], cosine, sine, data_r, data_i, weight, x, y, w, rr, ri,
+        usable, far,
+    )  # fmt: skip
+    choice.offer_returns(order, (0,), (0, 0), weight, x, y, w, cost, penalty, one > 0.0, found)
+    return scale, numbers, usable, penalty
+
+
 @njit(nogil=True, error_model="numpy")
 def fit_returns(
     order: Any, slots: Any, cosine: float, sine: float, b: Any, variance: Any, error: float,
@@ -222,19 +242,13 @@ def fit_returns(
     x, y, w = simd.registers(one, (), 3), simd.registers(one, (), 3), simd.registers(one, (), 3)
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        scale, numbers, usable = prepare(order, b, variance, error, p, one, data_r, data_i, weight)
-        penalty = logarithm(numbers) + MARGIN
-        choice.nothing(one, far, found)
-        for j in range(m + 1):
-            rr[j], ri[j] = data_r[j], data_i[j]
-        cost = fit(
-            order, (0,), (0, 0), STEPS[0], cosine, sine, data_r, data_i, weight, x, y, w, rr, ri,
-            usable, far,
+        scale, numbers, usable, penalty = fit_one(
+            order, cosine, sine, b, variance, error, p, one, data_r, data_i, weight, x, y, w, rr,
+            ri, found,
         )  # fmt: skip
-        choice.offer_returns(order, (0,), (0, 0), weight, x, y, w, cost, penalty, one > 0.0, found)
         more = found[SCORE] > 4.0 * penalty
         if m >= 2 and simd.some(more):
-            cost = fit(
+            cost = _fit(
                 order, (0, 0), (0, 0, 0, 0), STEPS[1], cosine, sine, data_r, data_i, weight, x, y,
                 w, rr, ri, more, far,
             )  # fmt: skip
@@ -248,7 +262,7 @@ def fit_returns(
             )  # fmt: skip
             more = more & (found[SCORE] > 6.0 * penalty) & (numbers >= 6.0)
             if m >= 3 and simd.some(more):
-                cost = fit(
+                cost = _fit(
                     order, (0, 0, 0), (0, 0, 0, 0, 0, 0), STEPS[2], cosine, sine, data_r, data_i,
                     weight, x, y, w, rr, ri, more, found[SCORE] - 6.0 * penalty,
                 )  # fmt: skip

@@ -16,11 +16,10 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._kernels.likelihood import fit, portable, prepare, write
+from transientcam_moments._kernels.likelihood import fit_one, portable, write
 from transientcam_moments._kernels.parallel import Spread, at_once
 from transientcam_moments.likelihood import choice, sharp
-from transientcam_moments.likelihood.arithmetic import logarithm
-from transientcam_moments.likelihood.choice import MARGIN, SCORE, STEPS
+from transientcam_moments.likelihood.choice import SCORE
 from transientcam_moments.likelihood.pairs import COINCIDE, FIRST_STEPS, LAST_STEPS, STARTS, grid
 
 __all__ = ["pairs_lane", "portable"]  # which gives the fits' arithmetic its meaning
@@ -163,7 +162,6 @@ def fit_pairs(
 
     ``starts`` is a tuple of length `STARTS`.
     """
-    m = len(order)
     one = simd.ones(variance, 1)
     step, far = simd.width(one), simd.infinity(one)
     data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
@@ -178,16 +176,10 @@ def fit_pairs(
     room = np.empty((4, step), turns.dtype)
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        scale, numbers, usable = prepare(order, b, variance, error, p, one, data_r, data_i, weight)
-        penalty = logarithm(numbers) + MARGIN
-        choice.nothing(one, far, found)
-        for j in range(m + 1):
-            rr[j], ri[j] = data_r[j], data_i[j]
-        cost = fit(
-            order, (0,), (0, 0), STEPS[0], cosine, sine, data_r, data_i, weight, x, y, w, rr, ri,
-            usable, far,
+        scale, numbers, usable, penalty = fit_one(
+            order, cosine, sine, b, variance, error, p, one, data_r, data_i, weight, x, y, w, rr,
+            ri, found,
         )  # fmt: skip
-        choice.offer_returns(order, (0,), (0, 0), weight, x, y, w, cost, penalty, one > 0.0, found)
         more = (found[SCORE] > 4.0 * penalty) & (numbers >= 4.0)
         if simd.some(more):
             _search(order, turns, data_r, data_i, weight, along, alike, rows, gains, pairs)

@@ -34,7 +34,7 @@ _LEAST_PHASES: Final = 24
 _BLOCK: Final = 16  # pixels, whose pairs stay in cache
 
 
-def grid(m: int) -> NDArray[np.float64]:
+def grid(m: int) -> NDArray[np.floating[Any]]:
     """Return the phases of the grid in radians, an even number of them, for multiples up to m."""
     count = max(_LEAST_PHASES, PHASES_PER_PERIOD * m)
     return np.arange(count) * (2 * np.pi / count)

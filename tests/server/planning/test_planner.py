@@ -289,7 +289,9 @@ def test_lines_fall_onto_the_bias(capabilities: Capabilities) -> None:
     goal = Goal()
     search = Search(goal, families(goal, predictor, capabilities), predictor, lambda *_: 1e-3)
 
-    *so_far, front = search.fronts("range_error_m")
+    shares: list[float] = []
+    progress = Progress(lambda share, step: shares.append(share))
+    *so_far, front = search.fronts("range_error_m", progress)
     ends = front[0].applied.capture_s, front[-1].applied.capture_s
     for part in so_far[1:]:
         times_s = [choice.applied.capture_s for choice in part]
@@ -297,6 +299,9 @@ def test_lines_fall_onto_the_bias(capabilities: Capabilities) -> None:
         assert (times_s[0], times_s[-1]) == ends, "both ends first, then what is between"
     assert [len(part) for part in so_far] == sorted(len(part) for part in so_far)
     lines = search.lines(front)
+
+    assert shares == sorted(set(shares))
+    assert (shares[0], len(shares)) == (0.0, 12)
 
     times_s = [choice.applied.capture_s for choice in front]
     assert len(front) > 3

@@ -218,6 +218,10 @@ AccuracyName = Literal["range_error_m", "range_std_m", "bound_width"]
 class TradeoffRequest(_Asked):
     """What the front is wanted for."""
 
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"by": "range_error_m"}]}
+    )
+
     by: AccuracyName = "range_error_m"
     """The accuracy that capture time is held against."""
 

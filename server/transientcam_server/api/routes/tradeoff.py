@@ -61,7 +61,7 @@ async def read_tradeoff(
 )
 @needs(Role.VIEWER, lease=False)
 async def start_tradeoff(
-    service: ServiceOf, http: Request, response: Response, request: TradeoffRequest | None = None
+    service: ServiceOf, request: TradeoffRequest, http: Request, response: Response
 ) -> JobDocument:
     """Begin to compute what `GET /tradeoff` answers with, which is the `result` of the job.
 
@@ -69,8 +69,7 @@ async def start_tradeoff(
     lines. What that would be refused with is the `problem` of the job. It goes on when the client
     leaves; `POST /jobs/{job}/cancel` ends it.
     """
-    by = (request or TradeoffRequest()).by
-    return planned.as_job(service, KIND, _work(service, by, http), response)
+    return planned.as_job(service, KIND, _work(service, request.by, http), response)
 
 
 def _work(service: Service, by: str, http: Request) -> planned.Work[TradeoffDocument]:

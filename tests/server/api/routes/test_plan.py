@@ -119,7 +119,7 @@ def test_the_front_falls_and_the_current_frame_says_where_it_stands(
     monkeypatch.setattr(families, "HARMONICS", (3,))
     monkeypatch.setattr(families, "SEARCHED", ("maximum-entropy",))
 
-    job = end_of(noisy, noisy.post("/api/v1/tradeoff/jobs").json())
+    job = end_of(noisy, noisy.post("/api/v1/tradeoff/jobs", json={}).json())
     assert (job["kind"], job["state"], job["problem"]) == ("tradeoff", "done", None)
     answer = job["result"]
     assert set(noisy.get("/api/v1/tradeoff").json()) == set(answer)
@@ -242,7 +242,7 @@ def test_what_is_planned_is_cancelled_without_the_lease_and_reports_its_steps(
     what, work = endless
     lease = noisy.post("/api/v1/lease", json={"holder": "test", "duration_s": 60}).json()
     try:
-        body = {"target": {"range_error_m": 0.01}} if what == "plan" else None
+        body = {"target": {"range_error_m": 0.01}} if what == "plan" else {}
         job = noisy.post(f"/api/v1/{what}/jobs", json=body).json()
         assert work.began.wait(60)
         running = noisy.get(f"/api/v1/jobs/{job['id']}").json()
@@ -267,7 +267,7 @@ def test_a_viewer_has_new_frames_while_something_is_planned(
     noisy: httpx.Client, noisy_daemon: Served, endless: tuple[str, Endless]
 ) -> None:
     what, work = endless
-    body = {"target": {"range_error_m": 0.01}} if what == "plan" else None
+    body = {"target": {"range_error_m": 0.01}} if what == "plan" else {}
     with Camera(noisy_daemon.url, timeout_s=60.0) as camera, camera.stream("range") as stream:
         frames = iter(stream)
         numbers = [next(frames).meta["frame"]]
