@@ -46,10 +46,18 @@ class Progress:
         self._report(whole, step)
 
     def part(self, first: float, last: float, *, show: Show | None = None) -> "Progress":
-        """Return the progress of work that is a part of this; ``show`` in the place of its own."""
+        """Return the progress of work that is a part of this; ``show`` in the place of its own.
+
+        What the part reports is where the whole is from then on, too.
+        """
         span = self._last - self._first
+
+        def report(share: float, step: str) -> None:
+            self._now = share, step
+            self._report(share, step)
+
         return Progress(
-            self._report,
+            report,
             first=self._first + span * first,
             last=self._first + span * last,
             show=show or self.show,

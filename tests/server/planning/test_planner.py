@@ -284,6 +284,16 @@ def test_a_goal_that_cannot_be_meant_is_refused(goal: Goal, capabilities: Capabi
     assert refusal.value.kind.slug == "invalid-request"
 
 
+def test_the_whole_is_where_its_part_is() -> None:
+    reports: list[tuple[float, str]] = []
+    whole = Progress(lambda share, step: reports.append((share, step)))
+
+    whole.part(0.5, 1.0).part(0.0, 0.8).at(0.5, "searching")
+    whole()
+
+    assert reports == [(pytest.approx(0.7), "searching")] * 2
+
+
 def test_lines_fall_onto_the_bias(capabilities: Capabilities) -> None:
     predictor = cast(Predictor, ClosedForm())
     goal = Goal()
