@@ -122,7 +122,7 @@ export class Api {
 
   /** Begins to predict what accuracy costs on the scene before the camera: the result is a `Tradeoff`, so far while it runs. */
   startTradeoff(): Promise<JobDocument> {
-    return this.#json("POST", "/tradeoff/jobs") as Promise<JobDocument>;
+    return this.#json("POST", "/tradeoff/jobs", { body: { by: "range_error_m" } }) as Promise<JobDocument>;
   }
 
   /** Begins to look for the quickest sequence that reaches the target, or the most accurate within the budget: a `Choice`. */
