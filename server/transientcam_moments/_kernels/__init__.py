@@ -9,7 +9,8 @@ a time as a vector register holds. A planar function names the lane that may sta
 The lanes and their signatures, each that of the planar statement it stands beside
 (``b`` complex (m+1, ...), NumPy arrays with any trailing shape, strided or not):
 
-``levinson(b) -> error (...), polynomial (m+1, ...), reflection (m, ...)``
+``levinson(b, brightness (...) or left out) -> error (...), polynomial (m+1, ...), reflection (m,
+...)``
 
 ``density(polynomial, reflection, error, phase_rad (T,)) -> (T, ...)``, also into ``out``
 

@@ -17,6 +17,7 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.parallel import Spread, at_once
+from transientcam_moments._kernels.pool import empty
 from transientcam_moments._kernels.returns import phase_of
 from transientcam_moments.likelihood import choice, sharp, tail
 from transientcam_moments.likelihood.arithmetic import logarithm
@@ -298,8 +299,8 @@ def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:
             return None
         pixels, size = b.shape[1], len(slots)
         moments, noise = np.ascontiguousarray(b), np.ascontiguousarray(variance)
-        planes = np.empty((4 * size + 5, pixels), precision)
-        free, count = np.empty(pixels, np.int32), np.empty(pixels, np.int32)
+        planes = empty((4 * size + 5, pixels), precision)
+        free, count = empty(pixels, np.int32), empty(pixels, np.int32)
 
         def part(start: int, stop: int) -> None:
             run(order, slots, cosine, sine, moments, noise, error, planes, free, count, start, stop)

@@ -198,6 +198,25 @@ class Recipe:
         """The gains (m + 1,) that sub-phases and the camera's delay alone give."""
         return nominal_gains(self.applied.sequence, delay_s=self.applied.delay_s)
 
+    @cached_property
+    def moment_variance(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Variance (m + 1,) of the moments of a dark pixel, and how it grows with b_0 in DN.
+
+        Only with a sensor, whose noise is an affine function of the light.
+        """
+        assert self.sensor is not None  # noqa: S101 - callers have one, or no noise to predict
+        sequence = self.applied.sequence
+        noise = tm.noise.moment_noise(
+            np.array([0.0, 1.0]),
+            self.sensor,
+            calibration=self.nominal_gains,
+            zeroth=sequence.zeroth,
+            takes=sequence.takes,
+            phases_rad=sequence.sampling.phases_rad,
+        )
+        dark, lit = np.asarray(noise.variance).T
+        return dark, lit - dark
+
     def reconstruct(self, raw: RawFrame, previous: RawFrame | None = None) -> tm.Reconstruction:
         """Return the reconstruction of a capture; it computes what is read of it.
 

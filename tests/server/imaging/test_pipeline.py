@@ -23,7 +23,7 @@ from transientcam_server.imaging.encodings.encoding import MSGPACK, NPY, Encodin
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.imaging.recipe import Recipe, SettingsVersion, suited
-from transientcam_server.imaging.view import View
+from transientcam_server.imaging.view import Crop, View
 from transientcam_server.imaging.workers import Workers
 from transientcam_server.settings import ReconstructionSettings
 
@@ -139,6 +139,25 @@ def test_products_requested_together_share_the_first_hop(
             *(frame.encoded(pipeline.product(name), MSGPACK, channel=0) for name in names)
         )
         assert hops == ["compute", *["_made"] * len(names)]
+
+    with_frame(camera, raw, test)
+
+
+@pytest.mark.parametrize("name", ["coefficients", "returns", "range"])
+def test_a_region_is_that_of_the_whole_whichever_is_requested_first(
+    camera: Camera, raw: RawFrame, name: str
+) -> None:
+    view = View(crop=Crop((30, 20, 41, 13), 3))
+
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        product = pipeline.product(name)
+        region, whole, again = [
+            np.load(io.BytesIO(await frame.encoded(product, encoding, each)))
+            for encoding, each in ((NPY, view), (NPY, View()), (replace(NPY, name="npy2"), view))
+        ]
+        assert whole.shape[-2:] == (120, 163)
+        np.testing.assert_array_equal(region, whole[..., 20:33:3, 30:71:3])
+        np.testing.assert_array_equal(again, region)
 
     with_frame(camera, raw, test)
 
