@@ -5,7 +5,7 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.browser.dashboard import LIVE, choose, map_pixels, open_page
 from tests.serving import Served
@@ -26,10 +26,25 @@ def simulated(served: Served) -> dict[str, Any]:
 
 def test_the_camera_is_put_before_another_scene(page: Page, served: Served) -> None:
     open_page(page)
+    held_up: list[Route] = []
+
+    def hold(route: Route) -> None:
+        held_up.append(route)
+
+    page.route("**/simulation/explain", hold)
     choose(page, "sequence", "Simulated scene")
     panel = page.locator(".panel-simulation")
     scene = panel.get_by_label("Scene")
     expect(scene).to_have_value("wall")
+    unplug = panel.get_by_role("button", name="Unplug")
+    before = unplug.bounding_box()
+    while not held_up:
+        page.wait_for_timeout(50)
+    for route in held_up:
+        route.continue_()
+    page.unroute("**/simulation/explain")
+    panel.locator(".effect-table").wait_for()
+    assert unplug.bounding_box() == before, "nothing moves when the effects come"
     wall = map_pixels(page)
     scene.select_option("mirrors")
     mirrors = panel.locator("[data-effect=mirror-paths]")

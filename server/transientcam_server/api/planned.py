@@ -46,6 +46,8 @@ async def for_request(http: Request, work: Work[_Answer]) -> _Answer:
 def as_job(service: Service, kind: str, work: Work[_Answer], response: Response) -> JobDocument:
     """Start a job that does the work beside those of the camera; its result is the answer.
 
+    While it runs, its result is what the work shows of it.
+
     Raises
     ------
     Problem
@@ -56,7 +58,7 @@ def as_job(service: Service, kind: str, work: Work[_Answer], response: Response)
         async def ask() -> None:
             job.report(job.progress, job.step)
 
-        made = await _ended(work(Progress(job.report)), ask)
+        made = await _ended(work(Progress(job.report, show=job.show)), ask)
         return made.model_dump(mode="json")
 
     return jobs.accepted(service.jobs.start(kind, run, in_turn=False), response)

@@ -54,21 +54,23 @@ class FrontCache:
     ) -> dict[str, Any]:
         """Return the front compared by target ``by``, and the frame's own place, as JSON.
 
-        What either progress raises ends the work, unless it is done.
+        ``predicting`` shows the same document with the front so far; what either progress raises
+        ends the work, unless it is done.
         """
+        around = {
+            "compared_by": by,
+            "scene_of_frame": frame.number,
+            "current": await self._current(frame),
+        }
+        shown = predicting.part(0.0, 1.0, show=lambda part: predicting.show(around | part))
         async with self._predicting:
             cached = self._cached.get(by)
             made_with = frame.raw.epoch, frame.recipe.settings_version
             if cached is None or cached.made_with != made_with or self._clock() > cached.until_s:
-                document = await self._predicted(frame, by, looking, predicting)
+                document = await self._predicted(frame, by, looking, shown)
                 cached = _CachedFront(made_with, frame.number, self._clock() + KEPT_S, document)
                 self._cached[by] = cached
-        return {
-            "compared_by": by,
-            "scene_of_frame": cached.frame,
-            "current": await self._current(frame),
-            **cached.document,
-        }
+        return around | {"scene_of_frame": cached.frame} | cached.document
 
     def forget(self) -> None:
         """Drop the fronts, as when the scene is another one."""

@@ -18,7 +18,8 @@ class JobDocument(Document):
     step: str
     """What is being done, in a word or two."""
     result: dict[str, Any] | None = None
-    """What came of it; null until it is done."""
+    """What came of it; null until it is done. A `tradeoff` has the front so far while it runs, and
+    keeps that when it is cancelled."""
     problem: dict[str, Any] | None = None
     """Why it failed: a problem as a request would be answered with."""
     created_at: float

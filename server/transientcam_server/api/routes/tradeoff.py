@@ -65,8 +65,9 @@ async def start_tradeoff(
 ) -> JobDocument:
     """Begin to compute what `GET /tradeoff` answers with, which is the `result` of the job.
 
-    What that would be refused with is the `problem` of the job. It goes on when the client leaves;
-    `POST /jobs/{job}/cancel` ends it.
+    While the job runs the result is the front so far: its ends first, then what is between, without
+    lines. What that would be refused with is the `problem` of the job. It goes on when the client
+    leaves; `POST /jobs/{job}/cancel` ends it.
     """
     return planned.as_job(service, KIND, _work(service, request.by, http), response)
 

@@ -157,6 +157,7 @@ class Endless:
 
     def __call__(self, goal: object, scene: object, progress: Progress) -> None:
         progress.at(0.5, "searching")
+        progress.show({"summary": "One of many."})
         self.began.set()
         try:
             while not self.ended.is_set():
@@ -253,7 +254,11 @@ def test_what_is_planned_is_cancelled_without_the_lease_and_reports_its_steps(
         assert running["kind"] == what
         assert (running["state"], running["step"]) == ("running", "searching")
         assert 0.5 < running["progress"] < 1
-        assert end_of(noisy, job)["state"] == "cancelled"
+        assert running["result"]["summary"] == "One of many."
+        if what == "tradeoff":
+            assert running["result"]["current"]["capture_s"] > 0
+        ended = end_of(noisy, job)
+        assert (ended["state"], ended["result"]) == ("cancelled", running["result"])
     finally:
         noisy.delete("/api/v1/lease", headers={LEASE_HEADER: lease["lease_id"]})
 
