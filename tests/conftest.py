@@ -6,6 +6,7 @@ import threading
 from collections.abc import Generator, Iterator
 from pathlib import Path
 
+import httpx
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -14,6 +15,10 @@ ROOT = Path(__file__).resolve().parents[1]
 os.environ["TRANSIENTCAM_KERNELS"] = "manual"
 # every process that a test starts would compile all modules anew, which takes it a second
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# httpx gives up after 5 s, which a laden machine may take to answer; what hangs is ended by the
+# limit of each test
+for _each in ("connect", "read", "write", "pool"):
+    setattr(httpx._config.DEFAULT_TIMEOUT_CONFIG, _each, 60.0)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -32,6 +32,7 @@ from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
 LONG_S = 20.0
 SHORT_S = 1.5
 KEPT, HALF = Rate(10.0, 10.0), Rate(5.0, 10.0)
+NO_TOKEN, TOO_SLOW = "the service requires no token", "the camera does not keep its rate"
 BY_NAME = {each.name: each for each in CHECKS}
 
 
@@ -53,9 +54,10 @@ def test_the_daemon_keeps_every_promise(daemon: Breakable) -> None:
 
     assert not report.failed, said(report)
     assert len(report.results) == len(CHECKS) + 1
-    assert {each.reason for each in report.results if each.outcome == "skipped"} <= {
-        "the service requires no token",
-    }
+    # what rests on the camera's rate is skipped where the machine is too slow for it
+    for each in report.results:
+        if each.outcome == "skipped":
+            assert str(each.reason).startswith((NO_TOKEN, TOO_SLOW))
     assert after == before
     assert not recordings
     assert not held
@@ -105,9 +107,7 @@ def test_what_rests_on_the_rate_is_not_failed_where_the_camera_does_not_keep_it(
         report = run(device, only(name), rate=measured)
 
     assert report.results[0].outcome == outcome
-    said_so = "the camera does not keep its rate: 5 of 10 frames/s arrive" in str(
-        report.results[0].reason
-    )
+    said_so = f"{TOO_SLOW}: 5 of 10 frames/s arrive" in str(report.results[0].reason)
     assert said_so is (outcome == "skipped")
     assert (report.to_document()["slow"] is not None) is (outcome == "skipped")
 
@@ -186,7 +186,7 @@ def test_with_tokens_the_promises_about_them_are_kept(guarded: Guarded) -> None:
         report = run(device, chosen(["authentication", "stream"]))
 
     assert not report.failed, said(report)
-    assert report.counts["skipped"] == 0
+    assert report.slow or report.counts["skipped"] == 0
 
 
 @pytest.mark.parametrize(
