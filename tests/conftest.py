@@ -50,6 +50,8 @@ _LONGEST_FIRST = (
     "tests/browser/test_settings.py",
     "tests/experiments/paper/test_figures.py",
     "tests/server/api/routes/test_recordings.py",
+    # before all others that need what it compiles: two workers would compile it at the same time
+    "tests/moments/test_kernels_lanes.py",
     "tests/conformance/test_conformance.py",
     "tests/stability/test_sweep.py",
     "tests/moments/test_noise.py",
@@ -58,6 +60,7 @@ _LONGEST_FIRST = (
     "tests/browser/test_views.py",
     "tests/browser/test_accessibility.py",
     "tests/server/fuzzing/test_recordings.py",
+    "tests/moments/test_kernels_reconstruct.py",
 )
 
 
