@@ -89,6 +89,7 @@ def measure(scene: str, sequence: Capture, frames: int, bench: Bench, seed: int)
             tm.Settings(
                 base_frequency_hz=sequence.base_frequency_hz,
                 zeroth=sequence.zeroth,
+                takes=sequence.takes,
                 estimator="maximum-entropy",
                 spoilt_images=each,
             ),

@@ -1,19 +1,20 @@
 """How long the likelihood takes for a frame, beside the compiled pass that makes its moments."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Final
 
 import numpy as np
 
 import transientcam_moments as tm
-from benchmarks.data import CORES, PAPER, VGA, images, numpy_alone
+from benchmarks.data import CORES, PAPER, SETTINGS, VGA, images, numpy_alone
 from benchmarks.tables import Table
 from benchmarks.timing import measure
 from transientcam_moments.likelihood import MODEL_ERROR
 
 ORDERS: Final = (3, 4, 8)
-_SENSOR: Final = tm.noise.Sensor(read_noise_e=18.0, dark_dn=50.0, gain_e_per_dn=1.0)
+_SENSOR: Final = tm.noise.Sensor(read_noise_e=2.0, dark_dn=50.0, gain_e_per_dn=1.0)
 """That of `benchmarks.data.images`."""
 
 
@@ -46,8 +47,9 @@ def tables() -> Iterator[Table]:
 
 def _row(m: int, name: str, shape: tuple[int, int], returns: int) -> tuple[str, ...]:
     raw = images(m, shape)
-    settings = tm.Settings(sensor=_SENSOR)
-    found = tm.reconstruct(raw, settings)
+    settings = replace(SETTINGS, sensor=_SENSOR)
+    reconstructor = tm.Reconstructor(settings, calibration=np.ones(m + 1))
+    found = reconstructor(raw)
     moments, noise = np.asarray(found.smoothed), found.noise
     if returns == 1:
         random = np.random.default_rng(m)
@@ -59,7 +61,6 @@ def _row(m: int, name: str, shape: tuple[int, int], returns: int) -> tuple[str, 
     estimate = partial(tm.likelihood, moments, noise, model_error=MODEL_ERROR)
     lane = measure(partial(estimate, threads=1))
     spread = measure(partial(estimate, threads=CORES))
-    reconstructor = tm.Reconstructor(settings)
     one_pass = measure(partial(reconstructor, raw))
     planar = "-"
     if shape == PAPER:
