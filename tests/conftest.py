@@ -6,8 +6,8 @@ import threading
 from collections.abc import Generator, Iterator
 from pathlib import Path
 
-import httpx
 import pytest
+from httpx._config import DEFAULT_TIMEOUT_CONFIG
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -18,7 +18,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # httpx gives up after 5 s, which a laden machine may take to answer; what hangs is ended by the
 # limit of each test
 for _each in ("connect", "read", "write", "pool"):
-    setattr(httpx._config.DEFAULT_TIMEOUT_CONFIG, _each, 60.0)
+    setattr(DEFAULT_TIMEOUT_CONFIG, _each, 60.0)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
