@@ -147,6 +147,18 @@ def test_levinson_follows_the_planar_statement(m: int, dtype: type) -> None:
 
 
 @pytest.mark.parametrize("dtype", TYPES)
+def test_levinson_takes_a_brightness_in_place_of_b_0(dtype: type) -> None:
+    b, _ = special_moments(3, dtype)
+    with np.errstate(all="ignore"):
+        biased = tm.bias(b).moments
+
+    beside = lane("levinson", b)(b, biased[0].real)
+
+    for part, expected in zip(beside, lane("levinson", b)(biased), strict=True):
+        assert np.array_equal(part, expected, equal_nan=True)
+
+
+@pytest.mark.parametrize("dtype", TYPES)
 @pytest.mark.parametrize("m", ORDERS)
 def test_indefinite_moments_are_projected_as_by_the_planar_statement(m: int, dtype: type) -> None:
     b = varied_moments(m, dtype)

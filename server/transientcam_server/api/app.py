@@ -32,6 +32,7 @@ from transientcam_server.api.routes import (
     recordings,
     sequence,
     simulation,
+    tradeoff,
 )
 from transientcam_server.api.routes import (
     metrics as metrics_route,
@@ -55,6 +56,7 @@ _RESOURCES = (
     recording_frames,
     simulation,
     plan,
+    tradeoff,
     parameters,
     jobs,
 )

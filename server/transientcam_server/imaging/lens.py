@@ -9,6 +9,7 @@ from typing import Any, Final, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam.robotics import Pinhole
 from transientcam_server.settings import LensSettings
 
 ASSUMED_FIELD_OF_VIEW_DEG: Final = 45.0
@@ -17,28 +18,18 @@ Source = Literal["settings", "scene", "recording", "assumed"]
 
 
 @dataclass(frozen=True, slots=True)
-class Intrinsics:
-    """A pinhole camera: pixel (column, row) looks along ((c - cx) / fx, (r - cy) / fy, 1).
+class Intrinsics(Pinhole):
+    """A pinhole camera, and what the service computes with it.
 
-    Whole numbers are the centres of pixels. x points right, y down, z where the camera looks.
+    x points right, y down, z where the camera looks.
 
     Attributes
     ----------
-    fx, fy, cx, cy
-        Focal lengths and principal point, in pixels.
-    width, height
-        Of the frame they belong to.
     source
         Where they come from: the ``settings`` of the service, the simulated ``scene``, the
         ``recording``, or none of these (``assumed``).
     """
 
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    width: int
-    height: int
     source: Source = "assumed"
 
     @classmethod

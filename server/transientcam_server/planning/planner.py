@@ -104,12 +104,19 @@ class Planner:
         """Return all that is searched for a goal; see `planning.families`."""
         return families(goal, self._predictor(scene), self._capabilities)
 
-    def tradeoff_document(self, goal: Goal, scene: SceneStatistics) -> dict[str, Any]:
-        """Return all that no other beats, and the lines they lie on, as JSON: seconds of work."""
-        predictor = self._predictor(scene)
+    def tradeoff_document(
+        self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
+    ) -> dict[str, Any]:
+        """Return all that no other beats, and the lines they lie on, as JSON: seconds of work.
+
+        What is raised by ``progress`` ends it.
+        """
+        progress = progress or Progress()
+        predictor = self._predictor(scene, progress)
         found = families(goal, predictor, self._capabilities)
         search = Search(goal, found, predictor, self._computing)
-        choices = search.front(goal.leading)
+        choices = search.front(goal.leading, progress.part(0.0, 0.8))
+        progress.at(0.8, "lines")
         return {
             "front": [choice.to_document() for choice in choices],
             "lines": [

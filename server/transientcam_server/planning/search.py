@@ -13,6 +13,7 @@ from transientcam_server.planning.families import Family, Member
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.pareto import front
 from transientcam_server.planning.prediction import Predictor
+from transientcam_server.planning.progress import Progress
 
 Timed = Callable[[Sequence, str], float]
 """Computing time in s of a frame of a sequence with an estimator."""
@@ -175,14 +176,18 @@ class Search:
         choices = [self.choice(each.family, each.member) for each in found[:contenders]]
         return min(choices, key=lambda choice: choice.error(leading), default=None)
 
-    def front(self, leading: str) -> list[Choice]:
+    def front(self, leading: str, progress: Progress | None = None) -> list[Choice]:
         """Return the finest choices within rising times, without those that others beat."""
+        progress = progress or Progress()
         shortest_s = self.families[0].members[0].capture_s
         longest_s = max(family.members[-1].capture_s for family in self.families)
         longest_s = min(max(LONGEST_S, shortest_s), longest_s)
         ratio = (longest_s / shortest_s) ** (1 / (ON_FRONT - 1))
         times_s = [shortest_s * ratio**k * (1 + 1e-9) for k in range(ON_FRONT)]
-        choices = [self.finest(leading, within_s, contenders=1) for within_s in times_s]
+        choices = []
+        for k, within_s in enumerate(times_s):
+            progress.at(k / ON_FRONT, f"captures of {within_s * 1e3:.3g} ms")
+            choices.append(self.finest(leading, within_s, contenders=1))
         return front(
             [choice for choice in choices if choice is not None],
             cost=lambda choice: choice.applied.capture_s,

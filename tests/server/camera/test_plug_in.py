@@ -203,6 +203,7 @@ def test_what_they_cannot_give_is_absent_with_the_reason(
         device.refusal(pixel, 409, "estimator-misfit")
 
     assert problem["field"] == "sampling"
+    assert "the multiples 2, 10 and 15 at 3" in problem["detail"]
     assert set(absent) == {*OF_CONSECUTIVE_MULTIPLES, "brightness", "uniform", "truth"}
     assert command(["doctor", fixed.url, "--seconds", "0.1", "--json"]) == 0
     told = of_products(capsys.readouterr().out)

@@ -289,8 +289,12 @@ def test_lines_fall_onto_the_bias(capabilities: Capabilities) -> None:
     goal = Goal()
     search = Search(goal, families(goal, predictor, capabilities), predictor, lambda *_: 1e-3)
 
-    front = search.front("range_error_m")
+    shares: list[float] = []
+    front = search.front("range_error_m", Progress(lambda share, step: shares.append(share)))
     lines = search.lines(front)
+
+    assert shares == sorted(set(shares))
+    assert (shares[0], len(shares)) == (0.0, 12)
 
     times_s = [choice.applied.capture_s for choice in front]
     assert len(front) > 3
