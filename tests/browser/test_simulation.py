@@ -1,5 +1,6 @@
 """The simulated scene, its effects and its faults, from the page."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import httpx
@@ -7,16 +8,21 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, Route, expect
 
+from tests.browser.conftest import put
 from tests.browser.dashboard import LIVE, choose, map_pixels, open_page
 from tests.serving import Served
 
 PATIENCE_MS = 60_000
 
+# a scene other than the usual one
+pytestmark = pytest.mark.shared_daemon("sim:wall?noise=off")
 
-@pytest.fixture
-def camera() -> str:
-    """A scene other than the usual one."""
-    return "sim:wall?noise=off"
+
+@pytest.fixture(autouse=True)
+def wall(served: Served) -> Iterator[None]:
+    """The wall without forced effects at the end of each test."""
+    yield
+    put(served, "simulation", {"scene": "wall", "effects": {}})
 
 
 def simulated(served: Served) -> dict[str, Any]:

@@ -111,7 +111,7 @@ def test_without_a_camera_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.mark.parametrize(("width", "height"), [(163, 120), (320, 240), (640, 480)])
 def test_resolutions_can_be_chosen(open_virtual: OpenCamera, width: int, height: int) -> None:
-    camera = open_virtual(f"sim:mirrors?width={width}&height={height}")
+    camera = open_virtual(f"sim:wall?width={width}&height={height}")
     camera.start()
 
     assert camera.read_frame().images.shape == (16, height, width)
