@@ -28,6 +28,7 @@ WAIT_S = 120.0
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
     with serving(SPEC) as daemon, Camera(daemon.url, timeout_s=60.0) as camera:
+        daemon.start_all_workers()  # later they would look like threads that a test left behind
         camera.sequence = SEQUENCE
         with camera.stream("range") as stream:
             stream.receive(timeout_s=WAIT_S)
