@@ -3,7 +3,7 @@
 Run it with ``python -m benchmarks.cameras [--write] [--cost]``; with ``--write`` all go into
 docs/cameras.md. The bound is arithmetic; moments have noise of a known seed, and so has the frame
 of the emulated TOFcam660, so that none depends on the machine. ``--cost`` times the measurement of
-moments instead, which does.
+moments and the search for pairs instead, which does.
 """
 
 import argparse
@@ -15,7 +15,7 @@ import numpy as np
 from rich.console import Console
 
 import transientcam_moments as tm
-from benchmarks import camera_estimates
+from benchmarks import camera_estimates, camera_pairs
 from benchmarks.camera_estimates import FIRST_M, NOISE, RATIO
 from benchmarks.tables import Table
 from transientcam_driver import Sequence, SubPhases, open_camera
@@ -109,13 +109,19 @@ def main() -> None:
     """Print the table, or write it into docs/cameras.md."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.cameras", description=__doc__)
     parser.add_argument("--write", action="store_true", help=f"write it into docs/{PAGE.name}")
-    parser.add_argument("--cost", action="store_true", help="time the measurement of moments")
+    parser.add_argument(
+        "--cost",
+        action="store_true",
+        help="time the measurement of moments, and the search for pairs",
+    )
     arguments = parser.parse_args()
     if arguments.cost:
-        Console(width=140).print(camera_estimates.cost())
+        Console(width=140).print(f"{camera_estimates.cost()}\n{camera_pairs.cost()}")
         return
     estimates = camera_estimates.table()
-    estimates.show(Console(width=140))
+    pairs = camera_pairs.table()
+    for each in (estimates, pairs):
+        each.show(Console(width=140))
     made = table()
     made.notes.append("")
     made.notes.append(frame_of_hall())
@@ -124,7 +130,9 @@ def main() -> None:
         text = PAGE.read_text(encoding="utf-8")
         before, rest = text.split(_MARKS[0])
         _, after = rest.split(_MARKS[1])
-        body = "\n".join(each.markdown().replace("## ", "### ", 1) for each in (estimates, made))
+        body = "\n".join(
+            each.markdown().replace("## ", "### ", 1) for each in (estimates, pairs, made)
+        )
         written = "Written by `python -m benchmarks.cameras --write`; no machine has a part in it."
         page = f"{before}{_MARKS[0]}\n{body}\n{written}\n{_MARKS[1]}{after}"
         PAGE.write_text(page, encoding="utf-8")

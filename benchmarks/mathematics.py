@@ -18,7 +18,7 @@ from transientcam_experiments.tradeoff.picture import saved
 
 FIGURES: Final = Path(__file__).parents[1] / "docs" / "figures"
 BASE_FREQUENCY_HZ: Final = 23e6
-RETURNS_S: Final = np.array([10e-9, 19e-9])
+RETURNS_S: Final = np.array([10e-9, 17e-9])
 WEIGHTS: Final = np.array([0.6, 0.35])
 UNIFORM: Final = 0.05
 _PERIOD_S: Final = 1 / BASE_FREQUENCY_HZ
@@ -51,7 +51,8 @@ def _figure(columns: int) -> tuple[Figure, np.ndarray]:
 
 
 def _truth(panel: Axes, height: float) -> None:
-    stems = panel.stem(RETURNS_S / _NS, height * WEIGHTS / WEIGHTS.max(), "k", markerfmt="ko")
+    heights = height * WEIGHTS / WEIGHTS.max()
+    stems = panel.stem(RETURNS_S / _NS, heights, "k", markerfmt="ko", basefmt=" ")
     stems.set_label("truth")
     panel.set(xlabel="time of flight / ns", xlim=(0, _PERIOD_S / _NS))
 
@@ -66,11 +67,14 @@ def measured() -> Figure:
     waves.set(title="light, and what it is multiplied with", yticks=[])
     b = _of_pixel(3)
     for j in (1, 2, 3):
-        plane.annotate("", (b[j].real, b[j].imag), (0, 0), arrowprops={"arrowstyle": "->", "color": f"C{j}"})
-        plane.text(b[j].real, b[j].imag, f"$b_{j}$", color=f"C{j}", fontsize="large")
+        tip, label = (b[j].real, b[j].imag), (1.5 * b[j].real, 1.5 * b[j].imag)
+        plane.annotate("", tip, (0, 0), arrowprops={"arrowstyle": "->", "color": f"C{j}"})
+        plane.annotate(f"$b_{j}$", label, color=f"C{j}", ha="center", va="center")
     circle = np.exp(1j * phase_rad) * b[0].real
     plane.plot(circle.real, circle.imag, "0.8")
-    plane.set(aspect="equal", title="what is left: one arrow a wave", xlabel="real", ylabel="imaginary")
+    plane.set(
+        aspect="equal", title="what is left: one arrow a wave", xlabel="real", ylabel="imaginary"
+    )
     waves.legend(fontsize="small", loc="lower right")
     return figure
 
@@ -97,7 +101,9 @@ def bounded() -> Figure:
     b = _of_pixel(4)[:, None]
     lower, upper = (each[:, 0] for each in tm.bounds(b, phase_rad))
     panel.fill_between(time_ns, lower, upper, color="C0", alpha=0.3, label="all that is possible")
-    panel.plot(time_ns, tm.smoothed_density(tm.levinson(b), phase_rad)[:, 0], "C0", label="estimate")
+    panel.plot(
+        time_ns, tm.smoothed_density(tm.levinson(b), phase_rad)[:, 0], "C0", label="estimate"
+    )
     _truth(panel, float(upper.max()))
     panel.set(ylabel="smoothed density / rad⁻¹", title="m = 4: what four frequencies leave open")
     panel.legend()

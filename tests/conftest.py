@@ -7,6 +7,7 @@ from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import pytest
+from httpx._config import DEFAULT_TIMEOUT_CONFIG
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -14,6 +15,10 @@ ROOT = Path(__file__).resolve().parents[1]
 os.environ["TRANSIENTCAM_KERNELS"] = "manual"
 # every process that a test starts would compile all modules anew, which takes it a second
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# httpx gives up after 5 s, which a laden machine may take to answer; what hangs is ended by the
+# limit of each test
+for _each in ("connect", "read", "write", "pool"):
+    setattr(DEFAULT_TIMEOUT_CONFIG, _each, 60.0)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -45,6 +50,8 @@ _LONGEST_FIRST = (
     "tests/browser/test_settings.py",
     "tests/experiments/paper/test_figures.py",
     "tests/server/api/routes/test_recordings.py",
+    # before all others that need what it compiles: two workers would compile it at the same time
+    "tests/moments/test_kernels_lanes.py",
     "tests/conformance/test_conformance.py",
     "tests/stability/test_sweep.py",
     "tests/moments/test_noise.py",
@@ -53,6 +60,7 @@ _LONGEST_FIRST = (
     "tests/browser/test_views.py",
     "tests/browser/test_accessibility.py",
     "tests/server/fuzzing/test_recordings.py",
+    "tests/moments/test_kernels_reconstruct.py",
 )
 
 

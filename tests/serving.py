@@ -1,5 +1,6 @@
 """A real daemon for tests: uvicorn on a port of its own, on a thread, with a simulated camera."""
 
+import asyncio
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,6 +11,7 @@ from typing import Any
 from fastapi import FastAPI
 
 from transientcam_driver import Camera, open_camera
+from transientcam_driver.clock import Clock
 from transientcam_server.api.app import build_app
 from transientcam_server.daemon.server import Server, address, listen
 from transientcam_server.service import Service
@@ -18,6 +20,15 @@ from transientcam_server.settings import Settings
 START_S = 60.0
 UNSERVED_S = 60.0
 """A laden machine does not turn the light off in tests that are about something else."""
+
+
+class PromptServer(Server):
+    """Looks every 10 ms whether it is to end, which uvicorn does every 100 ms."""
+
+    async def main_loop(self) -> None:
+        """Serve until the end is requested."""
+        while not await self.on_tick(0):
+            await asyncio.sleep(0.01)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,15 +64,16 @@ def serving(
     camera: str = "sim:mirrors?noise=off",
     *,
     prepare: Callable[[FastAPI], None] = lambda app: None,
+    clock: Clock | None = None,
     **settings: Any,
 ) -> Iterator[Served]:
     """Serve a camera on an ephemeral port until the end of the block; leave nothing behind.
 
     Calibrations are kept where no other service has them, unless ``settings`` say where.
 
-    ``prepare`` is given the application before it starts.
+    ``prepare`` is given the application before it starts; ``clock`` is that of a simulated camera.
     """
-    with open_camera(camera) as opened, TemporaryDirectory() as state:
+    with open_camera(camera, clock=clock) as opened, TemporaryDirectory() as state:
         usual = {"port": 0, "log_level": "warning", "calibrations": {"directory": state}}
         # "automatic" depends on the kernels that other tests of this process have compiled
         usual |= {"reconstruction": {"estimator": "pisarenko"}}
@@ -70,7 +82,7 @@ def serving(
         prepare(app)
         with listen(chosen.host, chosen.port) as listener:
             listening = threading.Event()
-            server = Server(app, chosen, on_listening=listening.set)
+            server = PromptServer(app, chosen, on_listening=listening.set)
             thread = threading.Thread(target=server.run, args=([listener],), name="served")
             thread.start()
             try:

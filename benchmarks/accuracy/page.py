@@ -31,7 +31,8 @@ def report(
         "All scenes are simulated, so that the truth is known; images come over the emulated USB "
         "and go through what the daemon computes. `transientcam tradeoff --scene NAME -o FOLDER` "
         "measures the same on any scene and makes a page on which every point can be copied as a "
-        "sequence. `transientcam plan` and `POST /api/v1/plan` turn a target or a budget into one.",
+        "sequence. `transientcam plan` and `POST /api/v1/plan` turn a target or a budget into one; "
+        "[docs/plans.md](plans.md) holds plans to what they promise.",
         "",
         *_glossary(),
         "",

@@ -123,19 +123,22 @@ def looked(scene: str) -> tuple[Planner, SceneStatistics]:
 def measured(
     scene: str, sequence: Sequence, estimator: str, captures: int
 ) -> tuple[dict[str, float], float, float]:
-    """Capture, and return noise, bias, error and outliers, the device's time, and saturation."""
+    """Capture, and return noise, bias, error and outliers, the device's time, and saturation.
+
+    Each range is held against the truth in the middle of its own capture: scenes may move.
+    """
     with opened(scene, CAPTURE_SEED) as camera:
         assert camera.simulation is not None
         applied = camera.configure(sequence)
         sensor = sensor_of(camera, SensorSettings())
         recipe = Recipe(applied, SETTINGS, float(sensor.highest_dn), sensor=sensor)
         camera.start()
-        truth, pixels, ranges, device_s, full = camera.simulation.truth(), None, [], 0.0, 0.0
+        pixels, errors_m, device_s, full = None, [], 0.0, 0.0
         for _ in range(captures):
             raw = camera.read_frame(timeout_s=1e3)
             device_s = raw.capture_s
+            truth = camera.simulation.truth(device_time_s=raw.device_time_s + device_s / 2)
             if pixels is None:
-                truth = camera.simulation.truth()
                 lit = np.flatnonzero(np.isfinite(truth.range_m) & (truth.brightness > 0))
                 random = np.random.default_rng(1)
                 pixels = np.sort(random.choice(lit, min(PIXELS, lit.size), replace=False))
@@ -144,10 +147,10 @@ def measured(
             part = b.reshape((len(b), -1))[:, pixels]
             variance = _variance(part, recipe, sensor)
             frequency_hz = recipe.base_frequency_hz
-            ranges.append(ranges_m(part, variance, estimator, frequency_hz, SETTINGS))
+            found_m = ranges_m(part, variance, estimator, frequency_hz, SETTINGS)
+            errors_m.append(found_m - truth.range_m.ravel()[pixels])
         camera.stop()
-    assert pixels is not None
-    errors = pixel_errors(np.stack(ranges), truth.range_m.ravel()[pixels])
+    errors = pixel_errors(np.stack(errors_m), np.zeros_like(errors_m[0]))
     values = {
         "std": float(np.median(errors.std_m)),
         "bias": float(np.median(errors.bias_m)),

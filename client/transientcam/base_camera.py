@@ -108,6 +108,10 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         """Return what accuracy costs in time: the sequences that no other beats, in ``front``."""
         return self._ask(planning.tradeoff(by))
 
+    def start_tradeoff(self, by: str = "range_error_m") -> _Document:
+        """Begin what `tradeoff` returns as a job, and return that; see `start_plan`."""
+        return self._ask(planning.start_tradeoff(by))
+
     @property
     def calibrations(self) -> Calibrations[_Document, _Bytes]:
         """The calibrations that the daemon keeps: to measure, use, export and import."""

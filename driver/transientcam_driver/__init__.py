@@ -42,6 +42,7 @@ from transientcam_driver.errors import (
     SequenceError,
     SpecError,
 )
+from transientcam_driver.factory import FactoryCalibration, Lens
 from transientcam_driver.handle import Simulation, Truth
 from transientcam_driver.opening import open_camera
 from transientcam_driver.plugin import CameraName, CameraPlugin, FoundCamera
@@ -75,11 +76,13 @@ __all__ = [
     "DeviceRefused",
     "DriverError",
     "EffectError",
+    "FactoryCalibration",
     "FirmwareTooOld",
     "FoundCamera",
     "FrameTimeout",
     "ImageLabel",
     "ImagesLost",
+    "Lens",
     "LibusbMissing",
     "NotStreaming",
     "PermissionDenied",

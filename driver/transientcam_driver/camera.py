@@ -4,6 +4,7 @@ from enum import StrEnum
 from typing import Protocol, Self
 
 from transientcam_driver.capabilities import AppliedSequence, Capabilities
+from transientcam_driver.factory import FactoryCalibration
 from transientcam_driver.handle import Simulation
 from transientcam_driver.protocol import Status
 from transientcam_driver.receiving import Counters, RawFrame
@@ -41,6 +42,11 @@ class Camera(Protocol):
     @property
     def capabilities(self) -> Capabilities:
         """Limits and size of the device."""
+        ...
+
+    @property
+    def factory(self) -> FactoryCalibration | None:
+        """What the device reports of its pixels and its lens; None where it reports nothing."""
         ...
 
     @property

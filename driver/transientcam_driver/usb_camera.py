@@ -60,6 +60,8 @@ class UsbCamera:
         What to configure first; by default the nearest that the camera can do to ``Sequence()``.
     """
 
+    factory: None = None
+
     def __init__(
         self,
         connect: Callable[[str | None], Transport],

@@ -59,10 +59,11 @@ LANES = (
     "density",
     "reconstruct",
     "likelihood",
+    "pairs",
     "harmonics",
     "covariance",
 )
-WHEN_NEEDED = ("likelihood", "harmonics")
+WHEN_NEEDED = ("likelihood", "pairs", "harmonics")
 """Those that `compile_in_background` leaves out, but for the likelihood of its first order."""
 Progress = Callable[[int, int, str], None]
 """Takes lanes done, lanes in all, and the name of the lane that is next ("" after the last)."""
@@ -167,8 +168,9 @@ def compile_in_background(
 ) -> threading.Thread:
     """Start compiling on a thread and return it; arguments and errors as in `compile`.
 
-    Leaves out "harmonics", which few cameras need, and "likelihood", which takes long to compile,
-    but for that of the first order: they are prepared by themselves when they are first needed.
+    Leaves out "harmonics" and "pairs", which few cameras need, and "likelihood", which takes long
+    to compile, but for that of the first order: they are prepared by themselves when they are first
+    needed.
 
     The thread is named "transientcam-compile", and can be joined. A process that ends in the
     meantime waits at most for the lane that is being compiled.

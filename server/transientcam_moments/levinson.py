@@ -82,7 +82,9 @@ class Recursion(NamedTuple):
     order: Array
 
 
-def levinson(b: Array, *, threads: int | None = None) -> Coefficients:
+def levinson(
+    b: Array, *, brightness: Array | None = None, threads: int | None = None
+) -> Coefficients:
     """Solve the Toeplitz system of Theorem 1 for every pixel.
 
     Parameters
@@ -90,6 +92,8 @@ def levinson(b: Array, *, threads: int | None = None) -> Coefficients:
     b : array, shape (m + 1, ...)
         Trigonometric moments b_0 .. b_m, complex64 or complex128; the imaginary part of b_0 is
         ignored.
+    brightness : array, shape (...), optional
+        Real, in place of b_0, as biasing raises it (Sec. 4.3).
     threads : int, optional
         How many threads a compiled lane uses; all cores when left out.
 
@@ -103,7 +107,7 @@ def levinson(b: Array, *, threads: int | None = None) -> Coefficients:
     Raises
     ------
     ShapeError
-        When `b` is not 2 to 33 planes of numbers.
+        When `b` is not 2 to 33 planes of numbers, or the brightness has another shape.
     ParameterError
         For less than one thread.
 
@@ -112,7 +116,8 @@ def levinson(b: Array, *, threads: int | None = None) -> Coefficients:
     Theorem 1 and Eq. (2) of the paper; the recursion is Levinson's and Durbin's.
     """
     planes, trailing = moment_planes(b)
-    error, polynomial, reflection = _coefficients(planes, spread=on_threads(threads))
+    given = () if brightness is None else (_flat(brightness, trailing),)
+    error, polynomial, reflection = _coefficients(planes, *given, spread=on_threads(threads))
     return Coefficients(
         error.reshape(trailing),
         polynomial.reshape((polynomial.shape[0], *trailing)),
@@ -214,14 +219,24 @@ def predicted(a: Array, b: list[Array], k: int) -> Array:
     return -total
 
 
+def _flat(brightness: Array, trailing: tuple[int, ...]) -> Array:
+    brightness = as_array(brightness)
+    if tuple(brightness.shape) != trailing:
+        found = f"of shape {tuple(brightness.shape)}"
+        raise ShapeError("brightness", found, str(trailing))
+    return brightness.reshape(-1)
+
+
 @accelerated("levinson")
-def _coefficients(b: Array) -> tuple[Array, ...]:
-    return by_blocks(_levinson, b)
+def _coefficients(b: Array, *brightness: Array) -> tuple[Array, ...]:
+    return by_blocks(_levinson, b, *brightness)
 
 
-def _levinson(b: Array) -> tuple[Array, Array, Array]:
+def _levinson(b: Array, *brightness: Array) -> tuple[Array, Array, Array]:
     """Planar statement of `levinson`: b (m + 1, P) to error, polynomial, reflection."""
     xp = namespace(b)
+    if brightness:
+        b = xp.concatenate([brightness[0][None].astype(b.dtype), b[1:]])
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
         relative, scale = normalised(b)
         floor = 4 * float(np.finfo(scale.dtype).eps)

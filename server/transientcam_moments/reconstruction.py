@@ -29,7 +29,7 @@ from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.likelihood import MODEL_ERROR, Likelihood
 from transientcam_moments.likelihood.choice import MOST_RETURNS
 from transientcam_moments.likelihood.estimate import assumed_noise, fitted
-from transientcam_moments.likelihood.pairs import two_returns
+from transientcam_moments.likelihood.pairs import fitted_pairs
 from transientcam_moments.maximum_entropy import density
 from transientcam_moments.merging import merge_returns
 from transientcam_moments.noise.moments import MomentNoise, moment_noise, smoothed_of
@@ -255,22 +255,22 @@ class Reconstruction:
         """Calibrated moments (m + 1, ...), not smoothed."""
         return self._measured
 
-    @property
+    @cached_property
     def rejected_images(self) -> int:
         """How many images were left out of the average over takes, as outliers."""
         return 0 if self._kept is None else int((~self._kept).sum())
 
-    @property
+    @cached_property
     def repaired_images(self) -> int:
         """How many images that lost their synchronisation were rebuilt from the others."""
         return 0 if self._repaired is None else int(self._repaired.repaired.sum())
 
-    @property
+    @cached_property
     def unrepaired_images(self) -> int:
         """How many images are of pairs that contradict the others and could not be repaired."""
         return 0 if self._repaired is None else int(self._repaired.unrepaired.sum())
 
-    @property
+    @cached_property
     def filled_images(self) -> tuple[tuple[int, int], ...]:
         """Take and place in it of the images that are those of the frame before."""
         if self._repaired is None:
@@ -285,7 +285,7 @@ class Reconstruction:
             moments = smooth(moments, self.settings.smoothing_sigma_px)
         return (moments, None) if self._correction is None else self._correction(moments)
 
-    @property
+    @cached_property
     def corrected_pixels(self) -> int | None:
         """Of how many pixels known harmonics were taken out; None where none are known."""
         corrected = self._corrected[1]
@@ -446,7 +446,7 @@ class Reconstruction:
     def two_returns(self) -> Likelihood:
         """One or two returns, as many as the noise justifies, with what they are worth."""
         moments, noise, harmonics, error = self._evidence
-        return two_returns(moments, noise, harmonics=harmonics, model_error=error)
+        return fitted_pairs(moments, noise, self._spread, harmonics, error)
 
     @cached_property
     def unwrapped(self) -> Unwrapped:
@@ -663,6 +663,11 @@ class PassedReconstruction(Reconstruction):
     def measured(self) -> Array:
         """Calibrated moments (m + 1, ...), not smoothed; read from the data once more."""
         return self._measure()
+
+    @cached_property
+    def coefficients(self) -> Coefficients:
+        """Coefficients of the maximum entropy density; no biased moments are made for them."""
+        return levinson(self.smoothed, brightness=self.brightness)
 
     @property
     def _shape(self) -> tuple[int, tuple[int, ...]]:

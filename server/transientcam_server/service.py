@@ -204,6 +204,7 @@ class Service:
             self.settings.lens,
             width=camera.capabilities.width,
             height=camera.capabilities.height,
+            reported=None if camera.factory is None else camera.factory.lens,
             scene_field_deg=None if simulation is None else simulation.field_of_view_deg,
             recorded=camera.intrinsics if isinstance(camera, ReplayCamera) else None,
         )

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -11,9 +12,20 @@ from urllib.parse import urlsplit
 
 import httpx
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, sync_playwright
+from playwright.sync_api import (
+    Browser,
+    BrowserContext,
+    ConsoleMessage,
+    Page,
+    Request,
+    WebError,
+    expect,
+    sync_playwright,
+)
 
 from tests.serving import Served, serving
+from transientcam.wire import LEASE_HEADER
+from transientcam_driver.clock import Clock, RealClock
 
 # A laden machine takes its time; nothing here is about how long.
 _PATIENCE_MS = 60_000
@@ -28,7 +40,9 @@ _BUILT = _ROOT / "server" / "transientcam_server" / "static" / "index.html"
 
 def pytest_configure(config: pytest.Config) -> None:
     """Name the marker of modules whose tests share a daemon."""
-    config.addinivalue_line("markers", "shared_daemon(camera): the module's tests share one daemon")
+    config.addinivalue_line(
+        "markers", "shared_daemon(camera, slower): the module's tests share one daemon"
+    )
 
 
 @pytest.fixture(scope="session")
@@ -53,7 +67,9 @@ def browser(built: None) -> Iterator[Browser]:
             pytest.fail(message)
         pytest.skip(message)
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=executable)
+        # pages of a context in one process, which starts and compiles the page's scripts once
+        alone = ["--renderer-process-limit=1"]
+        chromium = playwright.chromium.launch(executable_path=executable, args=alone)
         yield chromium
         chromium.close()
 
@@ -75,6 +91,10 @@ class Watch:
         if message.type == "error" and not refused:
             self.complaints.append(f"console: {message.text}")
 
+    def on_exception(self, error: WebError) -> None:
+        """Remember what no script caught."""
+        self.complaints.append(f"exception: {error.error}")
+
     def on_request(self, request: Request) -> None:
         """Remember every request, those of the worker included."""
         self.requests.append(f"{request.method} {request.url}")
@@ -89,14 +109,29 @@ def camera() -> str:
     return MIRRORS
 
 
+class SlowClock(RealClock):
+    """Time passes more slowly: daemon and page compute and draw so many times fewer frames."""
+
+    def __init__(self, slower: float = 3.0) -> None:
+        self._slower = slower
+
+    def now_s(self) -> float:
+        """Monotonic time."""
+        return super().now_s() / self._slower
+
+    def wait(self, condition: threading.Condition, timeout_s: float) -> None:
+        """Sleep until notified or the time has passed."""
+        super().wait(condition, self._slower * timeout_s)
+
+
 @contextmanager
-def _storing_in(directory: Path, camera: str) -> Iterator[Served]:
+def _storing_in(directory: Path, camera: str, clock: Clock) -> Iterator[Served]:
     """A daemon that keeps what it stores in a directory of its own."""
     stored: dict[str, Any] = {
         "recordings": {"directory": directory / "recordings", "min_free_bytes": 0},
         "calibrations": {"directory": directory / "calibrations"},
     }
-    with serving(camera, **stored) as daemon:
+    with serving(camera, clock=clock, **stored) as daemon:
         yield daemon
 
 
@@ -111,7 +146,8 @@ def shared_daemon(
         yield None
         return
     camera = marker.args[0] if marker.args else MIRRORS
-    with _storing_in(tmp_path_factory.mktemp("daemon"), camera) as daemon:
+    clock = SlowClock(**marker.kwargs)
+    with _storing_in(tmp_path_factory.mktemp("daemon"), camera, clock) as daemon:
         daemon.start_all_workers()
         yield daemon
 
@@ -120,13 +156,14 @@ def shared_daemon(
 def served(shared_daemon: Served | None, camera: str, tmp_path: Path) -> Iterator[Served]:
     """A daemon; where tests share one, all that they set or stored is as it began with."""
     if shared_daemon is None:
-        with _storing_in(tmp_path, camera) as own:
+        with _storing_in(tmp_path, camera, SlowClock()) as own:
             yield own
         return
     daemon = shared_daemon
     began_with = {of: _document(daemon, of) for of in ("sequence", "reconstruction")}
     put(daemon, "acquisition", {"running": True})
     yield daemon
+    _end_lease(daemon)
     if _document(daemon, "sequence")["sequence_id"] != began_with["sequence"]["sequence_id"]:
         put(daemon, "sequence", {name: began_with["sequence"][name] for name in SEQUENCE_FIELDS})
     settings = ("estimator", "smoothing_px")
@@ -138,6 +175,15 @@ def served(shared_daemon: Served | None, camera: str, tmp_path: Path) -> Iterato
         put(daemon, "reconstruction", before)
     for recording in _document(daemon, "recordings")["recordings"]:
         httpx.delete(f"{daemon.url}/api/v1/recordings/{recording['id']}").raise_for_status()
+
+
+def _end_lease(served: Served) -> None:
+    """Let every client change things again, whichever has the lease."""
+    address = f"{served.url}/api/v1/lease"
+    if _document(served, "lease")["held"]:
+        terms = {"holder": "the next test", "takeover": True}
+        taken = httpx.post(address, json=terms).raise_for_status().json()
+        httpx.delete(address, headers={LEASE_HEADER: taken["lease_id"]}).raise_for_status()
 
 
 def _document(served: Served, path: str) -> dict[str, Any]:
@@ -171,16 +217,60 @@ def watch(served: Served) -> Watch:
     return Watch(urlsplit(served.url).netloc)
 
 
-@pytest.fixture
-def page(browser: Browser, served: Served, watch: Watch) -> Iterator[Page]:
-    """A fresh page, at rest until the test opens it; it may log no error until the test ends."""
+def _context(browser: Browser, served: Served) -> BrowserContext:
     context = browser.new_context(
         viewport={"width": 1280, "height": 800}, reduced_motion="reduce", base_url=served.url
     )
     context.set_default_timeout(_PATIENCE_MS)
-    context.on("console", watch.on_console)
-    context.on("weberror", lambda error: watch.complaints.append(f"exception: {error.error}"))
-    context.on("request", watch.on_request)
-    yield context.new_page()
+    return context
+
+
+@pytest.fixture(scope="module")
+def shared_context(
+    browser: Browser, shared_daemon: Served | None
+) -> Iterator[BrowserContext | None]:
+    """One context for the tests that share a daemon: scripts stay compiled from page to page."""
+    if shared_daemon is None:
+        yield None
+        return
+    context = _context(browser, shared_daemon)
+    context.new_page().goto("/icon.svg")  # keeps the process between the tests
+    yield context
     context.close()
+
+
+@pytest.fixture
+def context(
+    browser: Browser, shared_context: BrowserContext | None, served: Served, watch: Watch
+) -> Iterator[BrowserContext]:
+    """A context without pages of its own, storage and permissions, which is watched."""
+    context = shared_context or _context(browser, served)
+    listeners: dict[Any, Any] = {
+        "console": watch.on_console,
+        "weberror": watch.on_exception,
+        "request": watch.on_request,
+    }
+    for event, listener in listeners.items():
+        context.on(event, listener)
+    before = context.pages
+    yield context
+    for each in context.pages:
+        if each not in before:
+            each.close()
+    for event, listener in listeners.items():
+        context.remove_listener(event, listener)
+    if shared_context is None:
+        context.close()
+    else:
+        context.clear_permissions()
+
+
+@pytest.fixture
+def page(context: BrowserContext, served: Served, watch: Watch) -> Iterator[Page]:
+    """A fresh page, at rest until the test opens it; it may log no error until the test ends."""
+    page = context.new_page()
+    stored = {"origin": served.url, "storageTypes": "local_storage"}
+    context.new_cdp_session(page).send("Storage.clearDataForOrigin", stored)
+    yield page
+    page.close()
     assert watch.complaints == []

@@ -22,7 +22,6 @@ _RULES = {
 }
 VIEWS = (
     "Validity",
-    "Accuracy against time",
     "Recordings",
     "Reconstruction",
     "Calibration",
@@ -33,7 +32,8 @@ VIEWS = (
 )
 
 
-def _offences(page: Page, *, within: str = "html", rules: dict[str, Any] = _RULES) -> list[str]:
+def offences_of(page: Page, *, within: str = "html", rules: dict[str, Any] = _RULES) -> list[str]:
+    """What a page, or a part of it, offends against, in words."""
     # the page's own content security policy lets no script in but its own: evaluated, not linked
     if not page.evaluate("() => 'axe' in window"):
         page.evaluate(_AXE.read_text(encoding="utf-8"))
@@ -53,7 +53,7 @@ def test_no_view_offends_a_rule(page: Page, served: Served, scheme: str) -> None
     open_page(page)
     page.locator(".panel-response .returns").wait_for()
     stop(served)  # new frames alter no rule
-    assert _offences(page) == []
+    assert offences_of(page) == []
     shown = "sequence"
     offences: dict[str, list[str]] = {}
     for title in VIEWS:
@@ -62,7 +62,7 @@ def test_no_view_offends_a_rule(page: Page, served: Served, scheme: str) -> None
         shown = str(panel.get_attribute("data-view"))
         # what is beside the panel is held to all rules above; the scheme changes colours alone
         rules = _RULES if scheme == "light" else {"runOnly": ["color-contrast"]}
-        if found := _offences(page, within=f".panel-{shown}", rules=rules):
+        if found := offences_of(page, within=f".panel-{shown}", rules=rules):
             offences[title] = found
     assert offences == {}
 
@@ -72,11 +72,11 @@ def test_the_page_on_a_phone_and_its_dialogs_offend_no_rule(page: Page, served: 
     open_page(page)
     page.locator(".panel-response .returns").wait_for()
     stop(served)
-    assert _offences(page) == []
+    assert offences_of(page) == []
     look = page.get_by_role("button", name="Look of the light")
     look.click()
-    assert _offences(page, within=".look") == []
+    assert offences_of(page, within=".look") == []
     page.keyboard.press("Escape")
     page.keyboard.press("?")
     page.locator("dialog[open]").wait_for()
-    assert _offences(page) == []
+    assert offences_of(page) == []

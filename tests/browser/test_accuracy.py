@@ -1,88 +1,168 @@
+"""The panel of sequence and accuracy: the front, the slider along it, plans, and the way back."""
+
+import threading
+from importlib import import_module
+from typing import Any
+
 import httpx
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
 
-from tests.browser.conftest import Watch
-from tests.browser.dashboard import choose, open_page, shows_frame, text
+from tests.browser.conftest import SEQUENCE_FIELDS
+from tests.browser.dashboard import open_page, shows_frame, text
+from tests.browser.test_accessibility import offences_of
 from tests.browser.test_transient import stop
 from tests.serving import Served
+from transientcam_server.planning import Progress
 
-# Every sequence is weighed on the scene: seconds of work on a free machine.
-PATIENCE_MS = 120_000
+pytestmark = pytest.mark.shared_daemon
+
+PANEL = ".panel-sequence"
+
+
+@pytest.fixture(autouse=True)
+def few_families(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is searched is no concern of the page's: little, so that it is found quickly."""
+    families = import_module("transientcam_server.planning.families")  # not the function
+    monkeypatch.setattr(families, "HARMONICS", (1, 4))
+    monkeypatch.setattr(families, "FREQUENCY_FACTORS", (1.0,))
+    monkeypatch.setattr(families, "SEARCHED", ("single-frequency", "maximum-entropy"))
 
 
 def number(shown: str) -> float:
     """A figure with its prefix, in the unit itself."""
-    value, unit = shown.split()[:2]
+    value, unit = shown.removeprefix("± ").split()[:2]
     factors = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "s": 1.0, "ms": 1e-3, "µs": 1e-6}
     return float(value) * factors[unit]
 
 
-def test_a_point_of_the_front_is_chosen_and_applied(page: Page, served: Served) -> None:
+def running(served: Served) -> dict[str, Any]:
+    """What the camera measures with, as a sequence is set."""
+    document = httpx.get(f"{served.url}/api/v1/sequence").raise_for_status().json()
+    return {name: document[name] for name in SEQUENCE_FIELDS}
+
+
+def test_the_front_fills_and_its_slider_sets_a_sequence_that_can_be_undone(
+    page: Page, served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go_on = threading.Event()
+    computed = served.service.planner.tradeoff_document
+
+    def held_up(goal: Any, scene: Any, progress: Progress) -> Any:
+        def show(document: dict[str, Any]) -> None:
+            progress.show(document)
+            if len(document["front"]) > 2:
+                assert go_on.wait(120)
+
+        return computed(goal, scene, progress.part(0.0, 1.0, show=show))
+
+    monkeypatch.setattr(served.service.planner, "tradeoff_document", held_up)
     open_page(page)
     shows_frame(page, stop(served))
-    choose(page, "response", "Accuracy against time")
-    page.get_by_role("button", name="Predict").click()
+    began_with = running(served)
+    page.locator(".performance").click()
     points = page.locator(".front-point")
-    points.first.wait_for(timeout=PATIENCE_MS)
-    answer = httpx.get(f"{served.url}/api/v1/tradeoff", timeout=120).raise_for_status().json()
-    front = answer["front"]
-    expect(points).to_have_count(len(front))
-    centres = points.evaluate_all(
-        "(all) => all.map((each) => { const dot = each.querySelector('circle');"
-        " return [Number(dot.getAttribute('cx')), Number(dot.getAttribute('cy'))]; })"
+    status = page.locator(f"{PANEL} [data-field=accuracy-status]")
+    try:
+        expect(points).to_have_count(3)
+        expect(status).to_contain_text("captures of")
+        expect(status.get_by_role("button", name="Cancel")).to_be_visible()
+    finally:
+        go_on.set()
+    expect(status.get_by_role("progressbar")).to_have_count(0)
+    front = (
+        httpx.get(f"{served.url}/api/v1/tradeoff", timeout=120).raise_for_status().json()["front"]
     )
+    expect(points).to_have_count(len(front))
+    centres = centres_of(points)
     assert centres == sorted(centres), "more time to the right"
     assert [y for _, y in centres] == sorted(y for _, y in centres), "less error further down"
     expect(page.locator("[data-field=now]")).to_be_visible()
+    expect(page.locator("[data-field=ghost]")).to_be_visible()
+    assert offences_of(page, within=PANEL) == []
 
-    wanted = front[len(front) // 2]
+    # a point is looked at, and nothing set
+    middle = len(front) // 2
     plot = page.locator(".front svg").bounding_box()
     assert plot is not None
-    x, y = centres[len(front) // 2]
+    x, y = centres[middle]
     page.mouse.click(plot["x"] + x, plot["y"] + y)
-    points.nth(len(front) // 2).focus()
-    panel = ".panel-accuracy"
-    predicted = wanted["predicted"]
-    for name, expected in (
-        ("range_error_m", predicted["range_error_m"]["median"]),
-        ("range_std_m", predicted["range_std_m"]["median"]),
-        ("range_bias_m", predicted["range_bias_m"]),
-    ):
-        assert number(text(page, panel, f"choice_{name}")) == pytest.approx(expected, rel=5e-3)
-    capture_s = number(text(page, panel, "choice_capture_s"))
-    assert capture_s == pytest.approx(wanted["capture_s"], rel=5e-3)
-    page.keyboard.press("ArrowRight")
-    following = front[len(front) // 2 + 1]
     expect(page.locator("[data-field=choice_exposure_s]")).to_be_visible()
-    assert number(text(page, panel, "choice_exposure_s")) == pytest.approx(
-        following["sequence"]["exposure_s"], rel=5e-3
+    looked = front[middle]
+    for name, expected in (
+        ("range_error_m", looked["predicted"]["range_error_m"]["median"]),
+        ("range_std_m", looked["predicted"]["range_std_m"]["median"]),
+        ("range_bias_m", looked["predicted"]["range_bias_m"]),
+        ("capture_s", looked["capture_s"]),
+    ):
+        assert number(text(page, PANEL, f"choice_{name}")) == pytest.approx(expected, rel=5e-3)
+    assert running(served) == began_with
+
+    # neither is what keys pass by, until they are let go
+    slider = page.get_by_label("From fast to accurate")
+    expect(slider).to_have_value(str(middle))
+    slider.focus()
+    page.keyboard.down("ArrowRight")
+    expect(slider).to_have_value(str(middle + 1))
+    assert running(served) == began_with
+    page.keyboard.up("ArrowRight")
+    undo = page.get_by_role("log").get_by_role("button", name="Undo")
+    undo.wait_for()
+    wanted = front[middle + 1]["sequence"]
+    assert running(served) == {name: wanted[name] for name in SEQUENCE_FIELDS}
+    exposure = page.locator(f"{PANEL} [data-field=exposure_s]")
+    expect(exposure).to_be_visible()
+    assert number(str(exposure.text_content()).replace("\u202f", " ")) == pytest.approx(
+        wanted["exposure_s"], rel=5e-3
     )
-    page.get_by_role("button", name="Apply this sequence").click()
-    expect(page.locator(".panel-sequence [data-field=harmonics]")).to_have_text(
-        str(following["sequence"]["harmonics"])
+    undo.click()
+    page.wait_for_function(
+        "(exposure_s) => transientcam.store.sequence.peek().exposure_s === exposure_s",
+        arg=began_with["exposure_s"],
     )
-    expect(page.locator("[data-field=accuracy-status]")).to_have_text("")
-    applied = httpx.get(f"{served.url}/api/v1/sequence").json()
-    assert {name: applied[name] for name in following["sequence"]} == following["sequence"]
+    assert running(served) == began_with
 
 
-def test_a_target_is_planned_for_or_refused_in_words(
-    page: Page, served: Served, watch: Watch
+def test_a_target_is_planned_for_refused_in_words_or_given_up(
+    page: Page, served: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     open_page(page)
     shows_frame(page, stop(served))
-    choose(page, "response", "Accuracy against time")
-    plan = page.get_by_role("button", name="Plan")
+    panel = page.locator(PANEL)
+    panel.get_by_text("Plan for a target").click()
+    plan = page.get_by_role("button", name="Plan", exact=True)
     expect(plan).to_be_disabled()
-    page.get_by_label("Error at most").fill("8")
+    page.get_by_label("Error at most").fill("20")
     plan.click()
-    page.locator("[data-field=choice]").wait_for(timeout=PATIENCE_MS)
-    assert number(text(page, ".panel-accuracy", "choice_range_error_m")) <= 8e-3
-    watch.refusals_expected = True
+    panel.locator("[data-field=choice_range_error_m]").wait_for()
+    assert number(text(page, PANEL, "choice_range_error_m")) <= 20e-3
     page.get_by_label("Error at most").fill("1e-9")
-    page.get_by_label("Frames at least").fill("20")
     plan.click()
-    status = page.locator("p.refusal[data-field=accuracy-status]")
-    status.wait_for(timeout=PATIENCE_MS)
-    assert len(str(status.text_content())) > 20
+    status = panel.locator("p.refusal[data-field=accuracy-status]")
+    status.wait_for()
+    assert "error of the range" in str(status.text_content())
+
+    began, pause = threading.Event(), threading.Event()
+
+    def endless(goal: object, scene: object, progress: Progress) -> None:
+        began.set()
+        while True:
+            progress()
+            pause.wait(0.01)
+
+    monkeypatch.setattr(served.service.planner, "plan_document", endless)
+    plan.click()
+    assert began.wait(60)
+    panel.get_by_role("button", name="Cancel").click()
+    expect(panel.get_by_role("progressbar")).to_have_count(0)
+    jobs = httpx.get(f"{served.url}/api/v1/jobs").json()["jobs"]
+    assert jobs[0]["state"] == "cancelled"
+
+
+def centres_of(points: Locator) -> list[list[float]]:
+    """Where the dots of a front are drawn."""
+    centres: list[list[float]] = points.evaluate_all(
+        "(all) => all.map((each) => { const dot = each.querySelector('circle');"
+        " return [Number(dot.getAttribute('cx')), Number(dot.getAttribute('cy'))]; })"
+    )
+    return centres

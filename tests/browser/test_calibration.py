@@ -12,8 +12,8 @@ from tests.browser.conftest import Watch, put
 from tests.browser.dashboard import LIVE, choose, choose_from, open_page
 from tests.serving import Served
 
-# a camera before the diffusor
-pytestmark = pytest.mark.shared_daemon("sim:calibration?seed=3")
+# a camera before the diffusor, of which many frames are captured
+pytestmark = pytest.mark.shared_daemon("sim:calibration?seed=3", slower=1.0)
 
 # A measurement captures every frame twice, and is evaluated.
 PATIENCE_MS = 60_000

@@ -1,22 +1,28 @@
 """The simulated scene, its effects and its faults, from the page."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import httpx
 import numpy as np
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
+from tests.browser.conftest import put
 from tests.browser.dashboard import LIVE, choose, map_pixels, open_page
 from tests.serving import Served
 
 PATIENCE_MS = 60_000
 
+# a scene other than the usual one
+pytestmark = pytest.mark.shared_daemon("sim:wall?noise=off")
 
-@pytest.fixture
-def camera() -> str:
-    """A scene other than the usual one."""
-    return "sim:wall?noise=off"
+
+@pytest.fixture(autouse=True)
+def wall(served: Served) -> Iterator[None]:
+    """The wall without forced effects at the end of each test."""
+    yield
+    put(served, "simulation", {"scene": "wall", "effects": {}})
 
 
 def simulated(served: Served) -> dict[str, Any]:
@@ -26,10 +32,25 @@ def simulated(served: Served) -> dict[str, Any]:
 
 def test_the_camera_is_put_before_another_scene(page: Page, served: Served) -> None:
     open_page(page)
+    held_up: list[Route] = []
+
+    def hold(route: Route) -> None:
+        held_up.append(route)
+
+    page.route("**/simulation/explain", hold)
     choose(page, "sequence", "Simulated scene")
     panel = page.locator(".panel-simulation")
     scene = panel.get_by_label("Scene")
     expect(scene).to_have_value("wall")
+    unplug = panel.get_by_role("button", name="Unplug")
+    before = unplug.bounding_box()
+    while not held_up:
+        page.wait_for_timeout(50)
+    for route in held_up:
+        route.continue_()
+    page.unroute("**/simulation/explain")
+    panel.locator(".effect-table").wait_for()
+    assert unplug.bounding_box() == before, "nothing moves when the effects come"
     wall = map_pixels(page)
     scene.select_option("mirrors")
     mirrors = panel.locator("[data-effect=mirror-paths]")

@@ -1,20 +1,13 @@
-import os
 import re
-import signal
-import socket
-import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from urllib.parse import urlsplit
 
 import httpx
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.conftest import Watch
+from tests.browser.conftest import MIRRORS, SlowClock, Watch
 from tests.browser.dashboard import LIVE, open_page, text
-from tests.serving import Served
+from tests.serving import Served, serving
 
 pytestmark = pytest.mark.shared_daemon
 
@@ -184,37 +177,17 @@ def test_nothing_hangs_over_the_edge(page: Page, width: int) -> None:
     assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
-@contextmanager
-def daemon(port: int) -> Iterator[None]:
-    """The `transientcam serve` of this installation, as a process of its own."""
-    executable = str(Path(sys.executable).with_name("transientcam"))
-    command = [executable, "serve", "--port", str(port)]
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, env=os.environ | {"COLUMNS": "200"}
-    )
-    try:
-        assert process.stdout is not None
-        assert f":{port}" in process.stdout.readline()
-        yield
-    finally:
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=20)
-
-
 def test_a_page_outlives_its_daemon(browser: Browser) -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    context = browser.new_context(base_url=f"http://127.0.0.1:{port}", reduced_motion="reduce")
-    page = context.new_page()
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    with daemon(port):
+    with serving(MIRRORS, clock=SlowClock()) as first:
+        context = browser.new_context(base_url=first.url, reduced_motion="reduce")
+        page = context.new_page()
+        errors: list[str] = []
+        page.on("pageerror", lambda error: errors.append(str(error)))
         open_page(page)
     banner = page.locator("[data-banner=connection]")
     expect(banner).to_contain_text("No connection to the service.")
     expect(page.locator("[data-field=state]")).to_have_text(re.compile("Reconnecting|Connecting"))
-    with daemon(port):
+    with serving(MIRRORS, clock=SlowClock(), port=urlsplit(first.url).port):
         expect(banner).to_have_count(0)
         expect(page.locator("[data-field=state]")).to_have_text(LIVE)
     context.close()

@@ -6,10 +6,12 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.conftest import Watch
+from tests.browser.conftest import MIRRORS, SlowClock, Watch
 from tests.browser.dashboard import LIVE, choose_from, open_page, shows_frame
 from tests.serving import Served, serving
 from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
+
+pytestmark = pytest.mark.shared_daemon
 
 
 def lease(served: Served, method: str, **document: Any) -> httpx.Response:
@@ -152,7 +154,7 @@ def guarded(tmp_path: Path) -> Any:
         role: TokenFile(file).create(str(role), role, now=utc_now(), expires=None)[1]
         for role in (Role.VIEWER, Role.OPERATOR)
     }
-    with serving("sim:mirrors?noise=off", require_token=True, tokens_file=file) as served:
+    with serving(MIRRORS, clock=SlowClock(), require_token=True, tokens_file=file) as served:
         yield served, tokens
 
 

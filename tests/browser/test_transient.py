@@ -355,7 +355,14 @@ def test_a_strip_shows_light_at_the_times_it_arrives(page: Page, served: Served)
 
 def test_a_film_and_a_figure_are_handed_out(page: Page, served: Served) -> None:
     open_page(page)
+    choose(page, "transient", "Film of 30 frames (WebM)")
+    filming = page.locator(".filming")
+    expect(filming).to_contain_text(re.compile("Filming [1-9]"))  # frames come
+    filming.get_by_role("button", name="Cancel").click()
+    expect(filming).to_have_count(0)
     shows_frame(page, stop(served))
+    choose(page, "transient", "Film of 30 frames (GIF)")
+    page.get_by_text("No film was made: the camera is stopped.").wait_for()
     page.locator(".panel-transient").get_by_label("Speed").select_option("20")
     before = text(page, ".panel-transient", "time")
     with page.expect_download() as download:

@@ -168,8 +168,10 @@ def test_points_stand_where_their_pixels_look(page: Page, served: Served, watch:
     aside = canvas_pixels_of_scene(page)
     page.locator(".panel-points").get_by_label("Size of a point").select_option("6")
     page.get_by_role("button", name="Camera's eye").click()
+    assert np.any(aside != canvas_pixels_of_scene(page))
+    page.get_by_role("button", name="Shading").click()
+    page.get_by_role("button", name="Grid").click()
     eye = canvas_pixels_of_scene(page)
-    assert np.any(aside != eye)
     # seen from the camera, the cloud is the camera's own picture
     low, high = (float(str(canvas.get_attribute(f"data-{key}"))) for key in ("low", "high"))
     expected = map_colours(ranges, low, high, "viridis").astype(int)
@@ -184,6 +186,31 @@ def test_points_stand_where_their_pixels_look(page: Page, served: Served, watch:
             nearest = np.abs(around - eye[at_y, at_x, :3].astype(int)).max(axis=1).min()
             found.append(nearest <= 8)
     assert np.mean(found) > 0.97
+    # and a point is its pixel in all views
+    box = canvas.bounding_box()
+    assert box is not None
+    scale = min(box["width"] / 163, box["height"] / 120)
+    x, y = smoothest(ranges)
+    place = (
+        box["x"] + box["width"] / 2 + (x + 0.5 - 81.5) * scale,
+        box["y"] + box["height"] / 2 + (y + 0.5 - 60) * scale,
+    )
+    page.mouse.move(*place)
+    for signal in ("pointed", "selected"):
+        page.wait_for_function(
+            """([signal, x, y]) => { const pixel = transientcam.store[signal].peek();
+                 return pixel !== null && Math.hypot(pixel.x - x, pixel.y - y) < 2; }""",
+            arg=[signal, x, y],
+        )
+        page.mouse.click(*place)
+    expect(page.locator(".scene-mark-selected")).to_be_visible()
+
+
+def smoothest(ranges: NDArray[Any]) -> tuple[int, int]:
+    """Column and row of a pixel around which no point strays: none stands before another there."""
+    places = [(x, y) for x in range(20, 140, 5) for y in range(20, 100, 5)]
+    spread = [float(np.ptp(ranges[y - 10 : y + 11, x - 10 : x + 11])) for x, y in places]
+    return places[int(np.argmin(np.nan_to_num(spread, nan=np.inf)))]
 
 
 def test_points_turn_and_change_their_colours(page: Page, served: Served) -> None:
@@ -200,12 +227,21 @@ def test_points_turn_and_change_their_colours(page: Page, served: Served) -> Non
     page.mouse.move(box["x"] + 160, box["y"] + 120, steps=3)
     page.mouse.up()
     seen.append(canvas_pixels_of_scene(page))
-    for colouring in ("light", "validity"):
+    for colouring, shows in (
+        ("light", "brightness"),
+        ("validity", "flags"),
+        ("flight", "coefficients"),
+    ):
         page.get_by_label("Colour by").select_option(colouring)
         expect(canvas).to_have_attribute("data-colouring", colouring)
-        shows = "brightness" if colouring == "light" else "flags"
         page.wait_for_function(f"() => transientcam.store.frames.of('{shows}').value !== null")
         seen.append(canvas_pixels_of_scene(page))
+    # the wave runs over the points: where light arrives, they are brighter than before it came
+    page.get_by_role("button", name="Grid").click()
+    page.evaluate("() => transientcam.store.player.seek(0.02)")
+    early = canvas_pixels_of_scene(page)
+    page.evaluate("() => transientcam.store.player.seek(0.27)")
+    assert np.mean(canvas_pixels_of_scene(page)[..., :3]) > 2 * np.mean(early[..., :3])
     for before, after in pairwise(seen):
         assert np.any(before != after)
 
@@ -228,7 +264,7 @@ def test_panels_are_moved_added_closed_and_resized_and_stay_so(page: Page, serve
         return views
 
     assert shown() == ["map", "transient", "response", "sequence"]
-    choose(page, "map", "Sequence")
+    choose(page, "map", "Sequence and accuracy")
     assert shown() == ["sequence", "transient", "response", "map"]
     choose(page, "map", "Close")
     choose(page, "response", "Streak →")

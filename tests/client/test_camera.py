@@ -91,6 +91,11 @@ _CALLS: dict[
         lambda c: c.tradeoff(),
         ("GET", "tradeoff", "by=range_error_m", None),
     ),
+    "start a tradeoff": (
+        lambda c: c.start_tradeoff("range_std_m"),
+        lambda c: c.start_tradeoff("range_std_m"),
+        ("POST", "tradeoff/jobs", "", {"by": "range_std_m"}),
+    ),
     "reconstruction": (
         lambda c: c.reconstruction,
         lambda c: c.reconstruction(),

@@ -197,11 +197,9 @@ def test_a_rate_can_be_limited(camera: Camera) -> None:
     with camera.stream("range", max_rate_hz=4.0) as stream:
         frames = [stream.receive(timeout_s=_LONG_S) for _ in range(4)]
 
-    # a laden machine gives fewer, and never more
+    # a laden machine gives fewer, and never more; one is due a tenth of the period early
     times_s = [frame.meta["device_time_s"] for frame in frames]
-    period_s = camera.sequence["capture_s"]
-    assert (np.diff(times_s) > 0.25 - 2 * period_s).all()
-    assert np.mean(np.diff(times_s)) > 0.25 - period_s
+    assert (np.subtract(times_s, times_s[0]) > (np.arange(4) - 0.11) / 4.0).all()
 
 
 def test_a_change_of_the_sequence_is_announced_with_the_new_channels(camera: Camera) -> None:
@@ -240,8 +238,8 @@ def test_a_wrong_change_of_a_subscription_leaves_the_stream_as_it_was(camera: Ca
         assert stream.receive(timeout_s=_LONG_S).product == "range"
 
         stream.subscribe("brightness")
-        products = [stream.receive(timeout_s=_LONG_S).product for _ in range(8)]
-        assert products[-1] == "brightness"
+        while stream.receive(timeout_s=_LONG_S).product != "brightness":
+            pass  # those of before that were on their way
 
 
 def test_a_slow_reader_gets_fresh_frames_and_notices_of_those_it_missed(camera: Camera) -> None:

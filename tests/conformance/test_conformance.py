@@ -30,8 +30,10 @@ from transientcam.wire import LEASE_HEADER
 from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
 
 LONG_S = 20.0
-SHORT_S = 1.5
+SHORT_S = 2.5
+SILENCES = ("within", "no hello", "no notice", "no problem")
 KEPT, HALF = Rate(10.0, 10.0), Rate(5.0, 10.0)
+NO_TOKEN, TOO_SLOW = "the service requires no token", "the camera does not keep its rate"
 BY_NAME = {each.name: each for each in CHECKS}
 
 
@@ -53,9 +55,10 @@ def test_the_daemon_keeps_every_promise(daemon: Breakable) -> None:
 
     assert not report.failed, said(report)
     assert len(report.results) == len(CHECKS) + 1
-    assert {each.reason for each in report.results if each.outcome == "skipped"} <= {
-        "the service requires no token",
-    }
+    # what rests on the camera's rate is skipped where the machine is too slow for it
+    for each in report.results:
+        if each.outcome == "skipped":
+            assert str(each.reason).startswith((NO_TOKEN, TOO_SLOW))
     assert after == before
     assert not recordings
     assert not held
@@ -78,8 +81,8 @@ def test_a_broken_promise_fails_its_check(
 ) -> None:
     monkeypatch.setattr(recording, "replayed", replayed_here)
     breakable.breaker.current = breaking
-    # some things take their time also where they are broken
-    timeout_s = LONG_S if BY_NAME[name].group in ("routes", "sizes") else SHORT_S
+    # where nothing comes it is waited for as long
+    timeout_s = SHORT_S if word in SILENCES else LONG_S
     with Device(breakable.served.url, timeout_s=timeout_s) as device:
         result = run(device, only(name), rate=lambda device: KEPT).results[0]
 
@@ -105,9 +108,7 @@ def test_what_rests_on_the_rate_is_not_failed_where_the_camera_does_not_keep_it(
         report = run(device, only(name), rate=measured)
 
     assert report.results[0].outcome == outcome
-    said_so = "the camera does not keep its rate: 5 of 10 frames/s arrive" in str(
-        report.results[0].reason
-    )
+    said_so = f"{TOO_SLOW}: 5 of 10 frames/s arrive" in str(report.results[0].reason)
     assert said_so is (outcome == "skipped")
     assert (report.to_document()["slow"] is not None) is (outcome == "skipped")
 
@@ -148,7 +149,7 @@ def test_a_broken_promise_fails_no_other_check(breakable: Breakable) -> None:
     breaking = {name: breaking for name, breaking, _ in BROKEN}
     for name in ("a-wrong-method-is-a-problem", "an-unknown-product-is-a-problem"):
         breakable.breaker.current = breaking[name]
-        with Device(breakable.served.url, timeout_s=SHORT_S) as device:
+        with Device(breakable.served.url, timeout_s=LONG_S) as device:
             report = run(device, chosen(["problems"]))
 
         assert [each.check.name for each in report.failed] == [name]
@@ -186,7 +187,7 @@ def test_with_tokens_the_promises_about_them_are_kept(guarded: Guarded) -> None:
         report = run(device, chosen(["authentication", "stream"]))
 
     assert not report.failed, said(report)
-    assert report.counts["skipped"] == 0
+    assert report.slow or report.counts["skipped"] == 0
 
 
 @pytest.mark.parametrize(
@@ -198,7 +199,7 @@ def test_a_broken_promise_about_tokens_fails_its_check(
     daemon, tokens = guarded
     daemon.breaker.current = breaking
     try:
-        with Device(daemon.served.url, token=tokens[Role.ADMIN], timeout_s=SHORT_S) as device:
+        with Device(daemon.served.url, token=tokens[Role.ADMIN], timeout_s=LONG_S) as device:
             result = run(device, only(name), rate=lambda device: KEPT).results[0]
     finally:
         daemon.breaker.current = NOTHING

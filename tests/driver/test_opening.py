@@ -58,7 +58,7 @@ def test_a_simulated_cameras_name_says_its_scene(spec: str, expected: SimulatedS
     ("spec", "reason"),
     [
         ("", "no camera is called ''"),
-        ("webcam", "no camera is called 'webcam'; known are recording, sim"),
+        ("webcam", "no camera is called 'webcam'; known are kinect2, recording, sim"),
         ("usb:A-17?speed=3", "unknown option 'speed'; there are none"),
         ("sim:", "it names no scene"),
         ("sim:mirrors?depth=3", "unknown option 'depth'"),
@@ -111,7 +111,7 @@ def test_without_a_camera_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.mark.parametrize(("width", "height"), [(163, 120), (320, 240), (640, 480)])
 def test_resolutions_can_be_chosen(open_virtual: OpenCamera, width: int, height: int) -> None:
-    camera = open_virtual(f"sim:mirrors?width={width}&height={height}")
+    camera = open_virtual(f"sim:wall?width={width}&height={height}")
     camera.start()
 
     assert camera.read_frame().images.shape == (16, height, width)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments import oracles
-from tests.moments.kernel_lanes import lanes, without_lanes
+from tests.moments.kernel_lanes import FEW, lanes, without_lanes
 from transientcam_moments import _kernels
 from transientcam_moments._kernels import density as density_module
 from transientcam_moments._kernels.parallel import blocks
@@ -19,13 +19,14 @@ from transientcam_moments.levinson import _levinson
 from transientcam_moments.polishing import residual, size
 
 ORDERS = [3, 4, 8]
+LANES = tuple(name for name in FEW if name != "reconstruct")
 TYPES = [np.complex64, np.complex128]
 Array = NDArray[Any]
 
 
 @pytest.fixture(autouse=True, scope="module")
 def compiled() -> Iterator[None]:
-    with lanes(*ORDERS):
+    with lanes(*ORDERS, names=LANES):
         yield
 
 
@@ -143,6 +144,18 @@ def test_levinson_follows_the_planar_statement(m: int, dtype: type) -> None:
         assert np.array_equal(part[:, ~lit], expected[:, ~lit], equal_nan=True) or (
             np.allclose(part[:, ~lit], expected[:, ~lit], rtol=1e-2, equal_nan=True)
         )
+
+
+@pytest.mark.parametrize("dtype", TYPES)
+def test_levinson_takes_a_brightness_in_place_of_b_0(dtype: type) -> None:
+    b, _ = special_moments(3, dtype)
+    with np.errstate(all="ignore"):
+        biased = tm.bias(b).moments
+
+    beside = lane("levinson", b)(b, biased[0].real)
+
+    for part, expected in zip(beside, lane("levinson", b)(biased), strict=True):
+        assert np.array_equal(part, expected, equal_nan=True)
 
 
 @pytest.mark.parametrize("dtype", TYPES)

@@ -1,7 +1,10 @@
 """Levinson's recursion and its inverses."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments import oracles
@@ -156,3 +159,24 @@ def test_wrong_shapes_are_refused() -> None:
         tm.from_reflection(np.ones(2), np.zeros((0, 2), complex))
     with pytest.raises(tm.ParameterError, match=r"n = 2 .* above the order m = 2"):
         tm.extend(tm.levinson(np.array([1.0, 0, 0])), 2)
+
+
+@pytest.mark.parametrize("dtype", [np.complex64, np.complex128])
+def test_a_brightness_takes_the_place_of_b_0(dtype: type) -> None:
+    moments = oracles.random_moments(np.random.default_rng(5), 3, 40).reshape(4, 5, 8)
+    b: NDArray[Any] = moments.astype(dtype)
+    raised = 1.2 * b[0].real
+
+    found = tm.levinson(b, brightness=raised)
+
+    whole = np.concatenate([raised[None], b[1:]]).reshape(4, -1).astype(complex)
+    column = oracles.first_column_of_inverse(whole).reshape(b.shape)
+    accurate = 1e-9 if dtype is np.complex128 else 1e-3
+    assert np.allclose(found.polynomial, column * found.error, rtol=accurate, atol=accurate)
+    assert np.allclose(found.error, 1 / column[0].real, rtol=accurate)
+
+
+def test_a_brightness_of_other_pixels_is_refused() -> None:
+    b = oracles.random_moments(np.random.default_rng(5), 3, 40)
+    with pytest.raises(tm.ShapeError, match=r"brightness is of shape \(39,\), expected \(40,\)"):
+        tm.levinson(b, brightness=b[0, :39].real)

@@ -13,8 +13,8 @@ import venv
 from collections.abc import Iterator
 from importlib.metadata import Distribution, PathDistribution, distribution
 from pathlib import Path
-from zipfile import ZipFile
 from zipfile import Path as ZipPath
+from zipfile import ZipFile
 
 import httpx
 import numpy as np
@@ -172,13 +172,15 @@ def test_the_same_sources_give_the_same_bytes_elsewhere_and_later(
 ) -> None:
     again = build(unpacked, tmp_path)
 
-    digests = [[hashlib.sha256(each.read_bytes()).hexdigest() for each in x] for x in (built, again)]
+    digests = [
+        [hashlib.sha256(each.read_bytes()).hexdigest() for each in x] for x in (built, again)
+    ]
     assert digests[0] == digests[1]
 
 
 def test_a_daemon_of_the_wheel_serves_frames_and_its_page(url: str) -> None:
     with httpx.Client(base_url=url, timeout=_TWO_MINUTES_S) as http:
-        answer = http.get("/api/v1/frames/latest/range.npy", params={"wait_s": 30})
+        answer = http.get("/api/v1/frames/latest/range.npy", params={"wait_s": 10})
         page = http.get("/").text
         parts = re.findall(r'(?:src|href)="\.?(/[^"]+)"', page)
         assert http.get("/api/v1/info").json()["version"] == _VERSION

@@ -15,6 +15,7 @@ from transientcam.errors import CommandUnavailable
 
 GROUP: Final = "transientcam.commands"
 _EXTRA_OF_PACKAGE: Final = {
+    "foxglove": "foxglove",
     "matplotlib": "plot",
     "transientcam_driver": "driver",
     "transientcam_moments": "server",
@@ -53,7 +54,9 @@ def _add(app: typer.Typer, point: EntryPoint) -> None:
     try:
         function: Callable[..., Any] | typer.Typer = point.load()
     except ModuleNotFoundError as error:
-        missing = CommandUnavailable(point.name, error.name or "", extra_of("", point.name))
+        missing = CommandUnavailable(
+            point.name, error.name or "", extra_of(error.name or "", point.name)
+        )
         remedy = f"pip install 'transientcam[{missing.extra}]'" if missing.extra else str(missing)
         app.command(
             point.name,

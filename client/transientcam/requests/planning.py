@@ -30,3 +30,8 @@ def _body(parts: Mapping[str, Mapping[str, Any] | str | None]) -> dict[str, Any]
 def tradeoff(by: str) -> Request[dict[str, Any]]:
     """Build the request for all sequences that no other beats."""
     return document("tradeoff", params=[("by", by)], extra_timeout_s=_PLANNED_S)
+
+
+def start_tradeoff(by: str) -> Request[dict[str, Any]]:
+    """Build the request for the job that finds these."""
+    return document("tradeoff/jobs", method="POST", body={"by": by})

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
+from transientcam_driver.cli import kinect2_checks
 from transientcam_driver.errors import UDEV_RULES_FILE, LibusbMissing
 from transientcam_driver.plugin import FoundCamera
 from transientcam_driver.protocol.requests import PRODUCT_ID, VENDOR_ID
@@ -34,7 +35,7 @@ _IN_A_CONTAINER = "in a container: -v /dev/bus/usb:/dev/bus/usb --device-cgroup-
 def checks(
     config: Path | None = None, *, root: Path = Path("/"), backend: Any = None
 ) -> Iterator[Reported]:
-    """Check libusb, the device nodes, the udev rule and the cameras.
+    """Check libusb, the device nodes, the udev rule and the cameras; Kinects v2 by themselves.
 
     Parameters
     ----------
@@ -54,6 +55,7 @@ def checks(
     yield _rule(root)
     if backend is not None:
         yield from map(_camera, _plugged_in(backend))
+    yield from kinect2_checks.checks(root=root)
 
 
 def _device_nodes(root: Path) -> Reported:

@@ -7,7 +7,12 @@ from typing import Any, Final, get_args
 
 from transientcam_driver.camera import Camera
 from transientcam_driver.clock import Clock
-from transientcam_driver.entries.sim import SCENE_OPTIONS, SimulatedScene
+from transientcam_driver.entries.emulated import (
+    EMULATED,
+    OF_EMULATION,
+    require_no_emulation,
+    simulated_scene,
+)
 from transientcam_driver.errors import CameraError, SequenceError, SpecError
 from transientcam_driver.plugin import CameraName, CameraPlugin, FoundCamera
 from transientcam_driver.sampling import MAX_HARMONICS, Sampling
@@ -23,8 +28,6 @@ from transientcam_driver.tofcam660.wire import (
 )
 from transientcam_driver.triggered import TriggeredCamera
 
-EMULATED: Final = "emulated"
-DEFAULT_SCENE: Final = "hall"
 _LOOK_S: Final = 0.3
 _EMULATED_ANSWER_S: Final = 60.0
 """An emulated camera may compute for seconds what a scene looks like at another frequency."""
@@ -36,7 +39,6 @@ _OPTIONS: Final = {
     "answer_s": "longest time for an answer",
     "image_s": "longest time for an image",
 }
-_OF_EMULATION: Final = {"scene": f"of the emulation, {DEFAULT_SCENE} without it", **SCENE_OPTIONS}
 
 
 def device_options(name: CameraName) -> DeviceOptions:
@@ -86,17 +88,6 @@ def _multiples(name: CameraName) -> tuple[int, ...]:
     raise name.refused("multiples", limit)
 
 
-def simulated_scene(name: CameraName) -> SimulatedScene:
-    """Return the scene in front of an emulated camera.
-
-    Raises
-    ------
-    SpecError
-        Naming the part that is not valid.
-    """
-    return SimulatedScene.of(name, name.options.get("scene", DEFAULT_SCENE))
-
-
 def _open(name: CameraName, clock: Clock) -> Camera:
     options = device_options(name)
     if name.address != EMULATED:
@@ -123,9 +114,7 @@ def _open(name: CameraName, clock: Clock) -> Camera:
 def _require_real(name: CameraName) -> None:
     if not name.address:
         raise SpecError(name.spec, f"it names no address (the factory's is {DEFAULT_ADDRESS})")
-    for option in name.options:
-        if option in _OF_EMULATION:
-            raise SpecError(name.spec, f"{option} belongs to tofcam660:{EMULATED}")
+    require_no_emulation(name)
 
 
 def _check(name: CameraName) -> None:
@@ -170,5 +159,5 @@ PLUGIN: Final = CameraPlugin(
     find_on_network=_find_on_network,
     check=_check,
     facts=_facts,
-    options={**_OPTIONS, **_OF_EMULATION},
+    options={**_OPTIONS, **OF_EMULATION},
 )

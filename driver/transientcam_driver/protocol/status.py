@@ -47,6 +47,31 @@ class Status:
     _LAYOUT = struct.Struct("<BBHIQQIIIhxx")
     BYTES = _LAYOUT.size
 
+    @classmethod
+    def of_host(
+        cls,
+        *,
+        streaming: bool,
+        light_on: bool,
+        epoch: int,
+        next_image: int,
+        device_time_s: float,
+        temperature_c: float,
+    ) -> "Status":
+        """Return the status of a camera without watchdog, interlock and FIFO of its own."""
+        flags = StatusFlag.INTERLOCK_CLOSED
+        return cls(
+            state=DeviceState.STREAMING if streaming else DeviceState.IDLE,
+            flags=flags | StatusFlag.LIGHT_ON if light_on else flags,
+            epoch=epoch,
+            next_image=next_image,
+            device_time_s=device_time_s,
+            dropped_images=0,
+            fifo_bytes=0,
+            fifo_high_water_bytes=0,
+            temperature_c=temperature_c,
+        )
+
     @property
     def light_on(self) -> bool:
         """Whether the light source is enabled."""

@@ -6,10 +6,9 @@ from contextlib import suppress
 from typing import Final, TypeVar
 
 from transientcam_driver.camera import CameraState
-from transientcam_driver.capabilities import AppliedSequence, Capabilities
+from transientcam_driver.capabilities import AppliedSequence
 from transientcam_driver.clock import Clock, RealClock
 from transientcam_driver.errors import (
-    CameraClosed,
     CameraError,
     CameraLost,
     CameraNotFound,
@@ -18,9 +17,9 @@ from transientcam_driver.errors import (
     NotStreaming,
 )
 from transientcam_driver.handle import Simulation
-from transientcam_driver.protocol import DeviceState, Status
-from transientcam_driver.protocol.status import StatusFlag
-from transientcam_driver.receiving import Counters, RawFrame
+from transientcam_driver.host_camera import HostCamera
+from transientcam_driver.protocol import Status
+from transientcam_driver.receiving import RawFrame
 from transientcam_driver.sequence import Sequence
 from transientcam_driver.triggered.device import TriggeredDevice
 from transientcam_driver.triggered.partial_frame import PartialFrame
@@ -33,7 +32,7 @@ _SHORTEST_S: Final = 1e-9  # where the clock does not move meanwhile
 _T = TypeVar("_T")
 
 
-class TriggeredCamera:
+class TriggeredCamera(HostCamera):
     """A `Camera` of a device that exposes on request.
 
     A frame with a lost image is dropped as a whole; the next one has their number. Where nothing
@@ -65,18 +64,10 @@ class TriggeredCamera:
         simulation: Simulation | None = None,
         on_close: Callable[[], None] = lambda: None,
     ) -> None:
-        self.simulation = simulation
-        self.counters = Counters()
+        super().__init__(clock or RealClock(), simulation)
         self._connect = connect
         self._on_close = on_close
-        self._clock = clock or RealClock()
-        self._since_s = self._clock.now_s()
-        self._control = threading.RLock()  # requests, the state and what is exposed
         self._changed = threading.Condition(self._control)
-        self._reading = threading.Lock()  # held by the reader
-        self._state = CameraState.CONNECTING
-        self._closed = False
-        self._resume = False
         self._device = connect()
         self._capabilities = self._device.capabilities
         self._number = 0
@@ -92,49 +83,22 @@ class TriggeredCamera:
 
     # --- state -------------------------------------------------------------------------------
 
-    @property
-    def capabilities(self) -> Capabilities:
-        """What the camera can do."""
-        return self._capabilities
-
-    @property
-    def state(self) -> CameraState:
-        """Where the camera stands."""
-        return self._state
-
-    @property
-    def applied(self) -> AppliedSequence:
-        """What is really set."""
-        return self._applied
-
-    def device_time_s(self) -> float:
-        """Time since the camera was opened, by this machine's clock."""
-        return self._clock.now_s() - self._since_s
-
     def status(self) -> Status:
         """Read the device's temperature, and put this camera's state beside it."""
         with self._control:
             self._require_connected()
             temperature_c = self._asked(self._device.temperature_c)
             streaming = self._state is CameraState.STREAMING
-            flags = StatusFlag.INTERLOCK_CLOSED
-            return Status(
-                state=DeviceState.STREAMING if streaming else DeviceState.IDLE,
-                flags=flags | StatusFlag.LIGHT_ON if streaming else flags,
+            return Status.of_host(
+                streaming=streaming,
+                light_on=streaming,
                 epoch=self._applied.epoch,
                 next_image=self.counters.images + self.counters.lost,
                 device_time_s=self.device_time_s(),
-                dropped_images=0,
-                fifo_bytes=0,
-                fifo_high_water_bytes=0,
                 temperature_c=temperature_c,
             )
 
     # --- sequence and light ------------------------------------------------------------------
-
-    def validate(self, sequence: Sequence) -> AppliedSequence:
-        """Return what would be set, without a request to the device; the epoch is 0."""
-        return self._capabilities.apply(sequence)
 
     def configure(self, sequence: Sequence) -> AppliedSequence:
         """Set a sequence; the frame that is being captured is dropped."""
@@ -162,10 +126,6 @@ class TriggeredCamera:
             self._begin_frame()
             self._changed.notify_all()
             self._asked(self._device.light_off)
-
-    def safe_off(self) -> None:
-        """As ``stop``."""
-        self.stop()
 
     def reconnect(self) -> None:
         """After CameraLost: connect again, restore the sequence, resume the capture."""
@@ -201,12 +161,6 @@ class TriggeredCamera:
         with self._reading:  # the device must not be closed while a thread reads
             self._device.close()
             self._on_close()
-
-    def __enter__(self) -> "TriggeredCamera":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     # --- frames ------------------------------------------------------------------------------
 
@@ -319,12 +273,3 @@ class TriggeredCamera:
         except CameraLost:
             self._state = CameraState.DISCONNECTED
             raise
-
-    def _require_open(self) -> None:
-        if self._closed:
-            raise CameraClosed
-
-    def _require_connected(self) -> None:
-        self._require_open()
-        if self._state is CameraState.DISCONNECTED:
-            raise CameraLost("it is disconnected")

@@ -9,7 +9,8 @@ a time as a vector register holds. A planar function names the lane that may sta
 The lanes and their signatures, each that of the planar statement it stands beside
 (``b`` complex (m+1, ...), NumPy arrays with any trailing shape, strided or not):
 
-``levinson(b) -> error (...), polynomial (m+1, ...), reflection (m, ...)``
+``levinson(b, brightness (...) or left out) -> error (...), polynomial (m+1, ...), reflection (m,
+...)``
 
 ``density(polynomial, reflection, error, phase_rad (T,)) -> (T, ...)``, also into ``out``
 
@@ -30,6 +31,8 @@ isn't finite
 
 ``likelihood(b (m+1, P), variance (m+1, P), returns, tail_shape) -> attributes of Likelihood``,
 or None for other than the usual models
+
+``pairs(b (m+1, P), variance (m+1, P), error) -> attributes of Likelihood``, of two returns
 
 ``harmonics(given, current, polynomial (m+1, P), mixed (K m, P), inverse (m, P), orders) ->
 following (m+1, P), misfit (P)``, or None for orders above 31

@@ -11,7 +11,15 @@ THREAD: Final = "transientcam-compile"
 """Name of every thread that compiles."""
 MOST_ROOTS: Final = 8
 """The largest m with lanes for eigenvalues and returns."""
-_SINGLE_ONLY: Final = ("smooth", "measure", "separate", "reconstruct", "likelihood", "harmonics")
+_SINGLE_ONLY: Final = (
+    "smooth",
+    "measure",
+    "separate",
+    "reconstruct",
+    "likelihood",
+    "pairs",
+    "harmonics",
+)
 _DOUBLE_ONLY: Final = ("covariance",)
 _FEW_ROOTS: Final = (
     "pisarenko",
@@ -66,6 +74,8 @@ def is_offered(key: Key) -> bool:
     if key.name in _SINGLE_ONLY and key.precision != "f":
         return False
     if key.name in _DOUBLE_ONLY and key.precision != "d":
+        return False
+    if key.name == "pairs" and key.harmonics < 2:
         return False
     # a characteristic polynomial with more roots underflows where they cluster
     return key.harmonics <= MOST_ROOTS or key.name not in _FEW_ROOTS

@@ -10,6 +10,7 @@ from transientcam_moments._kernels.frames import measure_lane, separate_lane, sm
 from transientcam_moments._kernels.harmonics import harmonics_lane
 from transientcam_moments._kernels.levinson import levinson_lane
 from transientcam_moments._kernels.likelihood import likelihood_lane
+from transientcam_moments._kernels.pairs import pairs_lane
 from transientcam_moments._kernels.pisarenko import pisarenko_lane
 from transientcam_moments._kernels.reconstruct import reconstruct_lane
 from transientcam_moments._kernels.registry import Key
@@ -24,6 +25,7 @@ LANES: dict[str, Callable[[int, str], Callable[..., Any]]] = {
     "separate": separate_lane,
     "reconstruct": reconstruct_lane,
     "likelihood": likelihood_lane,
+    "pairs": pairs_lane,
     "harmonics": harmonics_lane,
     "covariance": covariance_lane,
 }

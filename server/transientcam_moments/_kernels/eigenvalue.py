@@ -15,6 +15,7 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.parallel import Spread, at_once
+from transientcam_moments._kernels.pool import empty
 
 _INTERLEAVE = 4
 
@@ -52,7 +53,7 @@ def smallest_eigenvalue_lane(m: int, precision: str) -> Callable[..., Any]:
     def lane(b: Any, *, spread: Spread = at_once) -> Any:
         pixels = b[0].size
         planes = np.ascontiguousarray(b).reshape(m + 1, pixels)
-        out = np.empty(pixels, precision)
+        out = empty(pixels, precision)
         spread(lambda start, stop: run(order, planes, 0, out, start, stop), pixels)
         return out.reshape(b.shape[1:])
 

@@ -18,6 +18,7 @@ from transientcam_moments._kernels.compiled_entry import (
 )
 from transientcam_moments._kernels.padding import LEAST_WIDTH, normalisation, row_length
 from transientcam_moments._kernels.parallel import Spread, at_once
+from transientcam_moments._kernels.pool import empty
 from transientcam_moments._kernels.registry import LEAST_PIXELS
 
 ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}
@@ -56,7 +57,7 @@ def measure_lane(m: int, precision: str) -> Callable[..., Any]:
     def lane(images: Any, zeroth: str, *, spread: Spread = at_once) -> Any:
         pixels = images[0].size
         raw = np.ascontiguousarray(images).reshape(len(images), pixels)
-        moments, saturated = np.empty((m + 1, pixels), np.complex64), np.empty(pixels, np.uint8)
+        moments, saturated = empty((m + 1, pixels), np.complex64), empty(pixels, np.uint8)
 
         def part(start: int, stop: int) -> None:
             run(order, raw, ZEROTH[zeroth], ones, 0, 0.0, moments, saturated, start, stop)
@@ -78,7 +79,7 @@ def smooth_lane(m: int, precision: str) -> Callable[..., Any]:
         if width < LEAST_WIDTH or moments.ndim != 3:
             return None
         planes = np.ascontiguousarray(moments).reshape(len(moments), -1).view(np.float32)
-        out = np.empty_like(planes)
+        out = empty(planes.shape, planes.dtype)
         weights = taps.astype(np.float32)
         weight = normalisation(np.ones((height, width), bool), taps)
         finite: list[bool] = []
@@ -102,7 +103,7 @@ def separate_lane(m: int, precision: str) -> Callable[..., Any]:
         angles = np.ascontiguousarray(phase).reshape(m, pixels)
         weights = np.ascontiguousarray(weight).reshape(m, pixels)
         flags = np.zeros(pixels, np.uint8)
-        direct, indirect, first = (np.empty(pixels, np.float32) for _ in range(3))
+        direct, indirect, first = (empty(pixels, np.float32) for _ in range(3))
 
         def part(start: int, stop: int) -> None:
             run(order, angles, weights, flags, direct, indirect, first, threshold, 1.0, start, stop)

@@ -15,6 +15,7 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.parallel import Spread, at_once
+from transientcam_moments._kernels.pool import empty
 
 _INTERLEAVE = 2
 
@@ -74,14 +75,18 @@ def levinson_lane(m: int, precision: str) -> Callable[..., Any]:
     order = (0,) * m
     run = levinson_entry(m, precision)
 
-    def lane(b: Any, *, spread: Spread = at_once) -> tuple[Any, Any, Any]:
+    def lane(b: Any, brightness: Any = None, *, spread: Spread = at_once) -> tuple[Any, Any, Any]:
         shape, pixels = b.shape[1:], b[0].size
         planes = np.ascontiguousarray(b).reshape(m + 1, pixels)
-        error = np.empty(pixels, precision)
-        polynomial, reflection = np.empty_like(planes), np.empty_like(planes[1:])
+        error = empty(pixels, precision)
+        polynomial = empty(planes.shape, planes.dtype)
+        reflection = empty(planes[1:].shape, planes.dtype)
+        zeroth, apart = error, 0
+        if brightness is not None:
+            zeroth, apart = np.ascontiguousarray(brightness, precision).reshape(pixels), 1
 
         def part(start: int, stop: int) -> None:
-            run(order, planes, error, 0, error, polynomial, reflection, start, stop)
+            run(order, planes, zeroth, apart, error, polynomial, reflection, start, stop)
 
         spread(part, pixels)
         return (

@@ -17,6 +17,7 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.parallel import Spread, at_once
+from transientcam_moments._kernels.pool import empty
 from transientcam_moments._kernels.returns import phase_of
 from transientcam_moments.likelihood import choice, sharp, tail
 from transientcam_moments.likelihood.arithmetic import logarithm
@@ -148,7 +149,7 @@ def _fit_tail(
 
 
 @njit(forceinline=True, error_model="numpy")
-def _write(
+def write(
     slots: Any, found: Any, scale: Any, numbers: Any, usable: Any, p: int, planes: Any, free: Any,
     count: Any,
 ) -> None:  # fmt: skip
@@ -207,6 +208,26 @@ def _write(
     simd.store(count, p, there)
 
 
+@njit(forceinline=True, error_model="numpy")
+def fit_one(
+    order: Any, cosine: float, sine: float, b: Any, variance: Any, error: float, p: int, one: Any,
+    data_r: Any, data_i: Any, weight: Any, x: Any, y: Any, w: Any, rr: Any, ri: Any, found: Any,
+) -> Any:  # fmt: skip
+    """Load pixels and put one return in `found`; return their scale, numbers, use and penalty."""
+    far = simd.infinity(one)
+    scale, numbers, usable = _prepare(order, b, variance, error, p, one, data_r, data_i, weight)
+    penalty = logarithm(numbers) + MARGIN
+    choice.nothing(one, far, found)
+    for j in range(len(order) + 1):
+        rr[j], ri[j] = data_r[j], data_i[j]
+    cost = _fit(
+        order, (0,), (0, 0), STEPS[0], cosine, sine, data_r, data_i, weight, x, y, w, rr, ri,
+        usable, far,
+    )  # fmt: skip
+    choice.offer_returns(order, (0,), (0, 0), weight, x, y, w, cost, penalty, one > 0.0, found)
+    return scale, numbers, usable, penalty
+
+
 @njit(nogil=True, error_model="numpy")
 def fit_returns(
     order: Any, slots: Any, cosine: float, sine: float, b: Any, variance: Any, error: float,
@@ -222,16 +243,10 @@ def fit_returns(
     x, y, w = simd.registers(one, (), 3), simd.registers(one, (), 3), simd.registers(one, (), 3)
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        scale, numbers, usable = _prepare(order, b, variance, error, p, one, data_r, data_i, weight)
-        penalty = logarithm(numbers) + MARGIN
-        choice.nothing(one, far, found)
-        for j in range(m + 1):
-            rr[j], ri[j] = data_r[j], data_i[j]
-        cost = _fit(
-            order, (0,), (0, 0), STEPS[0], cosine, sine, data_r, data_i, weight, x, y, w, rr, ri,
-            usable, far,
+        scale, numbers, usable, penalty = fit_one(
+            order, cosine, sine, b, variance, error, p, one, data_r, data_i, weight, x, y, w, rr,
+            ri, found,
         )  # fmt: skip
-        choice.offer_returns(order, (0,), (0, 0), weight, x, y, w, cost, penalty, one > 0.0, found)
         more = found[SCORE] > 4.0 * penalty
         if m >= 2 and simd.some(more):
             cost = _fit(
@@ -256,7 +271,7 @@ def fit_returns(
                     order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, x, y, w, cost, penalty, more,
                     found,
                 )  # fmt: skip
-        _write(slots, found, scale, numbers, usable, p, planes, free, count)
+        write(slots, found, scale, numbers, usable, p, planes, free, count)
 
 
 def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:
@@ -284,8 +299,8 @@ def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:
             return None
         pixels, size = b.shape[1], len(slots)
         moments, noise = np.ascontiguousarray(b), np.ascontiguousarray(variance)
-        planes = np.empty((4 * size + 5, pixels), precision)
-        free, count = np.empty(pixels, np.int32), np.empty(pixels, np.int32)
+        planes = empty((4 * size + 5, pixels), precision)
+        free, count = empty(pixels, np.int32), empty(pixels, np.int32)
 
         def part(start: int, stop: int) -> None:
             run(order, slots, cosine, sine, moments, noise, error, planes, free, count, start, stop)

@@ -10,6 +10,7 @@ import numpy as np
 
 from transientcam_moments._kernels.padding import normalisation, row_length
 from transientcam_moments._kernels.parallel import Spread, blocks
+from transientcam_moments._kernels.pool import empty
 from transientcam_moments._kernels.refine import Found
 from transientcam_moments._kernels.registry import LEAST_PIXELS
 
@@ -130,7 +131,7 @@ class OnePass:
         """
         s, constants = self._stages, self._constants
         raw = np.ascontiguousarray(images).reshape(len(images), self._pixels)
-        smoothed = np.empty((len(s.order) + 1, self._pixels), np.complex64)
+        smoothed = empty((len(s.order) + 1, self._pixels), np.complex64)
         with self._scratch() as scratch:
             calibrated = smoothed if self._taps is None else scratch.calibrated
 
@@ -212,17 +213,17 @@ class OnePass:
         return Planes(*shaped)._replace(redone=redone)
 
     def _new_planes(self, smoothed: Any) -> Planes:
-        """Return room for a result: an array a plane, which the allocator has at hand again."""
+        """Return room for a result: an array a plane, none of which keeps another from the pool."""
         m, pixels = len(self._stages.order), self._pixels
-        plane = (np.empty(pixels, np.float32) for _ in range(6))
+        plane = (empty(pixels, np.float32) for _ in range(6))
         return Planes(
             smoothed=smoothed,
             brightness=next(plane),
             validity=next(plane),
-            flags=np.empty(pixels, np.uint8),
-            phase_rad=np.empty((m, pixels), np.float32),
-            weight=np.empty((m, pixels), np.float32),
-            count=np.empty(pixels, np.int32),
+            flags=empty(pixels, np.uint8),
+            phase_rad=empty((m, pixels), np.float32),
+            weight=empty((m, pixels), np.float32),
+            count=empty(pixels, np.int32),
             uniform=next(plane),
             direct=next(plane),
             indirect=next(plane),

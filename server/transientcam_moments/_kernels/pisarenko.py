@@ -7,6 +7,7 @@ import numpy as np
 
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.parallel import Spread, at_once, blocks
+from transientcam_moments._kernels.pool import empty
 from transientcam_moments._kernels.refine import Found, redo
 from transientcam_moments._kernels.returns import half_turns, returns_entry
 from transientcam_moments._kernels.wide import WideReturns
@@ -30,11 +31,11 @@ def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
     ) -> tuple[Any, Any, Any, Any]:
         shape, pixels = b.shape[1:], b[0].size
         planes = np.ascontiguousarray(b).reshape(m + 1, pixels)
-        uniform = np.empty(pixels, precision)
+        uniform = empty(pixels, precision)
         if eigenvalue is not None:
             uniform[:] = eigenvalue.reshape(-1)
-        phase, weight = np.empty((m, pixels), precision), np.empty((m, pixels), precision)
-        count, residual = np.empty(pixels, np.int32), np.empty(pixels, precision)
+        phase, weight = empty((m, pixels), precision), empty((m, pixels), precision)
+        count, residual = empty(pixels, np.int32), empty(pixels, precision)
         found = Found(uniform, phase, weight, count, residual)
         brightness = np.ascontiguousarray(planes[0].real)
         eps = noise or float(np.finfo(precision).eps)

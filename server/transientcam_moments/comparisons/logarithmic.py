@@ -55,7 +55,7 @@ def logarithmic(
     pixels = pixels_of(b, least=_LEAST, name="logarithmic")
     if bins <= 2 * pixels.m:
         raise ParameterError("bins", bins, f"more than {2 * pixels.m}")
-    solve = program(pixels.m, bins=bins, epsilon=epsilon)
+    solve = program(range(1, pixels.m + 1), bins=bins, epsilon=epsilon)
 
     def descend(c: Complex) -> Real | None:
         light: Real | None = solve(c)

@@ -76,7 +76,7 @@ def _table(nodes: int, epsilon: float) -> Any:
     from scipy.interpolate import RegularGridInterpolator  # heavy, like the solver
 
     axes = (_axis(nodes, _SINGLE), _axis(nodes, 0.0)) * 2
-    solve = program(_LEAST, bins=_BINS, epsilon=epsilon)
+    solve = program(range(1, _LEAST + 1), bins=_BINS, epsilon=epsilon)
     values = np.zeros((nodes,) * 4, dtype=complex)
     for place in map(tuple, np.argwhere(_needed(axes))):
         mirror = (place[0], nodes - 1 - place[1], place[2], nodes - 1 - place[3])

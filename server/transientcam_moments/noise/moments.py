@@ -289,9 +289,10 @@ def smoothed_at(
     near = brightness[rows.clip(0, height - 1), columns.clip(0, width - 1)]
     present = inside & np.isfinite(near)
     light = np.where(present, np.maximum(near, 0), 0)
-    weight = np.outer(taps, taps) * present
+    weight = np.outer(taps, taps).reshape(-1)
+    total, share = (each.reshape((-1, weight.size)) @ weight for each in (light, present))
     with np.errstate(divide="ignore", invalid="ignore"):
-        mean = (light * weight).sum(axis=(1, 2)) / weight.sum(axis=(1, 2))
+        mean = total / share
     # a pixel that is not finite stays as it is
     variance = noise_of(np.where(present[:, radius, radius], mean, np.nan)).variance
     left = _factors(sigma_px, height)[row] * _factors(sigma_px, width)[column]

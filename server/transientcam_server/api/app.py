@@ -7,7 +7,7 @@ from typing import Final
 from fastapi import APIRouter, Depends, FastAPI
 
 from transientcam_driver import Camera
-from transientcam_server.api import problems
+from transientcam_server.api import problems, query
 from transientcam_server.api.auth import permissions
 from transientcam_server.api.auth.guard import Authentication, Guard
 from transientcam_server.api.docs import openapi, pages
@@ -32,6 +32,7 @@ from transientcam_server.api.routes import (
     recordings,
     sequence,
     simulation,
+    tradeoff,
 )
 from transientcam_server.api.routes import (
     metrics as metrics_route,
@@ -55,6 +56,7 @@ _RESOURCES = (
     recording_frames,
     simulation,
     plan,
+    tradeoff,
     parameters,
     jobs,
 )
@@ -91,8 +93,9 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     app.state.metrics = metrics
     app.state.guard = guard
     api = APIRouter()
+    admitted = [Depends(permissions.admit), Depends(query.require_known)]
     for resource in _RESOURCES:
-        api.include_router(resource.router, dependencies=[Depends(permissions.admit)])
+        api.include_router(resource.router, dependencies=admitted)
     api.include_router(websocket.router)
     app.include_router(api, prefix=API)  # with a prefix of its own FastAPI analyses it twice
     for outside in (info.versions, health.router, metrics_route.router):
@@ -100,7 +103,7 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     for documents in (openapi.router, pages.router):
         app.include_router(documents)
     pages.add_dashboard(app)
-    problems.install(app)
+    problems.install(app, prefix=API)
     permissions.describe(app, [resource.router for resource in _RESOURCES], prefix=API)
     openapi.describe_limits(app, camera.capabilities, prefix=API)
     # the last one added is the first to see a request

@@ -76,15 +76,20 @@ def _add_to(
                 "content": {PROBLEM_MEDIA_TYPE: {"schema": _REFERENCE, "examples": {}}},
             },
         )
+        examples = entry["content"][PROBLEM_MEDIA_TYPE]["examples"]
+        if kind.slug in examples:
+            continue
         entry["description"] = "; ".join(filter(None, (entry["description"], kind.title)))
-        entry["content"][PROBLEM_MEDIA_TYPE]["examples"][kind.slug] = {
+        examples[kind.slug] = {
             "summary": kind.title,
             "value": problem_document(Problem(kind, kind.meaning)),
         }
 
 
-def describe(app: FastAPI) -> None:
+def describe(app: FastAPI, *, prefix: str) -> None:
     """Add to the OpenAPI document of ``app`` what `documented` refers to.
+
+    Reads below ``prefix`` refuse parameters that they do not have.
 
     A model named in a route's responses would be documented as plain JSON beside the problem.
     """
@@ -98,14 +103,16 @@ def describe(app: FastAPI) -> None:
             for operation in operations.values() if "{" in path else ():
                 if "400" not in operation["responses"]:  # control characters are no HTTP
                     document_problems(operation, kinds.BAD_REQUEST)
+            if path.startswith(prefix) and "get" in operations:  # as `query.require_known`
+                document_problems(operations["get"], kinds.INVALID_REQUEST)
         return document
 
     app.openapi = openapi  # type: ignore[method-assign]  # as FastAPI's documentation extends it
 
 
-def install(app: FastAPI) -> None:
+def install(app: FastAPI, *, prefix: str) -> None:
     """Answer every error of ``app`` as a problem, and document it as one."""
-    describe(app)
+    describe(app, prefix=prefix)
     app.state.interface = Interface(app)
 
     async def known(request: Request, error: Exception) -> Response:

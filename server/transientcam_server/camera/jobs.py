@@ -41,7 +41,7 @@ class Job:
     step
         The present step, in a word or two.
     result
-        A document, once it is done.
+        A document, once it is done; before, and where it was cancelled, what there is of it.
     problem
         Why it failed.
     cancelled, ended
@@ -77,6 +77,10 @@ class Job:
         if self.cancelled.is_set():
             raise JobCancelled(self.id)
         self.progress, self.step = progress, step
+
+    def show(self, so_far: dict[str, Any]) -> None:
+        """Keep what there is of the result so far; from any thread."""
+        self.result = so_far
 
     def to_document(self) -> dict[str, Any]:
         """Return the job as JSON."""

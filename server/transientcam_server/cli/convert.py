@@ -5,7 +5,7 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from rich.console import Console
@@ -20,16 +20,36 @@ def convert(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="The .npz, .nc, .zarr or .mcap to write.")
     ],
+    product: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Of an .mcap: what it holds of each frame, such as range,pointcloud,raw; "
+            "separated by commas, or repeated.  [default: raw]"
+        ),
+    ] = None,
+    schemas: Annotated[
+        Literal["foxglove", "ros2"],
+        typer.Option(help="Of an .mcap: whose messages it holds; a file holds those of one."),
+    ] = "foxglove",
     as_json: JsonOption = False,
 ) -> None:
-    """Convert a recording: .npz (NumPy), .nc (netCDF), .zarr (Dask), .mcap (Foxglove, ROS)."""
+    """Convert a recording: .npz (NumPy), .nc (netCDF), .zarr (Dask), .mcap (Foxglove or ROS 2)."""
     from transientcam_server.offline import convert_recording
+    from transientcam_server.offline.mcap import lens_of
     from transientcam_server.recording import Recording
 
+    products = [name.strip() for text in product or ["raw"] for name in text.split(",")]
     with Recording(recording) as opened, progress_bar("converting") as advance:
-        convert_recording(opened, output, progress=advance)
-        frames = opened.frames
+        convert_recording(opened, output, products=products, schemas=schemas, progress=advance)
+        frames, lens = opened.frames, lens_of(opened)
     if as_json:
         typer.echo(json.dumps({"file": str(output), "frames": frames}))
-    else:
-        Console(stderr=True).print(f"{output}: {frames} frames", soft_wrap=True)
+        return
+    console = Console(stderr=True)
+    console.print(f"{output}: {frames} frames", soft_wrap=True)
+    if "pointcloud" in products and lens.source == "assumed":
+        console.print(
+            f"the recording does not say its lens: points, depth and calibration assume "
+            f"fx = {lens.fx:.1f} pixels",
+            soft_wrap=True,
+        )

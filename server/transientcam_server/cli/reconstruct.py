@@ -27,8 +27,9 @@ def reconstruct(
     input: Annotated[  # noqa: A002 - it is what the argument is called in the help
         Path,
         typer.Argument(
-            help="An .npz with moments and base_frequency_hz, counts and bin_s, or h with "
-            "start_opl_m and bin_opl_m; or a recording."
+            help="An .npz with moments and base_frequency_hz, counts and bin_s, h with "
+            "start_opl_m and bin_opl_m, or transient (mitransient) with start_opl and "
+            "bin_width_opl; an HDF5 file of tal; or a recording."
         ),
     ],
     output: Annotated[
@@ -168,9 +169,12 @@ def _settings(values: Mapping[str, Any]) -> "ReconstructionSettings":
 
 
 def _is_recording(path: Path) -> bool:
-    """Whether a file is HDF5, which of all inputs only recordings are."""
+    """Whether a file is HDF5, and not an impulse response of tal."""
+    from transientcam_server.offline.impulse_responses import is_tal
+
     with path.open("rb") as file:
-        return file.read(len(_HDF5)) == _HDF5
+        is_hdf5 = file.read(len(_HDF5)) == _HDF5
+    return is_hdf5 and not is_tal(path)
 
 
 def _reconstruct_recording(

@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_driver import CalibrationCapture, Sequence
+from transientcam_driver import CalibrationCapture, FactoryCalibration, Sequence
 from transientcam_server.imaging.waveform import usable
 
 _Array = NDArray[Any]
 NOMINAL_ID = "nominal"
 """Of the gains that sub-phases alone give an ideal modulation."""
+FACTORY_ID = "factory"
+"""Of the gains that a camera itself reports."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,6 +45,12 @@ class Gains:
     def bad_pixels(self) -> int:
         """How many pixels are bad."""
         return 0 if self.bad is None else int(np.count_nonzero(self.bad))
+
+    @property
+    def sizes(self) -> _Array:
+        """The mean modulus (m + 1,) of the gains of each moment."""
+        sizes: _Array = np.abs(self.planes).reshape((len(self.planes), -1)).mean(axis=1)
+        return sizes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,6 +89,13 @@ def evaluate(capture: CalibrationCapture) -> Calibration:
     # a brightness stays in digital numbers, as with nominal gains
     gains = tm.calibration_of(measured) * np.complex64(nominal[0])
     return Calibration(capture, Gains(capture.id, gains, bad, usable(capture.waveform)))
+
+
+def factory_gains(reported: FactoryCalibration | None) -> Gains | None:
+    """Return the gains that a camera reports; None where it reports none."""
+    if reported is None or reported.gains is None:
+        return None
+    return Gains(FACTORY_ID, reported.gains, None)
 
 
 def calibration_id(gains: Gains | None) -> str:

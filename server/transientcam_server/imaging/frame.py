@@ -320,6 +320,8 @@ class Frame:
     def _remember(self, product: Product, view: View, array: _Array) -> None:
         if product.over_time and array.nbytes > _REMEMBERED_BYTES:
             return
+        if product.of_view and not view.crop.is_whole:
+            return
         future: asyncio.Future[_Array] = asyncio.get_running_loop().create_future()
         future.set_result(array)
         self._arrays(product).setdefault(_array_key(product, view), future)
@@ -432,19 +434,21 @@ def _made(
     view: View,
     framed: "partial[EncodedFrame]",
 ) -> tuple[_Array, bytes]:
-    """Return a product, computed where ``array`` is None, and the bytes of what the view shows."""
+    """Return a product, computed where ``array`` is None, and the bytes of what the view shows.
+
+    One that is computed for a view is that view alone; ``array`` is one of all pixels.
+    """
     begin_s = time.perf_counter()
     height, width = raw.images.shape[-2:]
+    cropped = product.over_time or (array is None and product.of_view)
     if array is None:
         array = computed(product, recipe, given, view, height=height, width=width)
-    whole = array
-    shown, extra = whole, framed.keywords["extra"]
+    extra = framed.keywords["extra"]
     if encoding.archive:
         extra |= product.archive(recipe, raw, view)
-    if not product.over_time:  # those were computed for no more than that
-        shown = view.crop.apply(whole, product.description.axes)
-        extra |= {name: view.crop.apply(extra[name]) for name in encoding.beside}
+    shown = array if cropped else view.crop.apply(array, product.description.axes)
+    extra |= {name: view.crop.apply(extra[name]) for name in encoding.beside}
     # in the type of the contract, also where the computation worked in another one
     shown = np.asarray(shown, dtype=product.description.dtype, order="C")
     frame = framed(array=shown, encode_s=time.perf_counter() - begin_s, extra=extra)
-    return whole, encoding.encode(frame)
+    return array, encoding.encode(frame)

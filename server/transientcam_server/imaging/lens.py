@@ -4,42 +4,40 @@ import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam.robotics import Pinhole
+from transientcam_driver import Lens
 from transientcam_server.settings import LensSettings
 
 ASSUMED_FIELD_OF_VIEW_DEG: Final = 45.0
 """Of a camera whose lens is not known."""
-Source = Literal["settings", "scene", "recording", "assumed"]
+Source = Literal["settings", "camera", "scene", "recording", "assumed"]
 
 
 @dataclass(frozen=True, slots=True)
-class Intrinsics:
-    """A pinhole camera: pixel (column, row) looks along ((c - cx) / fx, (r - cy) / fy, 1).
+class Intrinsics(Pinhole):
+    """A pinhole camera, and what the service computes with it.
 
-    Whole numbers are the centres of pixels. x points right, y down, z where the camera looks.
+    x points right, y down, z where the camera looks. With
+    a distortion the pixel looks along the ray that the lens bends there, see `Lens`.
 
     Attributes
     ----------
-    fx, fy, cx, cy
-        Focal lengths and principal point, in pixels.
-    width, height
-        Of the frame they belong to.
     source
-        Where they come from: the ``settings`` of the service, the simulated ``scene``, the
-        ``recording``, or none of these (``assumed``).
+        Where they come from: the ``settings`` of the service, the ``camera`` itself, the simulated
+        ``scene``, the ``recording``, or none of these (``assumed``).
+    distortion, light_x_m
+        As of `Lens`.
     """
 
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    width: int
-    height: int
     source: Source = "assumed"
+    distortion: tuple[float, ...] = ()
+    light_x_m: float = 0.0
 
     @classmethod
     def of_field(
@@ -73,22 +71,41 @@ class Intrinsics:
             If it holds something else.
         """
         fx, fy, cx, cy = (float(document[name]) for name in ("fx", "fy", "cx", "cy"))
-        if not (all(map(math.isfinite, (fx, fy, cx, cy))) and min(fx, fy) > 0.0):
-            raise ValueError("focal lengths must be greater than 0")
+        distortion = tuple(float(each) for each in document.get("distortion", ()))
+        lens = Lens(fx, fy, cx, cy, distortion, float(document.get("light_x_m", 0.0)))
         width, height = int(document["width"]), int(document["height"])
-        return cls(fx, fy, cx, cy, width, height, "recording")
+        return cls.of_lens(lens, width=width, height=height, source="recording")
+
+    @classmethod
+    def of_lens(cls, lens: Lens, *, width: int, height: int, source: Source) -> Self:
+        """Return those of a lens."""
+        pinhole = lens.fx, lens.fy, lens.cx, lens.cy
+        return cls(*pinhole, width, height, source, lens.distortion, lens.light_x_m)
 
     def points(self, range_m: NDArray[Any]) -> NDArray[np.float32]:
-        """Return the points (3, H, W) in m at distances (H, W) along the pixels' rays."""
-        rows, columns = range_m.shape
-        x = (np.arange(columns) - self.cx) / self.fx
-        y = (np.arange(rows) - self.cy) / self.fy
-        z = 1.0 / np.sqrt(x * x + (y * y)[:, None] + 1.0)  # of the unit vector
-        points = np.empty((3, rows, columns), dtype=np.float32)
+        """Return the points (3, H, W) in m of a range (H, W): half of the path of the light."""
+        pinhole = self.fx, self.fy, self.cx, self.cy
+        lens = Lens(*pinhole, self.distortion, self.light_x_m)
+        x, y, z = _rays(lens, *range_m.shape)
+        if self.light_x_m:
+            # |p| + |p - light| is the path: intersect the ray with that ellipsoid
+            path_m = 2.0 * range_m
+            with np.errstate(all="ignore"):  # a path shorter than the way to the light
+                around = path_m * path_m - self.light_x_m**2
+                range_m = around / (2.0 * (path_m - self.light_x_m * x * z))
+                range_m = np.where(around > 0.0, range_m, np.nan)
+        points = np.empty((3, *range_m.shape), dtype=np.float32)
         np.multiply(range_m, z, out=points[2], casting="same_kind")
         np.multiply(points[2], x, out=points[0], casting="same_kind")
-        np.multiply(points[2], y[:, None], out=points[1], casting="same_kind")
+        np.multiply(points[2], y, out=points[1], casting="same_kind")
         return points
+
+
+@lru_cache(maxsize=4)
+def _rays(lens: Lens, rows: int, columns: int) -> tuple[NDArray[np.float64], ...]:
+    """Return x and y (H, W) of the rays (x, y, 1), and z of their unit vectors."""
+    x, y = lens.slopes(columns, rows)
+    return x, y, 1.0 / np.sqrt(x * x + y * y + 1.0)
 
 
 def known_intrinsics(
@@ -96,13 +113,19 @@ def known_intrinsics(
     *,
     width: int,
     height: int,
+    reported: Lens | None = None,
     scene_field_deg: float | None = None,
     recorded: Mapping[str, Any] | None = None,
 ) -> Intrinsics:
-    """Return the best that is known: settings before scene before recording before a guess."""
+    """Return the best that is known.
+
+    Settings go before what the camera reports, then scene and recording, then a guess.
+    """
     given = Intrinsics.of_settings(settings, width=width, height=height)
     if given is not None:
         return given
+    if reported is not None:
+        return Intrinsics.of_lens(reported, width=width, height=height, source="camera")
     if scene_field_deg is not None:
         return Intrinsics.of_field(scene_field_deg, width=width, height=height, source="scene")
     if recorded is not None:

@@ -21,6 +21,7 @@ MEDIAN_OF_NORMAL: Final = 0.674490
 EXPLAINED_DEVIATIONS: Final = 4.0
 """Standard deviations of a negative eigenvalue that noise explains."""
 _UNLIT: Final = np.uint8(tm.Flags.NO_SIGNAL | tm.Flags.NON_FINITE | tm.Flags.SATURATED)
+_BLOCK_PIXELS: Final = 1 << 14
 _FEW: Final = 1 / 16
 """Share of the pixels up to which their neighbourhoods are quicker to average one by one."""
 
@@ -91,9 +92,8 @@ def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
     known = std_m[np.isfinite(std_m)]
     if not known.size:
         return None
-    return RangeNoise(
-        float(np.median(known)), float(np.quantile(known, 0.9)), float(first_order.mean())
-    )
+    median_m, p90_m = np.quantile(known, (0.5, 0.9)).tolist()
+    return RangeNoise(median_m, p90_m, float(first_order.mean()))
 
 
 def _of_pisarenko(recipe: Recipe, found: tm.Reconstruction) -> tuple[_Array, _Array]:
@@ -129,16 +129,10 @@ def _sample(seen: _Array) -> _Array:
 
 def _of_pixels(recipe: Recipe, brightness: _Array) -> tm.noise.MomentNoise:
     """Return the noise of moments with this brightness, each pixel by itself."""
-    assert recipe.sensor is not None  # noqa: S101 - callers have one, or no noise to predict
-    sequence = recipe.applied.sequence
-    return tm.noise.moment_noise(
-        brightness,
-        recipe.sensor,
-        calibration=recipe.nominal_gains,
-        zeroth=sequence.zeroth,
-        takes=sequence.takes,
-        phases_rad=sequence.sampling.phases_rad,
-    )
+    light = np.maximum(brightness, 0)
+    column = (-1, *(1,) * light.ndim)
+    dark, slope = (each.astype(light.dtype).reshape(column) for each in recipe.moment_variance)
+    return tm.noise.MomentNoise(dark + slope * light)
 
 
 def contradictions(recipe: Recipe, found: tm.Reconstruction) -> _Array | None:
@@ -158,11 +152,11 @@ def contradictions(recipe: Recipe, found: tm.Reconstruction) -> _Array | None:
         return None
     if not sequence.sampling.consecutive:
         return None
-    dark, lit = np.asarray(_of_pixels(recipe, np.array([0.0, 1.0])).variance).sum(axis=0).tolist()
+    dark, slope = (float(each.sum()) for each in recipe.moment_variance)
 
     def of_all(light: _Array) -> tm.noise.MomentNoise:
         """Return the variance of all moments together, which grows linearly with the light."""
-        return tm.noise.MomentNoise((dark + (lit - dark) * light)[None])
+        return tm.noise.MomentNoise((dark + slope * light)[None])
 
     return beyond_noise(found, of_all, recipe.settings.smoothing_px)
 
@@ -191,24 +185,42 @@ def beyond_noise(
     -------
     boolean array, shape (H, W)
     """
-    brightness = np.asarray(found.smoothed[0].real)
-    eigenvalue = np.asarray(found.validity) * brightness
-    # noise moves no eigenvalue by more than the norm of its own Toeplitz matrix, and a pixel's own
-    # share of it settles most pixels without a look at their neighbours
-    variance = noise_of(np.maximum(brightness, 0)).variance.sum(axis=0)
-    limit = EXPLAINED_DEVIATIONS**2 * tm.noise.own_share(smoothing_px)
-    beyond = _lit(found)
-    beyond &= eigenvalue * np.abs(eigenvalue) < -limit * variance
+    beyond = _beyond_own_share(found, noise_of, smoothing_px)
     doubtful = np.flatnonzero(beyond)
     if not doubtful.size:
         return beyond
+    brightness = np.asarray(found.smoothed[0].real)
+    eigenvalue = np.asarray(found.validity).flat[doubtful] * brightness.flat[doubtful]
     if doubtful.size > _FEW * beyond.size:
         noise = tm.noise.smoothed_of(noise_of, brightness, smoothing_px).variance
         noise = noise.reshape((len(noise), -1))[:, doubtful]
     else:
         noise = tm.noise.smoothed_at(noise_of, brightness, doubtful, smoothing_px).variance
     std = np.sqrt(noise.sum(axis=0))
-    beyond.flat[doubtful] = eigenvalue.flat[doubtful] < -EXPLAINED_DEVIATIONS * std
+    beyond.flat[doubtful] = eigenvalue < -EXPLAINED_DEVIATIONS * std
+    return beyond
+
+
+def _beyond_own_share(
+    found: tm.Reconstruction,
+    noise_of: Callable[[_Array], tm.noise.MomentNoise],
+    smoothing_px: float,
+) -> _Array:
+    """Return where the part of the noise that is a pixel's own does not explain its moments.
+
+    Noise moves no eigenvalue by more than the norm of its own Toeplitz matrix, and a pixel's own
+    share of it settles most pixels without a look at their neighbours.
+    """
+    limit = EXPLAINED_DEVIATIONS**2 * tm.noise.own_share(smoothing_px)
+    beyond = _lit(found)
+    places = beyond.reshape(-1)
+    light = np.asarray(found.smoothed[0].real).reshape(-1)
+    validity = np.asarray(found.validity).reshape(-1)
+    for start in range(0, places.size, _BLOCK_PIXELS):  # which stay in the caches
+        block = slice(start, start + _BLOCK_PIXELS)
+        eigenvalue = validity[block] * light[block]
+        variance = noise_of(np.maximum(light[block], 0)).variance.sum(axis=0)
+        places[block] &= eigenvalue * np.abs(eigenvalue) < -limit * variance
     return beyond
 
 

@@ -8,13 +8,14 @@ from transientcam_driver import (
     AppliedSequence,
     CalibrationMismatch,
     Capabilities,
+    FactoryCalibration,
     RawFrame,
     Simulation,
     Truth,
 )
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.calibration import Calibration, Gains
+from transientcam_server.imaging.calibration import Calibration, Gains, factory_gains
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.lens import Intrinsics
 from transientcam_server.imaging.products import PRODUCTS, Product
@@ -30,6 +31,11 @@ class Source(Protocol):
     @property
     def capabilities(self) -> Capabilities:
         """What it can do."""
+        ...
+
+    @property
+    def factory(self) -> FactoryCalibration | None:
+        """What it reports of its pixels and its lens."""
         ...
 
     @property
@@ -73,6 +79,7 @@ class Pipeline:
         self._intrinsics = intrinsics
         self._capabilities = camera.capabilities
         self._full_scale = 2.0**camera.capabilities.bits - 1.0
+        self._factory = factory_gains(camera.factory)
         self._truth = _truth_of(camera.simulation)
         self._frames = 0
         self._last: RawFrame | None = None
@@ -123,9 +130,12 @@ class Pipeline:
         )
 
     def gains_for(self, applied: AppliedSequence) -> Gains | None:
-        """Return the gains of the calibration, if it fits this sequence."""
+        """Return the gains of the calibration, or those of the camera where none fits.
+
+        None are the nominal ones.
+        """
         if self.calibration is None or self.misfit(applied) is not None:
-            return None
+            return self._factory
         return self.calibration.gains
 
     def misfit(self, applied: AppliedSequence) -> CalibrationMismatch | None:

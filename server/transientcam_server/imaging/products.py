@@ -54,6 +54,9 @@ class Product:
         for the crop of the view alone, any other one whole.
     over_time
         Whether it is evaluated at times of flight that the request names.
+    of_view
+        Whether it is computed for the pixels of a view alone, as those over time are, too; any
+        other one is computed whole, once for all views.
     of_row
         Whether it is one row of the picture, which the request may name.
     of_toeplitz
@@ -78,6 +81,7 @@ class Product:
     needs: str
     compute: Callable[[Recipe, Any, View], _Array]
     over_time: bool = False
+    of_view: bool = False
     of_row: bool = False
     of_noise: bool = False
     of_toeplitz: bool = False
@@ -91,6 +95,11 @@ class Product:
     def name(self) -> str:
         """The name clients ask by."""
         return self.description.name
+
+    @property
+    def cropped(self) -> bool:
+        """Whether what is computed are the pixels of the view."""
+        return self.over_time or self.of_view
 
     @property
     def png_steps(self) -> Steps | None:
@@ -118,7 +127,7 @@ class Product:
 
 
 def _coefficient_planes(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
-    coefficients = found.coefficients
+    coefficients = _cropped(found.coefficients, view.crop)
     m = coefficients.polynomial.shape[0] - 1
     planes = np.empty((2 * m + 1, *coefficients.error.shape), dtype=np.float32)
     planes[0] = coefficients.error
@@ -191,7 +200,7 @@ def _pointcloud(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
 
 def _return_planes(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
     """Return time of flight and weight (2 m, H, W) of each return, the strongest first."""
-    phase_rad, weight = found.returns.phase_rad, found.returns.weight
+    phase_rad, weight = map(view.crop.apply, (found.returns.phase_rad, found.returns.weight))
     order = np.argsort(-weight, axis=0, kind="stable")
     planes = np.empty((2 * len(weight), *weight.shape[1:]), dtype=np.float32)
     rad_s = 2.0 * np.pi * recipe.base_frequency_hz
@@ -304,7 +313,13 @@ PRODUCTS: Final[dict[str, Product]] = {
             steps=Steps(1e2, "1e-2"),
         ),
         Product(_WIRE["flags"], "light", _property("flags")),
-        Product(_WIRE["coefficients"], "coefficients", _coefficient_planes, of_toeplitz=True),
+        Product(
+            _WIRE["coefficients"],
+            "coefficients",
+            _coefficient_planes,
+            of_view=True,
+            of_toeplitz=True,
+        ),
         Product(_WIRE["moments"], "moments", _property("moments"), fields=_frequencies),
         Product(_WIRE["raw"], "raw", _images, fields=_labels, archive=_evaluation),
         Product(
@@ -352,7 +367,7 @@ PRODUCTS: Final[dict[str, Product]] = {
             reads=("moments",),
             fields=_radius,
         ),
-        Product(_WIRE["returns"], "returns", _return_planes),
+        Product(_WIRE["returns"], "returns", _return_planes, of_view=True),
         Product(_WIRE["pointcloud"], "returns", _pointcloud, fields=_intrinsics),
         Product(_WIRE["truth"], "truth", _true_range, steps=_MILLIMETRES),
     )

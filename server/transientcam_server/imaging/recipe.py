@@ -14,15 +14,17 @@ from transientcam_driver import AppliedSequence, RawFrame, Sampling, Sequence
 from transientcam_moments.reconstruction import OF_ANY_MULTIPLES
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.calibration import Gains, nominal_gains
+from transientcam_server.imaging.calibration import FACTORY_ID, Gains, nominal_gains
 from transientcam_server.imaging.lens import ASSUMED_FIELD_OF_VIEW_DEG, Intrinsics
 from transientcam_server.settings import ReconstructionSettings
 
 _log = logging.getLogger(__name__)
-_WITH_GAPS: Final = "likelihood"
-"""Of those that serve frequencies with gaps, the one that keeps up with a camera."""
 _UNTIL_COMPILED: Final = "pisarenko"
 """In NumPy as in compiled lanes fast enough for a camera of 163 x 120 pixels."""
+_GAPPED_UNTIL_COMPILED: Final = "likelihood"
+"""For frequencies with gaps; in NumPy the quickest there that knows more than one return."""
+_LEAST_FOR_PAIRS: Final = 3
+"""Frequencies of which two returns leave something to judge them by."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,15 +45,21 @@ class SettingsVersion:
     ) -> "SettingsVersion":
         """Return these settings with an estimator that keeps up with a camera now.
 
-        ``automatic`` stays where ``ready`` says that the kernel of the likelihood of this order is
-        compiled, and with multiples that have gaps, and is Pisarenko's returns elsewhere.
+        ``automatic`` stays where ``ready`` says that the kernel of its estimator is compiled for
+        this order. Until then it is Pisarenko's returns, and the likelihood for multiples that have
+        gaps.
         """
-        if self.settings.estimator != "automatic" or not sequence.sampling.consecutive:
+        if self.settings.estimator != "automatic":
             return self
-        if ready("likelihood", sequence.harmonics):
+        if sequence.sampling.consecutive:
+            kernel, until = "likelihood", _UNTIL_COMPILED
+        else:
+            kernel, until = "pairs", _GAPPED_UNTIL_COMPILED
+            if _for_gaps(sequence.sampling) == until:
+                return self
+        if ready(kernel, sequence.multiples[-1]):
             return self
-        until = self.settings.model_copy(update={"estimator": _UNTIL_COMPILED})
-        return replace(self, settings=until)
+        return replace(self, settings=self.settings.model_copy(update={"estimator": until}))
 
     def followed_by(self, settings: ReconstructionSettings) -> "SettingsVersion":
         """Return the next version; the same one where the settings are equal."""
@@ -106,14 +114,19 @@ def suited(settings: ReconstructionSettings, sampling: Sampling) -> Reconstructi
         "the camera measures the multiples %s, which %s cannot serve: the estimator is %s",
         listed(sampling.multiples),
         settings.estimator,
-        _WITH_GAPS,
+        _for_gaps(sampling),
     )
-    return settings.model_copy(update={"estimator": _WITH_GAPS})
+    return settings.model_copy(update={"estimator": "automatic"})
 
 
 def _serves(settings: ReconstructionSettings, sampling: Sampling) -> bool:
     """Return whether the settings' estimator goes with the multiples that are measured."""
     return sampling.consecutive or settings.estimator in ("automatic", *OF_ANY_MULTIPLES)
+
+
+def _for_gaps(sampling: Sampling) -> str:
+    """Return what `automatic` is for multiples that have gaps."""
+    return "two-returns" if len(sampling.multiples) >= _LEAST_FOR_PAIRS else "likelihood"
 
 
 def listed(multiples: tuple[int, ...]) -> str:
@@ -155,7 +168,7 @@ class Recipe:
         """The estimator of its frames, by its name in `transientcam_moments`."""
         sampling, chosen = self.applied.sequence.sampling, self.settings.estimator
         if not sampling.consecutive:
-            return chosen if chosen in OF_ANY_MULTIPLES else _WITH_GAPS
+            return chosen if chosen in OF_ANY_MULTIPLES else _for_gaps(sampling)
         return self.settings.technique(noise_known=self.sensor is not None)
 
     @property
@@ -184,6 +197,35 @@ class Recipe:
     def nominal_gains(self) -> NDArray[np.complex128]:
         """The gains (m + 1,) that sub-phases and the camera's delay alone give."""
         return nominal_gains(self.applied.sequence, delay_s=self.applied.delay_s)
+
+    @cached_property
+    def noise_gains(self) -> NDArray[Any]:
+        """The gains (m + 1,) that noise is predicted with, of all pixels.
+
+        They are the nominal ones also with a measured calibration, whose pixels differ by their
+        noise, too.
+        """
+        factory = self.gains is not None and self.gains.id == FACTORY_ID
+        return self.gains.sizes if factory and self.gains is not None else self.nominal_gains
+
+    @cached_property
+    def moment_variance(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Variance (m + 1,) of the moments of a dark pixel, and how it grows with b_0 in DN.
+
+        Only with a sensor, whose noise is an affine function of the light.
+        """
+        assert self.sensor is not None  # noqa: S101 - callers have one, or no noise to predict
+        sequence = self.applied.sequence
+        noise = tm.noise.moment_noise(
+            np.array([0.0, 1.0]),
+            self.sensor,
+            calibration=self.noise_gains,
+            zeroth=sequence.zeroth,
+            takes=sequence.takes,
+            phases_rad=sequence.sampling.phases_rad,
+        )
+        dark, lit = np.asarray(noise.variance).T
+        return dark, lit - dark
 
     def reconstruct(self, raw: RawFrame, previous: RawFrame | None = None) -> tm.Reconstruction:
         """Return the reconstruction of a capture; it computes what is read of it.

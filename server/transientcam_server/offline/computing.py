@@ -117,7 +117,7 @@ class ComputedFrame:
         view = self._view(product, time_s, bins, y, region, decimation)
         given = self.raw_frame if product.needs == "raw" else self._found(product.needs)
         array = product.compute(self.recipe, given, view)
-        if not product.over_time:
+        if not product.cropped:
             array = view.crop.apply(array, product.description.axes)
         height, width = self.raw.shape[1:]
         return ProductFrame(

@@ -57,14 +57,26 @@ def write(output: Path, content: Content, rows: Iterable[Row], sink: Sink) -> No
     OSError
         If the output cannot be written.
     """
+    with whole(output) as scratch, sink(scratch, content) as put:
+        for name, index, values in rows:
+            put(name, index, values)
+
+
+@contextmanager
+def whole(output: Path) -> Iterator[Path]:
+    """Yield a path to write to, which becomes ``output`` in the end; nothing is left of a failure.
+
+    Raises
+    ------
+    FileExistsError
+        If the output is there already.
+    """
     if output.exists():
         raise FileExistsError(17, "it is there already", str(output))
     scratch = output.with_name(output.name + ".writing")
     _remove(scratch)
     try:
-        with sink(scratch, content) as put:
-            for name, index, values in rows:
-                put(name, index, values)
+        yield scratch
         scratch.rename(output)
     finally:
         _remove(scratch)
@@ -209,4 +221,4 @@ def _remove(path: Path) -> None:
 
 SINKS: Final[dict[str, Sink]] = {".npz": _npz, ".nc": _netcdf, ".zarr": _zarr}
 """What writes the formats that any arrays have, by suffix."""
-_LIBRARIES: Final = {".nc": "h5netcdf", ".zarr": "zarr", ".mcap": "foxglove"}
+_LIBRARIES: Final = {".nc": "h5netcdf", ".zarr": "zarr"}

@@ -1,22 +1,26 @@
 """Reconstruction of a measurement in a file: the daemon's arithmetic without a camera.
 
-Three kinds of ``.npz`` are understood: ``moments`` with ``base_frequency_hz``; photons in
-``counts`` (n_bins,) or ``meas`` (H, W, n_bins) with ``bin_s``; a transient cube ``h`` (H, W, T)
-with ``start_opl_m`` and ``bin_opl_m``, its time axis an optical path length.
+An ``.npz`` of ``moments`` with ``base_frequency_hz``, or a file of impulse responses
+(`offline.impulse_responses`), which are measured here with a modulation.
 """
 
-import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_server.errors.exceptions import InputError
+from transientcam_server.offline.impulse_responses import (
+    KEYS,
+    arrays_of,
+    impulse_response,
+    require_some_finite,
+    scalar,
+)
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
@@ -95,7 +99,7 @@ def load_measurement(
     OSError
         If the file cannot be read.
     """
-    arrays = _read(path)
+    arrays = arrays_of(path)
     if "moments" in arrays:
         return _of_moments(path, arrays, frequency_hz, harmonics)
     if frequency_hz is not None and not (np.isfinite(frequency_hz) and frequency_hz > 0.0):
@@ -103,13 +107,10 @@ def load_measurement(
     if harmonics is not None and not 1 <= harmonics <= MAX_HARMONICS:
         raise InputError("--harmonics", "value", f"{harmonics}", f"from 1 to {MAX_HARMONICS}")
     f_hz, m = frequency_hz or DEFAULT_FREQUENCY_HZ, harmonics or DEFAULT_HARMONICS
-    if "counts" in arrays or "meas" in arrays:
-        time_s, response = _of_counts(path, arrays, background=background)
-    elif "h" in arrays:
-        time_s, response = _of_cube(path, arrays)
-    else:
+    if not any(key in arrays for key in KEYS):
         found = ", ".join(sorted(arrays)) or "nothing"
-        raise InputError(str(path), "content", found, "moments, counts, meas or h")
+        raise InputError(str(path), "content", found, f"moments, {', '.join(KEYS[:-1])} or H")
+    time_s, response = impulse_response(path, arrays, background=background)
     return Measurement(moments_of(response, time_s, frequency_hz=f_hz, harmonics=m), f_hz)
 
 
@@ -179,21 +180,6 @@ def _blocks(pixels: int, bins: int) -> Iterator[slice]:
         yield slice(start, min(start + step, pixels))
 
 
-def _read(path: Path) -> dict[str, _Array]:
-    try:
-        # no pickle: a measurement from elsewhere must not be able to run anything
-        with path.open("rb") as opened:
-            file = np.load(opened, allow_pickle=False)
-            if not isinstance(file, NpzFile):
-                raise InputError(str(path), "content", "a single array", "an .npz of named arrays")
-            with file:
-                return {name: file[name] for name in file}
-    except (zipfile.BadZipFile, ValueError, EOFError) as error:
-        raise InputError(str(path), "content", f"unreadable ({error})", "an .npz of arrays") from (
-            error
-        )
-
-
 def _of_moments(
     path: Path, arrays: Mapping[str, _Array], frequency_hz: float | None, harmonics: int | None
 ) -> Measurement:
@@ -206,7 +192,7 @@ def _of_moments(
         )
     if moments.dtype.kind not in "cfiu":
         raise InputError(str(path), "moments", f"{moments.dtype}", "complex numbers")
-    f_hz = _scalar(path, arrays, "base_frequency_hz")
+    f_hz = scalar(path, arrays, "base_frequency_hz")
     if frequency_hz is not None and frequency_hz != f_hz:
         raise InputError(
             "--frequency-hz", "value", f"{frequency_hz:g}", f"the {f_hz:g} of these moments"
@@ -217,55 +203,5 @@ def _of_moments(
     moments = moments[: (harmonics or m) + 1]
     dtype = np.complex64 if moments.dtype == np.complex64 else np.complex128
     moments = np.ascontiguousarray(moments, dtype=dtype)
-    _some_finite(path, "moments", moments)
+    require_some_finite(path, "moments", moments)
     return Measurement(moments, f_hz)
-
-
-def _of_counts(
-    path: Path, arrays: Mapping[str, _Array], *, background: str
-) -> tuple[_Array, _Array]:
-    key = "counts" if "counts" in arrays else "meas"
-    counts = arrays[key]
-    if counts.ndim not in (1, 3) or counts.shape[-1] < 2 or not counts.size:
-        raise InputError(str(path), key, f"of shape {counts.shape}", "(n_bins,) or (H, W, n_bins)")
-    if counts.dtype.kind not in "fiu":
-        raise InputError(str(path), key, f"{counts.dtype}", "numbers")
-    if counts.ndim == 1:
-        counts = counts[np.newaxis, np.newaxis]
-    counts = counts.astype(np.float64)
-    bin_s = _scalar(path, arrays, "bin_s")
-    _some_finite(path, key, counts.sum(axis=-1)[np.newaxis])
-    if background == "median":
-        # fewer photons than the background are noise of it, not negative light
-        counts = np.maximum(counts - np.median(counts, axis=-1, keepdims=True), 0.0)
-    return np.arange(counts.shape[-1]) * bin_s, counts
-
-
-def _of_cube(path: Path, arrays: Mapping[str, _Array]) -> tuple[_Array, _Array]:
-    h = arrays["h"]
-    if h.ndim != 3 or not h.size or h.dtype.kind not in "fiu":
-        found = f"{h.dtype} of shape {h.shape}"
-        raise InputError(str(path), "h", found, "numbers of shape (H, W, T)")
-    start_m = _scalar(path, arrays, "start_opl_m", positive=False)
-    bin_m = _scalar(path, arrays, "bin_opl_m")
-    _some_finite(path, "h", h.sum(axis=-1, dtype=np.float64)[np.newaxis])
-    return (start_m + np.arange(h.shape[-1]) * bin_m) / tm.SPEED_OF_LIGHT_M_S, h
-
-
-def _scalar(path: Path, arrays: Mapping[str, _Array], key: str, *, positive: bool = True) -> float:
-    expected = "a positive number" if positive else "a finite number"
-    if key not in arrays:
-        raise InputError(str(path), key, "missing", expected)
-    array = arrays[key]
-    if array.size != 1 or array.dtype.kind not in "fiu":
-        raise InputError(str(path), key, f"{array.dtype} of shape {array.shape}", expected)
-    value = float(array.reshape(()))
-    if not np.isfinite(value) or (positive and value <= 0.0):
-        raise InputError(str(path), key, f"{value}", expected)
-    return value
-
-
-def _some_finite(path: Path, key: str, planes: _Array) -> None:
-    """Refuse an array without a single usable pixel; unusable ones beside others are flagged."""
-    if not np.isfinite(planes).all(axis=0).any():
-        raise InputError(str(path), key, "NaN or infinite in every pixel", "finite somewhere")

@@ -5,11 +5,20 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from transientcam_driver import AppliedSequence
+from transientcam_driver import AppliedSequence, Sequence
 from transientcam_server.planning.prediction import Prediction
 
 TARGETS: Final = ("range_error_m", "range_std_m", "separation_m", "bound_width")
 """Accuracies that a goal may limit; choices are compared by the first by default."""
+
+
+def in_words(sequence: Sequence, estimator: str) -> str:
+    """State a sequence and an estimator: frequencies, exposure, takes."""
+    takes = f" x {sequence.takes}" if sequence.takes > 1 else ""
+    return (
+        f"m = {sequence.harmonics} at {sequence.base_frequency_hz / 1e6:g} MHz, "
+        f"{sequence.exposure_s * 1e3:.3g} ms{takes}, {estimator}"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,9 +97,4 @@ class Choice:
 
     def in_words(self) -> str:
         """State the sequence and the estimator."""
-        sequence = self.applied.sequence
-        takes = f" x {sequence.takes}" if sequence.takes > 1 else ""
-        return (
-            f"m = {sequence.harmonics} at {sequence.base_frequency_hz / 1e6:g} MHz, "
-            f"{sequence.exposure_s * 1e3:.3g} ms{takes}, {self.estimator}"
-        )
+        return in_words(self.applied.sequence, self.estimator)

@@ -9,6 +9,7 @@ from transientcam_driver import AppliedSequence, Capabilities, Sequence, Sequenc
 from transientcam_moments.comparisons import TECHNIQUES
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging.recipe import listed
 from transientcam_server.planning.estimation import MOST_HARMONICS, SEARCHED
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.pareto import front
@@ -73,10 +74,12 @@ def require_plannable(capabilities: Capabilities) -> None:
     sampling = capabilities.sampling
     if sampling.consecutive and len(sampling.phases_rad) == 4:
         return
+    multiples = "1 to m" if sampling.consecutive else listed(sampling.multiples)
     raise Problem(
         kinds.TARGET_UNREACHABLE,
-        "Plans are made for consecutive multiples of one frequency at four phases alone, and this "
-        "camera has a sampling of its own.",
+        "Plans are made for the multiples 1 to m of one frequency at 4 phases, and this camera "
+        f"measures the multiples {multiples} at {len(sampling.phases_rad)}. What an exposure and "
+        "takes give is in the product range_std of its frames.",
         field="sampling",
         value=sampling.to_document(),
         best=None,

@@ -49,41 +49,50 @@ class FrontCache:
         self._cached: dict[str, _CachedFront] = {}
         self._predicting = asyncio.Lock()
 
-    async def of(self, frame: Frame, by: str) -> dict[str, Any]:
-        """Return the front compared by target ``by``, and the frame's own place, as JSON."""
+    async def of(
+        self, frame: Frame, by: str, looking: Progress, predicting: Progress
+    ) -> dict[str, Any]:
+        """Return the front compared by target ``by``, and the frame's own place, as JSON.
+
+        ``predicting`` shows the same document with the front so far; what either progress raises
+        ends the work, unless it is done.
+        """
+        around = {
+            "compared_by": by,
+            "scene_of_frame": frame.number,
+            "current": await self._current(frame),
+        }
+        shown = predicting.part(0.0, 1.0, show=lambda part: predicting.show(around | part))
         async with self._predicting:
             cached = self._cached.get(by)
             made_with = frame.raw.epoch, frame.recipe.settings_version
             if cached is None or cached.made_with != made_with or self._clock() > cached.until_s:
-                document = await self._predicted(frame, by)
+                document = await self._predicted(frame, by, looking, shown)
                 cached = _CachedFront(made_with, frame.number, self._clock() + KEPT_S, document)
                 self._cached[by] = cached
-        return {
-            "compared_by": by,
-            "scene_of_frame": cached.frame,
-            "current": await self._current(frame),
-            **cached.document,
-        }
+        return around | {"scene_of_frame": cached.frame} | cached.document
 
     def forget(self) -> None:
         """Drop the fronts, as when the scene is another one."""
         self._cached.clear()
         self._looks.forget()
 
-    async def _predicted(self, frame: Frame, by: str) -> dict[str, Any]:
+    async def _predicted(
+        self, frame: Frame, by: str, looking: Progress, predicting: Progress
+    ) -> dict[str, Any]:
         base = frame.recipe.applied.sequence
         if self._looks.needs_frame:
             scene = await self._looks.of_frame(frame, None)
         else:
             frequency_hz = base.base_frequency_hz
             base = Sequence(base_frequency_hz=frequency_hz, sub_phases=base.sub_phases)
-            scene = await self._looks.of_twin(base, None, Progress())
+            scene = await self._looks.of_twin(base, None, looking)
         goal = Goal(
             base=base,
             range_std_m=_WIDE if by == "range_std_m" else None,
             bound_width=_WIDE if by == "bound_width" else None,
         )
-        return await self._queue.run(self._planner.tradeoff_document, goal, scene)
+        return await self._queue.run(self._planner.tradeoff_document, goal, scene, predicting)
 
     async def _current(self, frame: Frame) -> dict[str, Any]:
         found = await frame.reconstruction("returns")

@@ -141,7 +141,7 @@ def in_a_sentence(front: list[Choice]) -> str:
     finest = front[-1]
     best = (
         f"the best is {finest.predicted.range_error.median * 1e3:.3g} mm in "
-        f"{finest.applied.capture_s * 1e3:.3g} ms ({finest.in_words()})"
+        f"{_time_in_words(finest.applied.capture_s)} ({finest.in_words()})"
     )
     ruled = list(
         itertools.takewhile(
@@ -151,10 +151,12 @@ def in_a_sentence(front: list[Choice]) -> str:
     )
     if not ruled:
         return f"Noise rules everywhere: more time buys accuracy; {best}."
-    return (
-        f"From {ruled[-1].applied.capture_s * 1e3:.3g} ms on bias rules and more time buys little; "
-        f"{best}."
-    )
+    since = _time_in_words(ruled[-1].applied.capture_s)
+    return f"From {since} on bias rules and more time buys little; {best}."
+
+
+def _time_in_words(time_s: float) -> str:
+    return f"{time_s:.3g} s" if time_s >= 1 else f"{time_s * 1e3:.3g} ms"
 
 
 def _summary(best: Choice, twice: Choice | None) -> str:

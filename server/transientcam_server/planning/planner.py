@@ -12,6 +12,7 @@ import transientcam_moments as tm
 from transientcam_driver import Capabilities, Sequence, Truth
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
+from transientcam_server.planning.choice import Choice
 from transientcam_server.planning.families import Family, families, require_plannable
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.look import STEPS, LookedThrough, look_at
@@ -20,7 +21,7 @@ from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.queue import Allowance, Rest
 from transientcam_server.planning.scene import SceneStatistics
-from transientcam_server.planning.search import Search
+from transientcam_server.planning.search import Line, Search
 from transientcam_server.planning.timing import ReconstructionTimer
 from transientcam_server.settings import ReconstructionSettings
 
@@ -104,25 +105,23 @@ class Planner:
         """Return all that is searched for a goal; see `planning.families`."""
         return families(goal, self._predictor(scene), self._capabilities)
 
-    def tradeoff_document(self, goal: Goal, scene: SceneStatistics) -> dict[str, Any]:
-        """Return all that no other beats, and the lines they lie on, as JSON: seconds of work."""
-        predictor = self._predictor(scene)
+    def tradeoff_document(
+        self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
+    ) -> dict[str, Any]:
+        """Return all that no other beats, and the lines they lie on, as JSON: seconds of work.
+
+        ``progress`` shows the same document, without lines, after each point of the front; what it
+        raises ends the work.
+        """
+        progress = progress or Progress()
+        predictor = self._predictor(scene, progress)
         found = families(goal, predictor, self._capabilities)
         search = Search(goal, found, predictor, self._computing)
-        choices = search.front(goal.leading)
-        return {
-            "front": [choice.to_document() for choice in choices],
-            "lines": [
-                {
-                    "estimator": line.estimator,
-                    "harmonics": line.sequence.harmonics,
-                    "base_frequency_hz": line.sequence.base_frequency_hz,
-                    "points": [asdict(point) for point in line.points],
-                }
-                for line in search.lines(choices)
-            ],
-            "summary": in_a_sentence(choices),
-        }
+        choices: list[Choice] = []
+        for choices in search.fronts(goal.leading, progress.part(0.0, 0.8)):
+            progress.show(_front_document(choices, []))
+        progress.at(0.8, "lines")
+        return _front_document(choices, search.lines(choices))
 
     def close(self) -> None:
         """End what is being computed: it raises Problem ``shutting-down``. From any thread."""
@@ -149,6 +148,22 @@ class Planner:
                 raise Problem(kinds.SHUTTING_DOWN, "The service is shutting down.")
 
         return pause
+
+
+def _front_document(choices: list[Choice], lines: list[Line]) -> dict[str, Any]:
+    return {
+        "front": [choice.to_document() for choice in choices],
+        "lines": [
+            {
+                "estimator": line.estimator,
+                "harmonics": line.sequence.harmonics,
+                "base_frequency_hz": line.sequence.base_frequency_hz,
+                "points": [asdict(point) for point in line.points],
+            }
+            for line in lines
+        ],
+        "summary": in_a_sentence(choices),
+    }
 
 
 def range_error(found: tm.Reconstruction, truth: Truth) -> dict[str, float] | None:

@@ -1,8 +1,9 @@
 """The search: which member of which family is quickest, or finest, and what is stated of it."""
 
 import bisect
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
@@ -13,6 +14,7 @@ from transientcam_server.planning.families import Family, Member
 from transientcam_server.planning.goal import Goal
 from transientcam_server.planning.pareto import front
 from transientcam_server.planning.prediction import Predictor
+from transientcam_server.planning.progress import Progress
 
 Timed = Callable[[Sequence, str], float]
 """Computing time in s of a frame of a sequence with an estimator."""
@@ -175,19 +177,29 @@ class Search:
         choices = [self.choice(each.family, each.member) for each in found[:contenders]]
         return min(choices, key=lambda choice: choice.error(leading), default=None)
 
-    def front(self, leading: str) -> list[Choice]:
-        """Return the finest choices within rising times, without those that others beat."""
+    def fronts(self, leading: str, progress: Progress | None = None) -> Iterator[list[Choice]]:
+        """Yield the finest choices within rising times, without those that others beat.
+
+        After each time the front so far, the last time the whole; the ends come first and then what
+        is between, so that early ones show all of it coarsely.
+        """
+        progress = progress or Progress()
         shortest_s = self.families[0].members[0].capture_s
         longest_s = max(family.members[-1].capture_s for family in self.families)
         longest_s = min(max(LONGEST_S, shortest_s), longest_s)
         ratio = (longest_s / shortest_s) ** (1 / (ON_FRONT - 1))
         times_s = [shortest_s * ratio**k * (1 + 1e-9) for k in range(ON_FRONT)]
-        choices = [self.finest(leading, within_s, contenders=1) for within_s in times_s]
-        return front(
-            [choice for choice in choices if choice is not None],
-            cost=lambda choice: choice.applied.capture_s,
-            error=lambda choice: choice.error(leading),
-        )
+        choices = []
+        for done, k in enumerate(_coarse_to_fine(ON_FRONT)):
+            progress.at(done / ON_FRONT, f"captures of {times_s[k] * 1e3:.3g} ms")
+            choice = self.finest(leading, times_s[k], contenders=1)
+            if choice is not None:
+                choices.append(choice)
+            yield front(
+                choices,
+                cost=lambda choice: choice.applied.capture_s,
+                error=lambda choice: choice.error(leading),
+            )
 
     def lines(self, choices: list[Choice]) -> list[Line]:
         """Return noise and bias over time of every family that choices come from."""
@@ -320,6 +332,16 @@ class Search:
             if place >= len(family.members):
                 return None
         return None
+
+
+def _coarse_to_fine(count: int) -> list[int]:
+    """Return the places 0 to ``count`` - 1: the ends, then each time the middle of a widest gap."""
+    order = [0, count - 1]
+    while len(order) < count:
+        gaps = itertools.pairwise(sorted(order))
+        before, after = max(gaps, key=lambda gap: gap[1] - gap[0])
+        order.append((before + after) // 2)
+    return order
 
 
 def _frequencies_of(estimator: str, sequence: Sequence) -> tuple[str, int, float, str]:

@@ -46,6 +46,7 @@ class RecordedCamera:
     """What a pipeline requires of a camera."""
 
     capabilities: Capabilities
+    factory: None = None
     simulation: None = None
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from transientcam_driver import (
     AppliedSequence,
     Camera,
@@ -16,6 +18,7 @@ from transientcam_driver import (
     CameraState,
     Capabilities,
     Counters,
+    FactoryCalibration,
     FrameTimeout,
     NotStreaming,
     RawFrame,
@@ -25,8 +28,7 @@ from transientcam_driver import (
     Status,
 )
 from transientcam_driver.clock import Clock, RealClock
-from transientcam_driver.protocol import DeviceState
-from transientcam_driver.protocol.status import StatusFlag
+from transientcam_server.imaging.calibration import FACTORY_ID
 from transientcam_server.recording.reader import Recording
 
 LOOP_BYTES: Final = 256 * 1024**2
@@ -108,6 +110,14 @@ class ReplayCamera:
         return self._recording.header.capabilities
 
     @property
+    def factory(self) -> FactoryCalibration | None:
+        """What that camera reported of its pixels, if they were recorded with it."""
+        gains = self._recording.header.gains
+        if gains is None or gains.id != FACTORY_ID:
+            return None
+        return FactoryCalibration(gains.planes.astype(np.complex64, copy=False))
+
+    @property
     def intrinsics(self) -> Mapping[str, Any] | None:
         """Where the pixels of that camera look, if it was recorded."""
         return self._recording.header.camera.get("intrinsics")
@@ -171,16 +181,12 @@ class ReplayCamera:
         with self._changed:
             self._require_open()
             self._require_more()
-            streaming = self._state is CameraState.STREAMING
-            return Status(
-                state=DeviceState.STREAMING if streaming else DeviceState.IDLE,
-                flags=StatusFlag.INTERLOCK_CLOSED,
+            return Status.of_host(
+                streaming=self._state is CameraState.STREAMING,
+                light_on=False,
                 epoch=self.applied.epoch,
                 next_image=self._index * self.applied.images,
                 device_time_s=self.device_time_s(),
-                dropped_images=0,
-                fifo_bytes=0,
-                fifo_high_water_bytes=0,
                 temperature_c=self._temperature_c,
             )
 

@@ -11,7 +11,7 @@ from transientcam.cli import devices, run
 from transientcam.discovery import FoundCamera
 from transientcam.errors import ServerUnreachable
 from transientcam_driver import CameraUnreachable, LibusbMissing
-from transientcam_driver.entries import tofcam660, usb
+from transientcam_driver.entries import kinect2, tofcam660, usb
 from transientcam_driver.plugin import FoundCamera as Camera
 from transientcam_driver.tofcam660.wire import Answer, AnswerType
 
@@ -24,6 +24,7 @@ ANNOUNCED = FoundCamera("lidar B-3", "http://192.168.7.5:8000", "B-3", "1.2", "v
 def nothing_there(monkeypatch: pytest.MonkeyPatch) -> None:
     """Start from empty buses and silent networks."""
     monkeypatch.setattr(usb, "list_cameras", lambda: ())
+    monkeypatch.setattr(kinect2, "list_kinects", lambda: ())
     monkeypatch.setattr(devices, "discover", lambda **_: ())
 
     def nobody(address: str, *_: object, **__: object) -> None:

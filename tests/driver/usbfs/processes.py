@@ -152,6 +152,19 @@ class _RemoteCamera:
 @contextmanager
 def emulated_camera() -> Iterator[EmulatedCamera]:
     """Plug a camera into a bus of its own; skip, or fail where CI is set, if there can be none."""
+    if missing := missing_libraries():
+        skip_or_fail(missing)
+    # by a short path: names of sockets are limited to 107 characters
+    with tempfile.TemporaryDirectory(prefix="usb-", dir="/tmp") as folder:
+        camera = EmulatedCamera(Path(folder))
+        try:
+            yield camera
+        finally:
+            camera.close()
+
+
+def missing_libraries() -> str | None:
+    """Return which libraries an emulated bus lacks, and what installs them."""
     missing = [
         name
         for name, found in (
@@ -160,15 +173,9 @@ def emulated_camera() -> Iterator[EmulatedCamera]:
         )
         if not found
     ]
-    if missing:
-        skip_or_fail(f"{' and '.join(missing)} missing: apt install umockdev libusb-1.0-0")
-    # by a short path: names of sockets are limited to 107 characters
-    with tempfile.TemporaryDirectory(prefix="usb-", dir="/tmp") as folder:
-        camera = EmulatedCamera(Path(folder))
-        try:
-            yield camera
-        finally:
-            camera.close()
+    if not missing:
+        return None
+    return f"{' and '.join(missing)} missing: apt install umockdev libusb-1.0-0"
 
 
 def skip_or_fail(reason: str) -> None:

@@ -14,14 +14,14 @@ import socket
 import struct
 import threading
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
+from typing import Any
 
 from transientcam_driver.protocol.requests import PRODUCT_ID, VENDOR_ID
 from transientcam_driver.simulation.device import descriptors
 from transientcam_driver.simulation.device.usb_device import (
-    EmulatedDevice,
     Overflow,
     Stall,
     Unplugged,
@@ -83,12 +83,27 @@ class Urb:
     data: bytes = b""
     actual: int = 0
     status: int = 0
+    iso: list[bytes] = field(default_factory=list)
+    """Packets of an isochronous one."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """What the kernel knows of a device without asking it; ``chain`` are its descriptors."""
+
+    vendor_id: int = VENDOR_ID
+    product_id: int = PRODUCT_ID
+    speed_mbit: int = HIGH_SPEED_MBIT
+    speed: int = HIGH_SPEED
+    chain: bytes = descriptors.DEVICE_DESCRIPTOR + descriptors.CONFIGURATION_DESCRIPTOR
 
 
 class UsbfsMount:
     """One emulated device in a tree of files below ``root``."""
 
-    def __init__(self, device: EmulatedDevice, root: Path) -> None:
+    model = Model()
+
+    def __init__(self, device: Any, root: Path) -> None:
         self.device = device
         self.clients: list[Client] = []
         self.owners: dict[int, Client] = {}
@@ -132,6 +147,10 @@ class UsbfsMount:
         for client in clients:
             client.close()
 
+    def client_of(self, connection: socket.socket) -> "Client":
+        """Return what serves an open file descriptor."""
+        return Client(self, connection)
+
     # --- the tree of files ----------------------------------------------------------------
 
     def _plug(self) -> None:
@@ -147,10 +166,10 @@ class UsbfsMount:
         attributes = {
             "busnum": f"{self.device.bus}\n",
             "devnum": f"{self.device.address}\n",
-            "speed": f"{HIGH_SPEED_MBIT}\n",
+            "speed": f"{self.model.speed_mbit}\n",
             "bConfigurationValue": "1\n",
-            "idVendor": f"{VENDOR_ID:04x}\n",
-            "idProduct": f"{PRODUCT_ID:04x}\n",
+            "idVendor": f"{self.model.vendor_id:04x}\n",
+            "idProduct": f"{self.model.product_id:04x}\n",
             # the kernel has read these when the device was plugged in
             "manufacturer": self._string(1),
             "product": self._string(2),
@@ -159,8 +178,7 @@ class UsbfsMount:
         }
         for name, text in attributes.items():
             (folder / name).write_text(text)
-        chain = descriptors.DEVICE_DESCRIPTOR + descriptors.CONFIGURATION_DESCRIPTOR
-        (folder / "descriptors").write_bytes(chain)
+        (folder / "descriptors").write_bytes(self.model.chain)
         self._link(folder / "subsystem", "../../../../../bus/usb")
         self._link(self._root / "sys/bus/usb/devices/1-1", f"../../..{DEVICE_PATH}")
         self._node.parent.mkdir(parents=True, exist_ok=True)
@@ -178,7 +196,8 @@ class UsbfsMount:
         threading.Thread(target=self._accept, args=(self._listener,)).start()
 
     def _string(self, index: int) -> str:
-        return self.device.strings[index][2:].decode("utf-16-le") + "\n"
+        descriptor: bytes = self.device.strings[index]
+        return descriptor[2:].decode("utf-16-le") + "\n"
 
     def _withdraw(self) -> None:
         self._listener.shutdown(socket.SHUT_RDWR)
@@ -229,7 +248,7 @@ class UsbfsMount:
                 connection, _ = listener.accept()
             except OSError:
                 return  # withdrawn
-            client = Client(self, connection)
+            client = self.client_of(connection)
             with self.device.changed:
                 self.clients.append(client)
             threading.Thread(target=client.serve).start()
@@ -334,14 +353,14 @@ class Client:
             raise Refused(errno.ENODEV)
         match request:
             case Ioctl.SUBMITURB:
-                self._submit(argument)
+                self.submit(argument)
             case Ioctl.DISCARDURB:
                 with self._device.changed:
                     if argument not in self.in_flight:
                         raise Refused(errno.EINVAL)
                     self.complete(self.in_flight[argument], status=-errno.ENOENT)
             case Ioctl.GET_CAPABILITIES:
-                self._write(argument, struct.pack("<I", CAPABILITIES))
+                self.write_memory(argument, struct.pack("<I", CAPABILITIES))
             case Ioctl.CLAIMINTERFACE | Ioctl.DISCONNECT_CLAIM:
                 with self._device.changed:
                     interface = self._integer(argument)
@@ -355,7 +374,7 @@ class Client:
             case Ioctl.RESET:
                 self._device.reset()
             case Ioctl.GET_SPEED:
-                return HIGH_SPEED
+                return self._mount.model.speed
             case Ioctl.GETDRIVER:
                 raise Refused(errno.ENODATA)
             case Ioctl.SETCONFIGURATION | Ioctl.SETINTERFACE | Ioctl.RESETEP:
@@ -364,8 +383,8 @@ class Client:
                 raise Refused(errno.ENOTTY)
         return 0
 
-    def _submit(self, address: int) -> None:
-        raw = self._read(address, _URB.size)
+    def submit(self, address: int) -> None:
+        raw = self.read_memory(address, _URB.size)
         kind, _endpoint, _status, _flags, buffer, length, *_ = _URB.unpack(raw)
         urb = Urb(address, raw, kind, buffer, length)
         if kind == _CONTROL_URB:
@@ -378,7 +397,7 @@ class Client:
             self._device.changed.notify_all()
 
     def _control(self, urb: Urb) -> None:
-        sent = self._read(urb.buffer, urb.length)
+        sent = self.read_memory(urb.buffer, urb.length)
         request_type, request, value, index, length = _SETUP.unpack_from(sent)
         with self._device.changed:
             self.in_flight[urb.address] = urb
@@ -403,13 +422,17 @@ class Client:
                 raise Refused(errno.ENODEV if self.gone else errno.EAGAIN)
             urb = self._completed.popleft()
             self._show_reapable(bool(self._completed) or self.gone)
+        self.deliver(urb)
+        self.write_memory(argument, struct.pack("<Q", urb.address))
+        return 0
+
+    def deliver(self, urb: Urb) -> None:
+        """Write what came of a transfer into the client's memory."""
         done = bytearray(urb.raw)
         struct.pack_into("<i", done, 4, urb.status)
         struct.pack_into("<i", done, 28, urb.actual)
-        self._write(urb.buffer, urb.data)
-        self._write(urb.address, bytes(done))
-        self._write(argument, struct.pack("<Q", urb.address))
-        return 0
+        self.write_memory(urb.buffer, urb.data)
+        self.write_memory(urb.address, bytes(done))
 
     # --- the memory of the client ---------------------------------------------------------
 
@@ -423,14 +446,14 @@ class Client:
             at += count
         return bytes(data)
 
-    def _read(self, address: int, size: int) -> bytes:
+    def read_memory(self, address: int, size: int) -> bytes:
         self._connection.sendall(_MESSAGE.pack(_READ_MEMORY, address, size))
         return self._receive(size)
 
     def _integer(self, address: int) -> int:
-        return int(struct.unpack("<I", self._read(address, 4))[0])
+        return int(struct.unpack("<I", self.read_memory(address, 4))[0])
 
-    def _write(self, address: int, data: bytes) -> None:
+    def write_memory(self, address: int, data: bytes) -> None:
         if data:
             self._connection.sendall(_MESSAGE.pack(_WRITE_MEMORY, address, len(data)) + data)
 

@@ -39,7 +39,7 @@ def test_without_tolerance_the_least_brightness_is_minus_the_smallest_eigenvalue
 def test_the_program_keeps_to_the_tolerance_and_uses_it_up() -> None:
     b = oracles.random_moments(np.random.default_rng(5), 3, 5)
     for epsilon in (0.01, 0.05, 0.2):
-        solve = program(3, bins=128, epsilon=epsilon)
+        solve = program((1, 2, 3), bins=128, epsilon=epsilon)
         for c in b[1:].T:
             light = solve(c)
 
@@ -81,8 +81,25 @@ def test_light_that_comes_back_around_zero_is_one_return() -> None:
     assert oracles.around(found.phase_rad[0] - [0.01, 6.27]).max() < np.pi / 64
 
 
+def test_harmonics_may_come_in_any_order_and_with_gaps() -> None:
+    phase, weight, multiples = np.array([0.7, 2.2]), np.array([1.0, 0.6]), np.array([3, 0, 10, 2])
+    b = np.exp(1j * np.outer(multiples, phase)) @ weight
+    b[1] = np.nan  # b_0 is not looked at
+
+    found = sra(b, harmonics=multiples.tolist(), bins=512, epsilon=0.01)
+
+    design = np.exp(1j * np.outer(multiples, np.nan_to_num(found.phase_rad)))
+    left = (b - design @ found.weight)[multiples > 0]
+    assert np.abs(left).sum() < 0.05 * np.abs(b[multiples > 0]).sum()
+    assert found.weight.sum() <= weight.sum() + 1e-9
+
+
 @pytest.mark.parametrize(
-    ("arguments", "field"), [({"epsilon": -0.1}, "epsilon"), ({"bins": 6}, "bins")]
+    ("arguments", "field"),
+    [
+        ({"epsilon": -0.1}, "epsilon"),
+        ({"bins": 6}, "bins"),
+    ],
 )
 def test_arguments_that_it_cannot_work_with_are_refused(
     arguments: dict[str, float], field: str
@@ -137,7 +154,7 @@ def test_each_step_of_the_logarithmic_prior_goes_down_and_the_first_is_the_1_nor
     brightest = [each.weight.max() for each in found]
     assert brightest[-1] >= brightest[0]
     # the descent on the grid itself
-    solve = program(4, bins=bins, epsilon=0.05)
+    solve = program((1, 2, 3, 4), bins=bins, epsilon=0.05)
     c, costs, light = b[1:] / scale, [], solve(b[1:] / scale)
     for _ in range(4):
         assert light is not None
@@ -155,3 +172,18 @@ def test_the_logarithmic_prior_gives_strong_returns_more_of_the_light() -> None:
 
     assert logarithm.weight.max() >= one_norm.weight.max() - 1e-9
     assert (logarithm.weight > 0).sum() <= (one_norm.weight > 0).sum()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [
+        ({"epsilon": 0.0, "harmonics": (1, 2, 3, 5)}, "epsilon"),
+        ({"harmonics": (1, 2, 3, 33)}, "harmonics"),
+        ({"bins": 20, "harmonics": (1, 2, 3, 10)}, "bins"),
+    ],
+)
+def test_harmonics_that_it_cannot_work_with_are_refused(
+    arguments: dict[str, object], field: str
+) -> None:
+    with pytest.raises(tm.ParameterError, match=field):
+        sra(np.ones((4, 1)), **arguments)  # type: ignore[arg-type]  # by name

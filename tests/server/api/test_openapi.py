@@ -81,6 +81,7 @@ def test_every_resource_of_the_interface_is_described(document: dict[str, Any]) 
         "POST /api/v1/plan",
         "POST /api/v1/plan/jobs",
         "GET /api/v1/tradeoff",
+        "POST /api/v1/tradeoff/jobs",
         "GET /livez",
         "GET /metrics",
         "GET /readyz",

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.driver.kinect2.standing import READ_S, camera_of, emulated
 from tests.driver.mounts import PyusbMount
 from tests.server.recording.made import record
 from transientcam_driver import Camera, TriggeredCamera, open_camera
@@ -14,6 +15,7 @@ from transientcam_driver.clock import RealClock, VirtualClock
 from transientcam_driver.contract import CLAUSES, Bench, Clause, ContractSkipped
 from transientcam_driver.opening import kinds
 from transientcam_driver.simulation.build import find_scene, without_noise
+from transientcam_driver.simulation.device import Fault
 from transientcam_driver.simulation.tofcam660 import build_tofcam660
 from transientcam_driver.tofcam660 import DeviceOptions, Region, Tofcam660
 
@@ -74,7 +76,20 @@ def emulated_tofcam660(directory: Path, closing: ExitStack) -> Bench:
     )
 
 
+def emulated_kinect2(directory: Path, closing: ExitStack) -> Bench:
+    device = emulated()
+    return Bench(
+        lambda: camera_of(device),
+        lit=lambda camera: device.lit,
+        unplug=lambda camera: device.unplug(),
+        replug=lambda camera: device.replug(),
+        lose_image=lambda camera: device.inject(Fault.DROP),
+        read_s=READ_S,
+    )
+
+
 BENCHES = {
+    "kinect2": emulated_kinect2,
     "tofcam660": emulated_tofcam660,
     "sim": simulated,
     "usb": on_usb,

@@ -130,7 +130,7 @@ def test_the_doctor_lists_what_it_cannot_give(
 def test_its_daemon_measures_the_distance_and_passes_the_checks(wall: Path) -> None:
     with serving(f"wall:{wall}", sequence={"base_frequency_hz": 20e6}) as daemon:
         with Camera(daemon.url, timeout_s=60.0) as client:
-            frame = client.frame("range")
+            frame = client.frame("range", wait_s=10.0)
             with pytest.raises(ProblemError, match="only a simulated camera knows the true range"):
                 client.frame("truth")
             absent = {each["name"]: each["reason"] for each in client.info["absent_products"]}
@@ -154,7 +154,7 @@ def fixed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 def test_fixed_frequencies_measure_the_distance(fixed: Served) -> None:
     with Camera(fixed.url, timeout_s=60.0) as client:
-        sequence, frame = client.sequence, client.frame("range")
+        sequence, frame = client.sequence, client.frame("range", wait_s=10.0)
         moments = client.frame("moments")
         report = check_groups(fixed, *GROUPS)
 
@@ -203,6 +203,7 @@ def test_what_they_cannot_give_is_absent_with_the_reason(
         device.refusal(pixel, 409, "estimator-misfit")
 
     assert problem["field"] == "sampling"
+    assert "the multiples 2, 10 and 15 at 3" in problem["detail"]
     assert set(absent) == {*OF_CONSECUTIVE_MULTIPLES, "brightness", "uniform", "truth"}
     assert command(["doctor", fixed.url, "--seconds", "0.1", "--json"]) == 0
     told = of_products(capsys.readouterr().out)
@@ -216,7 +217,7 @@ def test_their_recordings_are_reconstructed_and_replayed(
     fixed: Served, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with Camera(fixed.url, timeout_s=60.0) as client:
-        client.frame("flags")  # there is a frame to begin with
+        client.frame("flags", wait_s=10.0)  # there is a frame to begin with
         recording = client.stop_recording(client.record(history_s=60.0)["id"])["id"]
         path = f"/api/v1/recordings/{recording}/frames/1/range"
         with Device(fixed.url, timeout_s=60.0) as device:
@@ -225,7 +226,7 @@ def test_their_recordings_are_reconstructed_and_replayed(
     copy = fixed.settings.recordings.directory / "copy.h5"
     copy.write_bytes(file)
     with serving(f"recording:{copy}") as replay, Camera(replay.url, timeout_s=60.0) as client:
-        replayed = client.frame("range")
+        replayed = client.frame("range", wait_s=10.0)
     products = copy.with_name("products.npz")
     again = ["reconstruct", str(copy), "-o", str(copy.with_name("again.npz"))]
     assert command(["reconstruct", str(copy), "-o", str(products)]) == 0

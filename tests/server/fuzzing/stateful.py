@@ -23,7 +23,7 @@ from schemathesis.config import SchemathesisConfig
 from schemathesis.core.failures import FailureGroup
 
 CONFIG: Final = Path(__file__).with_name("schemathesis.toml")
-LEFT_OUT: Final = r"mjpeg|/plan/jobs$"
+LEFT_OUT: Final = r"mjpeg|/(plan|tradeoff)/jobs$"
 """Answers without end, and jobs that compute for seconds each."""
 STORIES: Final = 30
 STORY: Final = settings(

@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import httpx
-import pytest
 
 from tests.conformance.breaking import Answer, Breaker, Breaking
 from tests.conformance.broken_promises import with_status
@@ -141,6 +140,3 @@ def test_something_deleted_that_can_still_be_had_is_found(tmp_path: Path) -> Non
 
     assert result.returncode == 0, result.stderr
     assert any(STILL_THERE in each for each in json.loads(result.stdout)["wrong"])
-
-
-pytestmark = pytest.mark.timeout(300)

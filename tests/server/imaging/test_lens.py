@@ -1,12 +1,13 @@
 """Where the pixels look, and by which source."""
 
-from dataclasses import asdict
+import json
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from transientcam_driver import open_camera
+from transientcam_driver import Lens, open_camera
 from transientcam_driver.simulation.build import find_scene
 from transientcam_driver.simulation.light.rays import camera_rays
 from transientcam_server.imaging.lens import Intrinsics, known_intrinsics
@@ -91,3 +92,40 @@ def test_without_anything_that_is_known_a_usual_field_of_view_is_assumed(
     found = known_intrinsics(LensSettings(), **SIZE, recorded=recorded)
 
     assert found == Intrinsics.of_field(45.0, **SIZE, source="assumed")
+
+
+def test_a_camera_reports_its_lens_and_settings_go_before_it() -> None:
+    lens = Lens(200.0, 210.0, 80.0, 60.0, (0.09, -0.27, 0.0, 0.0, 0.095), 0.045)
+
+    found = known_intrinsics(LensSettings(), **SIZE, reported=lens, scene_field_deg=40.0)
+
+    assert found.source == "camera"
+    assert (found.fx, found.fy, found.cx, found.cy) == (200.0, 210.0, 80.0, 60.0)
+    assert (found.distortion, found.light_x_m) == (lens.distortion, 0.045)
+    given = LensSettings(field_of_view_deg=90.0)
+    assert known_intrinsics(given, **SIZE, reported=lens).source == "settings"
+    assert replace(found, source="recording") == known_intrinsics(
+        LensSettings(), **SIZE, recorded=json.loads(json.dumps(asdict(found)))
+    )
+
+
+def test_a_recorded_lens_with_part_of_a_distortion_is_not_used() -> None:
+    document = asdict(SCENE) | {"distortion": [0.1, 0.2]}
+
+    assert known_intrinsics(LensSettings(), **SIZE, recorded=document).source == "assumed"
+
+
+def test_light_beside_the_lens_is_taken_into_account() -> None:
+    lens = Lens(200.0, 200.0, 81.0, 59.5, (0.05, -0.1, 0.001, 0.002, 0.03), 0.045)
+    intrinsics = Intrinsics.of_lens(lens, **SIZE, source="camera")
+    x, y = lens.slopes(**SIZE)
+    z = np.random.default_rng(2).uniform(0.2, 4.0, x.shape)
+    points = np.stack([x * z, y * z, z])
+    light = np.array([0.045, 0.0, 0.0])[:, None, None]
+    path_m = np.linalg.norm(points, axis=0) + np.linalg.norm(points - light, axis=0)
+    path_m[0, :2] = [0.04, np.nan]  # shorter than from the light to the lens
+
+    found = intrinsics.points(path_m / 2)
+
+    assert np.isnan(found[:, 0, :2]).all()
+    np.testing.assert_allclose(found[:, 1:], points[:, 1:], rtol=1e-5, atol=1e-6)

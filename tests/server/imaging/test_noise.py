@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence, open_camera
 from transientcam_server.camera.source import sensor_of
+from transientcam_server.imaging import noise as module
 from transientcam_server.imaging.noise import (
     beyond_noise,
     contradictions,
     contradictory_share,
+    moment_noise,
     range_noise,
 )
 from transientcam_server.imaging.recipe import Recipe
@@ -88,8 +90,9 @@ def test_pixels_without_light_are_not_counted() -> None:
 @pytest.mark.parametrize("spoilt", [(8, 12), (30, 50)], ids=["few", "many"])
 @pytest.mark.parametrize("smoothing_px", [0.0, 0.6])
 def test_pixels_settled_without_their_neighbours_are_those_of_the_smoothed_noise(
-    smoothing_px: float, spoilt: tuple[int, int]
+    smoothing_px: float, spoilt: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(module, "_BLOCK_PIXELS", 300)  # of which there are several, the last short
     b = moments((0.0, 0.0, 0.0, 0.0))
     b *= np.random.default_rng(2).uniform(0.05, 1.0, SHAPE).astype(np.float32)
     rows, columns = spoilt
@@ -110,7 +113,10 @@ def test_pixels_settled_without_their_neighbours_are_those_of_the_smoothed_noise
     np.testing.assert_array_equal(beyond, expected)
 
 
-def recipe(zeroth: Literal["low-frequency", "estimated"]) -> Recipe:
+Zeroth = Literal["low-frequency", "on-off", "estimated"]
+
+
+def recipe(zeroth: Zeroth) -> Recipe:
     with open_camera("sim:wall") as camera:
         applied = camera.validate(Sequence(harmonics=3, zeroth=zeroth))
         sensor = sensor_of(camera, SensorSettings())
@@ -120,6 +126,22 @@ def recipe(zeroth: Literal["low-frequency", "estimated"]) -> Recipe:
 
 def reconstruction(b: NDArray[np.complex64], zeroth: str) -> tm.Reconstruction:
     return tm.reconstruct(b, tm.Settings(smoothing_sigma_px=0.0, zeroth=zeroth))
+
+
+@pytest.mark.parametrize("zeroth", ["low-frequency", "on-off", "estimated"])
+def test_the_noise_of_moments_is_that_of_the_sensor_at_their_brightness(zeroth: Zeroth) -> None:
+    used = recipe(zeroth)
+    found = reconstruction(moments((0.0, 0.0, 0.0, 0.0)), "low-frequency")
+    found.smoothed[0] = np.linspace(-5, 4000, found.smoothed[0].size).reshape(SHAPE)
+    assert used.sensor is not None
+
+    variance = moment_noise(used, found).variance
+
+    expected = tm.noise.moment_noise(
+        found.smoothed[0].real, used.sensor, calibration=used.nominal_gains, zeroth=zeroth
+    ).variance
+    assert variance.dtype == np.float32
+    np.testing.assert_allclose(variance, expected, rtol=1e-6)
 
 
 def test_contradictions_are_distinguished_from_what_noise_biased() -> None:

@@ -14,7 +14,7 @@ import pytest
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import without_lanes
 from transientcam import wire
-from transientcam_driver import Camera, RawFrame, Sampling, Sequence, open_camera
+from transientcam_driver import AppliedSequence, Camera, RawFrame, Sampling, Sequence, open_camera
 from transientcam_moments._kernels.registry import REGISTRY, Key
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging import frame as module
@@ -22,8 +22,8 @@ from transientcam_server.imaging import stages
 from transientcam_server.imaging.encodings.encoding import MSGPACK, NPY, Encoding
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.recipe import SettingsVersion, suited
-from transientcam_server.imaging.view import View
+from transientcam_server.imaging.recipe import Recipe, SettingsVersion, suited
+from transientcam_server.imaging.view import Crop, View
 from transientcam_server.imaging.workers import Workers
 from transientcam_server.settings import ReconstructionSettings
 
@@ -139,6 +139,25 @@ def test_products_requested_together_share_the_first_hop(
             *(frame.encoded(pipeline.product(name), MSGPACK, channel=0) for name in names)
         )
         assert hops == ["compute", *["_made"] * len(names)]
+
+    with_frame(camera, raw, test)
+
+
+@pytest.mark.parametrize("name", ["coefficients", "returns", "range"])
+def test_a_region_is_that_of_the_whole_whichever_is_requested_first(
+    camera: Camera, raw: RawFrame, name: str
+) -> None:
+    view = View(crop=Crop((30, 20, 41, 13), 3))
+
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        product = pipeline.product(name)
+        region, whole, again = [
+            np.load(io.BytesIO(await frame.encoded(product, encoding, each)))
+            for encoding, each in ((NPY, view), (NPY, View()), (replace(NPY, name="npy2"), view))
+        ]
+        assert whole.shape[-2:] == (120, 163)
+        np.testing.assert_array_equal(region, whole[..., 20:33:3, 30:71:3])
+        np.testing.assert_array_equal(again, region)
 
     with_frame(camera, raw, test)
 
@@ -354,9 +373,39 @@ def test_an_estimator_that_is_named_is_used_compiled_or_not(named: str) -> None:
     assert settings.for_live_frames(Sequence(harmonics=4), ready=lambda name, m: False) == settings
 
 
-def test_frequencies_with_gaps_are_the_likelihoods_compiled_or_not() -> None:
+def test_two_frequencies_with_gaps_are_the_likelihoods_compiled_or_not() -> None:
     settings = SettingsVersion(1, ReconstructionSettings())
     gapped = Sequence(harmonics=2, sampling=Sampling((2, 3)))
 
     assert settings.for_live_frames(gapped, ready=lambda name, m: False) == settings
+    assert technique_of(gapped) == "likelihood"
     assert suited(settings.settings, gapped.sampling) == settings.settings
+
+
+def test_more_with_gaps_are_searched_for_pairs_once_that_is_compiled() -> None:
+    settings = SettingsVersion(1, ReconstructionSettings())
+    gapped = Sequence(harmonics=3, sampling=Sampling((2, 10, 15)))
+    asked: list[tuple[str, int]] = []
+
+    def ready(name: str, m: int) -> bool:
+        asked.append((name, m))
+        return len(asked) > 1
+
+    before, behind = (settings.for_live_frames(gapped, ready=ready) for _ in range(2))
+
+    assert asked == [("pairs", 15)] * 2
+    assert (before.settings.estimator, before.id) == ("likelihood", 1)
+    assert behind == settings
+    assert technique_of(gapped) == "two-returns"
+
+
+def test_an_estimator_that_gaps_rule_out_gives_way_to_the_automatic_one() -> None:
+    settings = ReconstructionSettings(estimator="pisarenko")
+
+    assert suited(settings, Sampling((2, 10, 15))).estimator == "automatic"
+
+
+def technique_of(sequence: Sequence) -> str:
+    """Return the estimator of recorded frames of a sequence with the usual settings."""
+    applied = AppliedSequence(sequence, 0, 12, 1.0, 1.0, 18.7, 1.0, 8e6)
+    return Recipe(applied, ReconstructionSettings(), 4095.0, sensor=tm.noise.Sensor()).technique

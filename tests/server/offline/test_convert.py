@@ -138,7 +138,7 @@ def test_mcap_has_an_image_a_topic_with_its_label_and_time(source: Path, tmp_pat
         (attachment,) = reader.iter_attachments()
         found = [
             (schema.name, channel, message)
-            for schema, channel, message in reader.iter_messages(topics=["/raw/001"])
+            for schema, channel, message in reader.iter_messages(topics=["/raw/image_001"])
             if schema is not None
         ]
     assert json.loads(metadata.metadata["sequence"])["harmonics"] == 2
@@ -163,21 +163,30 @@ def test_another_suffix_is_refused_with_those_there_are(source: Path, tmp_path: 
         convert_recording(recording, tmp_path / "a.mat")
 
 
+@pytest.mark.parametrize(
+    ("module", "suffix", "options"),
+    [("zarr", "zarr", {}), ("foxglove", "mcap", {}), ("rosbags", "mcap", {"schemas": "ros2"})],
+)
 def test_a_missing_library_is_named_with_its_extra(
-    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    source: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    module: str,
+    suffix: str,
+    options: dict[str, Any],
 ) -> None:
-    monkeypatch.setitem(sys.modules, "zarr", None)
+    monkeypatch.setitem(sys.modules, module, None)
     with (
         Recording(source) as recording,
-        pytest.raises(MissingExtra, match=r"transientcam\[convert\]"),
+        pytest.raises(MissingExtra, match=rf"needs {module}: .*transientcam\[convert\]"),
     ):
-        convert_recording(recording, tmp_path / "a.zarr")
+        convert_recording(recording, tmp_path / f"a.{suffix}", **options)
 
 
 def test_nothing_is_left_of_a_conversion_that_failed(source: Path, tmp_path: Path) -> None:
     with h5py.File(source, "r+") as file:
         file["crc32"][1] ^= 1
-    for suffix in ("npz", "nc", "zarr"):
+    for suffix in ("npz", "nc", "zarr", "mcap"):
         with Recording(source) as recording, pytest.raises(DamagedFrame):
             convert_recording(recording, tmp_path / f"b.{suffix}")
 

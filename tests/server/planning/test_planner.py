@@ -284,13 +284,35 @@ def test_a_goal_that_cannot_be_meant_is_refused(goal: Goal, capabilities: Capabi
     assert refusal.value.kind.slug == "invalid-request"
 
 
+def test_the_whole_is_where_its_part_is() -> None:
+    reports: list[tuple[float, str]] = []
+    whole = Progress(lambda share, step: reports.append((share, step)))
+
+    whole.part(0.5, 1.0).part(0.0, 0.8).at(0.5, "searching")
+    whole()
+
+    assert [step for _, step in reports] == ["searching", "searching"]
+    assert [share for share, _ in reports] == pytest.approx([0.7, 0.7])
+
+
 def test_lines_fall_onto_the_bias(capabilities: Capabilities) -> None:
     predictor = cast(Predictor, ClosedForm())
     goal = Goal()
     search = Search(goal, families(goal, predictor, capabilities), predictor, lambda *_: 1e-3)
 
-    front = search.front("range_error_m")
+    shares: list[float] = []
+    progress = Progress(lambda share, step: shares.append(share))
+    *so_far, front = search.fronts("range_error_m", progress)
+    ends = front[0].applied.capture_s, front[-1].applied.capture_s
+    for part in so_far[1:]:
+        times_s = [choice.applied.capture_s for choice in part]
+        assert times_s == sorted(times_s)
+        assert (times_s[0], times_s[-1]) == ends, "both ends first, then what is between"
+    assert [len(part) for part in so_far] == sorted(len(part) for part in so_far)
     lines = search.lines(front)
+
+    assert shares == sorted(set(shares))
+    assert (shares[0], len(shares)) == (0.0, 12)
 
     times_s = [choice.applied.capture_s for choice in front]
     assert len(front) > 3

@@ -1,7 +1,6 @@
 import { densityImage, type Coefficients } from "../physics/maximumEntropy";
-import { colourTable, levelOf } from "../ui/colourMaps";
+import { lightPainter } from "./paintLight";
 import type { DensityRenderer, Exposure } from "./renderer";
-import { backdropGrey, strength, toned } from "./tone";
 
 /** Draws with typed arrays on a 2D canvas, for browsers that refuse WebGL2. */
 export class TypedArrayRenderer implements DensityRenderer {
@@ -18,21 +17,13 @@ export class TypedArrayRenderer implements DensityRenderer {
     this.#context = context;
   }
 
-  draw(coefficients: Coefficients, { phase_rad, tone, colours, backdrop }: Exposure): void {
+  draw(coefficients: Coefficients, exposure: Exposure): void {
     const { width, height } = coefficients;
-    const density = this.#densityOf(coefficients, phase_rad);
+    const density = this.#densityOf(coefficients, exposure.phase_rad);
     const { data } = this.#imageOf(width, height);
-    const table = colourTable(colours);
+    const paint = lightPainter(density, exposure);
     for (let pixel = 0; pixel < density.length; pixel++) {
-      const share = density[pixel] / tone.white;
-      const place = share >= 0 ? toned(tone.kind, share) : 0; // NaN: no density, no light
-      const level = 4 * levelOf(place);
-      const grey = backdrop === null ? 0 : backdropGrey(backdrop.values[pixel] / backdrop.white);
-      const added = backdrop === null ? 1 : strength(place);
-      for (let channel = 0; channel < 3; channel++) {
-        const light = (added * table[level + channel]) / 255;
-        data[4 * pixel + channel] = 255 * (1 - (1 - grey) * (1 - light));
-      }
+      paint(pixel, data, 4 * pixel);
       data[4 * pixel + 3] = 255;
     }
     this.#context.putImageData(this.#imageOf(width, height), 0, 0);

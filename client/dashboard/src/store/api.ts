@@ -1,5 +1,5 @@
 /** The REST side of the service: requests, and problems in plain words. */
-import type { AppliedSequence, CameraDocument, PixelDocument, Plan, Problem, SequenceDocument, Tradeoff } from "../stream/protocol";
+import type { AppliedSequence, CameraDocument, PixelDocument, Problem, SequenceDocument } from "../stream/protocol";
 import { frameUrl } from "../stream/frameUrl";
 import { Credentials } from "./credentials";
 import type {
@@ -11,6 +11,7 @@ import type {
   EffectChoice,
   ExplanationDocument,
   Fault,
+  Goal,
   GrantedLease,
   JobDocument,
   LeaseDocument,
@@ -119,14 +120,14 @@ export class Api {
 
   // -- the sequence ------------------------------------------------------------------------------
 
-  /** What accuracy costs on the scene of the latest frame; takes the service many seconds. */
-  tradeoff(signal: AbortSignal): Promise<Tradeoff> {
-    return this.#json("GET", "/tradeoff", { signal }) as Promise<Tradeoff>;
+  /** Begins to predict what accuracy costs on the scene before the camera: the result is a `Tradeoff`, so far while it runs. */
+  startTradeoff(): Promise<JobDocument> {
+    return this.#json("POST", "/tradeoff/jobs", { body: { by: "range_error_m" } }) as Promise<JobDocument>;
   }
 
-  /** The quickest sequence that reaches the target, or the most accurate within the budget. */
-  plan(goal: { target: { range_error_m?: number }; budget: { frame_rate_hz?: number } }, signal: AbortSignal): Promise<Plan> {
-    return this.#json("POST", "/plan", { body: goal, signal }) as Promise<Plan>;
+  /** Begins to look for the quickest sequence that reaches the target, or the most accurate within the budget: a `Choice`. */
+  startPlan(goal: Goal): Promise<JobDocument> {
+    return this.#json("POST", "/plan/jobs", { body: goal }) as Promise<JobDocument>;
   }
 
   validate(sequence: SequenceDocument, signal?: AbortSignal): Promise<AppliedSequence> {

@@ -2,13 +2,10 @@ import { signal } from "@preact/signals";
 
 import { type Api, plainWords, RequestError } from "./api";
 import type { CalibrationRequest, CalibrationsDocument, JobDocument, VerdictDocument } from "./documents";
+import { followed, hasEnded } from "./jobs";
 
-/** How often a measurement is asked how far it is. */
-const LOOK_S = 0.4;
 /** How often drift is looked at while the list is in sight. */
 const DRIFT_S = 15;
-
-const ENDED: readonly string[] = ["done", "failed", "cancelled"];
 
 /** The calibrations of the service, and the measurement of one. */
 export class Calibrations {
@@ -20,7 +17,6 @@ export class Calibrations {
   /** How the last measurement that this page followed ended, in words. */
   readonly outcome = signal<{ readonly words: string; readonly good: boolean } | null>(null);
   readonly #api: Api;
-  #timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(api: Api) {
     this.#api = api;
@@ -48,12 +44,12 @@ export class Calibrations {
 
   async measure(wanted: CalibrationRequest): Promise<void> {
     this.outcome.value = null;
-    this.#take(await this.#api.measureCalibration(wanted));
+    void this.#follow(await this.#api.measureCalibration(wanted));
   }
 
   async cancel(): Promise<void> {
     const job = this.job.peek();
-    if (job !== null) this.#take(await this.#api.cancelJob(job.id));
+    if (job !== null) await this.#api.cancelJob(job.id);
   }
 
   async activate(id: string, force = false): Promise<void> {
@@ -82,36 +78,19 @@ export class Calibrations {
   async #findJob(): Promise<void> {
     if (this.job.peek() !== null) return;
     try {
-      const running = (await this.#api.jobs()).find(({ kind, state }) => kind === "calibration" && !ENDED.includes(state));
-      if (running !== undefined) this.#take(running);
+      const running = (await this.#api.jobs()).find((each) => each.kind === "calibration" && !hasEnded(each));
+      if (running !== undefined) void this.#follow(running);
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;
     }
   }
 
-  #take(job: JobDocument): void {
-    clearTimeout(this.#timer);
-    if (!ENDED.includes(job.state)) {
-      this.job.value = job;
-      this.#timer = setTimeout(() => void this.#look(job.id), 1000 * LOOK_S);
-      return;
-    }
+  async #follow(started: JobDocument): Promise<void> {
+    const ended = await followed(this.#api, started, (job) => (this.job.value = job));
     this.job.value = null;
-    this.outcome.value = outcomeOf(job);
+    if (ended === null) return;
+    this.outcome.value = outcomeOf(ended);
     void this.refresh();
-  }
-
-  async #look(id: string): Promise<void> {
-    try {
-      this.#take(await this.#api.job(id));
-    } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
-      if (error.problem.status === 404) {
-        this.job.value = null; // the service was started anew
-        return;
-      }
-      this.#timer = setTimeout(() => void this.#look(id), 1000 * LOOK_S);
-    }
   }
 }
 

@@ -189,6 +189,12 @@ export interface ExplanationDocument {
 }
 
 /** Long work, and where it stands. */
+/** What a sequence is wanted for. */
+export interface Goal {
+  readonly target: { readonly range_error_m?: number };
+  readonly budget: { readonly frame_rate_hz?: number };
+}
+
 export interface JobDocument {
   readonly id: string;
   readonly kind: string;

@@ -1,10 +1,16 @@
 /** What happened, for people: notices of the service and what this page noticed, the newest last. */
 import { signal } from "@preact/signals";
 
-import type { Notice } from "../stream/protocol";
+import type { AppliedSequence, Notice } from "../stream/protocol";
 import { engineering, grouped } from "../ui/format";
 
 export type EventTone = "plain" | "good" | "bad";
+
+/** What can be done about what happened. */
+export interface Remedy {
+  readonly word: string;
+  readonly run: () => void;
+}
 
 export interface Happening {
   /** Counts the happenings of this page. */
@@ -13,6 +19,9 @@ export interface Happening {
   readonly at_s: number;
   readonly words: string;
   readonly tone: EventTone;
+  /** Names it where it may be told twice: by the service, and by this page. */
+  readonly key?: string;
+  readonly remedy?: Remedy;
 }
 
 /** Only so many are kept. */
@@ -48,12 +57,21 @@ export class Events {
     this.all.value = this.all.peek().map((each) => (each === happening ? { ...each, words: words(burst.count) } : each));
   }
 
-  tell(words: string, tone: EventTone = "plain"): void {
+  /** Shows an event; one of the same key that was shown just before stays in its place, with the remedy of either. */
+  tell(words: string, tone: EventTone = "plain", more: Pick<Happening, "key" | "remedy"> = {}): void {
+    const shown = more.key === undefined ? undefined : this.all.peek().find(({ key, at_s }) => key === more.key && this.#now_s() - at_s < BURST_S);
+    if (shown !== undefined) {
+      this.all.value = this.all.peek().map((each) => (each === shown ? { ...each, ...more } : each));
+      return;
+    }
     this.#number += 1;
-    const happening = { number: this.#number, at_s: this.#now_s(), words, tone };
+    const happening = { number: this.#number, at_s: this.#now_s(), words, tone, ...more };
     this.all.value = [...this.all.peek().slice(1 - MOST), happening];
   }
 }
+
+/** Gains without a calibration, by the id that frames carry. */
+const UNMEASURED: Readonly<Record<string, string | undefined>> = { nominal: "Nominal gains", factory: "The gains that the camera reports" };
 
 /** Why a recording ended, in words. */
 export const END_REASONS: Readonly<Record<string, string | undefined>> = {
@@ -89,11 +107,8 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
       return { words: `The light was switched off${notice.reason ? `: ${notice.reason}` : ""}.`, tone: "bad" };
     case "light-released":
       return { words: "The light is on again.", tone: "good" };
-    case "sequence-changed": {
-      const { harmonics, exposure_s, images, base_frequency_hz } = notice.sequence;
-      const figures = `${engineering(base_frequency_hz, "Hz")}, m = ${harmonics}, ${engineering(exposure_s, "s")}, ${images} images`;
-      return { words: `The sequence changed: ${figures}.`, tone: "plain" };
-    }
+    case "sequence-changed":
+      return { words: sequenceWords(notice.sequence), tone: "plain" };
     case "reconstruction-changed":
       return { words: "The settings of the reconstruction changed.", tone: "plain" };
     case "simulation-changed": {
@@ -101,8 +116,8 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
       return { words: `The camera stands before ${notice.scene}${chosen.length > 0 ? `, with ${chosen.join(", ")}` : ""}.`, tone: "plain" };
     }
     case "calibration-changed":
-      return notice.calibration_id === "nominal"
-        ? { words: `Nominal gains are used from now on.${notice.reason ? ` ${notice.reason}` : ""}`, tone: notice.reason ? "bad" : "plain" }
+      return UNMEASURED[notice.calibration_id] !== undefined
+        ? { words: `${UNMEASURED[notice.calibration_id]} are used from now on.${notice.reason ? ` ${notice.reason}` : ""}`, tone: notice.reason ? "bad" : "plain" }
         : { words: `The calibration ${notice.calibration_id} is used from now on.`, tone: "good" };
     case "lease-changed":
       return { words: leaseWords(notice), tone: "plain" };
@@ -118,6 +133,15 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
     default:
       return null; // drops and lost images have their figures
   }
+}
+
+export function sequenceWords({ harmonics, exposure_s, images, base_frequency_hz }: AppliedSequence): string {
+  return `The sequence changed: ${engineering(base_frequency_hz, "Hz")}, m = ${harmonics}, ${engineering(exposure_s, "s")}, ${images} images.`;
+}
+
+/** Names the change to a sequence, of which service and page both know. */
+export function sequenceKey({ sequence_id }: AppliedSequence): string {
+  return `sequence-${sequence_id}`;
 }
 
 function leaseWords({ change, holder, from }: Extract<Notice, { kind: "lease-changed" }>): string {

@@ -3,6 +3,7 @@ import { createContext } from "preact";
 import { useContext } from "preact/hooks";
 
 import type { AppliedSequence, CameraDocument } from "../stream/protocol";
+import { Accuracy } from "./accuracy";
 import { Api, kindOf } from "./api";
 import { Calibrations } from "./calibrations";
 import { Caller } from "./caller";
@@ -15,10 +16,12 @@ import { Measures } from "./measures";
 import { Noises } from "./noise";
 import type { Pixel } from "./pixel";
 import { Player } from "./player";
+import { Sequencing } from "./sequencing";
 import { aNumber, browserShelf, oneOf, remembered, sessionShelf, type Shelf } from "./settings";
 import { isLayout, OVERVIEW, type Layout } from "../views/layout";
 import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
+import { TransientLook } from "../views/transient/look";
 import { Reconstruction } from "./reconstruction";
 import { Recordings } from "./recordings";
 import { Replay } from "./replay";
@@ -50,6 +53,10 @@ export class Store {
   readonly shelf: Shelf | null;
   /** The sequence in use, by the service; null until it is known. */
   readonly sequence = signal<AppliedSequence | null>(null);
+  /** Changes it. */
+  readonly sequencing: Sequencing;
+  /** What accuracy costs in time. */
+  readonly accuracy: Accuracy;
   /** What the camera is and can do; null until it is known. */
   readonly camera = signal<CameraDocument | null>(null);
   /** The page keeps the frame it shows although newer ones exist. */
@@ -70,6 +77,8 @@ export class Store {
   readonly player = new Player(this.period_s);
   /** A calibration has the camera for itself, so that no frames come. */
   readonly calibrating = computed(() => this.status.cameraState.value === "calibrating" || this.calibrations.job.value?.state === "running");
+  /** How light in flight is shown. */
+  readonly light: TransientLook;
   /** What only the service knows of the selected pixel. */
   readonly details: Details;
   readonly theme: Theme;
@@ -101,12 +110,15 @@ export class Store {
     this.reconstruction = new Reconstruction(api);
     this.calibrations = new Calibrations(api);
     this.simulation = new Simulation(api);
+    this.sequencing = new Sequencing(api, this.events, this.sequence);
+    this.accuracy = new Accuracy(api);
     this.replay = new Replay(api, this.frames, this.status);
     api.onRefusal = (problem) => {
       this.lease.refused(kindOf(problem));
       if (problem.status === 401) this.asksForToken.value = true;
     };
     this.details = new Details(api);
+    this.light = new TransientLook(this.frames.of("coefficients"), shelf);
     this.mapProduct = remembered(shelf, "map.product", "range", oneOf(MAP_PRODUCTS.map(({ product }) => product)));
     this.field_deg = remembered(shelf, "points.field_deg", 45, isField);
     this.looks = new Looks(this.frames, this.noises, shelf);

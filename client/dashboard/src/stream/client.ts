@@ -2,7 +2,7 @@
 import { effect } from "@preact/signals";
 
 import { kindOf, LIVE, RequestError } from "../store/api";
-import { inWords, lossWords } from "../store/events";
+import { inWords, lossWords, sequenceKey } from "../store/events";
 import { frameOf } from "../store/frames";
 import type { Store } from "../store/store";
 import type { AnimationLoop } from "../ui/animation";
@@ -166,7 +166,8 @@ export class StreamClient {
     const told = inWords(notice);
     // A calibration sets the sequence anew although it stays as it is.
     const unchanged = notice.kind === "sequence-changed" && sameSequence(notice.sequence, this.#store.sequence.peek());
-    if (told !== null && !unchanged) this.#store.events.tell(told.words, told.tone);
+    const key = notice.kind === "sequence-changed" ? { key: sequenceKey(notice.sequence) } : {};
+    if (told !== null && !unchanged) this.#store.events.tell(told.words, told.tone, key);
     switch (notice.kind) {
       case "dropped":
         status.dropNotice(notice.channel, notice.total);
@@ -200,6 +201,7 @@ export class StreamClient {
         if (this.#store.calibrations.document.peek() !== null) void this.#store.calibrations.refresh();
         break;
       case "simulation-changed":
+        this.#store.accuracy.sceneChanged();
         if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();
         break;
       case "recording-started":

@@ -124,6 +124,8 @@ export interface PixelDocument {
 export interface Choice {
   /** The body for `PUT /sequence`. */
   readonly sequence: SequenceDocument;
+  /** What the range is to be taken from. */
+  readonly estimator: string;
   readonly capture_s: number;
   readonly frame_rate_hz: number;
   /** Computing time of one frame. */
@@ -137,13 +139,7 @@ export interface Choice {
   };
 }
 
-/** What `POST /api/v1/plan` answers. */
-export interface Plan extends Choice {
-  readonly half_time: Choice | null;
-  readonly twice_accuracy: Choice | null;
-}
-
-/** What `GET /api/v1/tradeoff` answers. */
+/** What accuracy costs on the scene before the camera. */
 export interface Tradeoff {
   readonly scene_of_frame: number;
   readonly current: {
@@ -154,6 +150,8 @@ export interface Tradeoff {
   };
   /** By rising capture time and falling error. */
   readonly front: readonly Choice[];
+  /** From where on bias rules, in a sentence. */
+  readonly summary: string;
 }
 
 export interface Hello {

@@ -3,7 +3,7 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 import { computed } from "@preact/signals";
 
 import { regionOf } from "../store/measures";
-import type { Pixel } from "../store/pixel";
+import { type Pixel, stepped } from "../store/pixel";
 import { useStore } from "../store/store";
 import { placeIn, WHOLE, type Point } from "../store/viewport";
 import { Marks } from "./Marks";
@@ -99,11 +99,10 @@ export function Stage({ width, height, label, children }: StageProps) {
 
   const onKeyDown = (event: KeyboardEvent): void => {
     const from = store.selected.peek() ?? { x: width >> 1, y: height >> 1 };
+    const moved = event.shiftKey ? stepped(from, event.key, width, height) : null;
     const centre: Point = { x: 0.5, y: 0.5 };
-    const step = event.shiftKey ? ARROWS[event.key] : undefined;
-    if (step !== undefined) {
-      store.selected.value = { x: Math.min(width - 1, Math.max(0, from.x + step[0])), y: Math.min(height - 1, Math.max(0, from.y + step[1])) };
-    } else if (event.key === "+") viewport.zoomAt(centre, KEY_ZOOM);
+    if (moved !== null) store.selected.value = moved;
+    else if (event.key === "+") viewport.zoomAt(centre, KEY_ZOOM);
     else if (event.key === "-") viewport.zoomAt(centre, 1 / KEY_ZOOM);
     else if (event.key === "Enter") measures.pin(from);
     else if (event.key === "r") measures.toggleRegion(from, width, height);
@@ -155,10 +154,3 @@ export function Stage({ width, height, label, children }: StageProps) {
     </div>
   );
 }
-
-const ARROWS: Readonly<Record<string, readonly [number, number] | undefined>> = {
-  ArrowLeft: [-1, 0],
-  ArrowRight: [1, 0],
-  ArrowUp: [0, -1],
-  ArrowDown: [0, 1],
-};

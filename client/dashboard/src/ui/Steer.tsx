@@ -49,7 +49,7 @@ export function Obstacle() {
 export function TaskLine({ task, field }: { task: Task; field?: string }) {
   const words = task.busy.value ?? task.refusal.value;
   return (
-    <p class={task.refusal.value === null || task.busy.value !== null ? "task quiet" : "task refusal"} role="status" data-field={field} data-empty={words === null}>
+    <p class={task.refusal.value === null || task.busy.value !== null ? "task quiet" : "task refusal"} role="status" data-field={field}>
       {words ?? ""}
     </p>
   );

@@ -1,6 +1,5 @@
 import type { ComponentType } from "preact";
 
-import { AccuracyView } from "./accuracy/AccuracyView";
 import { CalibrationView } from "./calibration/CalibrationView";
 import { EventsView } from "./events/EventsView";
 import { MapView } from "./map/MapView";
@@ -26,8 +25,7 @@ export const VIEWS: readonly { readonly name: ViewName; readonly title: string; 
   { name: "streak", title: "Streak", view: StreakView },
   { name: "points", title: "Points in space", view: PointsView },
   { name: "validity", title: "Validity", view: ValidityView },
-  { name: "sequence", title: "Sequence", view: SequenceView },
-  { name: "accuracy", title: "Accuracy against time", view: AccuracyView },
+  { name: "sequence", title: "Sequence and accuracy", view: SequenceView },
   { name: "recordings", title: "Recordings", view: RecordingsView },
   { name: "reconstruction", title: "Reconstruction", view: ReconstructionView },
   { name: "calibration", title: "Calibration", view: CalibrationView },

@@ -13,6 +13,19 @@ describe("what happened", () => {
     expect(events.all.value.at(-1)).toEqual({ number: 250, at_s: 5, words: "event 249", tone: "plain" });
   });
 
+  test("is shown once where the service and this page both tell of it, with what can be done", () => {
+    let now_s = 5;
+    const events = new Events(() => now_s);
+    const remedy = { word: "Undo", run: () => undefined };
+    events.tell("It changed.", "plain", { key: "sequence-2" });
+    events.tell("It changed.", "good", { key: "sequence-2", remedy });
+    events.tell("It changed.", "plain", { key: "sequence-2" });
+    expect(events.all.value).toEqual([{ number: 1, at_s: 5, words: "It changed.", tone: "plain", key: "sequence-2", remedy }]);
+    now_s = 500; // a service that was started anew counts from the start
+    events.tell("It changed.", "plain", { key: "sequence-2" });
+    expect(events.all.value).toHaveLength(2);
+  });
+
   test("to the sequence is said with its figures", () => {
     const sequence = { base_frequency_hz: 23e6, harmonics: 4, exposure_s: 5e-4, images: 20 } as AppliedSequence;
     expect(words({ kind: "sequence-changed", sequence })).toBe("The sequence changed: 23.0\u202fMHz, m = 4, 500\u202fµs, 20 images.");

@@ -5,9 +5,17 @@ firmware speaks the protocol. What the sensor sees comes from a renderer, the si
 """
 
 from transientcam_driver.simulation.device.bus import SimulatedBus
-from transientcam_driver.simulation.device.faults import Fault
+from transientcam_driver.simulation.device.faults import Fault, PendingFaults
 from transientcam_driver.simulation.device.firmware import Firmware, Renderer
 from transientcam_driver.simulation.device.prototype import prototype
 from transientcam_driver.simulation.device.usb_device import EmulatedDevice
 
-__all__ = ["EmulatedDevice", "Fault", "Firmware", "Renderer", "SimulatedBus", "prototype"]
+__all__ = [
+    "EmulatedDevice",
+    "Fault",
+    "Firmware",
+    "PendingFaults",
+    "Renderer",
+    "SimulatedBus",
+    "prototype",
+]

@@ -4,6 +4,7 @@ from collections import deque
 from enum import StrEnum
 
 from transientcam_driver.capabilities import IMAGE_HEADER_BYTES
+from transientcam_driver.errors import CameraError
 
 
 class Fault(StrEnum):
@@ -23,6 +24,39 @@ class Fault(StrEnum):
     """The image behind it comes first."""
     BABBLE = "babble"
     """The device sends more than was asked for, and the transfer is lost."""
+
+
+class PendingFaults:
+    """Faults of the images to come, of the kinds that a camera can have.
+
+    Parameters
+    ----------
+    camera
+        Its name, for the error.
+    """
+
+    def __init__(self, camera: str, *kinds: Fault) -> None:
+        self._camera = camera
+        self._images = dict.fromkeys(kinds, 0)
+
+    def inject(self, fault: Fault, images: int = 1) -> None:
+        """Let a fault happen to so many more images.
+
+        Raises
+        ------
+        CameraError
+            This camera knows no such fault.
+        """
+        if fault not in self._images:
+            raise CameraError(f"the emulated {self._camera} knows no fault {fault!r}")
+        self._images[fault] += images
+
+    def take(self, fault: Fault) -> bool:
+        """Return whether the fault happens to this image."""
+        if not self._images[fault]:
+            return False
+        self._images[fault] -= 1
+        return True
 
 
 class FaultyCable:

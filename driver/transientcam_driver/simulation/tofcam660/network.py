@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import Final
 
 from transientcam_driver.errors import CameraError, ProtocolError
-from transientcam_driver.simulation.device import Fault
+from transientcam_driver.simulation.device import Fault, PendingFaults
 from transientcam_driver.simulation.tofcam660.firmware import EmulatedFirmware
 from transientcam_driver.tofcam660.image import PacketHeader
 from transientcam_driver.tofcam660.wire import (
@@ -62,7 +62,7 @@ class EmulatedTofcam660:
         self._firmware = power_on()
         self._host = host
         self.udp_port = udp_port
-        self._faults = {Fault.DROP: 0, Fault.CORRUPT_PIXELS: 0}
+        self._faults = PendingFaults("TOFcam660", Fault.DROP, Fault.CORRUPT_PIXELS)
         self._measurement = 0
         self._selector = selectors.DefaultSelector()
         self._lock = threading.Lock()  # held while a request is served, and while the cable moves
@@ -112,9 +112,7 @@ class EmulatedTofcam660:
         CameraError
             This camera knows no such fault.
         """
-        if fault not in self._faults:
-            raise CameraError(f"the emulated TOFcam660 knows no fault {fault!r}")
-        self._faults[fault] += images
+        self._faults.inject(fault, images)
 
     def set_interlock(self, *, closed: bool) -> None:
         """Refuse: there is none.
@@ -212,9 +210,9 @@ class EmulatedTofcam660:
         if image is None:
             return
         self._measurement = (self._measurement + 1) % (1 << 16)
-        if self._takes(Fault.CORRUPT_PIXELS):
+        if self._faults.take(Fault.CORRUPT_PIXELS):
             image = image[:1] + _SPOILT_TYPE.to_bytes(2, "big") + image[3:]
-        lost = self._takes(Fault.DROP)
+        lost = self._faults.take(Fault.DROP)
         if not self._firmware.over_tcp:
             peer = self._firmware.data_address or connection.getpeername()[0]
             self._send_packets(image, peer, lost=lost)
@@ -236,12 +234,6 @@ class EmulatedTofcam660:
                     self._udp.sendto(header.pack() + data, (peer, self.udp_port))
             if number % _BURST == _BURST - 1:
                 pause.wait(_BURST_S)
-
-    def _takes(self, fault: Fault) -> bool:
-        if not self._faults[fault]:
-            return False
-        self._faults[fault] -= 1
-        return True
 
     # --- what both sides do ------------------------------------------------------------------
 

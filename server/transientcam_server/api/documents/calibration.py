@@ -122,7 +122,8 @@ class ActiveDocument(Document):
     id: str
     """`nominal` for the gains that an ideal modulation would have."""
     calibration_id: str
-    """What frames carry: `nominal` also where the active one is not good for the sequence."""
+    """What frames carry: `nominal`, or `factory` of a camera that reports its gains, also where the
+    active one is not good for the sequence."""
     reason: str | None = None
     """Why it is not."""
     former: str | None = None

@@ -19,8 +19,13 @@ class CameraDocument(Document):
         cy: float
         width: int
         height: int
-        source: Literal["settings", "scene", "recording", "assumed"]
-        """Its origin: the settings `[lens]`, the simulated scene, the recording, or none."""
+        distortion: tuple[float, ...]
+        """k1, k2, p1, p2, k3 of Brown and Conrady, which OpenCV has in this order; or none."""
+        light_x_m: float
+        """How far to the right of the lens the light is."""
+        source: Literal["settings", "camera", "scene", "recording", "assumed"]
+        """Its origin: the settings `[lens]`, the camera itself, the simulated scene, the recording,
+        or none."""
 
     state: Literal["starting", "streaming", "stopped", "calibrating", "lost", "held"]
     reason: str | None = None
@@ -29,7 +34,8 @@ class CameraDocument(Document):
     capabilities: dict[str, Any]
     """As the camera itself states them; units are in the names."""
     intrinsics: IntrinsicsDocument
-    """Where the pixels look: (column, row) along ((c - cx) / fx, (r - cy) / fy, 1)."""
+    """Where the pixels look: (column, row) along ((c - cx) / fx, (r - cy) / fy, 1), but for the
+    distortion."""
     status: dict[str, Any] | None = None
     """As the camera itself states it now; null while it is lost."""
     counters: dict[str, int]

@@ -211,6 +211,21 @@ class LineDocument(Document):
     points: list[PointDocument]
 
 
+AccuracyName = Literal["range_error_m", "range_std_m", "bound_width"]
+"""Which accuracy capture time is held against."""
+
+
+class TradeoffRequest(_Asked):
+    """What the front is wanted for."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"by": "range_error_m"}]}
+    )
+
+    by: AccuracyName = "range_error_m"
+    """The accuracy that capture time is held against."""
+
+
 class TradeoffDocument(Document):
     """What accuracy costs on the scene before the camera."""
 

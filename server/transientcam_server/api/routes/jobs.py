@@ -14,8 +14,6 @@ from transientcam_server.errors import kinds
 
 router = APIRouter(tags=["jobs"])
 MAX_WAIT_S: Final = 30.0
-PLAN: Final = "plan"
-"""The kind of job that makes a plan."""
 ACCEPTED: Final[dict[int | str, dict[str, Any]]] = {
     202: {
         "description": "It has begun, or waits for its turn",
@@ -69,10 +67,10 @@ async def read_job(
 async def cancel_job(service: ServiceOf, job: _Job, request: Request) -> JobDocument:
     """Cancel a job, which ends as soon as it can; it stays listed, and an ended one as it is.
 
-    A plan changes nothing, and may be cancelled by every client that may request one; another job
-    by those that may change the camera.
+    What is planned changes nothing, and may be cancelled by every client that may request it;
+    another job by those that may change the camera.
     """
-    if service.jobs.get(job).kind != PLAN:
+    if service.jobs.get(job).in_turn:
         require(request, service, TO_CHANGE)
     return document(service.jobs.cancel(job))
 

@@ -74,7 +74,7 @@ def _app(static: Path, monkeypatch: pytest.MonkeyPatch) -> FastAPI:
         return {"known": True}
 
     pages.add_dashboard(app)
-    problems.install(app)
+    problems.install(app, prefix="/api")
     return app
 
 

@@ -44,12 +44,12 @@ def test_without_one_that_may_stand_in_a_log_it_gets_one(
         "/docs",
     ],
 )
-def test_head_reports_what_get_would_without_a_body(http: httpx.Client, path: str) -> None:
-    http.put("/api/v1/acquisition", json={"running": False})  # both are about the same frame
+def test_head_reports_what_get_would_without_a_body(steady: httpx.Client, path: str) -> None:
+    steady.put("/api/v1/acquisition", json={"running": False})  # both are about the same frame
     try:
-        get, head = http.get(path), http.head(path)
+        get, head = steady.get(path), steady.head(path)
     finally:
-        http.put("/api/v1/acquisition", json={"running": True})
+        steady.put("/api/v1/acquisition", json={"running": True})
 
     assert head.status_code == get.status_code
     assert head.content == b""

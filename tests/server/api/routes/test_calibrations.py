@@ -426,11 +426,11 @@ def test_the_light_can_be_switched_off_which_ends_it(bench: Served, http: httpx.
 
 
 def test_a_lease_that_lapses_ends_it(bench: Served, http: httpx.Client) -> None:
-    lease = http.post("/api/v1/lease", json={"holder": "bench", "duration_s": 1.0}).json()
+    lease = http.post("/api/v1/lease", json={"holder": "bench"}).json()
+    own = {"Transientcam-Lease": lease["lease_id"]}
     assert http.post(CALIBRATIONS, json={}).json()["type"] == "/problems/lease-held"
-    answer = http.post(
-        CALIBRATIONS, json={"frames": 2000}, headers={"Transientcam-Lease": lease["lease_id"]}
-    )
+    answer = http.post(CALIBRATIONS, json={"frames": 2000}, headers=own)
+    http.put("/api/v1/lease", json={"duration_s": 1.0}, headers=own)
 
     ended = http.get(answer.headers["location"], params={"wait_s": 30}).json()
 

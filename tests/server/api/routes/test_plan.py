@@ -2,7 +2,7 @@
 
 import json
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from http.client import HTTPConnection
 from importlib import import_module
 from typing import Any
@@ -13,6 +13,7 @@ import pytest
 
 from tests.server.contract import hold_to_contract
 from tests.serving import Served, serving
+from transientcam import Camera
 from transientcam.wire import LEASE_HEADER
 from transientcam_server.errors.exceptions import JobCancelled, Problem
 from transientcam_server.planning import Progress
@@ -118,7 +119,10 @@ def test_the_front_falls_and_the_current_frame_says_where_it_stands(
     monkeypatch.setattr(families, "HARMONICS", (3,))
     monkeypatch.setattr(families, "SEARCHED", ("maximum-entropy",))
 
-    answer = noisy.get("/api/v1/tradeoff").json()
+    job = end_of(noisy, noisy.post("/api/v1/tradeoff/jobs", json={}).json())
+    assert (job["kind"], job["state"], job["problem"]) == ("tradeoff", "done", None)
+    answer = job["result"]
+    assert set(noisy.get("/api/v1/tradeoff").json()) == set(answer)
 
     times_s = [each["capture_s"] for each in answer["front"]]
     errors_m = [each["predicted"]["range_error_m"]["median"] for each in answer["front"]]
@@ -144,30 +148,57 @@ def test_the_front_falls_and_the_current_frame_says_where_it_stands(
     assert 0 <= accuracy["outlier_share"] < 0.5
 
 
-def test_a_client_that_leaves_ends_the_work(
-    noisy: httpx.Client, noisy_daemon: Served, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    began, ended, pause = threading.Event(), threading.Event(), threading.Event()
+class Endless:
+    """Work in pure Python that reports where it is, and goes on until that raises."""
 
-    def endless(goal: object, scene: object, go_on: Callable[[], None]) -> None:
-        began.set()
+    def __init__(self) -> None:
+        self.began, self.ended = threading.Event(), threading.Event()
+        self.raised: Exception | None = None
+
+    def __call__(self, goal: object, scene: object, progress: Progress) -> None:
+        progress.at(0.5, "searching")
+        progress.show({"summary": "One of many."})
+        self.began.set()
         try:
-            while True:
-                go_on()
-                pause.wait(0.01)
-        except Problem:
-            ended.set()
+            while not self.ended.is_set():
+                sum(k * k for k in range(10_000))
+                progress()
+        except (Problem, JobCancelled) as error:
+            self.raised = error
+            self.ended.set()
             raise
 
-    monkeypatch.setattr(noisy_daemon.service.planner, "plan_document", endless)
+
+@pytest.fixture(params=["plan", "tradeoff"])
+def endless(
+    request: pytest.FixtureRequest, noisy_daemon: Served, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[tuple[str, Endless]]:
+    """What a plan or a front is computed by, and which; no scene is looked at for it."""
+    planner, work = noisy_daemon.service.planner, Endless()
+    monkeypatch.setattr(planner, f"{request.param}_document", work)
+    monkeypatch.setattr(planner, "look", lambda *_, **__: None)
+    noisy_daemon.service.fronts.forget()
+    yield request.param, work
+    work.ended.set()
+    noisy_daemon.service.fronts.forget()
+
+
+def test_a_client_that_leaves_ends_the_work(
+    noisy: httpx.Client, noisy_daemon: Served, endless: tuple[str, Endless]
+) -> None:
+    what, work = endless
     client = HTTPConnection(urlsplit(noisy_daemon.url).netloc)
-    body = json.dumps({"target": {"range_error_m": 0.01}, "scene": SCENE})
-    client.request("POST", "/api/v1/plan", body, {"content-type": "application/json"})
-    assert began.wait(60)
+    if what == "plan":
+        body = json.dumps({"target": {"range_error_m": 0.01}})
+        client.request("POST", "/api/v1/plan", body, {"content-type": "application/json"})
+    else:
+        client.request("GET", "/api/v1/tradeoff")
+    assert work.began.wait(60)
 
     client.close()
 
-    assert ended.wait(60)
+    assert work.ended.wait(60)
+    assert isinstance(work.raised, Problem)
 
 
 def start(client: httpx.Client, **request: Any) -> dict[str, Any]:
@@ -205,37 +236,50 @@ def test_a_job_fails_with_what_the_request_is_refused_with(noisy: httpx.Client) 
     assert job["problem"]["field"] == "range_error_m"
 
 
-def test_a_plan_is_cancelled_without_the_lease_and_reports_its_steps(
-    noisy: httpx.Client, noisy_daemon: Served, monkeypatch: pytest.MonkeyPatch
+def test_what_is_planned_is_cancelled_without_the_lease_and_reports_its_steps(
+    noisy: httpx.Client, endless: tuple[str, Endless]
 ) -> None:
-    began, ended, pause = threading.Event(), threading.Event(), threading.Event()
-
-    def endless(goal: object, scene: object, progress: Progress) -> None:
-        progress.at(0.5, "searching")
-        began.set()
-        try:
-            while True:
-                progress()
-                pause.wait(0.01)
-        except JobCancelled:
-            ended.set()
-            raise
-
-    monkeypatch.setattr(noisy_daemon.service.planner, "plan_document", endless)
+    what, work = endless
     lease = noisy.post("/api/v1/lease", json={"holder": "test", "duration_s": 60}).json()
     try:
-        job = start(noisy, target={"range_error_m": 0.01})
-        assert began.wait(60)
+        body = {"target": {"range_error_m": 0.01}} if what == "plan" else {}
+        job = noisy.post(f"/api/v1/{what}/jobs", json=body).json()
+        assert work.began.wait(60)
         running = noisy.get(f"/api/v1/jobs/{job['id']}").json()
 
         noisy.post(f"/api/v1/jobs/{job['id']}/cancel")
 
-        assert ended.wait(60)
+        assert work.ended.wait(60)
+        assert isinstance(work.raised, JobCancelled)
+        assert running["kind"] == what
         assert (running["state"], running["step"]) == ("running", "searching")
         assert 0.5 < running["progress"] < 1
-        assert end_of(noisy, job)["state"] == "cancelled"
+        assert running["result"]["summary"] == "One of many."
+        if what == "tradeoff":
+            assert running["result"]["current"]["capture_s"] > 0
+        ended = end_of(noisy, job)
+        assert (ended["state"], ended["result"]) == ("cancelled", running["result"])
     finally:
         noisy.delete("/api/v1/lease", headers={LEASE_HEADER: lease["lease_id"]})
+
+
+def test_a_viewer_has_new_frames_while_something_is_planned(
+    noisy: httpx.Client, noisy_daemon: Served, endless: tuple[str, Endless]
+) -> None:
+    what, work = endless
+    body = {"target": {"range_error_m": 0.01}} if what == "plan" else {}
+    with Camera(noisy_daemon.url, timeout_s=60.0) as camera, camera.stream("range") as stream:
+        frames = iter(stream)
+        numbers = [next(frames).meta["frame"]]
+        job = noisy.post(f"/api/v1/{what}/jobs", json=body).json()
+        assert work.began.wait(60)
+
+        numbers += [next(frames).meta["frame"] for _ in range(4)]
+
+        assert not work.ended.is_set()
+        noisy.post(f"/api/v1/jobs/{job['id']}/cancel")
+        assert end_of(noisy, job)["state"] == "cancelled"
+    assert numbers == sorted(set(numbers))
 
 
 def test_errors_of_the_range_cost_nothing_until_a_client_requests_them(

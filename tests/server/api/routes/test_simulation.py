@@ -60,7 +60,7 @@ def test_the_camera_is_put_before_another_scene_while_it_captures(
     served: Served, http: httpx.Client
 ) -> None:
     with transientcam.Camera(served.url) as camera, open_camera("sim:wall?noise=off") as wall:
-        first = camera.frame("range").frame
+        first = camera.frame("range", wait_s=10.0).frame
         assert camera.simulate("wall", effects={"ambient": "on"})["scene"] == "wall"
         try:
             both = camera.frame("range", after=camera.frame("range").frame, wait_s=10)

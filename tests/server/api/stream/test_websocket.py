@@ -45,10 +45,9 @@ def test_the_products_of_a_frame_come_together_in_the_order_asked_for(served: Se
 def test_the_stream_sends_what_rest_answers(served: Served) -> None:
     with streaming(served.stream_url) as client, httpx.Client(base_url=served.url) as http:
         client.subscribe("range")
-        client.frame()
+        frame = client.frame()
         http.put("/api/v1/acquisition", json={"running": False})
         rest = wire.parse_frame(http.get("/api/v1/frames/latest/range").content)
-        frame = client.frame()
         while frame.meta["frame"] < rest.meta["frame"]:
             frame = client.frame()
 
@@ -77,12 +76,16 @@ def test_a_rate_limit_thins_one_channel_and_leaves_the_other(served: Served) -> 
                 ],
             }
         )
-        frames = [client.frame() for _ in range(14)]
+        times_s: dict[str, list[float]] = {"flags": [], "range": []}
+        # however many frames a laden machine captures, some are sent without a range
+        while len(times_s["range"]) < 3 or len(times_s["flags"]) < len(times_s["range"]) + 3:
+            frame = client.frame()
+            times_s[frame.product].append(frame.meta["device_time_s"])
 
-    times_s = {name: [f.meta["device_time_s"] for f in frames if f.product == name]
-               for name in ("flags", "range")}  # fmt: skip
-    assert len(times_s["flags"]) > 3 * len(times_s["range"]) > 0
-    assert np.diff(times_s["range"]).min() > 0.4
+    assert set(times_s["range"]) <= set(times_s["flags"])
+    # a frame is due a tenth of the period early
+    since_s = np.subtract(times_s["range"], times_s["range"][0])
+    assert (since_s > (np.arange(len(since_s)) - 0.11) / 2.0).all()
 
 
 def test_a_new_subscription_replaces_the_old_one(served: Served) -> None:
@@ -108,12 +111,13 @@ def receives_a_frame(client: Client, *, within_s: float) -> bool:
 
 
 def test_with_credits_the_server_waits_for_the_client_and_then_sends_the_newest(
-    served: Served,
+    served: Served, http: httpx.Client
 ) -> None:
     with streaming(served.stream_url) as client:
         client.subscribe("range", credits=1)
         first = client.frame()
-        assert not receives_a_frame(client, within_s=0.5)
+        http.get("/api/v1/frames/latest", params={"wait_s": 10.0, "after": first.frame + 3})
+        assert not receives_a_frame(client, within_s=0.1)
         waited_for = served.service.hub.latest
         assert waited_for is not None
 
@@ -254,8 +258,8 @@ def test_a_client_that_sends_without_end_is_closed_and_no_other(served: Served) 
     with streaming(served.stream_url) as other, streaming(served.stream_url) as client:
         other.subscribe("flags")
         client.subscribe("flags", max_rate_hz=0.5)
-        with suppress(ConnectionClosed):  # it may be sent away before it is done
-            for _ in range(300):
+        with suppress(ConnectionClosed):
+            for _ in range(10_000):
                 client.send({"type": "ack", "frame": 1})
         problem = client.error()
         code = client.close_code()
@@ -301,10 +305,12 @@ def test_frames_come_at_the_rate_of_the_camera_and_every_missing_one_is_reported
         client.subscribe("flags")
         messages = [client.receive() for _ in range(25)]
 
-    frames = [message for message in messages if isinstance(message, wire.Frame)]
+    places = [place for place, each in enumerate(messages) if isinstance(each, wire.Frame)]
+    between = messages[places[0] : places[-1] + 1]  # a notice is sent before the frame behind a gap
+    frames = [message for message in between if isinstance(message, wire.Frame)]
     dropped = sum(
         message.details["count"]
-        for message in messages
+        for message in between
         if isinstance(message, wire.Notice) and message.kind == "dropped"
     )
     numbers = [frame.meta["frame"] for frame in frames]
@@ -450,10 +456,8 @@ def test_a_client_that_leaves_is_forgotten(served: Served) -> None:
         client.subscribe("flags")
         assert served.service.hub.clients == 1
 
-    end_s = time.monotonic() + 10.0
-    while served.service.hub.clients and time.monotonic() < end_s:
+    while served.service.hub.clients:  # a test that hangs has a limit of its own
         time.sleep(0.01)
-    assert served.service.hub.clients == 0
 
 
 def test_a_client_is_notified_when_the_service_shuts_down() -> None:

@@ -1,40 +1,47 @@
 import { signal, useComputed } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 
+import { lightPainter } from "../../gl/paintLight";
+import type { Backdrop } from "../../gl/renderer";
+import { densityImage } from "../../physics/maximumEntropy";
 import { LIVE, RequestError } from "../../store/api";
-import { aNumber, oneOf, remembered } from "../../store/settings";
-import { isField, useStore } from "../../store/store";
+import type { Frame } from "../../store/frames";
+import { aBoolean, aNumber, oneOf, remembered } from "../../store/settings";
+import { useStore } from "../../store/store";
 import { frameUrl } from "../../stream/frameUrl";
 import { ColourBar } from "../../ui/ColourBar";
-import { Choice } from "../../ui/controls";
+import { Choice, Toggle } from "../../ui/controls";
 import { save, savePicture } from "../../ui/download";
 import { download } from "../../ui/files";
-import { fixed, grouped } from "../../ui/format";
+import { grouped } from "../../ui/format";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { AMPLITUDE } from "../map/catalogue";
-import { byFlags, byValue, fieldOfView, fillCloud } from "./cloud";
+import { LightBar } from "../transient/LightBar";
+import type { TransientLook } from "../transient/look";
+import { byFlags, byValue, colourCloud, fillCloud, type Painter } from "./cloud";
+import { FieldOfView } from "./FieldOfView";
 import { knownLens, lensOf } from "./lens";
 import { plyOf } from "./ply";
 import type { PointScene } from "./Scene";
+import { SceneStage } from "./SceneStage";
 
-const COLOURINGS = ["range", "light", "validity"] as const;
+const COLOURINGS = ["range", "light", "validity", "flight"] as const;
 type Colouring = (typeof COLOURINGS)[number];
-const NEEDED: Record<Colouring, readonly string[]> = { range: ["range"], light: ["range", AMPLITUDE], validity: ["range", "flags"] };
-
-/** Turn of one press of an arrow key. */
-const KEY_TURN_RAD = 0.08;
-const DEGREE = Math.PI / 180;
+const NAMES: Record<Colouring, string> = { range: "range", light: "light", validity: "validity", flight: "light in flight" };
+/** What the colours are made of, besides the range. */
+const NEEDED: Record<Colouring, readonly string[]> = { range: [], light: [AMPLITUDE], validity: ["flags"], flight: ["coefficients", AMPLITUDE] };
 
 /** The range map as points in space. */
 export function PointsView() {
   const store = useStore();
   const colouring = useMemo(() => remembered<Colouring>(store.shelf, "points.colouring", "range", oneOf(COLOURINGS)), [store]);
   const pointSize = useMemo(() => remembered(store.shelf, "points.size", 2, aNumber), [store]);
-  const { field_deg } = store;
-  const known = useComputed(() => knownLens(store));
+  const shaded = useMemo(() => remembered(store.shelf, "points.shaded", true, aBoolean), [store]);
+  const surrounded = useMemo(() => remembered(store.shelf, "points.surrounded", true, aBoolean), [store]);
+  const { light } = store;
   const [rangeLook, lightLook] = [store.looks.of("range"), store.looks.of(AMPLITUDE)];
-  useProducts(NEEDED[colouring.value]);
+  useProducts(["range", ...NEEDED[colouring.value]]);
   const range = store.frames.of("range");
   const canvas = useRef<HTMLCanvasElement>(null);
   const box = useRef<HTMLDivElement>(null);
@@ -43,6 +50,9 @@ export function PointsView() {
   const scene = useMemo(() => signal<PointScene | null>(null), []);
   const trouble = useMemo(() => signal<string | null>(null), []);
   const count = useMemo(() => signal(0), []);
+  /** Counts the clouds, which all lie in the same arrays. */
+  const cloud = useMemo(() => signal(0), []);
+  const density = useRef(new Float32Array(0));
 
   useEffect(() => {
     let wanted = true;
@@ -67,25 +77,46 @@ export function PointsView() {
   }, [scene, size]);
 
   useDrawing(() => {
-    if (scene.value !== null) scene.value.pointSize_px = pointSize.value;
+    if (scene.value === null) return;
+    scene.value.pointSize_px = pointSize.value;
+    scene.value.shaded = shaded.value;
+    scene.value.surrounded = surrounded.value;
   }, [scene]);
 
   useDrawing(() => {
-    const [frame, chosen, drawn] = [range.value, colouring.value, scene.value];
-    const other = chosen === "light" ? store.frames.of(AMPLITUDE).value : chosen === "validity" ? store.frames.of("flags").value : null;
+    const [frame, drawn] = [range.value, scene.value];
     if (frame === null || drawn === null) return;
     const [height, width] = frame.shape;
     const lens = lensOf(store, width, height);
-    const fits = other?.values.length === frame.values.length;
-    const colourOf =
-      chosen === "validity" && fits
-        ? byFlags(other.values)
-        : chosen === "light" && fits
-          ? byValue(other.values, lightLook.scale.value, lightLook.colours.value)
-          : byValue(frame.values, rangeLook.scale.value, rangeLook.colours.value);
-    count.value = fillCloud(drawn.cloudFor(width * height), frame.values, width, lens, colourOf);
-    drawn.show(count.value, { width, height, fieldOfView_rad: fieldOfView(width, lens) });
-    if (canvas.current !== null) Object.assign(canvas.current.dataset, { frame: frame.meta.frame, points: count.value, colouring: chosen, ...rangeLook.scale.peek() });
+    count.value = fillCloud(drawn.cloudFor(width * height), frame.values, width, lens);
+    drawn.show(count.value, { width, height, lens });
+    cloud.value = cloud.peek() + 1;
+  }, [scene, range]);
+
+  /** How the points are coloured; by their range where what is wanted has not come yet. */
+  const painter = (frame: Frame, chosen: Colouring): Painter => {
+    const of = (product: string): Frame | null => {
+      const other = store.frames.of(product).value;
+      return other?.values.length === frame.values.length ? other : null;
+    };
+    const amplitude = chosen === "light" || chosen === "flight" ? of(AMPLITUDE) : null;
+    const flags = chosen === "validity" ? of("flags") : null;
+    const coefficients = chosen === "flight" ? (store.frames.of("coefficients").value?.coefficients ?? null) : null;
+    if (flags !== null) return byFlags(flags.values);
+    if (coefficients !== null && coefficients.width * coefficients.height === frame.values.length) {
+      if (density.current.length !== frame.values.length) density.current = new Float32Array(frame.values.length);
+      densityImage(coefficients, store.player.phase_rad.value, density.current);
+      return lightPainter(density.current, { tone: light.toneNow, colours: light.colours.value, backdrop: backdropOf(amplitude, light) });
+    }
+    if (chosen === "light" && amplitude !== null) return byValue(amplitude.values, lightLook.scale.value, lightLook.colours.value);
+    return byValue(frame.values, rangeLook.scale.value, rangeLook.colours.value);
+  };
+  useDrawing(() => {
+    const [frame, chosen, drawn, made] = [range.value, colouring.value, scene.value, cloud.value];
+    if (frame === null || drawn === null || made === 0) return;
+    colourCloud(drawn.cloudFor(frame.values.length), count.peek(), painter(frame, chosen));
+    drawn.recolour();
+    if (canvas.current !== null) Object.assign(canvas.current.dataset, { frame: frame.meta.frame, points: count.peek(), colouring: chosen, ...rangeLook.scale.peek() });
   }, [scene, range]);
 
   const saveShown = (): void => {
@@ -93,7 +124,7 @@ export function PointsView() {
     if (frame === null || drawn === null) return;
     const [height, width] = frame.shape;
     const { fx, fy, cx, cy } = lensOf(store, width, height);
-    const facts = { frame: frame.meta.frame, intrinsics: { fx, fy, cx, cy, width, height, source: known.peek()?.source ?? "assumed" } };
+    const facts = { frame: frame.meta.frame, intrinsics: { fx, fy, cx, cy, width, height, source: knownLens(store)?.source ?? "assumed" } };
     save(`points-${frame.meta.frame}.ply`, new Blob([plyOf(drawn.cloudFor(width * height), count.peek(), facts)]));
   };
   const saveAll = async (): Promise<void> => {
@@ -108,14 +139,7 @@ export function PointsView() {
     }
   };
 
-  const onKeyDown = (event: KeyboardEvent): void => {
-    const turn = TURNS[event.key];
-    if (turn === undefined || event.ctrlKey || event.metaKey || event.altKey) return;
-    event.preventDefault();
-    event.stopPropagation();
-    scene.peek()?.turn(...turn);
-  };
-  const bar = useComputed(() => (colouring.value === "validity" ? null : colouring.value === "light" ? lightLook : rangeLook));
+  const bar = useComputed(() => ({ range: rangeLook, light: lightLook, validity: null, flight: null })[colouring.value]);
   const text = useComputed(() => (range.value === null ? "Waiting for the first frame" : scene.value === null ? "Loading" : null));
   return (
     <Panel
@@ -123,7 +147,7 @@ export function PointsView() {
       title={<h2>Points in space</h2>}
       tools={
         <>
-          <Choice label="Colour by" value={colouring.value} options={COLOURINGS.map((each) => ({ value: each, text: each }))} onChange={(each) => (colouring.value = each)} />
+          <Choice label="Colour by" value={colouring.value} options={COLOURINGS.map((each) => ({ value: each, text: NAMES[each] }))} onChange={(each) => (colouring.value = each)} />
           <Choice label="Size of a point" value={pointSize.value} options={[1, 2, 3, 4, 6].map((each) => ({ value: each, text: `${each} px` }))} onChange={(each) => (pointSize.value = each)} />
         </>
       }
@@ -140,19 +164,13 @@ export function PointsView() {
       ]}
     >
       <div class="picture">
-      <div class="points" ref={box}>
-        <canvas
-          ref={canvas}
-          data-product="points"
-          tabIndex={0}
-          role="application"
-          aria-roledescription="point cloud"
-          aria-label="Points in space. Drag or press arrow keys to turn, plus and minus to come nearer or go."
-          onKeyDown={onKeyDown}
-        />
-        {(trouble.value ?? text.value) !== null && <p class="stage-empty">{trouble.value ?? text.value}</p>}
-      </div>
-        {bar.value === null ? (
+        <div class="points" ref={box}>
+          <SceneStage canvas={canvas} scene={scene} range={range} />
+          {(trouble.value ?? text.value) !== null && <p class="stage-empty">{trouble.value ?? text.value}</p>}
+        </div>
+        {colouring.value === "flight" ? (
+          <LightBar look={light} play="density" />
+        ) : bar.value === null ? (
           <div class="colour-bar" />
         ) : (
           <ColourBar
@@ -171,28 +189,14 @@ export function PointsView() {
           <span>
             <span data-field="points">{grouped(count.value)}</span> <span class="quiet">points</span>
           </span>
-          {known.value !== null ? (
-            <span title={`As the ${known.value.source} says`} data-field="field_of_view">
-              <span class="quiet">field of view</span> {fixed(fieldOfView(known.value.width, known.value) / DEGREE, 1, "°")}
-            </span>
-          ) : (
-            <label class="choice" title="How wide the camera looks, across: the service does not know">
-              <span class="quiet">field of view</span>
-              <input
-                class="limit"
-                type="number"
-                min={5}
-                max={150}
-                value={field_deg.value}
-                aria-label="Horizontal field of view in degrees"
-                onChange={(event) => {
-                  if (isField(event.currentTarget.valueAsNumber)) field_deg.value = event.currentTarget.valueAsNumber;
-                }}
-              />
-              °
-            </label>
-          )}
+          <FieldOfView />
           <span class="panel-tools">
+            <Toggle pressed={surrounded.value} title="Floor with a grid in metres, the camera's axes (x red, y green, z blue) and its field of view" onToggle={() => (surrounded.value = !surrounded.peek())}>
+              Grid
+            </Toggle>
+            <Toggle pressed={shaded.value} title="Eye-dome lighting: what stands behind its neighbours is darker. Without it colours are exactly those of the colour bar" onToggle={() => (shaded.value = !shaded.peek())}>
+              Shading
+            </Toggle>
             <button type="button" onClick={() => scene.peek()?.fromCamera()}>
               Camera's eye
             </button>
@@ -206,11 +210,8 @@ export function PointsView() {
   );
 }
 
-const TURNS: Readonly<Record<string, readonly [number, number, number?] | undefined>> = {
-  ArrowLeft: [-KEY_TURN_RAD, 0],
-  ArrowRight: [KEY_TURN_RAD, 0],
-  ArrowUp: [0, KEY_TURN_RAD],
-  ArrowDown: [0, -KEY_TURN_RAD],
-  "+": [0, 0, 0.9],
-  "-": [0, 0, 1 / 0.9],
-};
+/** The still scene behind the light, where it is wanted. */
+function backdropOf(amplitude: Frame | null, light: TransientLook): Backdrop | null {
+  const white = amplitude?.map?.high ?? NaN;
+  return light.backdrop.value && white > 0 && amplitude?.values instanceof Float32Array ? { values: amplitude.values, white } : null;
+}

@@ -9,10 +9,15 @@ export interface Cloud {
   readonly positions: Float32Array;
   /** RGB bytes. */
   readonly colours: Uint8Array;
+  /** Which pixel of the picture each point is of. */
+  readonly pixels: Uint32Array;
 }
 
+/** Writes the RGB of a pixel into an array of bytes at an index. */
+export type Painter = (pixel: number, out: Uint8Array, at: number) => void;
+
 export function makeCloud(pixels: number): Cloud {
-  return { positions: new Float32Array(3 * pixels), colours: new Uint8Array(3 * pixels) };
+  return { positions: new Float32Array(3 * pixels), colours: new Uint8Array(3 * pixels), pixels: new Uint32Array(pixels) };
 }
 
 /** A pinhole camera, in pixels: a pixel looks along ((x - cx) / fx, (y - cy) / fy, 1), y down; centres are whole numbers. */
@@ -34,18 +39,8 @@ export function fieldOfView(width: number, { fx }: Pinhole): number {
   return 2 * Math.atan(width / (2 * fx));
 }
 
-/**
- * Writes the points of a range map, range along each pixel's ray; returns how many have one.
- *
- * `colourOf` writes the RGB of a pixel into `colours` at an index.
- */
-export function fillCloud(
-  cloud: Cloud,
-  range_m: ArrayLike<number>,
-  width: number,
-  { fx, fy, cx, cy }: Pinhole,
-  colourOf: (pixel: number, colours: Uint8Array, at: number) => void,
-): number {
+/** Writes the points of a range map, range along each pixel's ray; returns how many have one. */
+export function fillCloud(cloud: Cloud, range_m: ArrayLike<number>, width: number, { fx, fy, cx, cy }: Pinhole): number {
   const height = range_m.length / width;
   let at = 0;
   for (let y = 0, pixel = 0; y < height; y++) {
@@ -58,15 +53,20 @@ export function fillCloud(
       cloud.positions[at] = right * depth;
       cloud.positions[at + 1] = up * depth;
       cloud.positions[at + 2] = -depth;
-      colourOf(pixel, cloud.colours, at);
+      cloud.pixels[at / 3] = pixel;
       at += 3;
     }
   }
   return at / 3;
 }
 
+/** Colours the first `count` points. */
+export function colourCloud({ pixels, colours }: Cloud, count: number, paint: Painter): void {
+  for (let n = 0; n < count; n++) paint(pixels[n], colours, 3 * n);
+}
+
 /** Colours by a value, as a map on this scale has them. */
-export function byValue(values: ArrayLike<number>, scale: Scale, colours: ColourMapName): (pixel: number, out: Uint8Array, at: number) => void {
+export function byValue(values: ArrayLike<number>, scale: Scale, colours: ColourMapName): Painter {
   const pick = picker(scale, colours);
   return (pixel, out, at) => {
     const rgba = pick(values[pixel]);
@@ -85,7 +85,7 @@ const REASONS = Array.from({ length: 256 }, (_, bits): readonly [number, number,
 });
 
 /** Colours by the gravest flag. */
-export function byFlags(flags: ArrayLike<number>): (pixel: number, out: Uint8Array, at: number) => void {
+export function byFlags(flags: ArrayLike<number>): Painter {
   return (pixel, out, at) => {
     const [red, green, blue] = REASONS[flags[pixel] & 255];
     out[at] = red;

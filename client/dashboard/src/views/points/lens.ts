@@ -35,9 +35,9 @@ export function distanceOf(lens: Pinhole, a: Ranged, b: Ranged): { readonly dist
 }
 
 /** The point that a pixel sees, in m, as `fillCloud` has it. */
-function pointAt({ fx, fy, cx, cy }: Pinhole, { x, y, range_m }: Ranged): number[] {
+export function pointAt({ fx, fy, cx, cy }: Pinhole, { x, y, range_m }: Omit<Ranged, "std_m">): number[] {
   const cloud = makeCloud(1);
   // The same ray from a picture of this one pixel.
-  fillCloud(cloud, [range_m], 1, { fx, fy, cx: cx - x, cy: cy - y }, () => undefined);
+  fillCloud(cloud, [range_m], 1, { fx, fy, cx: cx - x, cy: cy - y });
   return [...cloud.positions];
 }

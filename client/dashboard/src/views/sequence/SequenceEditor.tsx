@@ -53,7 +53,7 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
     if (document === null) return;
     sending.value = true;
     try {
-      store.sequence.value = await store.api.setSequence(document);
+      await store.sequencing.set(document);
       onDone();
     } catch (error) {
       verdict.value = refusal(error);

@@ -21,9 +21,7 @@ export function SimulationView() {
       <div class="panel-body">
         {simulation.trouble.value !== null && <p class="quiet">{simulation.trouble.value}</p>}
         <Obstacle />
-        <TaskLine task={task} field="simulation-status" />
-        {world !== null && <p class="quiet">{world.scenes.find(({ name }) => name === world.scene)?.description}</p>}
-        {explanation !== null && <Effects task={task} />}
+        {world !== null && <p class="quiet scene-words">{world.scenes.find(({ name }) => name === world.scene)?.description}</p>}
         {world !== null && (
           <fieldset class="faults">
             <legend>Let something go wrong</legend>
@@ -32,6 +30,9 @@ export function SimulationView() {
             ))}
           </fieldset>
         )}
+        <TaskLine task={task} field="simulation-status" />
+        {/* last: it takes the service a while, and nothing may move when it comes */}
+        {explanation !== null && <Effects task={task} />}
       </div>
     </Panel>
   );

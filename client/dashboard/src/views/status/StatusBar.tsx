@@ -63,21 +63,26 @@ function slowed(state: State, trouble: string | null): State {
   return state.word === "Live" && trouble !== null ? { tone: "waiting", word: "Live, slow", why: trouble } : state;
 }
 
-/** Frames a second and what the noise of the sensor makes of the range; leads to what accuracy costs. */
+/** Frames a second and how well they measure; leads to what accuracy costs. */
 function Performance() {
-  const { status, alone } = useStore();
+  const { status, alone, accuracy } = useStore();
   const rate = useComputed(() => fixed(status.rate_hz.value, 1, "Hz"));
-  const std = useComputed(() => deviation(status.newest.value?.predicted_range_std_m?.median, "m"));
+  // Noise and bias together where the frames say so, which costs the service something; else noise alone.
+  const error = useComputed(() => deviation(status.newest.value?.accuracy?.range_error_m ?? status.newest.value?.predicted_range_std_m?.median, "m"));
+  const open = (): void => {
+    alone.value = alone.peek() === "sequence" ? null : "sequence";
+    if (alone.peek() !== null && accuracy.tradeoff.peek() === null && status.newest.peek() !== null) void accuracy.predict();
+  };
   return (
     <button
       type="button"
       class="performance"
-      title="Frames drawn a second, and the standard deviation (1 σ) of the range in the median pixel; shows what accuracy costs"
-      onClick={() => (alone.value = alone.peek() === "accuracy" ? null : "accuracy")}
+      title="Frames drawn a second, and the error of the range in the median pixel: its noise (1 σ), with its bias where that is known; shows what accuracy costs"
+      onClick={open}
     >
       <span data-field="rate">{rate}</span>
       <span class="quiet" data-field="deviation">
-        {std}
+        {error}
       </span>
     </button>
   );

@@ -55,7 +55,16 @@ export class Filming {
 
 /** How far the film is; nothing while none is made. */
 export function FilmProgress({ filming }: { filming: Filming }) {
-  if (filming.trouble.value !== "") return <p role="alert">{filming.trouble.value}</p>;
+  if (filming.trouble.value !== "") {
+    return (
+      <div class="panel-row filming" role="alert">
+        <span>{filming.trouble.value}</span>
+        <button type="button" onClick={() => (filming.trouble.value = "")}>
+          Dismiss
+        </button>
+      </div>
+    );
+  }
   if (filming.share.value === null) return null;
   return (
     <div class="panel-row filming" role="status">

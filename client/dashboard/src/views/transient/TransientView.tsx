@@ -1,13 +1,11 @@
 import { computed, useComputed } from "@preact/signals";
-import { useMemo, useRef } from "preact/hooks";
+import { useEffect, useMemo, useRef } from "preact/hooks";
 
-import { scaleOf } from "../../gl/tone";
 import { rangeOfTime_m } from "../../physics/constants";
 import { densityAt } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
 import { SPEEDS_NS } from "../../store/player";
 import { type Store, useStore } from "../../store/store";
-import { ColourBar } from "../../ui/ColourBar";
 import { Choice, Tabs } from "../../ui/controls";
 import { savePicture } from "../../ui/download";
 import { fixed, significant, superscript } from "../../ui/format";
@@ -16,11 +14,11 @@ import { captionOf, timeWords } from "../../ui/figure";
 import { saveFigure, type FigureParts } from "../../ui/figureFiles";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
-import type { Scale } from "../../ui/scale";
 import { AMPLITUDE } from "../map/catalogue";
 import { litOf, peaksOf, turnsOf } from "./arrivals";
 import { FilmProgress } from "./Filming";
-import { gateStart_rad, NAMES, TransientLook, type Play } from "./look";
+import { LightBar, lightScale } from "./LightBar";
+import { gateStart_rad, NAMES, type Play, type TransientLook } from "./look";
 import { LightSoFar } from "./LightSoFar";
 import { LookMenu } from "./LookMenu";
 import { Picture } from "./Picture";
@@ -38,8 +36,15 @@ export function TransientView() {
   const store = useStore();
   useProducts(["coefficients", AMPLITUDE]);
   const frame = store.frames.of("coefficients");
-  const look = useMemo(() => new TransientLook(frame, store.shelf), [frame, store]);
-  const { player } = store;
+  const { player, light: look } = store;
+  // A film ends with the picture that it is taken of.
+  useEffect(
+    () => () => {
+      look.filming.cancel();
+      look.snapshot = () => null;
+    },
+    [look],
+  );
   useDrawing(() => {
     const arrivals = frame.value?.light?.arrivals;
     if (arrivals === undefined) return;
@@ -93,7 +98,7 @@ export function TransientView() {
     >
       <div class="picture">
         {play === "density" ? <Picture look={look} /> : <LightSoFar look={look} />}
-        <LightBar look={look} />
+        <LightBar look={look} play={play} />
       </div>
       <footer class="panel-foot">
         <FilmProgress filming={look.filming} />
@@ -135,24 +140,12 @@ function steady(before: ReturnType<typeof litOf>, now: ReturnType<typeof litOf>)
   return near ? before : now;
 }
 
-/** What the colours of the light mean: their scale and its unit. */
-function lightScale(look: TransientLook, store: Store): { readonly scale: Scale; readonly unit: string } {
-  const gathered = look.play.value !== "density";
-  const white = gathered ? (store.frames.of(AMPLITUDE).value?.map?.high ?? NaN) / 2 ** look.stops.value : look.white.value * 1e-9;
-  return { scale: scaleOf(look.tone.value, Number(white.toPrecision(3))), unit: gathered ? "DN" : "DN/ns" };
-}
-
-function LightBar({ look }: { look: TransientLook }) {
-  const { scale, unit } = lightScale(look, useStore());
-  return scale.high > 0 ? <ColourBar scale={scale} colours={look.colours.value} unit={unit} /> : null;
-}
-
 /** What is written around a figure or a film of the light. */
 function partsOf(look: TransientLook, store: Store): FigureParts {
   const time_s = store.player.time_s.peek();
   const meta = store.frames.of("coefficients").peek()?.meta;
   return {
-    ...lightScale(look, store),
+    ...lightScale(look, store, look.play.peek()),
     title: `${NAMES[look.play.peek()]}, ${timeWords(time_s, rangeOfTime_m(time_s))}`,
     caption: meta === undefined ? "" : captionOf(meta),
     colours: look.colours.peek(),

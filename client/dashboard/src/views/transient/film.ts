@@ -78,33 +78,48 @@ export async function filmPass(subject: Subject, store: Store, kind: FilmKind, p
   }
 }
 
-/** The next frames of the camera, each for as long as it took; null where it was cancelled. */
+/** Why no more frames come; null where they do. Read in an effect, it is followed. */
+function standstill({ replay, held, status }: Store): string | null {
+  if (replay.active.value) return replay.playing.value ? null : "the recording is paused.";
+  if (held.value) return "the frame is held.";
+  if (status.cameraLoss.value !== null) return "the camera is lost.";
+  return status.running.value === false ? "the camera is stopped." : null;
+}
+
+/**
+ * The next frames of the camera, each for as long as it took; null where it was cancelled.
+ *
+ * It is shorter where frames cease to come. Raises Error where none comes at all.
+ */
 export async function filmFrames(subject: Subject, store: Store, kind: FilmKind, progress: Progress): Promise<Blob | null> {
   const plate = await plateOf(subject, store);
   if (plate === null) return null;
   const recorder = await recorderOf(plate.canvas, kind);
-  const newest = store.frames.of("coefficients");
-  let shown: Frame | null = newest.peek();
-  for (let n = 0; n < LIVE_FRAMES; n++) {
-    const next = await frameAfter(newest, shown, progress);
+  let shown = store.frames.of("coefficients").peek();
+  let count = 0;
+  for (; count < LIVE_FRAMES; count++) {
+    const next = await frameAfter(store, shown, progress);
     if (next === null) break;
     const took_s = shown === null ? FIRST_S : Math.abs(next.meta.host_time_s - shown.meta.host_time_s);
     shown = next;
     plate.draw();
     // A WebM is stamped by the clock: the wait for the next frame is what its picture lasts.
-    await recorder.add(kind === "gif" ? Math.min(LONGEST_S, took_s) : 0);
-    progress.report((n + 1) / LIVE_FRAMES);
+    await recorder.add(kind === "gif" || count === LIVE_FRAMES - 1 ? Math.min(LONGEST_S, took_s) : 0);
+    progress.report((count + 1) / LIVE_FRAMES);
   }
   const film = await recorder.finish();
-  return progress.cancelled ? null : film;
+  if (progress.cancelled) return null;
+  if (count === 0) throw new Error(standstill(store) ?? "no frame came.");
+  return film;
 }
 
-/** The next frame after one; null where the film was cancelled meanwhile. */
-function frameAfter(newest: { readonly value: Frame | null }, shown: Frame | null, progress: Progress): Promise<Frame | null> {
+/** The next frame after one; null where the film was cancelled meanwhile, or frames ceased to come. */
+function frameAfter(store: Store, shown: Frame | null, progress: Progress): Promise<Frame | null> {
+  const newest = store.frames.of("coefficients");
   return new Promise((done) => {
     const end = effect(() => {
       const frame = newest.value;
-      const over = progress.cancelled;
+      const over = progress.cancelled || standstill(store) !== null;
       if (!over && (frame === null || frame === shown)) return;
       queueMicrotask(() => {
         end();

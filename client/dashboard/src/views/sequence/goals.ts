@@ -5,6 +5,7 @@ import { engineering, fixed } from "../../ui/format";
 /** Goals as the service names them, as the form does, with their values. */
 const GOALS: readonly (readonly [field: string, name: string, write: (value: number) => string])[] = [
   ["frame_rate_hz", "frame rate", (value) => fixed(value, 1, "Hz")],
+  ["range_error_m", "error of the range", (value) => engineering(value, "m")],
   ["range_std_m", "deviation of the range", (value) => engineering(value, "m")],
   ["capture_s", "capture time", (value) => engineering(value, "s")],
 ];

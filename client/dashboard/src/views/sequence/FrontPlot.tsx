@@ -2,11 +2,14 @@ import { signal } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 
 import type { Choice, Tradeoff } from "../../stream/protocol";
-import { engineering } from "../../ui/format";
+import { engineering, significant } from "../../ui/format";
 import { useSize } from "../../ui/hooks";
-import { endsOf, marksOf, nearest, placeOf, sameSequence, standingOf, type Standing } from "./place";
+import { endsOf, marksOf, nearest, placeOf, sameSequence, type Standing } from "./place";
 
-const MARGIN = { left: 52, right: 14, top: 14, bottom: 36 };
+const MARGIN = { left: 52, right: 14, top: 14, bottom: 50 };
+
+/** Least room of a number beside an axis. */
+const LABEL_PX = { width: 48, height: 16 };
 
 const STEPS: Readonly<Record<string, number | undefined>> = { ArrowRight: 1, ArrowLeft: -1, Enter: 0, " ": 0 };
 
@@ -23,8 +26,7 @@ export function FrontPlot({ tradeoff, now, chosen, onChoose }: FrontPlotProps) {
   const size = useMemo(() => signal({ width: 0, height: 0 }), []);
   useSize(box, size);
   const { width, height } = size.value;
-  // By the prediction alone: the camera's present standing trembles with every frame, and the axes must not.
-  const ends = endsOf(tradeoff, standingOf(null, null, tradeoff));
+  const ends = endsOf(tradeoff);
   const inner = { width: width - MARGIN.left - MARGIN.right, height: height - MARGIN.top - MARGIN.bottom };
   const x = (place: number): number => MARGIN.left + place * inner.width;
   const y = (place: number): number => MARGIN.top + (1 - place) * inner.height;
@@ -56,15 +58,18 @@ export function FrontPlot({ tradeoff, now, chosen, onChoose }: FrontPlotProps) {
             if (near !== null) onChoose(near.choice);
           }}
         >
-          {marksOf(ends.time).map(({ value, place }) => (
+          {marksOf(ends.time, LABEL_PX.width / inner.width).map(({ value, place }) => (
             <g key={value} class="front-mark">
               <path d={`M${x(place)} ${MARGIN.top}v${inner.height}`} />
               <text x={x(place)} y={height - MARGIN.bottom + 14} text-anchor="middle">
                 {engineering(value, "s", 1)}
               </text>
+              <text x={x(place)} y={height - MARGIN.bottom + 28} text-anchor="middle">
+                {significant(1 / value, 1, "Hz")}
+              </text>
             </g>
           ))}
-          {marksOf(ends.error).map(({ value, place }) => (
+          {marksOf(ends.error, LABEL_PX.height / inner.height).map(({ value, place }) => (
             <g key={value} class="front-mark">
               <path d={`M${MARGIN.left} ${y(place)}h${inner.width}`} />
               <text x={MARGIN.left - 6} y={y(place) + 4} text-anchor="end">
@@ -73,9 +78,9 @@ export function FrontPlot({ tradeoff, now, chosen, onChoose }: FrontPlotProps) {
             </g>
           ))}
           <text class="front-axis" x={MARGIN.left + inner.width / 2} y={height - 4} text-anchor="middle">
-            time of one capture
+            time of one capture, and captures a second
           </text>
-          <text class="front-axis" x={MARGIN.left + 6} y={MARGIN.top + 8}>
+          <text class="front-axis" x={width - MARGIN.right} y={MARGIN.top + 8} text-anchor="end">
             error of the range: noise and bias
           </text>
           <path class="front-line" d={points.map((point, n) => `${n === 0 ? "M" : "L"}${point.x} ${point.y}`).join("")} />

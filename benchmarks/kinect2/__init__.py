@@ -1,0 +1,1 @@
+"""The decoder and the estimators of a Kinect v2 beside libfreenect2's."""

@@ -1,0 +1,87 @@
+import { computed, signal } from "@preact/signals";
+
+import type { Choice, Problem, Tradeoff } from "../stream/protocol";
+import { type Api, RequestError } from "./api";
+import type { Goal, JobDocument } from "./documents";
+import { followed } from "./jobs";
+
+/** What accuracy costs in time on the scene before the camera, and the choice that is looked at; null while there is none. */
+export class Accuracy {
+  /** With the points that there are so far, while it is predicted. */
+  readonly tradeoff = signal<Tradeoff | null>(null);
+  /** A point of the front or a plan that is looked at, and not set. */
+  readonly looked = signal<Choice | null>(null);
+  /** What the service computes for this page. */
+  readonly job = signal<JobDocument | null>(null);
+  /** Why the last question had no answer. */
+  readonly problem = signal<Problem | null>(null);
+  /** Whether the front is of a scene that the camera stands before no more. */
+  readonly outdated = computed(() => this.tradeoff.value !== null && this.#predicted.value !== this.#scene.value);
+  /** Counts the scenes, and which of them the front is of. */
+  readonly #scene = signal(0);
+  readonly #predicted = signal(0);
+  readonly #api: Api;
+
+  constructor(api: Api) {
+    this.#api = api;
+  }
+
+  /** Predicts the front; a page asks one question at a time. */
+  async predict(): Promise<void> {
+    const scene = this.#scene.peek();
+    await this.#ask(
+      () => this.#api.startTradeoff(),
+      ({ result }) => {
+        const soFar = result as Tradeoff | null;
+        if (soFar === null || soFar.front.length === 0) return;
+        this.#predicted.value = scene;
+        this.tradeoff.value = soFar;
+      },
+    );
+  }
+
+  /** Looks for a sequence for a goal. */
+  async plan(goal: Goal): Promise<void> {
+    this.looked.value = null; // it would seem to answer this question
+    await this.#ask(
+      () => this.#api.startPlan(goal),
+      ({ result }) => {
+        if (result !== null) this.looked.value = result as unknown as Choice;
+      },
+    );
+  }
+
+  async cancel(): Promise<void> {
+    const job = this.job.peek();
+    if (job !== null) await this.#told(() => this.#api.cancelJob(job.id));
+  }
+
+  /** The camera stands before another scene: what was predicted is of the one before. */
+  sceneChanged(): void {
+    this.#scene.value += 1;
+  }
+
+  async #ask(start: () => Promise<JobDocument>, seen: (job: JobDocument) => void): Promise<void> {
+    if (this.job.peek() !== null) return;
+    this.problem.value = null;
+    const started = await this.#told(start);
+    if (started === null) return;
+    const ended = await followed(this.#api, started, (job) => {
+      this.job.value = job;
+      seen(job);
+    });
+    this.job.value = null;
+    this.problem.value = ended === null ? { title: "The service was started anew and knows nothing of this any more." } : ended.problem;
+  }
+
+  /** What the service answers; null where it refuses, which is kept. */
+  async #told<T>(question: () => Promise<T>): Promise<T | null> {
+    try {
+      return await question();
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error;
+      this.problem.value = error.problem;
+      return null;
+    }
+  }
+}

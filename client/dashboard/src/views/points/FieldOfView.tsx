@@ -1,0 +1,36 @@
+import { isField, useStore } from "../../store/store";
+import { fixed } from "../../ui/format";
+import { fieldOfView } from "./cloud";
+import { knownLens } from "./lens";
+
+const DEGREE = Math.PI / 180;
+
+/** How wide the camera looks: as the service says, or to be set where it does not know. */
+export function FieldOfView() {
+  const store = useStore();
+  const known = knownLens(store);
+  if (known !== null) {
+    return (
+      <span title={`As the ${known.source} says`} data-field="field_of_view">
+        <span class="quiet">field of view</span> {fixed(fieldOfView(known.width, known) / DEGREE, 1, "°")}
+      </span>
+    );
+  }
+  return (
+    <label class="choice" title="How wide the camera looks, across: the service does not know">
+      <span class="quiet">field of view</span>
+      <input
+        class="limit"
+        type="number"
+        min={5}
+        max={150}
+        value={store.field_deg.value}
+        aria-label="Horizontal field of view in degrees"
+        onChange={(event) => {
+          if (isField(event.currentTarget.valueAsNumber)) store.field_deg.value = event.currentTarget.valueAsNumber;
+        }}
+      />
+      °
+    </label>
+  );
+}

@@ -1,0 +1,91 @@
+import { useStore } from "../../store/store";
+import type { AppliedSequence, Choice } from "../../stream/protocol";
+import { engineering, fixed } from "../../ui/format";
+import { useProducts } from "../../ui/hooks";
+import { Obstacle, Steer } from "../../ui/Steer";
+import { useTask } from "../../ui/useTask";
+import { ChoiceFacts } from "./ChoiceFacts";
+import { Finding } from "./Finding";
+import { FrontPlot } from "./FrontPlot";
+import { FrontSlider } from "./FrontSlider";
+import { GoalForm } from "./GoalForm";
+import { sameSequence, standingOf } from "./place";
+import { Summary } from "./Summary";
+
+/** What accuracy costs in time on the scene before the camera: the front, and a slider along it that sets the sequence. */
+export function AccuracySection({ applied }: { applied: AppliedSequence }) {
+  const store = useStore();
+  const { accuracy, sequencing, obstacle } = store;
+  const task = useTask();
+  const tradeoff = accuracy.tradeoff.value;
+  // Its frames say how well the camera does now. It costs the service something: not before it is compared with.
+  useProducts(tradeoff === null ? [] : ["range_error"]);
+  const now = tradeoff === null ? null : standingOf(store.frames.of("range_error").value?.meta ?? null, applied, tradeoff);
+  // Of a simulated scene: how far the frame was off that the front was predicted beside.
+  const judged = tradeoff !== null && tradeoff.current.meta.sequence_id === applied.sequence_id && !accuracy.outdated.value;
+  const truth_m = judged ? (tradeoff.current.range_error_m?.median ?? null) : null;
+  const looked = accuracy.looked.value;
+  const busy = accuracy.job.value !== null || task.busy.value !== null;
+  const look = (choice: Choice): void => {
+    accuracy.looked.value = choice;
+  };
+  const apply = async (): Promise<void> => {
+    const choice = accuracy.looked.peek();
+    if (choice === null || obstacle.peek() !== null) return;
+    if (await task.run("Applying…", () => sequencing.apply(choice))) {
+      if (sameSequence(accuracy.looked.peek(), choice)) accuracy.looked.value = null;
+    }
+  };
+  return (
+    <div class="accuracy" data-predicted={tradeoff !== null}>
+      {tradeoff !== null && <FrontPlot tradeoff={tradeoff} now={now} chosen={looked} onChoose={look} />}
+      <div class="accuracy-control">
+        <p class="accuracy-figures">{looked === null ? <NowFigures applied={applied} error_m={now?.range_error_m ?? null} truth_m={truth_m} /> : <LookedFigures choice={looked} />}</p>
+        <FrontSlider front={tradeoff?.front ?? []} now_s={applied.capture_s} looked={looked} onLook={look} onRelease={() => void apply()} />
+        <Finding task={task} />
+        {tradeoff !== null && <Obstacle />}
+        {looked !== null && (
+          <div class="accuracy-actions">
+            <button type="button" onClick={() => (accuracy.looked.value = null)}>
+              Back to the present
+            </button>
+            <Steer primary disabled={busy} onClick={() => void apply()}>
+              Apply
+            </Steer>
+          </div>
+        )}
+      </div>
+      <div class="accuracy-facts">
+        {looked === null ? <Summary applied={applied} /> : <ChoiceFacts choice={looked} />}
+        <details class="accuracy-goal">
+          <summary>Plan for a target</summary>
+          <GoalForm disabled={busy} onGoal={(goal) => void accuracy.plan(goal)} />
+        </details>
+      </div>
+    </div>
+  );
+}
+
+function LookedFigures({ choice }: { choice: Choice }) {
+  return (
+    <>
+      <strong data-field="choice_range_error_m">± {engineering(choice.predicted.range_error_m.median, "m")}</strong> <span data-field="choice_capture_s">{engineering(choice.capture_s, "s")}</span>
+      <span data-field="choice_frame_rate_hz">{fixed(choice.frame_rate_hz, 1, "Hz")}</span> <span class="quiet">predicted</span>
+    </>
+  );
+}
+
+/** How well the camera does now; noise and bias together once that is known, and where the truth is known how far it is off. */
+function NowFigures({ applied, error_m, truth_m }: { applied: AppliedSequence; error_m: number | null; truth_m: number | null }) {
+  const newest = useStore().status.newest.value;
+  const noise_m = newest?.sequence_id === applied.sequence_id ? newest.predicted_range_std_m?.median : null;
+  return (
+    <>
+      <strong data-field="now_range_error_m">± {engineering(error_m ?? noise_m, "m", 2)}</strong> <span>{engineering(applied.capture_s, "s")}</span> <span>{fixed(applied.frame_rate_hz, 1, "Hz")}</span>{" "}
+      <span class="quiet">
+        now
+        {truth_m !== null && `, ${engineering(truth_m, "m", 2)} off the truth`}
+      </span>
+    </>
+  );
+}

@@ -1,0 +1,24 @@
+import type { Choice } from "../../stream/protocol";
+import { engineering, fixed } from "../../ui/format";
+import { Fact } from "./Figures";
+import { ZEROTH_NAMES } from "./words";
+
+/** A sequence that is looked at, and what is predicted of it. */
+export function ChoiceFacts({ choice }: { choice: Choice }) {
+  const { sequence, predicted } = choice;
+  const { low, high } = predicted.range_error_m;
+  return (
+    <dl class="facts" data-field="choice">
+      <Fact name="Harmonics m" value={String(sequence.harmonics)} field="choice_harmonics" strong />
+      <Fact name="Exposure" value={engineering(sequence.exposure_s, "s")} field="choice_exposure_s" strong />
+      <Fact name="Takes" value={String(sequence.takes)} field="choice_takes" strong />
+      <Fact name="Base frequency" value={engineering(sequence.base_frequency_hz, "Hz", 4)} field="choice_base_frequency_hz" />
+      <Fact name="Zeroth moment" value={ZEROTH_NAMES[sequence.zeroth]} field="choice_zeroth" />
+      <Fact name="Range by" value={choice.estimator.replaceAll("-", " ")} field="choice_estimator" />
+      <Fact name="Error, 90 % within" value={`${engineering(low, "m", 2)} to ${engineering(high, "m", 2)}`} field="choice_range_error_interval_m" />
+      <Fact name="of that noise" value={engineering(predicted.range_std_m.median, "m")} field="choice_range_std_m" />
+      <Fact name="of that bias" value={engineering(predicted.range_bias_m, "m")} field="choice_range_bias_m" />
+      <Fact name="Outliers" value={fixed(100 * predicted.outlier_share, 1, "%")} field="choice_outlier_share" />
+    </dl>
+  );
+}

@@ -1,0 +1,19 @@
+import { scaleOf } from "../../gl/tone";
+import { useStore, type Store } from "../../store/store";
+import { ColourBar } from "../../ui/ColourBar";
+import type { Scale } from "../../ui/scale";
+import { AMPLITUDE } from "../map/catalogue";
+import type { Play, TransientLook } from "./look";
+
+/** What the colours of the light mean: their scale and its unit. */
+export function lightScale(look: TransientLook, store: Store, play: Play): { readonly scale: Scale; readonly unit: string } {
+  const gathered = play !== "density";
+  const white = gathered ? (store.frames.of(AMPLITUDE).value?.map?.high ?? NaN) / 2 ** look.stops.value : look.white.value * 1e-9;
+  return { scale: scaleOf(look.tone.value, Number(white.toPrecision(3))), unit: gathered ? "DN" : "DN/ns" };
+}
+
+/** The colour bar of light in flight, or of light gathered over a time. */
+export function LightBar({ look, play }: { look: TransientLook; play: Play }) {
+  const { scale, unit } = lightScale(look, useStore(), play);
+  return scale.high > 0 ? <ColourBar scale={scale} colours={look.colours.value} unit={unit} /> : null;
+}

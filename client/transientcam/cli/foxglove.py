@@ -1,0 +1,65 @@
+"""``transientcam foxglove``: a camera's frames, live, in Foxglove."""
+
+import json
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from transientcam.camera import Camera
+from transientcam.cli.options import JsonOption, TokenOption, UrlArgument
+from transientcam.robotics.foxglove_bridge import SHOWN, FoxgloveBridge
+from transientcam.robotics.reports import Report
+
+_STYLES = {"info": "green", "warning": "yellow", "error": "red"}
+
+
+def foxglove(
+    url: UrlArgument,
+    products: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="What can be looked at; range, direct, indirect, brightness and pointcloud, if "
+            "nothing is named."
+        ),
+    ] = None,
+    host: Annotated[
+        str,
+        typer.Option(help="Where to serve viewers; whoever reaches it sees the frames."),
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="0 for any that is free.")] = 8765,
+    max_rate_hz: Annotated[
+        float, typer.Option(min=0.01, help="No more frames a second than this are shown.")
+    ] = 10.0,
+    token: TokenOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show a camera live in Foxglove, until interrupted: images, points, lens and pose.
+
+    It only subscribes, and only to what somebody looks at.
+    """
+    console = Console(stderr=True)
+
+    def show(report: Report) -> None:
+        if as_json:
+            typer.echo(json.dumps(report.to_document()))
+        else:
+            console.print(report.text, style=_STYLES[report.level], soft_wrap=True, markup=False)
+
+    with (
+        Camera(url, token=token) as camera,
+        FoxgloveBridge(
+            camera,
+            products=products or SHOWN,
+            host=host,
+            port=port,
+            max_rate_hz=max_rate_hz,
+            on_report=show,
+        ) as bridge,
+    ):
+        address = f"ws://{host}:{bridge.port}"
+        if as_json:
+            typer.echo(json.dumps({"type": "serving", "url": address}))
+        else:
+            console.print(f"open {address} in Foxglove (Open connection, Foxglove WebSocket)")
+        bridge.run()

@@ -1,0 +1,175 @@
+"""What robot programs are sent of one frame, in nobody's format.
+
+Conventions are those of ROS, which Foxglove shares: REP 103 (frames and units) and REP 118 (depth
+images: metres along the optical axis, NaN without a return).
+"""
+
+from collections.abc import Container, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam.wire import PRODUCTS
+
+CAMERA_FRAME: Final = "camera_link"
+"""x where the camera looks, y left, z up, in m."""
+OPTICAL_FRAME: Final = "camera_optical_frame"
+"""x right, y down, z where the camera looks, in m: the frame of images and points."""
+DEPTH: Final = "/depth"
+"""Topic of the depth image of REP 118: z of the points. Product ``range`` is along the ray."""
+_ENCODINGS: Final = {"<f4": "32FC1", "<u2": "16UC1", "|u1": "mono8"}
+
+
+@dataclass(frozen=True, slots=True)
+class Pinhole:
+    """A lens without distortion: pixel (column, row) looks along ((c - cx) / fx, (r - cy) / fy, 1).
+
+    Attributes
+    ----------
+    fx, fy, cx, cy
+        Focal lengths and principal point in pixels; whole numbers are the centres of pixels.
+    width, height
+        Of the image, in pixels.
+    source
+        Where they are known from; ``assumed`` is a guess of the service.
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+    source: str
+
+    @classmethod
+    def of_document(cls, document: Mapping[str, Any]) -> Self:
+        """Return the intrinsics that a point cloud, or the camera's document, has."""
+        return cls(**{name: document[name] for name in cls.__slots__})
+
+    @property
+    def matrix(self) -> list[float]:
+        """The 3 x 3 camera matrix, row by row."""
+        return [self.fx, 0.0, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0]
+
+    @property
+    def projection(self) -> list[float]:
+        """The 3 x 4 projection of a single camera, row by row."""
+        return [self.fx, 0.0, self.cx, 0.0, 0.0, self.fy, self.cy, 0.0, 0.0, 0.0, 1.0, 0.0]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Image:
+    """One value a pixel, (H, W): float32, uint16 or uint8, little-endian."""
+
+    topic: str
+    values: NDArray[Any]
+
+    @property
+    def encoding(self) -> str:
+        """Name of the pixels' type, as `sensor_msgs/Image` and Foxglove call it."""
+        return _ENCODINGS[self.values.dtype.str]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """Points (H, W, 3 or 4), float32: x, y, z in m in `OPTICAL_FRAME`; NaN without a return.
+
+    The fourth is the intensity: light of the first return in DN.
+    """
+
+    topic: ClassVar[str] = "/pointcloud"
+    values: NDArray[np.float32]
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Name of each value of a point."""
+        return ("x", "y", "z", "intensity")[: self.values.shape[-1]]
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """The lens."""
+
+    topic: ClassVar[str] = "/camera_info"
+    lens: Pinhole
+
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """How `OPTICAL_FRAME` stands in `CAMERA_FRAME`; it never changes."""
+
+    topic: ClassVar[str] = "/tf_static"
+    rotation_xyzw: ClassVar[tuple[float, float, float, float]] = (-0.5, 0.5, -0.5, 0.5)
+
+
+Message = Image | Points | Calibration | Transform
+
+
+def viewable(product: str) -> bool:
+    """Return whether a product can be sent: images, raw images and points."""
+    known = PRODUCTS.get(product)
+    return known is not None and (
+        product in ("raw", "pointcloud") or (known.axes == ("y", "x") and known.dtype in _ENCODINGS)
+    )
+
+
+def topics_of(product: str) -> dict[str, type[Message]]:
+    """Return the topics that show a product (raw images excepted), and what is on each."""
+    if product == "pointcloud":
+        return {DEPTH: Image, Points.topic: Points}
+    return {f"/{product}": Image}
+
+
+def products_of(topics: Iterable[str]) -> tuple[str, ...]:
+    """Return the products that topics show, points last; lens and pose need none."""
+    products: set[str] = set()
+    for topic in topics:
+        if topic == Points.topic:
+            products |= {"pointcloud", "direct"}  # points are coloured by the direct light
+        elif topic == DEPTH:
+            products.add("pointcloud")
+        elif topic not in (Calibration.topic, Transform.topic):
+            products.add(topic.removeprefix("/"))
+    return tuple(sorted(products, key=lambda name: (name == "pointcloud", name)))
+
+
+def messages_of(
+    arrays: Mapping[str, NDArray[Any]],
+    lens: Pinhole,
+    *,
+    intensity: NDArray[np.float32] | None = None,
+    topics: Container[str] | None = None,
+) -> Iterator[Message]:
+    """Yield the messages of one frame, those about pose and lens first.
+
+    Parameters
+    ----------
+    arrays
+        The frame's products by name, each `viewable`.
+    lens
+        Of the frame's pixels.
+    intensity
+        Of the points: light of the first return (H, W) in DN; None for points without.
+    topics
+        Those to yield; None for all.
+    """
+    messages = (Transform(), Calibration(lens), *_of_products(arrays, intensity))
+    yield from (each for each in messages if topics is None or each.topic in topics)
+
+
+def _of_products(
+    arrays: Mapping[str, NDArray[Any]], intensity: NDArray[np.float32] | None
+) -> Iterator[Message]:
+    for name, array in arrays.items():
+        if name == "raw":
+            for index, image in enumerate(array):
+                yield Image(f"/raw/image_{index:03d}", image)
+        elif name == "pointcloud":
+            yield Image(DEPTH, array[2])
+            planes = [*array] if intensity is None else [*array, intensity]
+            yield Points(np.stack(planes, axis=-1))
+        else:
+            yield Image(f"/{name}", array)

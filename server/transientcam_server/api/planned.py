@@ -1,0 +1,86 @@
+"""What is planned: a request waits for it until its client leaves, or a job does it."""
+
+import asyncio
+import threading
+from collections.abc import Awaitable, Callable, Coroutine
+from typing import Any, Final, TypeVar
+
+from fastapi import Request, Response
+
+from transientcam_server.api.documents.document import Document
+from transientcam_server.api.documents.job import JobDocument
+from transientcam_server.api.routes import jobs
+from transientcam_server.camera.jobs import Job
+from transientcam_server.errors import Problem, kinds
+from transientcam_server.planning import Progress
+from transientcam_server.service import Service
+
+FRAME_WITHIN_S: Final = 10.0
+"""How long what is planned for the current frame waits for one."""
+LOOKED: Final = 0.5
+"""Share of the progress after which the scene was looked at."""
+_ASK_EVERY_S: Final = 0.5
+_Answer = TypeVar("_Answer", bound=Document)
+Work = Callable[[Progress], Coroutine[Any, Any, _Answer]]
+"""Plans; what its progress raises ends it."""
+
+
+async def for_request(http: Request, work: Work[_Answer]) -> _Answer:
+    """Return what the work answers with; a client that leaves ends it."""
+    left = threading.Event()
+
+    def go_on(share: float, step: str) -> None:
+        if left.is_set():
+            raise _left()
+
+    async def ask() -> None:
+        if await http.is_disconnected():
+            raise _left()
+
+    try:
+        return await _ended(work(Progress(go_on)), ask)
+    finally:
+        left.set()
+
+
+def as_job(service: Service, kind: str, work: Work[_Answer], response: Response) -> JobDocument:
+    """Start a job that does the work beside those of the camera; its result is the answer.
+
+    While it runs, its result is what the work shows of it.
+
+    Raises
+    ------
+    Problem
+        ``too-many-jobs``.
+    """
+
+    async def run(job: Job) -> dict[str, Any]:
+        async def ask() -> None:
+            job.report(job.progress, job.step)
+
+        made = await _ended(work(Progress(job.report, show=job.show)), ask)
+        return made.model_dump(mode="json")
+
+    return jobs.accepted(service.jobs.start(kind, run, in_turn=False), response)
+
+
+def address_of(http: Request) -> str:
+    """Return the address whose requests are counted together."""
+    return "" if http.client is None else http.client.host
+
+
+async def _ended(work: Coroutine[Any, Any, _Answer], ask: Callable[[], Awaitable[None]]) -> _Answer:
+    """Return what the work answers with; what ``ask``, called meanwhile, raises cancels it."""
+    task = asyncio.ensure_future(work)
+    try:
+        while not task.done():
+            await asyncio.wait({task}, timeout=_ASK_EVERY_S)
+            await ask()
+        return task.result()
+    finally:
+        task.cancel()
+
+
+def _left() -> Problem:
+    """Return what ends the work for a client that has gone, and reads no answer."""
+    return Problem(kinds.SHUTTING_DOWN, "The client left before there was an answer.")

@@ -1,0 +1,50 @@
+"""The verb ``import-kinect2`` of the ``transientcam`` command.
+
+What is heavy is imported when the verb runs, so that ``transientcam --help`` stays quick.
+"""
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from rich.console import Console
+
+from transientcam.cli.options import JsonOption, require_suffix
+from transientcam_server.cli.progress import progress_bar
+
+
+def import_kinect2(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE.h5",
+            help="Raw frames of a Kinect v2, with /P0Tables and /Frame_n/Ir, as "
+            "felja633/kinectv2_decoders reads them.",
+        ),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The recording (.h5) to write.")],
+    lens: Annotated[
+        Path | None,
+        typer.Option(
+            help="An .h5 with leader_calibration_parameters: the lens.  [default: unknown]"
+        ),
+    ] = None,
+    rows: Annotated[
+        Literal["top", "bottom"],
+        typer.Option(help="Which side the lens' cy is counted from (docs/kinect2.md)."),
+    ] = "top",
+    as_json: JsonOption = False,
+) -> None:
+    """Import raw frames of a Kinect v2 as a recording, to replay, reconstruct and convert."""
+    from transientcam_server.offline.kinect2 import import_kinect2 as imported
+    from transientcam_server.offline.kinect2 import read_lens
+
+    require_suffix(output, ".h5")
+    known = None if lens is None else read_lens(lens, rows)
+    with progress_bar("importing") as advance:
+        frames = imported(file, output, lens=known, progress=advance)
+    if as_json:
+        typer.echo(json.dumps({"file": str(output), "frames": frames}))
+    else:
+        Console(stderr=True).print(f"{output}: {frames} frames", soft_wrap=True)
