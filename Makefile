@@ -55,6 +55,7 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 	$(BIN)/python -m benchmarks.throughput --write
 	$(BIN)/python -m benchmarks.dashboard --hours 0.1 --write
 	$(BIN)/python -m benchmarks.pictures
+	$(BIN)/python -m benchmarks.mathematics
 	$(BIN)/transientcam paper -o docs
 
 docs-site: .venv/test.stamp  ## Write the documentation as a site: open build/site/index.html

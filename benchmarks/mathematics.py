@@ -67,7 +67,8 @@ def measured() -> Figure:
     waves.set(title="light, and what it is multiplied with", yticks=[])
     b = _of_pixel(3)
     for j in (1, 2, 3):
-        tip, label = (b[j].real, b[j].imag), (1.5 * b[j].real, 1.5 * b[j].imag)
+        beyond = b[j] * (1 + 0.14 / abs(b[j]))
+        tip, label = (b[j].real, b[j].imag), (beyond.real, beyond.imag)
         plane.annotate("", tip, (0, 0), arrowprops={"arrowstyle": "->", "color": f"C{j}"})
         plane.annotate(f"$b_{j}$", label, color=f"C{j}", ha="center", va="center")
     circle = np.exp(1j * phase_rad) * b[0].real

@@ -114,7 +114,7 @@ def waveform_of(phasors: Array, count: int) -> Array:
     -----
     At offset d, equation (1) of `harmonics` reads a_j(d) = sum over n = 1, -3, 5, -7, ... of
     C_n exp(-i n d), a Fourier series in 4 d whose coefficient of n is c_n u^n, or
-    conj(c_|n| u^|n|) for n < 0.
+    conj(c_k u^k), k = -n, for n < 0.
     """
     phasors = as_array(phasors)
     if phasors.ndim != 3:

@@ -190,7 +190,7 @@ def test_a_daemon_of_the_wheel_serves_frames_and_its_page(url: str) -> None:
     range_m = np.lib.format.read_array(_stream(answer))
     assert range_m.shape == (120, 163)
     assert np.isfinite(range_m).mean() > 0.9
-    assert len(parts) >= 3
+    assert {Path(each).suffix for each in parts} == {".js", ".css"}
 
 
 def _stream(answer: httpx.Response) -> io.BytesIO:
@@ -212,6 +212,25 @@ def test_what_is_not_declared_is_not_there(installed: Path) -> None:
     )
 
     assert done.stdout.split() == ["True", "True", "True", "False", "True"]
+
+
+def test_the_wheel_lists_the_licences_of_all_that_its_page_carries(
+    built: tuple[Path, Path],
+) -> None:
+    with ZipFile(built[1]) as archive:
+        listed = json.loads(archive.read("transientcam_server/static/licences.json"))
+    dashboard = json.loads((ROOT / "client" / "dashboard" / "package.json").read_text("utf-8"))
+
+    assert set(dashboard["dependencies"]) <= {each["name"] for each in listed}
+    # those that ask for no more than to be named with their text, as the list does
+    assert {each["identifier"] for each in listed} <= {
+        "0BSD",
+        "BSD-3-Clause",
+        "ISC",
+        "MIT",
+        "OFL-1.1",
+    }
+    assert all(len(each["text"]) > 500 for each in listed)
 
 
 # -- what is said of it ------------------------------------------------------------------------
