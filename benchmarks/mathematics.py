@@ -29,7 +29,7 @@ def moments(times_s: np.ndarray, weights: np.ndarray, uniform: float, m: int) ->
     """Return b_0 .. b_m (m + 1, ...) of sharp returns (K, ...) and uniform light: Eq. (1)."""
     phase_rad = 2 * np.pi * BASE_FREQUENCY_HZ * times_s
     order = np.arange(m + 1).reshape(-1, *[1] * times_s.ndim)
-    b = (weights * np.exp(1j * order * phase_rad)).sum(1)
+    b: np.ndarray = (weights * np.exp(1j * order * phase_rad)).sum(1)
     b[0] += uniform
     return b
 

@@ -33,7 +33,7 @@ _TWO_MINUTES_S = 120.0
 
 def build(source: Path, to: Path) -> tuple[Path, Path]:
     """Return the sdist of a directory and the wheel of that sdist, as ``make dist`` builds them."""
-    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", to, source]
+    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(to), str(source)]
     environment = os.environ | {"SOURCE_DATE_EPOCH": _EPOCH_S, "PATH": "/nowhere"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
@@ -63,7 +63,7 @@ def needed(wheel: Path, extra: str) -> dict[str, Distribution]:
     """Return every distribution that an extra of the wheel declares, and those that these need."""
     (metadata,) = (each for each in ZipPath(wheel).iterdir() if each.name.endswith(".dist-info"))
     found: dict[str, Distribution] = {}
-    left: list[tuple[Distribution, str]] = [(PathDistribution(metadata), extra)]  # type: ignore[arg-type]  # a zipfile.Path is as good
+    left: list[tuple[Distribution, str]] = [(PathDistribution(metadata), extra)]
     seen: set[tuple[str, str]] = set()
     while left:
         one, its_extra = left.pop()
@@ -77,7 +77,7 @@ def needed(wheel: Path, extra: str) -> dict[str, Distribution]:
                     continue
                 seen.add(key)
                 if key[0] == "transientcam":  # an extra that takes another one along
-                    left.append((PathDistribution(metadata), each))  # type: ignore[arg-type]  # as above
+                    left.append((PathDistribution(metadata), each))
                 else:
                     found[key[0]] = distribution(requirement.name)
                     left.append((found[key[0]], each))
@@ -99,9 +99,9 @@ def installed(built: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory
     directory = tmp_path_factory.mktemp("clean") / "venv"
     venv.create(directory, symlinks=True)
     python = directory / "bin" / "python"
-    pip = [sys.executable, "-m", "pip", "--python", python, "--no-input"]
+    pip = [sys.executable, "-m", "pip", "--python", str(python), "--no-input"]
     options = ["--quiet", "--no-index", "--no-deps", "--no-compile"]
-    subprocess.run([*pip, "install", *options, built[1]], check=True)
+    subprocess.run([*pip, "install", *options, str(built[1])], check=True)
     (site,) = directory.glob("lib/python*/site-packages")
     for one in needed(built[1], "server").values():
         link_into(site, one)
@@ -118,7 +118,7 @@ def url(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[s
         "TRANSIENTCAM_KERNELS": "off",
         "PYTHONUNBUFFERED": "1",
     }
-    command = [installed / "bin" / "transientcam", "serve", "--port", "0"]
+    command = [str(installed / "bin" / "transientcam"), "serve", "--port", "0"]
     with subprocess.Popen(
         [*command, "--camera", "sim:wall?noise=off"],
         cwd=home,

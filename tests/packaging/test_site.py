@@ -34,8 +34,8 @@ import quokka
 
 def sphinx(builder: str, source: Path, to: Path) -> "subprocess.CompletedProcess[str]":
     """Build with the site's settings; every warning fails, as in ``make docs-site``."""
-    strict = ["--quiet", "--fail-on-warning", "--keep-going", "--conf-dir", _DOCS]
-    command = [sys.executable, "-m", "sphinx", *strict, "--builder", builder, source, to]
+    strict = ["--quiet", "--fail-on-warning", "--keep-going", "--conf-dir", str(_DOCS)]
+    command = [sys.executable, "-m", "sphinx", *strict, "--builder", builder, str(source), str(to)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
