@@ -54,8 +54,8 @@ class GappedReconstruction(Reconstruction):
     def _biased(self) -> tuple[Array, Array]:
         return self.smoothed, namespace(self.smoothed).zeros(self.smoothed.shape[1:], dtype=bool)
 
-    @property
-    def corrected_pixels(self) -> None:
+    @cached_property
+    def corrected_pixels(self) -> int | None:
         """None: no harmonics of the modulation are taken out."""
         return None
 

@@ -17,6 +17,7 @@ from transientcam_driver import (
 )
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.errors import UDEV_RULES_FILE, TransferOverflow, TransferStalled
+from transientcam_driver.kinect2.usb_port import UDEV_RULES
 from transientcam_driver.plugin import FoundCamera
 from transientcam_driver.protocol import Request
 from transientcam_driver.simulation.build import build, find_scene
@@ -233,10 +234,12 @@ def test_an_empty_bus_lists_no_camera() -> None:
     assert list_cameras(backend=SimulatedBus([])) == ()
 
 
-def test_the_file_for_udev_holds_the_rule_that_the_error_names() -> None:
+def test_the_file_for_udev_holds_the_rules_that_errors_name() -> None:
     file = Path(__file__).parents[2] / "packaging" / Path(UDEV_RULES_FILE).name
-    (rule,) = [line for line in file.read_text().splitlines() if not line.startswith("#")]
+    rules = [line for line in file.read_text().splitlines() if not line.startswith("#")]
+    named = [UDEV_RULE, *(line.strip() for line in UDEV_RULES.splitlines())]
 
     # and more: the file also gives each camera a name by its serial number
-    assert set(UDEV_RULE.split(", ")) <= set(rule.split(", "))
+    for rule, each in zip(rules, named, strict=True):
+        assert set(each.split(", ")) <= set(rule.split(", "))
     assert UDEV_RULES_FILE in str(PermissionDenied("/dev/bus/usb/001/002", UDEV_RULE))

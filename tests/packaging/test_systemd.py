@@ -77,7 +77,7 @@ def test_usb_can_be_reached_and_kernels_can_be_kept() -> None:
 
 def test_the_udev_rule_is_for_the_camera_the_driver_looks_for() -> None:
     rules = _PACKAGING / Path(UDEV_RULES_FILE).name
-    (rule,) = [line for line in rules.read_text().splitlines() if not line.startswith("#")]
+    rule, *_ = [line for line in rules.read_text().splitlines() if not line.startswith("#")]
     keys = re.compile(r'(?:^|, )((?:ATTR|ENV){\w+}|[A-Z]+)(==|\+?=)"([^"]*)"')
     parts = set(keys.findall(rule))
 

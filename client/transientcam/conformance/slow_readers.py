@@ -1,6 +1,8 @@
 """Slow readers lose frames, with notices; no other client is affected."""
 
 import math
+from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Final
 
 import numpy as np
@@ -9,11 +11,13 @@ from transientcam.conformance.check import checks
 from transientcam.conformance.conversation import Conversation
 from transientcam.conformance.device import Device
 from transientcam.conformance.expecting import equal, expect, skip_unless
+from transientcam.errors import PromiseBroken
 from transientcam.wire import Channel
 
 _FRAMES: Final = 10
 _ATTEMPTS: Final = 6
 """A machine that is busy for a moment breaks no promise."""
+_ROUNDS: Final = 3
 _MORE_THAN_BUFFERS_BYTES: Final = (24 * 1024 * 1024, 96 * 1024 * 1024)
 """Between a daemon and its client; a proxy on the way has buffers of its own."""
 _SMALL_BYTES: Final = 400 * 1024
@@ -38,8 +42,13 @@ def drops_are_told(device: Device) -> None:
 
 def who_does_not_acknowledge_gets_no_more_than_its_credits(device: Device) -> None:
     """No more frames than the credits are on their way unacknowledged."""
+    with device.capturing():
+        for _ in range(_ROUNDS):  # a busy daemon may leave out the very frame that would show it
+            _keeps_to_credits(device)
+
+
+def _keeps_to_credits(device: Device) -> None:
     with (
-        device.capturing(),
         device.stream("range") as steady,
         device.stream("range", credit=2) as slow,
     ):
@@ -54,8 +63,10 @@ def who_does_not_acknowledge_gets_no_more_than_its_credits(device: Device) -> No
 def who_never_reads_delays_nobody(device: Device) -> None:
     """While one client reads nothing at all, another gets every single frame."""
     with device.capturing():
-        undisturbed = any(_gets_everything(device) for _ in range(_ATTEMPTS))
-        expect(undisturbed, "a healthy client misses frames while another one does not read")
+        if not any(_gets_everything(device, beside=_LARGE) for _ in range(_ATTEMPTS)):
+            alone = any(_gets_everything(device) for _ in range(_ATTEMPTS))
+            skip_unless(alone, "a client misses frames without that other one, too")
+            raise PromiseBroken("a healthy client misses frames while another one does not read")
 
 
 def who_never_reads_loses_frames(device: Device) -> None:
@@ -64,9 +75,10 @@ def who_never_reads_loses_frames(device: Device) -> None:
     expect(lost, "everything was kept for a client that does not read")
 
 
-def _gets_everything(device: Device) -> bool:
+def _gets_everything(device: Device, *, beside: Sequence[str] = ()) -> bool:
+    """Return whether a client gets every frame; beside one that reads nothing, if that has any."""
     with (
-        device.stream(*_LARGE, unread=True),
+        device.stream(*beside, unread=True) if beside else nullcontext(),
         device.stream("flags") as healthy,
     ):
         numbers = [healthy.frame().frame for _ in range(_FRAMES)]
