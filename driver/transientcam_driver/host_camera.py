@@ -1,6 +1,7 @@
 """What cameras share whose state, clock and sequence are kept on this machine."""
 
 import threading
+from abc import ABC, abstractmethod
 from typing import Self
 
 from transientcam_driver.camera import CameraState
@@ -13,7 +14,7 @@ from transientcam_driver.receiving import Counters
 from transientcam_driver.sequence import Sequence
 
 
-class HostCamera:
+class HostCamera(ABC):
     """The half of a `Camera` that needs no request to the device.
 
     A camera of it sets ``_capabilities`` and ``_applied``, and moves ``_state`` on from
@@ -65,17 +66,17 @@ class HostCamera:
         """Return what would be set, without a request to the device; the epoch is 0."""
         return self._capabilities.apply(sequence)
 
+    @abstractmethod
     def stop(self) -> None:
         """Switch the light off; a ``read_frame`` that is waiting raises NotStreaming."""
-        raise NotImplementedError
 
     def safe_off(self) -> None:
         """As ``stop``."""
         self.stop()
 
+    @abstractmethod
     def close(self) -> None:
         """Switch the light off and give the device back; may be called twice."""
-        raise NotImplementedError
 
     def __enter__(self) -> Self:
         return self
