@@ -111,14 +111,7 @@ class Kinect2Camera(HostCamera):
             self._require_connected()
             if not self._lit:
                 self._asked(self._device.check)
-            return Status.of_host(
-                streaming=self._state is CameraState.STREAMING,
-                light_on=self._lit,
-                epoch=self._applied.epoch,
-                next_image=self.counters.images + self.counters.lost,
-                device_time_s=self.device_time_s(),
-                temperature_c=UNKNOWN_C,
-            )
+            return self._status(light_on=self._lit, temperature_c=UNKNOWN_C)
 
     # --- sequence and light ------------------------------------------------------------------
 

@@ -6,6 +6,7 @@ first, then 1, 5, ... and so on, 11 bits each, the least significant bit first. 
 steps of 1 up to 256, and twice as large behind every further 128 codes.
 """
 
+from collections.abc import Iterator
 from functools import cache
 from typing import Final
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from transientcam_driver.kinect2.layout import (
     CODE_BITS,
     HEIGHT,
+    ROW_BYTES,
     SUB_IMAGE_BYTES,
     WIDTH,
 )
@@ -85,30 +87,35 @@ def images(data: NDArray[np.uint8]) -> NDArray[np.uint16]:
     if data.ndim != 2 or data.shape[1] != SUB_IMAGE_BYTES:
         raise ValueError(f"sub-images of shape {data.shape}, not (N, {SUB_IMAGE_BYTES})")
     made = np.empty((len(data), HEIGHT, WIDTH), np.uint16)
-    for image, sub_image in zip(made, data, strict=True):  # one at a time stays in cache
-        stored = _codes(sub_image)
-        _dn_of_code().take(stored, out=stored, mode="clip")
-        columns = image.reshape((HEIGHT, _GROUPS, _GROUP, _LANES))
-        half = HEIGHT // 2
-        columns[:half] = stored[:half]
-        columns[half:] = stored[: half - 1 : -1]
+    half = HEIGHT // 2
+    for image, sub_image in zip(made, np.ascontiguousarray(data), strict=True):  # stays in cache
+        # four columns side by side, one of each lane, are one word
+        words = image.reshape(-1).view(np.uint64).reshape((HEIGHT, _GROUPS, _GROUP))
+        for k, stored in enumerate(_columns(sub_image)):
+            words[:half, :, k] = stored[:half]
+            words[half:, :, k] = stored[: half - 1 : -1]
         image[:, [0, -1]] = ZERO_DN
     return made
 
 
-def _codes(sub_image: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    """Return the codes (424, groups, group, lanes) of one sub-image, rows as they are stored."""
-    octets = sub_image.reshape((HEIGHT, _LANES, _GROUPS, CODE_BITS))
-    planes = np.ascontiguousarray(octets.transpose((3, 0, 2, 1))).astype(np.uint16)
-    codes = np.empty((HEIGHT, _GROUPS, _GROUP, _LANES), np.uint16)
-    for k in range(_GROUP):
-        first, shift = divmod(CODE_BITS * k, 8)
-        code = planes[first] >> shift
-        code |= planes[first + 1] << (8 - shift)
-        if shift + CODE_BITS > 16:
-            code |= planes[first + 2] << (16 - shift)
-        np.bitwise_and(code, _MASK, out=codes[:, :, k])
-    return codes
+def _columns(sub_image: NDArray[np.uint8]) -> Iterator[NDArray[np.uint64]]:
+    """Yield the DN of the k-th codes of all groups (424, groups), those of four lanes a word.
+
+    The 88 bits of a group are in the 64 from its first bit on and the 64 from bit 24 on. The array
+    is the same one each time.
+    """
+    found = np.empty((HEIGHT, _GROUPS, _LANES), np.uint16)
+    code = np.empty(found.shape, np.uint64)
+    strides = (ROW_BYTES, CODE_BITS, CODE_BITS * _GROUPS)
+    for first_bit, codes in ((0, range(5)), (24, range(5, _GROUP))):
+        octets = np.ndarray(found.shape, "<u8", sub_image.data, first_bit // 8, strides)
+        bits = np.ascontiguousarray(octets)
+        for k in codes:
+            np.right_shift(bits, np.uint64(CODE_BITS * k - first_bit), out=code)
+            np.bitwise_and(code, np.uint64(_MASK), out=code)
+            # as indices, which `take` would convert other types to
+            _dn_of_code().take(code.view(np.int64), out=found, mode="clip")
+            yield found.view(np.uint64)[..., 0]
 
 
 def sub_images(samples: NDArray[np.floating] | NDArray[np.integer]) -> NDArray[np.uint8]:

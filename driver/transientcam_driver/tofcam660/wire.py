@@ -19,9 +19,6 @@ REQUEST_BYTES: Final = 34
 LONGEST_ANSWER_BYTES: Final = 4096
 DLL_REGISTERS: Final = (0x71, 0x72, 0x73, 0x8B, 0x93)
 """Those of the delay line, which presets use; free frequencies want them zero."""
-
-ZERO_DN: Final = 2048
-"""Code of a difference of zero."""
 CODES_FROM: Final = 64000
 """From here on a value is no measurement, but says why there is none."""
 LOW_AMPLITUDE, OVERFLOW, SATURATED = 64001, 64002, 64003

@@ -160,5 +160,3 @@ def test_a_fault_of_the_emulated_cable_spoils_a_packet_of_as_many_images(fault: 
 def test_a_fault_that_the_camera_cannot_have_is_refused() -> None:
     with pytest.raises(CameraError, match="babble"):
         emulated().inject(Fault.BABBLE)
-    with pytest.raises(CameraError, match="interlock"):
-        emulated().set_interlock(closed=False)

@@ -14,6 +14,7 @@ from tests.driver.kinect2.standing import (
     TABLES,
     camera_of,
     emulated,
+    firmware,
 )
 from transientcam_driver import CameraError, CameraLost, CameraNotFound, Sequence
 from transientcam_driver.kinect2 import measurement
@@ -136,7 +137,7 @@ def test_another_camera_in_the_same_port_is_not_taken_for_it() -> None:
         device.unplug()
         with pytest.raises(CameraLost):
             read_on(camera)
-        device._power_on = emulated("999")._power_on
+        device._firmware_of_power_on = lambda: firmware("999")
         device.replug()
         with pytest.raises(CameraNotFound, match=SERIAL):
             camera.reconnect()

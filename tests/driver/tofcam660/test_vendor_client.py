@@ -57,7 +57,7 @@ def truth_m(theirs: dict[str, Any], camera: Emulation) -> NDArray[np.float64]:
 @pytest.fixture(scope="module")
 def ours(theirs: dict[str, Any], camera: Emulation) -> dict[float, NDArray[Any]]:
     """The phasors of our driver at the same frequencies, with the delay taken away."""
-    options = DeviceOptions(settle_s=0.0)
+    options = DeviceOptions(settle_s=0.0, answer_s=60.0)  # of a machine that is slow
     with TriggeredCamera(lambda: Tofcam660(VENDOR_HOST, options)) as driver:
         delay_s = driver.capabilities.delay_s
         found = {}

@@ -1,6 +1,5 @@
 """The cable of an emulated Kinect v2: a link at a time, its packets, faults, and a plug."""
 
-import threading
 from collections.abc import Callable, Iterator
 from typing import Final, Protocol
 
@@ -8,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.clock import Clock
-from transientcam_driver.errors import CameraBusy, CameraError, CameraNotFound
 from transientcam_driver.kinect2 import encoder
 from transientcam_driver.kinect2.abilities import FRAME_RATE_HZ
 from transientcam_driver.kinect2.layout import MEASURED
 from transientcam_driver.kinect2.packets import TICK_S
-from transientcam_driver.simulation.device import Fault, PendingFaults
+from transientcam_driver.simulation.device import Fault
 from transientcam_driver.simulation.kinect2.firmware import EmulatedFirmware
 from transientcam_driver.simulation.kinect2.link import EmulatedLink
+from transientcam_driver.simulation.plugged_camera import PluggedCamera
 
 PERIOD_S: Final = 1 / FRAME_RATE_HZ
 _NUMBERS: Final = 1 << 32
@@ -30,8 +29,8 @@ class Pixels(Protocol):
         ...
 
 
-class EmulatedKinect2:
-    """An emulated camera, and its cable.
+class EmulatedKinect2(PluggedCamera[EmulatedLink]):
+    """An emulated camera, and its cable; a fault loses or shortens a packet of an image.
 
     Parameters
     ----------
@@ -46,86 +45,24 @@ class EmulatedKinect2:
     def __init__(
         self, power_on: Callable[[], EmulatedFirmware], pixels: Pixels, *, clock: Clock
     ) -> None:
-        self._power_on = power_on
+        super().__init__("kinect2:emulated", "Kinect v2")
+        self._firmware_of_power_on = power_on
         self._pixels = pixels
         self._clock = clock
-        self._faults = PendingFaults("Kinect v2", Fault.DROP, Fault.CORRUPT_PIXELS)
-        self._link: EmulatedLink | None = None
         self._since_s = clock.now_s()
         self._frame = 0
-        self.firmware = power_on()
-        self.changed = threading.Condition()
-        self.plugged = True
+        self._power_on()
+
+    def _power_on(self) -> None:
+        self.firmware = self._firmware_of_power_on()
+
+    def _new_link(self) -> EmulatedLink:
+        return EmulatedLink(self)
 
     @property
     def lit(self) -> bool:
         """Whether the light is on."""
         return self.plugged and self.firmware.lit
-
-    def connect(self) -> EmulatedLink:
-        """Open the camera.
-
-        Raises
-        ------
-        CameraNotFound
-            The cable is out.
-        CameraBusy
-            It is open already.
-        """
-        with self.changed:
-            if not self.plugged:
-                raise CameraNotFound
-            if self._link is not None:
-                raise CameraBusy("kinect2:emulated")
-            self._link = EmulatedLink(self)
-            return self._link
-
-    def release(self, link: EmulatedLink) -> None:
-        """Take note that a link was closed."""
-        with self.changed:
-            if self._link is link:
-                self._link = None
-
-    # --- cable and faults --------------------------------------------------------------------
-
-    def unplug(self) -> None:
-        """Pull the cable, and with it the power."""
-        with self.changed:
-            self.plugged = False
-            self._link = None
-            self.changed.notify_all()
-
-    def replug(self) -> None:
-        """Plug the cable in again: power-up. No effect on a plugged one."""
-        with self.changed:
-            if not self.plugged:
-                self.firmware = self._power_on()
-                self.plugged = True
-
-    def is_at(self, link: EmulatedLink) -> bool:
-        """Whether a link leads to this camera still."""
-        return self._link is link
-
-    def inject(self, fault: Fault, images: int = 1) -> None:
-        """Lose or shorten a packet of each of the next images.
-
-        Raises
-        ------
-        CameraError
-            This camera knows no such fault.
-        """
-        with self.changed:
-            self._faults.inject(fault, images)
-
-    def set_interlock(self, *, closed: bool) -> None:
-        """Refuse: there is none.
-
-        Raises
-        ------
-        CameraError
-            Always.
-        """
-        raise CameraError("a Kinect v2 has no interlock")
 
     # --- images ------------------------------------------------------------------------------
 

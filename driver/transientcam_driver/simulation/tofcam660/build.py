@@ -1,17 +1,15 @@
 """From a scene to an emulated TOFcam660 in front of it."""
 
-from dataclasses import replace
-
 from transientcam_driver.clock import Clock
 from transientcam_driver.simulation.build import world_before
 from transientcam_driver.simulation.handle import SimulationHandle
 from transientcam_driver.simulation.scene import Scene
 from transientcam_driver.simulation.tofcam660.firmware import EmulatedFirmware
 from transientcam_driver.simulation.tofcam660.network import EmulatedTofcam660
-from transientcam_driver.simulation.tofcam660.pixels import DifferentialPixels
+from transientcam_driver.simulation.two_taps import DifferentialPixels, with_bits
 from transientcam_driver.tofcam660.device import READOUT_S
 from transientcam_driver.tofcam660.region import COLUMNS, ROWS
-from transientcam_driver.tofcam660.wire import DATA_PORT
+from transientcam_driver.tofcam660.wire import DATA_PORT, SATURATED
 
 _BITS = 12
 
@@ -35,19 +33,12 @@ def build_tofcam660(
     CameraError
         A port cannot be had.
     """
-    finer = 2.0 ** (scene.sensor.bits - _BITS)
-    sensor = replace(
-        scene.sensor,
-        bits=_BITS,
-        gain_e_per_dn=scene.sensor.gain_e_per_dn * finer,
-        dark_dn=scene.sensor.dark_dn / finer,
-    )
-    scene = replace(scene, sensor=sensor)
+    scene = with_bits(scene, _BITS)
     world, prepare = world_before(scene, width=COLUMNS, height=ROWS, seed=seed, readout_s=READOUT_S)
 
     def power_on() -> EmulatedFirmware:
         begin_s = clock.now_s()
-        pixels = DifferentialPixels(world)
+        pixels = DifferentialPixels(world, saturated=SATURATED)
         firmware = EmulatedFirmware(pixels, lambda: clock.now_s() - begin_s)
         pixels.expose_for(firmware.integration_us[0] * 1e-6)
         return firmware

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
-from transientcam_driver.simulation.tofcam660.pixels import DifferentialPixels
+from transientcam_driver.simulation.two_taps import DifferentialPixels
 from transientcam_driver.tofcam660.device import (
     MAX_FREQUENCY_HZ,
     MIN_FREQUENCY_HZ,

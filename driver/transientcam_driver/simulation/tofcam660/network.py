@@ -114,16 +114,6 @@ class EmulatedTofcam660:
         """
         self._faults.inject(fault, images)
 
-    def set_interlock(self, *, closed: bool) -> None:
-        """Refuse: there is none.
-
-        Raises
-        ------
-        CameraError
-            Always.
-        """
-        raise CameraError("a TOFcam660 has no interlock")
-
     def close(self) -> None:
         """End it; may be called twice."""
         if not self._closed:

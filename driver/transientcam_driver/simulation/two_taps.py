@@ -1,7 +1,8 @@
-"""What the pixels of an emulated TOFcam660 measure: differences of two taps, at any frequency."""
+"""What pixels with two taps measure: the differences of these, at any frequency."""
 
 import copy
 from collections import OrderedDict
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -9,10 +10,11 @@ from numpy.typing import NDArray
 
 from transientcam_driver.sampling import FOUR_PHASES_RAD
 from transientcam_driver.sequence import ImageLabel, Sequence, SubPhases
+from transientcam_driver.simulation.scene import Scene
 from transientcam_driver.simulation.switchable_world import SwitchableWorld
 from transientcam_driver.simulation.world import World
-from transientcam_driver.tofcam660.wire import SATURATED, ZERO_DN
 
+ZERO_DN: Final = 2048
 _ANY_HZ: Final = 7e6
 _MOST_WORLDS: Final = 40  # m of 32, the zeroth moment, and what is changing
 
@@ -30,10 +32,22 @@ class DifferentialPixels:
     world
         The light in front of the sensor. What a scene needs for a frequency is kept for as long as
         the scene stays.
+    saturated
+        The code of a pixel of which a tap is full.
+    phases_rad
+        Of the images of a frequency.
     """
 
-    def __init__(self, world: SwitchableWorld) -> None:
+    def __init__(
+        self,
+        world: SwitchableWorld,
+        *,
+        saturated: int,
+        phases_rad: tuple[float, ...] = FOUR_PHASES_RAD,
+    ) -> None:
         self._switchable = world
+        self._saturated = saturated
+        self._phases_rad = phases_rad
         self._of: World | None = None
         self._worlds: OrderedDict[Sequence, World] = OrderedDict()
         self._number = 0
@@ -54,14 +68,14 @@ class DifferentialPixels:
     def differences(
         self, frequency_hz: float, exposure_s: float, *, delay_s: float, device_time_s: float
     ) -> Images:
-        """Return the images (4, H, W) at 0, 90, 180 and 270 degrees; code 64003 is saturated.
+        """Return the images (N, H, W) at the phases.
 
         ``delay_s`` is what the light takes inside of the camera.
         """
         world, sequence = self._world(frequency_hz, exposure_s)
         highest = world.sensor.highest_dn
         images = []
-        for index, phase_rad in enumerate(FOUR_PHASES_RAD):
+        for index, phase_rad in enumerate(self._phases_rad):
             late_rad = phase_rad - 2 * np.pi * frequency_hz * delay_s
             taps = [
                 self._tap(world, sequence, index, late_rad + opposite, device_time_s)
@@ -69,7 +83,7 @@ class DifferentialPixels:
             ]
             difference = ZERO_DN + (taps[0].astype(np.int32) - taps[1]) / 2
             spoilt = (taps[0] >= highest) | (taps[1] >= highest)
-            images.append(np.where(spoilt, SATURATED, np.rint(difference)).astype(np.uint16))
+            images.append(np.where(spoilt, self._saturated, np.rint(difference)).astype(np.uint16))
         return np.stack(images)
 
     def sum(self, exposure_s: float, *, device_time_s: float) -> Images:
@@ -115,3 +129,15 @@ def _sequence(frequency_hz: float, exposure_s: float) -> Sequence:
         exposure_s=exposure_s,
         sub_phases=SubPhases("none"),
     )
+
+
+def with_bits(scene: Scene, bits: int) -> Scene:
+    """Return a scene whose sensor has codes of so many bits over the same range of light."""
+    finer = 2.0 ** (scene.sensor.bits - bits)
+    sensor = replace(
+        scene.sensor,
+        bits=bits,
+        gain_e_per_dn=scene.sensor.gain_e_per_dn * finer,
+        dark_dn=scene.sensor.dark_dn / finer,
+    )
+    return replace(scene, sensor=sensor)
