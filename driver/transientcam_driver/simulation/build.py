@@ -143,7 +143,12 @@ def build(
         return Firmware(capabilities, world, power_on_s=now_s)
 
     device = EmulatedDevice(capabilities, power_on, clock=clock)
-    return device, SimulationHandle(scene, world, device, prepare=prepare)
+
+    def set_interlock(closed: bool) -> None:
+        device.set_interlock(closed=closed)
+
+    handle = SimulationHandle(scene, world, device, prepare=prepare, set_interlock=set_interlock)
+    return device, handle
 
 
 def world_before(

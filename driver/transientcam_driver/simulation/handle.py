@@ -38,10 +38,6 @@ class FaultyDevice(Protocol):
         """Inject a fault into the next images."""
         ...
 
-    def set_interlock(self, *, closed: bool) -> None:
-        """Open or close the safety interlock."""
-        ...
-
 
 class SimulationHandle:
     """A `transientcam_driver.handle.Simulation`: see there for what each member guarantees.
@@ -54,15 +50,24 @@ class SimulationHandle:
         The renderer of its images, and the device that sends them.
     prepare
         Prepares another scene, or other effects.
+    set_interlock
+        Closes or opens the safety interlock; None where the camera has none.
     """
 
     def __init__(
-        self, scene: Scene, world: SwitchableWorld, device: FaultyDevice, *, prepare: PrepareScene
+        self,
+        scene: Scene,
+        world: SwitchableWorld,
+        device: FaultyDevice,
+        *,
+        prepare: PrepareScene,
+        set_interlock: Callable[[bool], None] | None = None,
     ) -> None:
         self._scene = scene
         self._world = world
         self._device = device
         self._prepare = prepare
+        self._set_interlock = set_interlock
         self._effects: dict[str, str] = {}
         self._diffusor = False
         self._changing = threading.Lock()
@@ -140,7 +145,9 @@ class SimulationHandle:
 
     def set_interlock(self, *, closed: bool) -> None:
         """Open or close the safety interlock of the light."""
-        self._device.set_interlock(closed=closed)
+        if self._set_interlock is None:
+            raise CameraError("this camera has no interlock")
+        self._set_interlock(closed)
 
 
 def _count(images: int) -> int:

@@ -60,36 +60,41 @@ class Bundle:
         return cls(
             apex,
             (x, y, z),
-            np.broadcast_to(np.asarray(near, dtype=np.float32), counts.shape),
-            np.broadcast_to(np.asarray(far, dtype=np.float32), counts.shape),
+            np.broadcast_to(np.asarray(near, dtype=np.float32), counts.shape).copy(),
+            np.broadcast_to(np.asarray(far, dtype=np.float32), counts.shape).copy(),
             frame,
             low,
             high,
         )
 
-    def meeting(self, shape: Shape) -> Region | None:
-        """Return the region of the pixels whose lines may meet a shape; None if there are none."""
+    def meeting(self, shapes: list[Shape]) -> list[Region | None]:
+        """Return the regions of the pixels whose lines may meet shapes; None if there are none."""
         middle, *across = self.frame
-        meets = np.ones(self.low.shape[1:], dtype=bool)
+        meets: NDArray[np.bool_] = np.ones((len(shapes), *self.low.shape[1:]), dtype=bool)
         for axis, low, high in zip(across, self.low, self.high, strict=True):
-            least, most = shape.tangents(self.apex, middle, axis)
-            meets &= (low <= most) & (high >= least)
-        return _bounds(meets, self.way[0].shape)
+            limits = np.array([each.tangents(self.apex, middle, axis) for each in shapes])
+            meets &= (low <= limits[:, 1, None, None]) & (high >= limits[:, 0, None, None])
+        rows: NDArray[np.bool_] = np.logical_or.reduce(meets, axis=2)
+        columns: NDArray[np.bool_] = np.logical_or.reduce(meets, axis=1)
+        there: NDArray[np.bool_] = np.logical_or.reduce(rows, axis=1)
+        height, width = self.way[0].shape
+        return [
+            (slice(top, min(bottom, height)), slice(left, min(right, width))) if met else None
+            for top, bottom, left, right, met in zip(
+                *_span(rows), *_span(columns), there.tolist(), strict=True
+            )
+        ]
 
-    def within(self, region: Region) -> tuple[tuple[Plane, ...], Plane, Plane]:
+    def within(self, region: Region) -> tuple[tuple[Plane, Plane, Plane], Plane, Plane]:
         """Return the ways of a region's lines, and from where to where they count."""
-        ways = tuple(each[region] for each in self.way)
-        return ways, self.near[region], self.far[region]
+        x, y, z = (each[region] for each in self.way)
+        return (x, y, z), self.near[region], self.far[region]
 
 
-def _bounds(tiles: NDArray[np.bool_], shape: tuple[int, ...]) -> Region | None:
-    rows, columns = np.flatnonzero(tiles.any(axis=1)), np.flatnonzero(tiles.any(axis=0))
-    if not rows.size:
-        return None
-    return (
-        slice(int(rows[0]) * _TILE, min(int(rows[-1] + 1) * _TILE, shape[0])),
-        slice(int(columns[0]) * _TILE, min(int(columns[-1] + 1) * _TILE, shape[1])),
-    )
+def _span(tiles: NDArray[np.bool_]) -> tuple[list[int], list[int]]:
+    """Return the first pixels of the first tiles (N, T) that are true, and those after the last."""
+    first, after = tiles.argmax(axis=1), tiles.shape[1] - tiles[:, ::-1].argmax(axis=1)
+    return (first * _TILE).tolist(), (after * _TILE).tolist()
 
 
 def _frame(middle: Points) -> NDArray[np.float64]:
@@ -115,6 +120,11 @@ def _of_tiles(
 def extent(region: Region) -> tuple[int, int]:
     """Return the numbers of rows and columns."""
     return region[0].stop - region[0].start, region[1].stop - region[1].start
+
+
+def numbers(region: Region) -> tuple[int, int, int, int]:
+    """Return first row and column, and numbers of rows and columns."""
+    return region[0].start, region[1].start, *extent(region)
 
 
 def union(regions: list[Region]) -> Region:

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.scene.geometry import Ellipsoid, Points, Rectangle, Shape
 
 Plane = NDArray[np.float32]
-_TOUCHING = np.float32(1e-4)  # of the way from the apex
+TOUCHING = np.float32(1e-4)
+"""Of the way from the apex: what is so close to a point touches it."""
 _TINY = np.float32(1e-12)
 
 
@@ -35,8 +37,8 @@ class Crossing:
 
     def between(self, near: Plane | np.float32, far: Plane | np.float32) -> NDArray[np.bool_]:
         """Whether lines meet the shape between two of their points, and not just at one."""
-        between: NDArray[np.bool_] = self.at > near + _TOUCHING
-        between &= self.at < far * (1 - _TOUCHING)
+        between: NDArray[np.bool_] = self.at > near + TOUCHING
+        between &= self.at < far * (1 - TOUCHING)
         return between
 
     def holds(self, t: float) -> NDArray[np.bool_]:
@@ -59,37 +61,55 @@ def crossing(shape: Shape, apex: Points, way: tuple[Plane, ...]) -> Crossing:
     return _rectangle(shape, apex, way)
 
 
-def _ellipsoid(shape: Ellipsoid, apex: Points, way: tuple[Plane, ...]) -> Crossing:
+def ball_of(shape: Ellipsoid, apex: Points) -> Plane:
+    """Return what lines from an apex are crossed with: 1 / radii, origin, 1 - its square, tiny."""
     origin = (apex - shape.centre) / shape.radii
-    x, y, z = (w * np.float32(1 / r) for w, r in zip(way, shape.radii, strict=True))
+    ball = np.empty(8, dtype=np.float32)
+    ball[:3], ball[3:6], ball[6], ball[7] = 1 / shape.radii, origin, 1 - origin @ origin, _TINY
+    return ball
+
+
+def plate_of(shape: Rectangle, apex: Points) -> Plane:
+    """Return (3, 5) axes (normal, right, up), places along them, tiny, and 2 over the sides."""
+    origin = apex - shape.centre
+    plate = np.empty((3, 5), dtype=np.float32)
+    plate[0, :3], plate[0, 3], plate[0, 4] = shape.normal, -(origin @ shape.normal), _TINY
+    plate[1, :3], plate[1, 3], plate[1, 4] = shape.right, origin @ shape.right, 2 / shape.width
+    plate[2, :3], plate[2, 3], plate[2, 4] = shape.up, origin @ shape.up, 2 / shape.height
+    return plate
+
+
+def _ellipsoid(shape: Ellipsoid, apex: Points, way: tuple[Plane, ...]) -> Crossing:
+    ball = ball_of(shape, apex)
+    x, y, z = (w * scale for w, scale in zip(way, ball[:3], strict=True))
     squared = single(x * x)
     squared += y * y
     squared += z * z
     squared += _TINY
-    along: Plane = x * np.float32(origin[0])
-    along += y * np.float32(origin[1])
-    along += z * np.float32(origin[2])
+    along: Plane = x * ball[3]
+    along += y * ball[4]
+    along += z * ball[5]
     closest = single(along / squared)
     # 1 minus the squared distance of the line from the centre, where the ellipsoid is a unit sphere
     inside: Plane = along * closest
-    inside += np.float32(1 - origin @ origin)
+    inside += ball[6]
     np.negative(closest, out=closest)
     return Crossing((inside,), closest, np.sqrt(squared))
 
 
 def _rectangle(shape: Rectangle, apex: Points, way: tuple[Plane, ...]) -> Crossing:
-    origin = apex - shape.centre
+    normal, *sides = plate_of(shape, apex)
 
-    def part(axis: Points) -> Plane:
-        x, y, z = (w * np.float32(a) for w, a in zip(way, axis, strict=True))
+    def part(axis: Plane) -> Plane:
+        x, y, z = (w * a for w, a in zip(way, axis, strict=False))
         return single(x + y + z + _TINY)
 
-    at = single(np.float32(-(origin @ shape.normal)) / part(shape.normal))
+    at = single(normal[3] / part(normal))
     inside: list[Plane] = []
-    for axis, length in ((shape.right, shape.width), (shape.up, shape.height)):
+    for axis in sides:
         place = at * part(axis)
-        place += np.float32(origin @ axis)
-        inside.append(1 - np.abs(place) * np.float32(2 / length))
+        place += axis[3]
+        inside.append(1 - np.abs(place) * axis[4])
     return Crossing(tuple(inside), at)
 
 
@@ -168,6 +188,10 @@ def overlapped(one: Plane, other: Plane) -> Plane:
     shares then overlap as far as they can, or not at all if the borders face each other. Across
     each other they overlap by their product.
     """
+    lane = LANES.find("overlapped")
+    if lane is not None:
+        shared: Plane = lane(one, other)
+        return shared
     both = one * other
     at = np.flatnonzero((one > 0) & (one < 1) & (other > 0) & (other < 1))
     if not at.size:

@@ -3,25 +3,31 @@
 The same as ``paths.light_on_ends``, for the many points that are lit anew for every image.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
-from transientcam_driver.simulation.light.coverage import Crossing, Plane, crossing, single
+from transientcam_driver.simulation.light.coverage import (
+    TOUCHING,
+    Plane,
+    ball_of,
+    crossing,
+    plate_of,
+    single,
+)
+from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.light.paths import ImageLight, Lit, RayEnds, beam, highlight
+from transientcam_driver.simulation.light.shares import Around, among, share_around
 from transientcam_driver.simulation.scene.geometry import (
     Ellipsoid,
     Points,
     Rectangle,
+    Shape,
     blocked_by_mask,
 )
 from transientcam_driver.simulation.scene.scene import Scene, Surface
-
-Cover = Callable[[Crossing, NDArray[np.intp], NDArray[np.bool_]], Plane]
-"""Share of the pixels around some points that a crossing covers, where it counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,21 +39,19 @@ class Segment:
 
     apex: Points
     way: tuple[Plane, Plane, Plane]
-    near: Plane | np.float32
+    near: Plane
     mirror: Surface | None
 
     def of(self, kept: NDArray[np.intp]) -> "Segment":
         """Return the lines of some of the points."""
         x, y, z = (w[kept] for w in self.way)
-        near = self.near[kept] if isinstance(self.near, np.ndarray) else self.near
-        return Segment(self.apex, (x, y, z), near, self.mirror)
+        return Segment(self.apex, (x, y, z), self.near[kept], self.mirror)
 
     @property
     def ends(self) -> tuple[Points, Points]:
         """Points (P, 3) where the light arrives, and where it comes from."""
         way = np.stack(self.way, axis=-1).astype(np.float64)
-        near = np.broadcast_to(np.asarray(self.near, dtype=np.float64), len(way))[:, None]
-        return self.apex + way, self.apex + near * way
+        return self.apex + way, self.apex + self.near[:, None] * way
 
     @property
     def box(self) -> tuple[Points, Points]:
@@ -85,11 +89,13 @@ class Ends:
     direction: tuple[Plane, Plane, Plane]
     throughput: NDArray[np.float64]
 
-    def lit(self, lights: tuple[ImageLight, ...], *, movers: tuple[int, ...], cover: Cover) -> Lit:
+    def lit(
+        self, lights: tuple[ImageLight, ...], *, movers: tuple[int, ...], around: Around | None
+    ) -> Lit:
         """Return the light by each chain of mirrors; on the back of a rectangle there is none.
 
-        ``movers`` are the surfaces that move, and ``cover`` says which share of the pixels around
-        some points they cover.
+        ``movers`` are the surfaces that move. They, and mirrors, cover shares of the pixels around
+        points, unless it is not known what is ``around`` these.
         """
         count = len(self.distance_m)
         normal = self._normals()
@@ -115,7 +121,7 @@ class Ends:
                 sent = sent + highlight(
                     self.still, light, ends, np.stack(normal, axis=-1).astype(np.float64)
                 )
-            on, shown, segments = _ways(light, self.point, cover)
+            on, shown, beside, segments = _ways(light, self.point, around)
             if not on.size:
                 continue
             length_m, irradiance = self._irradiance(light, normal, on)
@@ -123,7 +129,7 @@ class Ends:
             for mirror in light.mirrors:
                 irradiance *= np.float32(mirror.reflectivity)
             for segment in segments:
-                irradiance *= self._clear(segment, on, movers, cover)
+                irradiance *= self._clear(segment, on, movers, beside)
             lit.delay_s[k, on] = (length_m + lit.distance_m[on]) / SPEED_OF_LIGHT_M_S
             lit.weight[k, on] = irradiance * sent[on]
         return lit
@@ -132,41 +138,44 @@ class Ends:
         self, light: ImageLight, normal: tuple[Plane, ...], on: NDArray[np.intp]
     ) -> tuple[Plane, Plane]:
         """Length of the ways and irradiance of some points, if nothing is in between."""
-        lamp = light.positions_m[0]
-        way = [np.float32(s) - p[on] for s, p in zip(lamp, self.point, strict=True)]
-        length_m = np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
-        cosine = way[0] * normal[0][on] + way[1] * normal[1][on] + way[2] * normal[2][on]
-        irradiance = np.maximum(cosine, 0) / (length_m * length_m * length_m)
+        lamp = light.positions_m[0].astype(np.float32)
+        axis = light.axis.astype(np.float32)
+        lane = LANES.find("received")
+        if lane is not None:
+            length_m, irradiance, cosine = lane(lamp, axis, *self.point, *normal, on)
+        else:
+            way = [s - p[on] for s, p in zip(lamp, self.point, strict=True)]
+            length_m = np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
+            facing = way[0] * normal[0][on] + way[1] * normal[1][on] + way[2] * normal[2][on]
+            irradiance = np.maximum(facing, 0) / (length_m * length_m * length_m)
+            cosine = -(way[0] * axis[0] + way[1] * axis[1] + way[2] * axis[2]) / length_m
         if self.still.light.beam_exponent:
-            along = -sum(w * np.float32(a) for w, a in zip(way, light.axis, strict=True))
-            irradiance *= beam(self.still.light, along / length_m).astype(np.float32)
+            irradiance *= beam(self.still.light, cosine).astype(np.float32)
         return single(length_m), single(irradiance)
 
     def _clear(
-        self, segment: Segment, on: NDArray[np.intp], movers: tuple[int, ...], cover: Cover
+        self,
+        segment: Segment,
+        on: NDArray[np.intp],
+        movers: tuple[int, ...],
+        around: Around | None,
     ) -> Plane:
         """Share of the light that all surfaces let through on a segment of its way."""
         clear = np.ones(len(on), dtype=np.float32)
         low, high = segment.box
+        mine = self.index[on]
         for index, surface in enumerate(self.surfaces):
-            shape = surface.shape
-            least, most = shape.box
+            least, most = surface.shape.box
             if (most < low).any() or (least > high).any() or surface is segment.mirror:
                 continue
             if surface.opaque is not None:
-                assert isinstance(shape, Rectangle)  # noqa: S101  (stencils are)
+                assert isinstance(surface.shape, Rectangle)  # noqa: S101  (stencils are)
                 start, end = segment.ends
-                clear[blocked_by_mask(shape, surface.opaque, start, end)] = 0
+                clear[blocked_by_mask(surface.shape, surface.opaque, start, end)] = 0
                 continue
-            cross = crossing(shape, segment.apex, segment.way)
-            between = cross.between(segment.near, np.float32(1)) & (self.index[on] != index)
-            met = between & (np.minimum.reduce(cross.inside) > 0)
-            if not met.any():
-                continue
-            # a point inside a surface stands for those beside it that are seen in its pixel
-            outside = ~cross.holds(1.0)
-            between, met = between & outside, met & outside
-            clear *= 1 - (cover(cross, on, between) if index in movers else met)
+            soft = around if index in movers else None
+            if not _dimmed(surface.shape, segment, (mine, index), soft, clear):
+                _dim(surface.shape, segment, mine != index, soft, clear)
         return clear
 
     def _normals(self) -> tuple[Plane, Plane, Plane]:
@@ -186,35 +195,92 @@ class Ends:
         return single(x / length), single(y / length), single(z / length)
 
 
+def _dim(
+    shape: Shape,
+    segment: Segment,
+    others: NDArray[np.bool_],
+    around: Around | None,
+    clear: Plane,
+) -> None:
+    """Take what a shape blocks on a segment from the light of points on other surfaces."""
+    cross = crossing(shape, segment.apex, segment.way)
+    between = cross.between(segment.near, np.float32(1)) & others
+    met = between & (np.minimum.reduce(cross.inside) > 0)
+    if not met.any():
+        return
+    # a point inside a surface stands for those beside it that are seen in its pixel
+    clear *= 1 - share_around(cross, between & ~cross.holds(1.0), around)
+
+
+def _dimmed(
+    shape: Shape,
+    segment: Segment,
+    of: tuple[NDArray[np.intp], int],
+    around: Around | None,
+    clear: Plane,
+) -> bool:
+    """Do the same by a lane, if there is one; ``of`` are the points' surfaces and the shape's."""
+    line = *segment.way, segment.near, TOUCHING, *of
+    if isinstance(shape, Ellipsoid):
+        lane = LANES.find("dim_softly")
+        if lane is None or around is None:
+            return False
+        lane(ball_of(shape, segment.apex), *line, around, clear)
+        return True
+    lane = LANES.find("dim_behind")
+    if lane is None or around is not None:
+        return False
+    lane(plate_of(shape, segment.apex), *line, clear)
+    return True
+
+
 def _ways(
-    light: ImageLight, point: tuple[Plane, Plane, Plane], cover: Cover
-) -> tuple[NDArray[np.intp], Plane, list[Segment]]:
+    light: ImageLight, point: tuple[Plane, Plane, Plane], around: Around | None
+) -> tuple[NDArray[np.intp], Plane, Around | None, list[Segment]]:
     """Return the points that a chain of mirrors shows the light to, and its ways to them.
 
-    The second is the share of the pixel around each point to which it does.
+    Between the two, the share of the pixel around each point to which it does, and what is around.
     """
     on = np.arange(len(point[0]))
-    shown = np.ones(len(on), dtype=np.float32)
+    share = np.ones(len(on), dtype=np.float32)
     segments: list[Segment] = []
     start, last = point, None
     for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
         way = _from(image_m, start)
-        cross = crossing(mirror.shape, image_m, way)
-        shows = cross.between(np.float32(0), np.float32(1))
-        shows &= sum(w * np.float32(n) for w, n in zip(way, mirror.mirror.normal, strict=True)) > 0
-        if not (shows & (np.minimum.reduce(cross.inside) > 0)).any():
-            return on[:0], shown[:0], []
-        shown = shown * cover(cross, on, shows)
-        kept = np.flatnonzero(shown)
-        on, shown = on[kept], shown[kept]
+        kept, part, at = _shown(mirror.mirror, image_m, way, around)
+        on, share = on[kept], share[kept] * part
+        if not on.size:
+            return on, share, around, []
+        around = around if around is None else among(kept, around)
         segments = [each.of(kept) for each in segments]
         x, y, z = (w[kept] for w in way)
-        at = cross.at[kept]
         segments.append(Segment(image_m, (x, y, z), at, last))
         start = _moved(image_m, (x * at, y * at, z * at))
         last = mirror
     lamp = light.positions_m[-1]
-    return on, shown, [*segments, Segment(lamp, _from(lamp, start), np.float32(0), last)]
+    none = np.zeros(len(on), dtype=np.float32)
+    return on, share, around, [*segments, Segment(lamp, _from(lamp, start), none, last)]
+
+
+def _shown(
+    mirror: Rectangle,
+    image_m: Points,
+    way: tuple[Plane, Plane, Plane],
+    around: Around | None,
+) -> tuple[NDArray[np.intp], Plane, Plane]:
+    """Return the points that a mirror shows the light to, its shares of their pixels, and its t."""
+    lane = LANES.find("shown")
+    if lane is not None and around is not None:
+        kept, share, at = lane(plate_of(mirror, image_m), *way, TOUCHING, around)
+        return kept, share, at
+    cross = crossing(mirror, image_m, way)
+    shows = cross.between(np.float32(0), np.float32(1))
+    shows &= sum(w * np.float32(n) for w, n in zip(way, mirror.normal, strict=True)) > 0
+    if not (shows & (np.minimum.reduce(cross.inside) > 0)).any():
+        shows[:] = False
+    share = share_around(cross, shows, around)
+    kept = np.flatnonzero(share)
+    return kept, share[kept], cross.at[kept]
 
 
 def _from(apex: Points, point: tuple[Plane, ...]) -> tuple[Plane, Plane, Plane]:

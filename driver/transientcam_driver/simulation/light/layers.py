@@ -7,22 +7,28 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.light.bundle import Region, inside
+from transientcam_driver.simulation.light.bundle import Region, extent, inside
 from transientcam_driver.simulation.light.coverage import Plane, overlapped, single
+from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.light.paths import Lit, scatter_of, sparse_image
 from transientcam_driver.simulation.light.still import StillLight
 from transientcam_driver.simulation.responses import Scatter, SparseResponses
 from transientcam_driver.simulation.scene.scene import Scene
 
+Values = NDArray[np.float64]
+
 
 @dataclass(frozen=True, slots=True)
-class Layer:
-    """Pixels, by index, each once, that show something that moves, and by which share."""
+class Layers:
+    """Pixels, by index, that show something that moves, and by which share.
 
-    region: Region
+    Each of the ``parts`` is one surface from one point, with each pixel once.
+    """
+
     pixel: NDArray[np.intp]
     share: NDArray[np.float32]
     lit: Lit
+    parts: tuple[slice, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +53,7 @@ class MovingResponses:
         self,
         still: StillLight,
         scene: Scene,
-        layers: tuple[Layer, ...],
+        layers: Layers | None,
         shadows: tuple[Shadow, ...],
         region: Region,
     ) -> None:
@@ -58,8 +64,9 @@ class MovingResponses:
         self._shape = still.height, still.width
         self._layers = layers
         self._uncovered = np.ones(still.height * still.width, dtype=np.float32)
-        for each in self._layers:
-            self._uncovered[each.pixel] -= each.share
+        if layers is not None:
+            for part in layers.parts:
+                self._uncovered[layers.pixel[part]] -= layers.share[part]
         np.maximum(self._uncovered, 0, out=self._uncovered)  # what rounding leaves
         self._shadows = tuple(self._uncovered_part(each) for each in shadows)
 
@@ -81,47 +88,72 @@ class MovingResponses:
 
     def moments_in(self, region: Region, frequency_hz: float) -> NDArray[np.complex64]:
         """Moments of a region that holds all that differs."""
-        if frequency_hz not in self._found:
-            self._found[frequency_hz] = self._moments(frequency_hz)
+        differ = self.differing(frequency_hz)
         if region == self.region:
-            return self._found[frequency_hz]
-        moments = self._still.phasors(frequency_hz)[1][region].copy()
-        moments[inside(self.region, region)] = self._found[frequency_hz]
+            return differ
+        moments = self.unchanged(frequency_hz)[region].copy()
+        moments[inside(self.region, region)] = differ
         return moments
 
-    def _moments(self, frequency_hz: float) -> NDArray[np.complex64]:
+    def unchanged(self, frequency_hz: float) -> NDArray[np.complex64]:
+        """Moments (H, W) of what stands still."""
+        return self._still.phasors(frequency_hz)[1]
+
+    def differing(self, frequency_hz: float) -> NDArray[np.complex64]:
         """Moments of the region that differs."""
+        if frequency_hz not in self._found:
+            self._found[frequency_hz] = self._moments(frequency_hz)
+        return self._found[frequency_hz]
+
+    def _moments(self, frequency_hz: float) -> NDArray[np.complex64]:
         each, total = self._still.phasors(frequency_hz)
         region = self.region
         moments = total[region].copy()
         for shadow in self._shadows:
-            moments[inside(shadow.region, region)] -= (1 - shadow.left) * each[shadow.chain][
-                shadow.region
-            ]
+            _darken(moments, region, shadow, each[shadow.chain])
         moments *= self._uncovered.reshape(self._shape)[region]
-        for layer in self._layers:
-            rows, columns = np.divmod(layer.pixel, self._shape[1])
-            at = rows - region[0].start, columns - region[1].start
-            moments[at] += self._of_layer(layer, frequency_hz)
+        if self._layers is not None:
+            flat, of_rays = moments.reshape(-1), self._of_layers(self._layers, frequency_hz)
+            for part in self._layers.parts:
+                flat[self._places[part]] += of_rays[part]
         return moments
 
-    def _of_layer(self, layer: Layer, frequency_hz: float) -> NDArray[np.complex64]:
-        """Moments of a layer's pixels by their shares, in single precision."""
-        lit = layer.lit
-        of_rays = np.zeros(len(lit.surface), dtype=np.complex64)
-        for delay_s, weight in zip(lit.delay_s, lit.weight, strict=True):
-            if not weight.any():
-                continue
+    @cached_property
+    def _places(self) -> NDArray[np.intp]:
+        """Where the pixels of layers are in the region that differs."""
+        assert self._layers is not None  # noqa: S101  (who asks has some)
+        rows, columns = np.divmod(self._layers.pixel, self._shape[1])
+        top, left = self.region[0].start, self.region[1].start
+        places: NDArray[np.intp] = (rows - top) * extent(self.region)[1] + columns - left
+        return places
+
+    @cached_property
+    def _ways(self) -> list[tuple[slice | NDArray[np.intp], Values, Values]]:
+        """Points of layers, delays and weights, of each chain of mirrors where it lights any."""
+        assert self._layers is not None  # noqa: S101  (who asks has some)
+        ways: list[tuple[slice | NDArray[np.intp], Values, Values]] = []
+        for delay_s, weight in zip(self._layers.lit.delay_s, self._layers.lit.weight, strict=True):
+            on = np.flatnonzero(weight)
+            if len(on) == len(weight):
+                ways.append((slice(None), delay_s, weight))
+            elif on.size:
+                ways.append((on, delay_s[on], weight[on]))
+        return ways
+
+    def _of_layers(self, layers: Layers, frequency_hz: float) -> NDArray[np.complex64]:
+        """Moments of the points of layers by their shares, in single precision."""
+        of_rays = np.zeros(len(layers.pixel), dtype=np.complex64)
+        for on, delay_s, weight in self._ways:
             if not frequency_hz:
-                of_rays.real += weight
+                of_rays.real[on] += weight
                 continue
             phase_rad = (2 * np.pi * frequency_hz * delay_s).astype(np.float32)
-            of_rays.real += weight * np.cos(phase_rad)
-            of_rays.imag += weight * np.sin(phase_rad)
-        scatter = lit.scatter(self.scene)
+            of_rays.real[on] += weight * np.cos(phase_rad)
+            of_rays.imag[on] += weight * np.sin(phase_rad)
+        scatter = layers.lit.scatter(self.scene)
         if scatter is not None:
             of_rays *= scatter.transfer(frequency_hz)
-        of_rays *= layer.share
+        of_rays *= layers.share
         return of_rays
 
     def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -144,19 +176,22 @@ class MovingResponses:
             still.delay_s,
             still.weight,
         )
-        for layer in self._layers:
-            most = np.flatnonzero(layer.share > 0.5)
-            lit.surface[layer.pixel[most]] = layer.lit.surface[most]
-            lit.point[layer.pixel[most]] = layer.lit.point[most]
-            lit.distance_m[layer.pixel[most]] = layer.lit.distance_m[most]
+        if self._layers is not None:
+            most = np.flatnonzero(self._layers.share > 0.5)  # of a pixel, one at most
+            pixel, of = self._layers.pixel[most], self._layers.lit
+            lit.surface[pixel] = of.surface[most]
+            lit.point[pixel] = of.point[most]
+            lit.distance_m[pixel] = of.distance_m[most]
         return lit
 
     @cached_property
     def reflectance(self) -> NDArray[np.float32]:
         """(H, W) of what the pixels see, by its shares."""
         reflectance = self._still.reflectance * self._uncovered
-        for layer in self._layers:
-            reflectance[layer.pixel] += (layer.share * layer.lit.reflectance).astype(np.float32)
+        if self._layers is not None:
+            more = (self._layers.share * self._layers.lit.reflectance).astype(np.float32)
+            for part in self._layers.parts:
+                reflectance[self._layers.pixel[part]] += more[part]
         return reflectance.reshape(self._shape)
 
     @cached_property
@@ -169,9 +204,10 @@ class MovingResponses:
             planes[:, *shadow.region] *= shadow.left  # a view of weight
             weight[shadow.chain :: chains] = planes.reshape(len(planes), -1)
         delays, weights, spreads = [delay_s], [weight], [scatter]
-        for layer in self._layers:
-            more_s, more, spread = self._planes_of(layer)
-            delays, weights, spreads = [*delays, more_s], [*weights, more], [*spreads, spread]
+        if self._layers is not None:
+            for part in self._layers.parts:
+                more_s, more, spread = self._planes_of(self._layers, part)
+                delays, weights, spreads = [*delays, more_s], [*weights, more], [*spreads, spread]
         whole = None
         if scatter is not None:
             whole = Scatter(
@@ -180,20 +216,24 @@ class MovingResponses:
             )
         return sparse_image(np.concatenate(delays), np.concatenate(weights), whole, self._shape)
 
-    def _planes_of(
-        self, layer: Layer
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], Scatter | None]:
+    def _planes_of(self, layers: Layers, part: slice) -> tuple[Values, Values, Scatter | None]:
         """Delays, weights and spread of a layer, (K, H W)."""
-        delays, surfaces = layer.lit.delay_s, layer.lit.surface
-        weights = layer.share * layer.lit.weight
-        delay_s, weight, surface = [], [], []
-        for index in np.unique(surfaces):
-            mine = surfaces == index
-            shape = (len(weights), len(self._uncovered))
-            delay_s.append(np.zeros(shape))
-            weight.append(np.zeros(shape))
-            delay_s[-1][:, layer.pixel[mine]] = delays[:, mine]
-            weight[-1][:, layer.pixel[mine]] = weights[:, mine]
-            surface.append(np.full(shape, index))
-        spread = scatter_of(self.scene, np.concatenate(surface))
-        return np.concatenate(delay_s), np.concatenate(weight), spread
+        lit, pixel = layers.lit.part(part), layers.pixel[part]
+        shape = (len(lit.weight), len(self._uncovered))
+        delay_s, weight = np.zeros(shape), np.zeros(shape)
+        delay_s[:, pixel] = lit.delay_s
+        weight[:, pixel] = layers.share[part] * lit.weight
+        return delay_s, weight, scatter_of(self.scene, np.full(shape, lit.surface[0]))
+
+
+def _darken(
+    moments: NDArray[np.complex64], region: Region, shadow: Shadow, each: NDArray[np.complex64]
+) -> None:
+    """Take what a shadow leaves out of light by one chain (H, W) from the moments of a region."""
+    at = inside(shadow.region, region)
+    lane = LANES.find("darkened")
+    if lane is None:
+        moments[at] -= (1 - shadow.left) * each[shadow.region]
+        return
+    starts = (of.start for of in (*shadow.region, *at))
+    lane(moments.view(np.float32), each.view(np.float32), shadow.left, *starts)

@@ -5,7 +5,9 @@ pixels that show one of them, by the share of the pixel that it covers, and the 
 it blocks. Everything follows the device's time without steps.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,19 +21,14 @@ from transientcam_driver.simulation.light.bundle import (
     overlap,
     union,
 )
-from transientcam_driver.simulation.light.coverage import (
-    Crossing,
-    Plane,
-    covered,
-    covered_among,
-    crossing,
-    overlapped,
-)
+from transientcam_driver.simulation.light.coverage import Plane, overlapped
 from transientcam_driver.simulation.light.ends import Ends
-from transientcam_driver.simulation.light.layers import Layer, MovingResponses, Shadow
+from transientcam_driver.simulation.light.lanes import LANES
+from transientcam_driver.simulation.light.layers import Layers, MovingResponses, Shadow
 from transientcam_driver.simulation.light.paths import ImageLight, image_lights
+from transientcam_driver.simulation.light.shares import above, around, seen, shaded
 from transientcam_driver.simulation.light.still import Sight, StillLight
-from transientcam_driver.simulation.scene.geometry import Points
+from transientcam_driver.simulation.scene.geometry import Points, Shape
 from transientcam_driver.simulation.scene.scene import Scene
 
 _TINY = np.float32(1e-9)
@@ -50,8 +47,14 @@ class _Seen:
 
     def points(self) -> tuple[NDArray[Any], ...]:
         """Return its pixels: rows, columns, shares, distances, and points and ways by component."""
+        bundle = self.sight.bundle
+        lane = LANES.find("points")
+        if lane is not None:
+            corner, apex = (of.start for of in self.region), bundle.apex.astype(np.float32)
+            places, lines = lane(self.share, self.at_m, *bundle.way, *corner, apex)
+            return *places, *lines
         place = np.nonzero(self.share)
-        at_m, bundle = self.at_m[place], self.sight.bundle
+        at_m = self.at_m[place]
         rows, columns = (on + of.start for on, of in zip(place, self.region, strict=True))
         way = [each[rows, columns] for each in bundle.way]
         point = [w * at_m + np.float32(a) for w, a in zip(way, bundle.apex, strict=True)]
@@ -76,6 +79,8 @@ class MovingLight:
         self.scene = scene
         self.still = still
         self._soft = soft
+        if soft:
+            LANES.want()
         self._movers = tuple(k for k, each in enumerate(scene.surfaces) if each.motions)
         self._lights = tuple(image_lights(scene))
         self._sights = still.lines_of_sight(soft=soft)
@@ -86,45 +91,29 @@ class MovingLight:
     def at(self, time_s: float) -> MovingResponses:
         """Impulse responses at a time."""
         scene = self.scene.at(time_s)
-        found = [self._cover(scene, k, sight) for sight in self._sights for k in self._movers]
-        seen = self._visible([each for each in found if each])
-        layers = self._lit(scene, seen) if seen else []
-        shadows = [shadow for k in range(len(self._chains)) if (shadow := self._shadow(scene, k))]
-        region = union([*(each.region for each in layers), *(each.region for each in shadows)])
-        return MovingResponses(self.still, scene, tuple(layers), tuple(shadows), region)
+        shapes = [scene.surfaces[k].shape for k in self._movers]
+        found = [each for sight in self._sights for each in self._cover(shapes, sight)]
+        visible = self._visible(found)
+        layers = self._lit(scene, visible) if visible else None
+        shadows = [shadow for k in range(len(self._chains)) if (shadow := self._shadow(shapes, k))]
+        region = union([*(each.region for each in visible), *(each.region for each in shadows)])
+        return MovingResponses(self.still, scene, layers, tuple(shadows), region)
 
-    def _cover(self, scene: Scene, index: int, sight: Sight) -> _Seen | None:
-        """Shares of pixels that a surface covers, where nothing that stands still is before it."""
-        shape = scene.surfaces[index].shape
-        region = sight.bundle.meeting(shape)
-        if region is None:
-            return None
-        way, near, far = sight.bundle.within(region)
-        cross = crossing(shape, sight.bundle.apex, way)
-        share, root = self._share(cross, rooted=True)
-        at_m = cross.entered(root)
-        share *= sight.fills[region]
-        share[~((at_m > near) & (at_m < far))] = 0
-        return _Seen(index, sight, region, share, at_m) if share.any() else None
+    def _cover(self, shapes: list[Shape], sight: Sight) -> Iterator[_Seen]:
+        """Shares of pixels that surfaces cover, where nothing that stands still is before them."""
+        bundle = sight.bundle
+        for index, shape, region in zip(self._movers, shapes, bundle.meeting(shapes), strict=True):
+            if region is None:
+                continue
+            share, at_m = seen(shape, bundle, region, sight.fills, soft=self._soft)
+            if share.any():
+                yield _Seen(index, sight, region, share, at_m)
 
-    def _share(self, cross: Crossing, *, rooted: bool = False) -> tuple[Plane, Plane]:
-        """Share of each pixel that a shape covers; with the mean root that says where, if asked."""
-        if not self._soft:
-            shares = [self._above(each) for each in cross.inside]
-            root = np.sqrt(np.maximum(cross.inside[0], 0)) if rooted else shares[0]
-            return _product(shares), root
-        parts = [covered(each, rooted=rooted) for each in cross.inside]
-        return _product([share for share, _root in parts]), parts[0][1]
-
-    def _above(self, values: Plane) -> Plane:
-        """Share of each pixel where values are above 0."""
-        return covered(values, rooted=False)[0] if self._soft else (values > 0).astype(np.float32)
-
-    def _visible(self, seen: list[_Seen]) -> list[_Seen]:
+    def _visible(self, found: list[_Seen]) -> list[_Seen]:
         """Take from each share what nearer surfaces that move cover of it; leave out the hidden."""
-        left = [each.share.copy() for each in seen]
-        for k, one in enumerate(seen):
-            for other, share in zip(seen[k + 1 :], left[k + 1 :], strict=True):
+        left = [each.share.copy() for each in found]
+        for k, one in enumerate(found):
+            for other, share in zip(found[k + 1 :], left[k + 1 :], strict=True):
                 both = overlap(one.region, other.region)
                 if both is None:
                     continue
@@ -132,55 +121,43 @@ class MovingLight:
                 hidden = overlapped(one.share[mine], other.share[its])
                 if not hidden.any():
                     continue
-                nearer = self._above(other.at_m[its] - one.at_m[mine])
+                nearer = above(other.at_m[its] - one.at_m[mine], soft=self._soft)
                 share[its] *= 1 - nearer * hidden / np.maximum(other.share[its], _TINY)
                 left[k][mine] *= 1 - (1 - nearer) * hidden / np.maximum(one.share[mine], _TINY)
-        shown = zip(seen, left, strict=True)
+        shown = zip(found, left, strict=True)
         return [replace(each, share=share) for each, share in shown if share.any()]
 
-    def _lit(self, scene: Scene, seen: list[_Seen]) -> list[Layer]:
+    def _lit(self, scene: Scene, visible: list[_Seen]) -> Layers:
         """Light the parts of surfaces that are seen, all at once."""
-        region = union([each.region for each in seen])
-        points = [each.points() for each in seen]
+        points = [each.points() for each in visible]
         counts = [len(each[0]) for each in points]
         rows, columns, share, at_m, *components = map(np.concatenate, zip(*points, strict=True))
-        around = _around(rows - region[0].start, columns - region[1].start, extent(region))
-
-        def cover(cross: Crossing, on: NDArray[np.intp], counts: NDArray[np.bool_]) -> Plane:
-            values = [np.where(counts, each, np.float32(np.nan)) for each in cross.inside]
-            if not self._soft:
-                return _product([(each > 0).astype(np.float32) for each in values])
-            beside = around if len(on) == around.shape[1] else _among(on, around)
-            return _product([covered_among(each, beside) for each in values])
-
+        region = union([each.region for each in visible])
         lit = Ends(
             self.still.scene,
             scene.surfaces,
-            np.repeat([each.index for each in seen], counts),
+            np.repeat([each.index for each in visible], counts),
             (components[0], components[1], components[2]),
             at_m,
             (components[3], components[4], components[5]),
-            np.repeat([each.sight.throughput for each in seen], counts),
-        ).lit(self._lights, movers=self._movers, cover=cover)
-        pixel = rows * self.still.width + columns
-        ends = np.cumsum(counts)
-        return [
-            Layer(each.region, pixel[start:end], share[start:end], lit.part(slice(start, end)))
-            for each, start, end in zip(seen, [0, *ends[:-1]], ends, strict=True)
-        ]
+            np.repeat([each.sight.throughput for each in visible], counts),
+        ).lit(
+            self._lights,
+            movers=self._movers,
+            around=around(rows, columns, region) if self._soft else None,
+        )
+        ends = np.cumsum([0, *counts]).tolist()
+        parts = tuple(slice(*pair) for pair in pairwise(ends))
+        return Layers(rows * self.still.width + columns, share, lit, parts)
 
-    def _shadow(self, scene: Scene, chain: int) -> Shadow | None:
+    def _shadow(self, shapes: list[Shape], chain: int) -> Shadow | None:
         """Share of the light by a chain of mirrors that is left on what stands still."""
         dark: list[tuple[Region, Plane]] = []
         for bundle in self._chains[chain]:
-            for index in self._movers:
-                shape = scene.surfaces[index].shape
-                region = bundle.meeting(shape)
+            for shape, region in zip(shapes, bundle.meeting(shapes), strict=True):
                 if region is None:
                     continue
-                way, near, far = bundle.within(region)
-                cross = crossing(shape, bundle.apex, way)
-                share = self._share(cross)[0] * cross.between(near, far)
+                share = shaded(shape, bundle, region, soft=self._soft)
                 if share.any():
                     dark.append((region, share))
         if not dark:
@@ -235,27 +212,3 @@ def _segments(
         start = start + fraction[:, None] * (image_m - start)
     segments.append((light.positions_m[-1], start, np.float32(0)))
     return segments
-
-
-def _around(
-    rows: NDArray[np.intp], columns: NDArray[np.intp], shape: tuple[int, int]
-) -> NDArray[np.intp]:
-    """Return the points (4, P) above, below, left and right of points; P is none."""
-    place = np.full((shape[0] + 2, shape[1] + 2), len(rows))
-    place[rows + 1, columns + 1] = np.arange(len(rows))
-    steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
-    return np.array([place[rows + 1 + down, columns + 1 + right] for down, right in steps])
-
-
-def _among(on: NDArray[np.intp], around: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return what is around some of the points, by their own indices."""
-    place = np.full(around.shape[1] + 1, len(on))
-    place[on] = np.arange(len(on))
-    return place[around[:, on]]
-
-
-def _product(planes: list[Plane]) -> Plane:
-    product = planes[0]
-    for plane in planes[1:]:
-        product = product * plane
-    return product

@@ -3,13 +3,15 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.light.bundle import Region, union
+from transientcam_driver.simulation.light.bundle import Region, numbers, union
 from transientcam_driver.simulation.light.coverage import single
+from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.light.layers import MovingResponses
 from transientcam_driver.simulation.scene.motion import Motion
 from transientcam_driver.simulation.scene.scene import Scene
@@ -122,6 +124,15 @@ class Between:
     def moments_in(self, region: Region, frequency_hz: float) -> NDArray[np.complex64]:
         """Moments of a region that holds all that differs."""
         (one, first), (other, second) = self._parts
+        lane = LANES.find("blended")
+        if lane is not None:
+            parts = (
+                (np.float32(share), of.differing(frequency_hz).view(np.float32), numbers(of.region))
+                for share, of in self._parts
+            )
+            total = first.unchanged(frequency_hz).view(np.float32)
+            mixed: NDArray[np.float32] = lane(total, numbers(region), *chain.from_iterable(parts))
+            return mixed.view(np.complex64)
         moments = np.float32(one) * first.moments_in(region, frequency_hz)
         moments += np.float32(other) * second.moments_in(region, frequency_hz)
         return moments

@@ -6,6 +6,7 @@ Lengths in m; x points right, y away from the camera, z up.
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import mul
 
 import numpy as np
 from numpy.typing import NDArray
@@ -229,14 +230,19 @@ class Ellipsoid:
         In the plane of the direction and of one across it, both unit vectors. Infinite where it
         reaches behind the apex.
         """
-        away, along_m, across_m = self.centre - apex, self.radii * middle, self.radii * across
-        along, aside = float(away @ middle), float(away @ across)
+        away, radii = (self.centre - apex).tolist(), self.radii.tolist()
+        # by numbers: each call of numpy takes as long as all of this
+        onwards, sideways = middle.tolist(), across.tolist()
+        along = sum(map(mul, away, onwards))
+        aside = sum(map(mul, away, sideways))
+        along_m = list(map(mul, radii, onwards))
+        across_m = list(map(mul, radii, sideways))
         # planes through the apex that touch it: (aside - t along)^2 = |radii (across - t middle)|^2
-        a = along * along - float(along_m @ along_m)
+        a = along * along - sum(map(mul, along_m, along_m))
         if along <= 0 or a <= _CLEAR:
-            return -np.inf, np.inf
-        b = along * aside - float(along_m @ across_m)
-        c = aside * aside - float(across_m @ across_m)
+            return -math.inf, math.inf
+        b = along * aside - sum(map(mul, along_m, across_m))
+        c = aside * aside - sum(map(mul, across_m, across_m))
         root = math.sqrt(max(b * b - a * c, 0.0))
         return (b - root) / a, (b + root) / a
 

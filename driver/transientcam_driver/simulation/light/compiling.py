@@ -1,0 +1,48 @@
+"""From functions to lanes: compiled for one signature by numba, or loaded from its cache."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from numba import float32 as numba_float32
+from numba import int64 as numba_int64
+from numba import njit
+from numba import types as numba_types
+
+LANES: dict[str, Callable[..., Any]] = {}
+"""All lanes that are compiled, by their names."""
+
+# numba is only partly annotated
+float32: Any = numba_float32
+int64: Any = numba_int64
+_types: Any = numba_types
+LINE = float32[::1]
+PLANE = _types.Array(float32, 2, "A")
+WHOLE = _types.Array(float32, 2, "C")
+PLACES = int64[::1]
+AROUND = int64[:, ::1]
+REGION = _types.UniTuple(int64, 4)
+"""First row and column, numbers of rows and columns."""
+
+
+def inner(function: Callable[..., Any]) -> Any:
+    """Have a function compiled with those that call it, which are in the same file.
+
+    The cache notices changes of that file only.
+    """
+    return njit(nogil=True, error_model="numpy")(function)
+
+
+def lane(*signature: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Compile a function now, and for this signature only: no call starts the compiler."""
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        dispatcher = inner(function)
+        with suppress(RuntimeError):  # where there is no place to keep it between processes
+            dispatcher.enable_caching()
+        dispatcher.compile(signature)
+        dispatcher.disable_compile()
+        LANES[function.__name__] = dispatcher
+        return dispatcher
+
+    return decorate

@@ -1,0 +1,116 @@
+"""Which shares of pixels shapes cover along lines through one point, by lanes that are ready.
+
+``soft`` edges take shares of the pixels that they cross; others run between pixels.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver.simulation.light.bundle import Bundle, Region, numbers
+from transientcam_driver.simulation.light.coverage import (
+    TOUCHING,
+    Crossing,
+    Plane,
+    ball_of,
+    covered,
+    covered_among,
+    crossing,
+)
+from transientcam_driver.simulation.light.lanes import LANES
+from transientcam_driver.simulation.scene.geometry import Ellipsoid, Shape
+
+Around = NDArray[np.intp]
+"""(4, P): the points above, below, left and right of each, by index; P is none."""
+
+
+def seen(
+    shape: Shape, bundle: Bundle, region: Region, fills: Plane, *, soft: bool
+) -> tuple[Plane, Plane]:
+    """Return shares (h, w) of what ``fills`` pixels that show a shape, and the t of its front.
+
+    ``fills`` (H, W) are shares of all pixels.
+    """
+    lane = LANES.find("seen")
+    if lane is not None and soft and isinstance(shape, Ellipsoid):
+        lines = *bundle.way, bundle.near, bundle.far
+        share, at = lane(ball_of(shape, bundle.apex), *lines, fills, numbers(region))
+        return share, at
+    way, near, far = bundle.within(region)
+    cross = crossing(shape, bundle.apex, way)
+    share, root = _share(cross, soft=soft, rooted=True)
+    at = cross.entered(root)
+    share *= fills[region]
+    share[~((at > near) & (at < far))] = 0
+    return share, at
+
+
+def shaded(shape: Shape, bundle: Bundle, region: Region, *, soft: bool) -> Plane:
+    """Return shares (h, w) of pixels whose lines a shape blocks between two of their points."""
+    lane = LANES.find("shaded")
+    if lane is not None and soft and isinstance(shape, Ellipsoid):
+        lines = *bundle.way, bundle.near, bundle.far
+        dark: Plane = lane(ball_of(shape, bundle.apex), *lines, numbers(region), TOUCHING)
+        return dark
+    way, near, far = bundle.within(region)
+    cross = crossing(shape, bundle.apex, way)
+    return _share(cross, soft=soft)[0] * cross.between(near, far)
+
+
+def above(values: Plane, *, soft: bool) -> Plane:
+    """Return the share of each pixel (h, w) where values are above 0."""
+    if not soft:
+        return (values > 0).astype(np.float32)
+    lane = LANES.find("covered")
+    share: Plane = covered(values, rooted=False)[0] if lane is None else lane(values)
+    return share
+
+
+def share_around(cross: Crossing, counts: NDArray[np.bool_], around: Around | None) -> Plane:
+    """Return the share of the pixels around points that a shape covers, where it counts.
+
+    Without ``around`` edges are not soft.
+    """
+    values = [np.where(counts, each, np.float32(np.nan)) for each in cross.inside]
+    if around is None:
+        return _product([(each > 0).astype(np.float32) for each in values])
+    return _product([covered_among(each, around) for each in values])
+
+
+def around(rows: NDArray[np.intp], columns: NDArray[np.intp], region: Region) -> Around:
+    """Return what is around points in a region of an image."""
+    top, left, height, width = numbers(region)
+    lane = LANES.find("around")
+    if lane is not None:
+        beside: Around = lane(rows, columns, top, left, height, width)
+        return beside
+    place = np.full((height + 2, width + 2), len(rows))
+    rows, columns = rows - top + 1, columns - left + 1
+    place[rows, columns] = np.arange(len(rows))
+    steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
+    return np.array([place[rows + down, columns + right] for down, right in steps])
+
+
+def among(on: NDArray[np.intp], around: Around) -> Around:
+    """Return what is around some of the points, by their own indices."""
+    if len(on) == around.shape[1]:
+        return around
+    place = np.full(around.shape[1] + 1, len(on))
+    place[on] = np.arange(len(on))
+    return place[around.take(on, axis=1)]
+
+
+def _share(cross: Crossing, *, soft: bool, rooted: bool = False) -> tuple[Plane, Plane]:
+    """Share of each pixel that a shape covers; with the mean root that says where, if asked."""
+    if not soft:
+        shares = [above(each, soft=False) for each in cross.inside]
+        root = np.sqrt(np.maximum(cross.inside[0], 0)) if rooted else shares[0]
+        return _product(shares), root
+    parts = [covered(each, rooted=rooted) for each in cross.inside]
+    return _product([share for share, _root in parts]), parts[0][1]
+
+
+def _product(planes: list[Plane]) -> Plane:
+    product = planes[0]
+    for plane in planes[1:]:
+        product = product * plane
+    return product
