@@ -48,9 +48,10 @@ from transientcam_moments.modulation import modulation_gain
 from transientcam_moments.peaks import Peaks, peaks
 from transientcam_moments.pisarenko import Returns, Separation, pisarenko, separate
 from transientcam_moments.ranging import SPEED_OF_LIGHT_M_S, range_m
-from transientcam_moments.reconstruction import Reconstruction, Settings
+from transientcam_moments.reconstruction import Reconstruction
 from transientcam_moments.reconstructor import Reconstructor, reconstruct
 from transientcam_moments.repair import Repair, repair
+from transientcam_moments.settings import Settings
 from transientcam_moments.smoothing import smooth
 from transientcam_moments.sweep import (
     SweepPhasors,

@@ -26,8 +26,9 @@ class Flags(IntFlag):
     DEGENERATE = 16
     """The Toeplitz matrix is singular or indefinite, so that the density is not determined.
 
-    By the estimator "unwrapped-phase", which has no density: another range explains the phases
-    nearly as well, so that noise may have chosen between them.
+    By the estimators "unwrapped-phase" and "two-returns", which have no density: another range, or
+    another pair of returns, explains the moments nearly as well, so that noise may have chosen
+    between them.
     """
     REPLACED = 32
     """A bad pixel, which shows the mean of its neighbours."""

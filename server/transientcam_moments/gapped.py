@@ -14,7 +14,8 @@ from transientcam_moments.likelihood.estimate import assumed_noise
 from transientcam_moments.noise.moments import MomentNoise
 from transientcam_moments.peaks import Peaks
 from transientcam_moments.pisarenko import Returns, Separation
-from transientcam_moments.reconstruction import OF_ANY_MULTIPLES, Reconstruction
+from transientcam_moments.reconstruction import Reconstruction
+from transientcam_moments.settings import OF_ANY_MULTIPLES
 from transientcam_moments.smoothing import smooth
 from transientcam_moments.unwrapping import Unwrapped
 

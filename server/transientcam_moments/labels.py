@@ -16,7 +16,7 @@ from transientcam_moments.phase_steps import (
     is_four_bucket,
     phase_weights,
 )
-from transientcam_moments.reconstruction import Settings
+from transientcam_moments.settings import Settings
 
 _SAME_FREQUENCY: Final = 1e-6  # relative
 

@@ -1,29 +1,22 @@
 """What follows from the moments of an image: each property computed once, when first read."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property, partial
 from html import escape
 
 import numpy as np
 
 from transientcam_moments._arrays import (
-    MAX_HARMONICS,
     Array,
-    chosen,
-    in_range,
     in_turn,
     namespace,
 )
-from transientcam_moments._kernels.one_pass import Planes
 from transientcam_moments._kernels.parallel import Spread, at_once
 from transientcam_moments._shown import map_html
-from transientcam_moments.biasing import EPSILON, bias, estimate_zeroth, smallest_eigenvalue
+from transientcam_moments.biasing import bias, estimate_zeroth, smallest_eigenvalue
 from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
 from transientcam_moments.cumulative import cumulative
 from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.flags import INVALID, Flags, flags
-from transientcam_moments.four_bucket import ZEROTH_IMAGES
 from transientcam_moments.harmonics import HarmonicCorrection
 from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.likelihood import MODEL_ERROR, Likelihood
@@ -33,11 +26,8 @@ from transientcam_moments.likelihood.pairs import fitted_pairs
 from transientcam_moments.maximum_entropy import density
 from transientcam_moments.merging import merge_returns
 from transientcam_moments.noise.moments import MomentNoise, moment_noise, smoothed_of
-from transientcam_moments.noise.sensor import Sensor
 from transientcam_moments.peaks import Peaks, peaks
-from transientcam_moments.phase_steps import FOUR_PHASES_RAD, phase_weights
 from transientcam_moments.pisarenko import (
-    DIRECT_THRESHOLD,
     Returns,
     Separation,
     pisarenko,
@@ -45,144 +35,9 @@ from transientcam_moments.pisarenko import (
 )
 from transientcam_moments.ranging import range_m
 from transientcam_moments.repair import Repair
-from transientcam_moments.smoothing import SIGMA_PX, smooth
+from transientcam_moments.settings import OF_ANY_MULTIPLES, OWN, Settings
+from transientcam_moments.smoothing import smooth
 from transientcam_moments.unwrapping import Unwrapped, unwrap
-
-SPOILT_IMAGES = ("keep", "repair", "fill")
-"""What becomes of images that lost their synchronisation; see `Settings`."""
-
-OF_ANY_MULTIPLES = ("likelihood", "two-returns", "unwrapped-phase")
-"""Estimators that serve moments of any multiples of the base frequency."""
-_OWN = (
-    "pisarenko",
-    "maximum-entropy",
-    "likelihood",
-    "single-frequency",
-    "pisarenko-merged",
-    "two-returns",
-    "unwrapped-phase",
-)
-ESTIMATORS = (
-    *_OWN,
-    *(
-        each.name
-        for each in TECHNIQUES.values()
-        if each.measures == "moments" and each.name not in _OWN
-    ),
-)
-"""What the range may be taken from; see `transientcam_moments.comparisons`."""
-
-
-def least_harmonics(estimator: str) -> int:
-    """Return the smallest m that an estimator gives a range of."""
-    return TECHNIQUES[estimator].least_harmonics if estimator in TECHNIQUES else 1
-
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """How moments become range.
-
-    Attributes
-    ----------
-    base_frequency_hz : float, optional
-        f, of the first harmonic. Ranges and times of flight need it.
-    zeroth : {"low-frequency", "on-off", "estimated"}, optional
-        How b_0 was measured (Sec. 4.3). Raw images need it; moments whose b_0 is 0 since it was
-        not measured are "estimated".
-    takes : int, optional
-        Captures in the images, averaged without outliers. Raw images need it.
-    multiples : tuple of int, optional
-        Which multiples of the base frequency were measured, ascending; 1 to m, when left out. Only
-        `OF_ANY_MULTIPLES` serve others.
-    phases_rad : tuple of float, optional
-        Of the raw images of each frequency, in their order, three or more: 0, 90, 180 and 270
-        degrees, when left out.
-    epsilon : float
-        Least uniform part relative to b_0 (Sec. 4.3), 0 <= epsilon < 1.
-    keep : {"harmonics", "brightness"}
-        What biasing leaves as it is.
-    smoothing_sigma_px : float
-        Of the Gaussian over neighbouring pixels; 0 for none, and none without two image axes.
-    threshold : float
-        The range is that of the first return, or peak, with this share of the strongest one's
-        weight, or density.
-    estimator : str
-        What the range is taken from: "pisarenko" as the paper has it, "pisarenko-merged" (see
-        `merge_returns`), "maximum-entropy", "likelihood", "two-returns" (see `two_returns`),
-        "unwrapped-phase" (see `unwrap`), "single-frequency", which is the usual arg b_1, or another
-        of the `comparisons` of moments.
-    minimum_brightness : float
-        Pixels with b_0 at or below it have no signal, in the unit of the moments.
-    full_scale : float
-        Largest value of a raw image; pixels that reach it are saturated.
-    spoilt_images : {"repair", "fill", "keep"}
-        What becomes of raw images that lost their synchronisation (Sec. 6): rebuilt where sums of
-        opposite images find them (`repair`), and where those don't, also filled in from the
-        frame before, or kept as they are.
-    sensor : noise.Sensor, optional
-        Whose noise the images have; "likelihood", "two-returns" and "unwrapped-phase" weigh the
-        moments by it, and "pisarenko-merged" merges by it; all assume some without one, see
-        `likelihood`.
-    """
-
-    base_frequency_hz: float | None = None
-    zeroth: str | None = None
-    takes: int | None = None
-    multiples: tuple[int, ...] | None = None
-    phases_rad: tuple[float, ...] | None = None
-    epsilon: float = EPSILON
-    keep: str = "harmonics"
-    smoothing_sigma_px: float = SIGMA_PX
-    threshold: float = DIRECT_THRESHOLD
-    estimator: str = "pisarenko"
-    minimum_brightness: float = 0.0
-    full_scale: float = 4095.0
-    spoilt_images: str = "repair"
-    sensor: Sensor | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse what no stage could work with (ParameterError)."""
-        if self.base_frequency_hz is not None and not 0 < self.base_frequency_hz < float("inf"):
-            raise ParameterError("base_frequency_hz", self.base_frequency_hz, "> 0 and finite")
-        if self.zeroth is not None:
-            chosen("zeroth", self.zeroth, tuple(ZEROTH_IMAGES))
-        if self.takes is not None and self.takes < 1:
-            raise ParameterError("takes", self.takes, ">= 1")
-        if self.sensor is not None:
-            for field in ("zeroth", "takes"):
-                if getattr(self, field) is None:
-                    raise ParameterError(field, None, "stated, for the noise of a sensor")
-        phase_weights(self.sampled_rad)
-        if self.multiples is not None and not _ascending(self.multiples):
-            raise ParameterError("multiples", self.multiples, "ascending, from 1 to 32")
-        in_range("epsilon", self.epsilon, 0.0, float(np.nextafter(1.0, 0.0)), "0 <= epsilon < 1")
-        chosen("keep", self.keep, ("harmonics", "brightness"))
-        in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
-        in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
-        chosen("estimator", self.estimator, ESTIMATORS)
-        chosen("spoilt_images", self.spoilt_images, SPOILT_IMAGES)
-
-    @property
-    def least_harmonics(self) -> int:
-        """The smallest m that the estimator gives a range of."""
-        return least_harmonics(self.estimator)
-
-    @property
-    def sampled_rad(self) -> tuple[float, ...]:
-        """Phases of the raw images of each frequency."""
-        return FOUR_PHASES_RAD if self.phases_rad is None else self.phases_rad
-
-    @property
-    def consecutive(self) -> bool:
-        """Whether the multiples are 1 to m, as the trigonometric moment problem needs."""
-        return self.multiples is None or self.multiples[-1] == len(self.multiples)
-
-
-def _ascending(multiples: tuple[int, ...]) -> bool:
-    """Return whether there are multiples, each larger than the one before."""
-    inside = bool(multiples) and multiples[0] >= 1 and multiples[-1] <= MAX_HARMONICS
-    return inside and list(multiples) == sorted(set(multiples))
-
 
 _SHOWN = ("smoothed", "flags", "coefficients", "returns", "range_m")
 """Properties that the short text of a reconstruction names once they are computed."""
@@ -341,10 +196,9 @@ class Reconstruction:
         xp = namespace(self.smoothed)
         estimate = self.estimate
         unexplained = self.has_range & ~estimate.explained()
+        undetermined = self.has_range & estimate.ambiguous()
         found = self._flags_of_moments | xp.where(unexplained, int(Flags.UNEXPLAINED), 0)
-        if isinstance(estimate, Unwrapped):
-            undetermined = self.has_range & estimate.ambiguous()
-            found = found | xp.where(undetermined, int(Flags.DEGENERATE), 0)
+        found = found | xp.where(undetermined, int(Flags.DEGENERATE), 0)
         return found.astype(xp.uint8)
 
     @cached_property
@@ -511,7 +365,7 @@ class Reconstruction:
     def _technique(self) -> Technique | None:
         """The technique of the settings where this class does not implement it itself."""
         name = self.settings.estimator
-        return None if name in _OWN else TECHNIQUES[name]
+        return None if name in OWN else TECHNIQUES[name]
 
     @cached_property
     def brightness(self) -> Array:
@@ -606,81 +460,6 @@ class Reconstruction:
         """Order m, and the shape of the pixels."""
         planes = self._measured
         return planes.shape[0] - 1, tuple(planes.shape[1:])
-
-
-class PassedReconstruction(Reconstruction):
-    """A reconstruction most of which one compiled pass has computed.
-
-    Parameters
-    ----------
-    planes : Planes
-        Of the pass.
-    settings : Settings
-        Those it was made with.
-    measure : callable
-        Returns the calibrated moments that are not smoothed; called when they are first read.
-    kept : boolean array, shape (takes, N), optional
-        Which images went into the moments; all, when left out.
-    repaired : Repair, optional
-        What was done to the images before.
-    calibration : array, optional
-        As of `Reconstruction`.
-    corrected : boolean array, shape (...), optional
-        Where known harmonics were taken out; none are known, when left out.
-    spread : callable, optional
-        As of `Reconstruction`.
-    """
-
-    def __init__(
-        self,
-        planes: Planes,
-        settings: Settings,
-        measure: Callable[[], Array],
-        kept: Array | None = None,
-        repaired: Repair | None = None,
-        calibration: Array | None = None,
-        corrected: Array | None = None,
-        spread: Spread = at_once,
-    ) -> None:
-        super().__init__(
-            None, settings, kept=kept, repaired=repaired, calibration=calibration, spread=spread
-        )
-        self._measure = measure
-        self.smoothed = planes.smoothed
-        self._corrected = planes.smoothed, corrected
-        self.validity = planes.validity
-        self._flags_of_moments = planes.flags
-        self.returns = Returns(planes.phase_rad, planes.weight, planes.uniform, planes.count)
-        self.brightness = planes.brightness
-        if settings.estimator == "pisarenko":  # else they follow from another estimate
-            self.uniform = planes.uniform
-            self.direct = planes.direct
-            self.indirect = planes.indirect
-            if settings.base_frequency_hz is not None:
-                self.range_m = planes.range_m
-
-    @cached_property
-    def measured(self) -> Array:
-        """Calibrated moments (m + 1, ...), not smoothed; read from the data once more."""
-        return self._measure()
-
-    @cached_property
-    def coefficients(self) -> Coefficients:
-        """Coefficients of the maximum entropy density; no biased moments are made for them."""
-        return levinson(self.smoothed, brightness=self.brightness)
-
-    @property
-    def _shape(self) -> tuple[int, tuple[int, ...]]:
-        return self.smoothed.shape[0] - 1, tuple(self.smoothed.shape[1:])
-
-    @cached_property
-    def _biased(self) -> tuple[Array, Array]:
-        biased = (self._flags_of_moments & int(Flags.BIASED)) > 0
-        if self.settings.zeroth == "estimated":
-            return self.smoothed, biased
-        moments = self.smoothed.copy()
-        moments[0] = self.brightness
-        return moments, biased
 
 
 def _in_metres(range_m: Array) -> str:

@@ -19,15 +19,12 @@ from transientcam_moments.four_bucket import harmonics_of, measure, saturated, t
 from transientcam_moments.gapped import GappedReconstruction
 from transientcam_moments.harmonics import HarmonicCorrection, checked_waveform, matters
 from transientcam_moments.labels import Labels
+from transientcam_moments.passed import PassedReconstruction
 from transientcam_moments.phase_steps import is_four_bucket
 from transientcam_moments.ranging import range_m
-from transientcam_moments.reconstruction import (
-    OF_ANY_MULTIPLES,
-    PassedReconstruction,
-    Reconstruction,
-    Settings,
-)
+from transientcam_moments.reconstruction import Reconstruction
 from transientcam_moments.repair import Repair, repair
+from transientcam_moments.settings import OF_ANY_MULTIPLES, Settings
 from transientcam_moments.smoothing import gaussian_taps, smooth
 from transientcam_moments.takes import average_takes
 

@@ -18,7 +18,7 @@ from transientcam_moments._arrays import (
 )
 from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError
-from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, checked, explained, reduced
+from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, ambiguous, explained, reduced
 from transientcam_moments.likelihood.estimate import places_of, variance_of
 from transientcam_moments.noise.moments import MomentNoise
 from transientcam_moments.pisarenko import Separation
@@ -83,8 +83,7 @@ class Unwrapped(NamedTuple):
         ParameterError
             For a significance outside of 0 to 1.
         """
-        checked(significance)
-        return self.lead < -2 * math.log(significance)
+        return ambiguous(self.lead, significance)
 
     def explained(self, significance: float = SIGNIFICANCE) -> Array:
         """Say where one return explains the phases; arguments as of `Likelihood.explained`."""

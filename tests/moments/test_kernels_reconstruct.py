@@ -14,7 +14,7 @@ import transientcam_moments as tm
 from tests.moments.kernel_lanes import lanes, without_lanes
 from transientcam_moments._kernels.registry import REGISTRY
 from transientcam_moments.four_bucket import harmonics_of
-from transientcam_moments.reconstruction import PassedReconstruction
+from transientcam_moments.passed import PassedReconstruction
 
 ORDERS = (3, 4, 8)
 M = 3

@@ -1,7 +1,7 @@
 """From a jitted function to a compiled entry that never compiles again."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from numba import types as numba_types
@@ -39,6 +39,11 @@ IMAGES = _types.Array(_types.uint16, 2, "C")
 def order_type(m: int) -> Any:
     """Return the type of a tuple of length m: how a kernel learns m while it's compiled."""
     return _types.UniTuple(_types.int64, m)
+
+
+def sizes_type(sizes: Iterable[int]) -> Any:
+    """Return the type of a tuple of tuples of such lengths."""
+    return _types.Tuple([order_type(size) for size in sizes])
 
 
 def entry(function: Any, *signature: Any) -> Callable[..., Any]:

@@ -10,42 +10,59 @@ from transientcam_moments._kernels import simd
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
+    PLACES,
     REAL,
     complex_arrays,
     entry,
     order_type,
     real_arrays,
+    sizes_type,
 )
 from transientcam_moments._kernels.likelihood import fit_one, portable, write
 from transientcam_moments._kernels.parallel import Spread, at_once
-from transientcam_moments.likelihood import choice, sharp
-from transientcam_moments.likelihood.choice import SCORE
-from transientcam_moments.likelihood.pairs import COINCIDE, FIRST_STEPS, LAST_STEPS, STARTS, grid
+from transientcam_moments.likelihood import choice, pair_fit, sharp
+from transientcam_moments.likelihood.choice import COUNT, SCORE
+from transientcam_moments.likelihood.pairs import (
+    COINCIDE,
+    FINALISTS,
+    FIRST_STEPS,
+    LAST_STEPS,
+    LEAST_GAIN,
+    PEAKS,
+    STARTS,
+    grid,
+    least_alike,
+)
 
 __all__ = ["pairs_lane", "portable"]  # which gives the fits' arithmetic its meaning
 
 
 @njit(error_model="numpy")
 def _project(
-    order: Any, turns: Any, data_r: Any, data_i: Any, weight: Any, along: Any, alike: Any
-) -> None:
+    places: Any, turns: Any, data_r: Any, data_i: Any, share: Any, along: Any, alike: Any
+) -> Any:
     """Put the moments' projections on returns at the phases of the grid in `along`, twice over.
 
-    In `alike`, what returns so many steps apart have in common, from 0 to half a turn.
+    In `alike`, what returns so many steps apart have in common, from 0 to half a turn. Returns what
+    a pair has to explain.
     """
-    m, count = len(order), turns.shape[1]
-    total = weight[0]
-    for j in range(1, m + 1):
-        total = total + weight[j]
-    inverse = 1.0 / total
+    count = turns.shape[1]
+    none = 0.0 * share[0]
+    squared, most = none, none
+    for k in range(len(places)):
+        squared = squared + share[k] * (data_r[k] * data_r[k] + data_i[k] * data_i[k])
     for g in range(count):
-        found, common = weight[0] * data_r[0], weight[0]
-        for j in range(1, m + 1):
-            c, s = turns[0, (j * g) % count], turns[1, (j * g) % count]
-            found = found + weight[j] * (data_r[j] * c + data_i[j] * s)
-            common = common + weight[j] * c
-        along[g], along[count + g] = found * inverse, found * inverse
-        alike[g] = common * inverse
+        found, common = none, none
+        for k in range(len(places)):
+            at = (places[k] * g) % count
+            c, s = turns[0, at], turns[1, at]
+            found = found + share[k] * (data_r[k] * c + data_i[k] * s)
+            common = common + share[k] * c
+        along[g], along[count + g] = found, found
+        most = simd.maximum(found, most)
+        if g <= count // 2:
+            alike[g] = common
+    return simd.maximum(LEAST_GAIN * squared, most * most)
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -63,17 +80,30 @@ def _fill_row(count: int, apart: int, along: Any, alike: Any, rows: Any) -> None
 
 
 @njit(forceinline=True, error_model="numpy")
-def _keep_peaks(count: int, apart: int, rows: Any, gains: Any, pairs: Any) -> None:
-    """Insert the pairs of a row that explain more than those beside them, the best ones first.
+def _insert(gain: Any, pair: Any, gains: Any, pairs: Any, size: int) -> None:
+    """Insert pairs in lists of the best ones, of so many each."""
+    for k in range(size):
+        better = gain > gains[k]
+        gain, gains[k] = simd.select(better, gains[k], gain), simd.select(better, gain, gains[k])
+        pair, pairs[k] = simd.select(better, pairs[k], pair), simd.select(better, pair, pairs[k])
+
+
+@njit(forceinline=True, error_model="numpy")
+def _keep_peaks(
+    count: int, apart: int, rows: Any, row_gains: Any, row_pairs: Any, gains: Any, pairs: Any
+) -> None:
+    """Insert the best pairs of a row that explain more than those beside them.
 
     A pair is its steps apart times the phases of the grid, and the place of its first phase.
     """
     width = count + 2
     row = (apart % 3) * width + 1
     before, after = (apart + 2) % 3 * width + 1, (apart + 1) % 3 * width + 1
+    for k in range(PEAKS):
+        row_gains[k], row_pairs[k] = gains[STARTS - 1], pairs[STARTS - 1]
     for g in range(count):
         gain = rows[row + g]
-        peak = gain > gains[STARTS - 1]
+        peak = gain > row_gains[PEAKS - 1]
         if not simd.some(peak):
             continue
         peak = peak & (gain >= rows[row + g + 1]) & (gain >= rows[row + g - 1])
@@ -81,43 +111,34 @@ def _keep_peaks(count: int, apart: int, rows: Any, gains: Any, pairs: Any) -> No
             peak = peak & (gain >= rows[before + g])
         if apart < count // 2:
             peak = peak & (gain >= rows[after + g])
-        if not simd.some(peak):
-            continue
-        gain = simd.select(peak, gain, 0.0)
-        pair = 0.0 * gain + float(apart * count + g)
-        for k in range(STARTS):
-            better = gain > gains[k]
-            gain, gains[k] = (
-                simd.select(better, gains[k], gain),
-                simd.select(better, gain, gains[k]),
-            )
-            pair, pairs[k] = (
-                simd.select(better, pairs[k], pair),
-                simd.select(better, pair, pairs[k]),
-            )
+        if simd.some(peak):
+            pair = 0.0 * gain + float(apart * count + g)
+            _insert(simd.select(peak, gain, 0.0), pair, row_gains, row_pairs, PEAKS)
+    for k in range(PEAKS):
+        if simd.some(row_gains[k] > gains[STARTS - 1]):
+            _insert(row_gains[k], row_pairs[k], gains, pairs, STARTS)
 
 
 @njit(error_model="numpy")
 def _search(
-    order: Any, turns: Any, data_r: Any, data_i: Any, weight: Any, along: Any, alike: Any,
-    rows: Any, gains: Any, pairs: Any,
+    places: Any, turns: Any, data_r: Any, data_i: Any, share: Any, along: Any, alike: Any,
+    rows: Any, row_gains: Any, row_pairs: Any, gains: Any, pairs: Any,
 ) -> None:  # fmt: skip
     """Put the pairs on the grid that explain most in `pairs`."""
     count = turns.shape[1]
     half = count // 2
-    zero = 0.0 * weight[0]
+    least = _project(places, turns, data_r, data_i, share, along, alike)
     for k in range(STARTS):
-        gains[k], pairs[k] = zero, zero + float(half * count)
-    _project(order, turns, data_r, data_i, weight, along, alike)
+        gains[k], pairs[k] = least, 0.0 * least + float(half * count)
     for apart in range(1, half + 2):
         if apart <= half:
             _fill_row(count, apart, along, alike, rows)
         if apart > 1:
-            _keep_peaks(count, apart - 1, rows, gains, pairs)
+            _keep_peaks(count, apart - 1, rows, row_gains, row_pairs, gains, pairs)
 
 
 @njit(forceinline=True, error_model="numpy")
-def _begin(turns: Any, pair: Any, room: Any, x: Any, y: Any) -> None:
+def _points(turns: Any, pair: Any, room: Any, x: Any, y: Any) -> None:
     """Put the points of the unit circle of a pair on the grid in `x` and `y`."""
     count = turns.shape[1]
     simd.store(room[0], 0, pair)
@@ -132,100 +153,181 @@ def _begin(turns: Any, pair: Any, room: Any, x: Any, y: Any) -> None:
 
 @njit(error_model="numpy")
 def _polish(
-    order: Any, steps: int, data_r: Any, data_i: Any, weight: Any, x: Any, y: Any, w: Any, rr: Any,
-    ri: Any, active: Any,
+    places: Any, steps: int, data_r: Any, data_i: Any, weight: Any, share: Any, x: Any, y: Any,
+    w: Any, room: Any, active: Any,
 ) -> Any:  # fmt: skip
     """Take at most so many steps from two returns on; return chi-square."""
-    for j in range(len(order) + 1):
-        rr[j], ri[j] = data_r[j], data_i[j]
-    sharp.weigh(order, (0, 0), data_r, data_i, weight, x, y, w)
-    for k in range(2):
-        sharp.take_away(order, x[k], y[k], w[k], rr, ri)
-    cost = sharp.chi_square(order, weight, rr, ri)
-    damping = simd.select(active, sharp.FIRST_DAMPING + 0.0 * cost, sharp.SETTLED)
+    pr, pi, tx, ty, tw, tr, ti = room
+    cost = pair_fit.begin(places, data_r, data_i, weight, share, x, y, w, pr, pi)
     far = simd.infinity(cost)
+    damping = pair_fit.first_damping(active, cost)
     for _ in range(steps):
         if not simd.some(damping < sharp.SETTLED):
             break
-        cost, damping = sharp.step(
-            order, (0, 0), (0, 0, 0, 0), data_r, data_i, weight, x, y, w, rr, ri, cost, damping, far
-        )
+        cost, damping = pair_fit.step(
+            places, data_r, data_i, weight, share, x, y, w, pr, pi, tx, ty, tw, tr, ti, cost,
+            damping, far,
+        )  # fmt: skip
     return cost
+
+
+@njit(forceinline=True, error_model="numpy")
+def _keep_finalist(cost: Any, x: Any, y: Any, costs: Any, points: Any) -> None:
+    """Insert a fit in the list of the best ones; each has four coordinates in `points`."""
+    a, b, c, d = x[0], y[0], x[1], y[1]
+    for k in range(FINALISTS):
+        better = cost < costs[k]
+        cost, costs[k] = simd.select(better, costs[k], cost), simd.select(better, cost, costs[k])
+        i = 4 * k
+        a, points[i] = simd.select(better, points[i], a), simd.select(better, a, points[i])
+        i += 1
+        b, points[i] = simd.select(better, points[i], b), simd.select(better, b, points[i])
+        i += 1
+        c, points[i] = simd.select(better, points[i], c), simd.select(better, c, points[i])
+        i += 1
+        d, points[i] = simd.select(better, points[i], d), simd.select(better, d, points[i])
+
+
+@njit(error_model="numpy")
+def _choose(
+    places: Any, same: float, data_r: Any, data_i: Any, weight: Any, share: Any, costs: Any,
+    points: Any, x: Any, y: Any, w: Any, bx: Any, by: Any, bw: Any, directs: Any, room: Any,
+    active: Any,
+) -> Any:  # fmt: skip
+    """Polish the finalists, put the best one in `bx`, `by`, `bw`; return its cost and lead."""
+    far = simd.infinity(weight[0])
+    best, bx_direct, by_direct = far, 0.0 * weight[0], 0.0 * weight[0]
+    for f in range(FINALISTS):
+        for k in range(2):
+            x[k], y[k] = points[4 * f + 2 * k], points[4 * f + 2 * k + 1]
+        _polish(places, LAST_STEPS, data_r, data_i, weight, share, x, y, w, room, active)
+        # anew: the last step before may have been damped
+        cost = _polish(places, FIRST_STEPS, data_r, data_i, weight, share, x, y, w, room, active)
+        dx, dy = pair_fit.direct(x, y, w)
+        costs[f], directs[2 * f], directs[2 * f + 1] = cost, dx, dy
+        better = cost < best
+        best = simd.select(better, cost, best)
+        bx_direct, by_direct = (
+            simd.select(better, dx, bx_direct),
+            simd.select(better, dy, by_direct),
+        )
+        for k in range(2):
+            bx[k] = simd.select(better, x[k], bx[k]) if f > 0 else x[k]
+            by[k] = simd.select(better, y[k], by[k]) if f > 0 else y[k]
+            bw[k] = simd.select(better, w[k], bw[k]) if f > 0 else w[k]
+    second = far
+    for f in range(FINALISTS):
+        other = directs[2 * f] * bx_direct + directs[2 * f + 1] * by_direct < same
+        second = simd.select(other & (costs[f] < second), costs[f], second)
+    return best, second - best
 
 
 @njit(nogil=True, error_model="numpy")
 def fit_pairs(
-    order: Any, starts: Any, cosine: float, sine: float, turns: Any, b: Any, variance: Any,
-    error: float, planes: Any, free: Any, count: Any, start: int, stop: int,
+    order: Any, lists: Any, places: Any, cosine: float, sine: float, same: float, turns: Any,
+    b: Any, variance: Any, error: float, planes: Any, free: Any, count: Any, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; two returns where one leaves enough.
 
-    ``starts`` is a tuple of length `STARTS`.
+    ``lists`` is a tuple of tuples as long as the powers of two returns, `STARTS`, `PEAKS`,
+    `FINALISTS`, and four times that.
     """
     one = simd.ones(variance, 1)
     step, far = simd.width(one), simd.infinity(one)
     data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
     rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
     weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
+    kr, ki = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    kw, share = simd.registers(one, order, 1), simd.registers(one, order, 1)
     x, y, w = simd.registers(one, (), 2), simd.registers(one, (), 2), simd.registers(one, (), 2)
-    bx, by = simd.registers(one, (), 2), simd.registers(one, (), 2)
+    bx, by, bw = simd.registers(one, (), 2), simd.registers(one, (), 2), simd.registers(one, (), 2)
+    room = (
+        simd.registers(one, lists[0], 0), simd.registers(one, lists[0], 0),
+        simd.registers(one, (), 2), simd.registers(one, (), 2), simd.registers(one, (), 2),
+        simd.registers(one, lists[0], 0), simd.registers(one, lists[0], 0),
+    )  # fmt: skip
     # 8 m phases, or 24: (m + 8)^2 are enough for two turns, and (m + 12)^2 for three rows
     along, alike = simd.matrix(one, order, 8), simd.matrix(one, order, 4)
     rows = simd.matrix(one, order, 12)
-    gains, pairs = simd.registers(one, starts, 0), simd.registers(one, starts, 0)
-    room = np.empty((4, step), turns.dtype)
+    gains, pairs = simd.registers(one, lists[1], 0), simd.registers(one, lists[1], 0)
+    row_gains, row_pairs = simd.registers(one, lists[2], 0), simd.registers(one, lists[2], 0)
+    costs, directs = simd.registers(one, lists[3], 0), simd.registers(one, lists[4], 0)
+    points = simd.registers(one, lists[4], 0)
+    scalars = np.empty((4, step), turns.dtype)
     for left in range(start, stop, step):
         p = min(left, stop - step)
         scale, numbers, usable, penalty = fit_one(
             order, cosine, sine, b, variance, error, p, one, data_r, data_i, weight, x, y, w, rr,
             ri, found,
         )  # fmt: skip
+        lead = far
         more = (found[SCORE] > 4.0 * penalty) & (numbers >= 4.0)
         if simd.some(more):
-            _search(order, turns, data_r, data_i, weight, along, alike, rows, gains, pairs)
-            best = far
-            for k in range(STARTS):
-                _begin(turns, pairs[k], room, x, y)
-                cost = _polish(order, FIRST_STEPS, data_r, data_i, weight, x, y, w, rr, ri, more)
-                better = cost < best
-                best = simd.select(better, cost, best)
-                for i in range(2):
-                    bx[i] = simd.select(better, x[i], bx[i]) if k > 0 else x[i]
-                    by[i] = simd.select(better, y[i], by[i]) if k > 0 else y[i]
-            cost = _polish(order, LAST_STEPS, data_r, data_i, weight, bx, by, w, rr, ri, more)
-            choice.offer_returns(
-                order, (0, 0), (0, 0, 0, 0), weight, bx, by, w, cost, penalty, more, found
+            total = 0.0 * one
+            for k in range(len(places)):
+                j = places[k]
+                kr[k], ki[k], kw[k] = data_r[j], data_i[j], weight[j]
+                total = total + weight[j]
+            inverse = 1.0 / total
+            for k in range(len(places)):
+                share[k] = kw[k] * inverse
+            _search(
+                places, turns, kr, ki, share, along, alike, rows, row_gains, row_pairs, gains, pairs
             )
+            for k in range(FINALISTS):
+                costs[k] = far
+            for k in range(STARTS):
+                _points(turns, pairs[k], scalars, x, y)
+                cost = _polish(places, FIRST_STEPS, kr, ki, kw, share, x, y, w, room, more)
+                _keep_finalist(cost, x, y, costs, points)
+            cost, lead = _choose(
+                places, same, kr, ki, kw, share, costs, points, x, y, w, bx, by, bw, directs, room,
+                more,
+            )  # fmt: skip
+            choice.offer_returns(
+                order, (0, 0), (0, 0, 0, 0), weight, bx, by, bw, cost, penalty, more, found
+            )
+            lead = simd.select(found[COUNT] == 2.0, lead, far)
         write((0, 0), found, scale, numbers, usable, p, planes, free, count)
+        simd.store(planes[13], p, lead)
 
 
 def pairs_lane(m: int, precision: str) -> Callable[..., Any]:
     """Compile the estimate of order m, 2 or more; see the table in ``_kernels``."""
-    order, starts = (0,) * m, (0,) * STARTS
+    order = (0,) * m
+    sizes = (2 * (m + 1), STARTS, PEAKS, FINALISTS, 4 * FINALISTS)
+    lists = tuple((0,) * size for size in sizes)
     real, cplx = real_arrays(precision), complex_arrays(precision)
     run = entry(
         fit_pairs,
-        order_type(m), order_type(STARTS), REAL, REAL, real[2], cplx[2], real[2], REAL, real[2],
-        COUNTS, COUNTS, PIXELS, PIXELS,
+        order_type(m), sizes_type(sizes), PLACES, REAL, REAL, REAL, real[2], cplx[2], real[2], REAL,
+        real[2], COUNTS, COUNTS, PIXELS, PIXELS,
     )  # fmt: skip
     turn = 2 * np.pi / choice.phases_of(m)
     cosine, sine = float(np.cos(turn)), float(np.sin(turn))
-    phase = grid(m)
+    phase, same = grid(m), least_alike(m)
     turns = np.stack([np.cos(phase), np.sin(phase)]).astype(precision)
 
     def lane(b: Any, variance: Any, error: float, *, spread: Spread = at_once) -> tuple[Any, ...]:
         pixels = b.shape[1]
         moments, noise = np.ascontiguousarray(b), np.ascontiguousarray(variance)
-        planes = np.empty((13, pixels), precision)
+        places = np.array([j for j, plane in enumerate(noise) if plane.any()], np.int64)
+        planes = np.empty((14, pixels), precision)
         free, count = np.empty(pixels, np.int32), np.empty(pixels, np.int32)
 
         def part(start: int, stop: int) -> None:
             run(
-                order, starts, cosine, sine, turns, moments, noise, error, planes, free, count,
-                start, stop,
+                order, lists, places, cosine, sine, same, turns, moments, noise, error, planes,
+                free, count, start, stop,
             )  # fmt: skip
 
         spread(part, pixels)
-        return (*(planes[2 * k : 2 * k + 2] for k in range(4)), *planes[8:], free, count)
+        return (
+            *(planes[2 * k : 2 * k + 2] for k in range(4)),
+            *planes[8:13],
+            free,
+            count,
+            planes[13],
+        )
 
     return lane

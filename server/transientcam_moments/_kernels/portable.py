@@ -14,7 +14,7 @@ from numba.core import cgutils as numba_cgutils
 
 from transientcam_moments._kernels import simd
 from transientcam_moments._kernels.simd import Lanes, Mask, Registers, extending, templates
-from transientcam_moments.likelihood import arithmetic, choice, linear, sharp, tail
+from transientcam_moments.likelihood import arithmetic, choice, linear, pair_fit, sharp, tail
 
 types: Any = numba_types
 cgutils: Any = numba_cgutils
@@ -99,7 +99,16 @@ for _function in (
     sharp.try_phase,
     sharp.information,
     sharp.weigh,
+    sharp.turned,
     sharp.step,
+    pair_fit.powers,
+    pair_fit.weigh,
+    pair_fit.chi_square,
+    pair_fit.turns,
+    pair_fit.begin,
+    pair_fit.step,
+    pair_fit.first_damping,
+    pair_fit.direct,
     sharp.deviations,
     tail.shape,
     tail.weigh,

@@ -33,6 +33,15 @@ def explained(chi_square: Array, degrees_of_freedom: Array, significance: float)
     return (chi_square <= limit) | ((degrees_of_freedom == 0) & (chi_square >= 0))
 
 
+def ambiguous(lead: Array, significance: float) -> Array:
+    """Say where another hypothesis may be the right one, by how much larger its chi-square is.
+
+    That is where exp(-lead / 2), the ratio of their likelihoods, is above a significance. Raises
+    ParameterError for one outside of 0 to 1.
+    """
+    return lead < -2 * math.log(checked(significance))
+
+
 def reduced(chi_square: Array, degrees_of_freedom: Array) -> Array:
     """Return chi-square (...) over its degrees of freedom; NaN where there are none."""
     xp = namespace(chi_square)

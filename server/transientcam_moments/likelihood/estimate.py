@@ -21,7 +21,7 @@ from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.likelihood import choice
 from transientcam_moments.likelihood.arithmetic import logarithm
-from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, explained, reduced
+from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, ambiguous, explained, reduced
 from transientcam_moments.likelihood.choice import MARGIN, MOST_RETURNS, TAIL_SHAPE
 from transientcam_moments.likelihood.planar import Data, fit
 from transientcam_moments.noise.moments import MomentNoise
@@ -59,6 +59,10 @@ class Likelihood(NamedTuple):
         How many more real numbers were measured than the model has unknowns.
     count : integer array, shape (...)
         Number of returns; 0 where there is no light or a measured moment is not finite.
+    lead : array, shape (...)
+        Of two returns by `two_returns`: by how much chi-square is larger with the best other pair
+        that was found and has another direct return. Infinite where there is none, or none was
+        looked for.
     tail_shape : int
         Shape p of the tail's gamma distribution, the same in all pixels.
     """
@@ -74,6 +78,7 @@ class Likelihood(NamedTuple):
     chi_square: Array
     degrees_of_freedom: Array
     count: Array
+    lead: Array
     tail_shape: int
 
     def __repr__(self) -> str:
@@ -89,6 +94,10 @@ class Likelihood(NamedTuple):
     def reduced_chi_square(self) -> Array:
         """Chi-square over its degrees of freedom; NaN where there are none."""
         return reduced(self.chi_square, self.degrees_of_freedom)
+
+    def ambiguous(self, significance: float = SIGNIFICANCE) -> Array:
+        """Say where another pair of returns may be the right one; as `Unwrapped.ambiguous`."""
+        return ambiguous(self.lead, significance)
 
     def explained(self, significance: float = SIGNIFICANCE) -> Array:
         """Say where the model explains the moments.
@@ -228,8 +237,10 @@ def fitted(
     in_range("model_error", model_error, 0.0, 1.0, "0 to 1")
     planes, variance = dense(planes, noise, harmonics, trailing)
     found = _estimated(planes, variance, returns, tail_shape, float(model_error), spread=spread)
-    shaped = (part.reshape((*part.shape[:-1], *trailing)) for part in found)
-    return Likelihood._make([*shaped, tail_shape])
+    shaped = [part.reshape((*part.shape[:-1], *trailing)) for part in found]
+    xp = namespace(planes)
+    lead = xp.broadcast_to(xp.asarray(np.inf, dtype=shaped[0].dtype), trailing)
+    return Likelihood._make([*shaped, lead, tail_shape])
 
 
 def dense(

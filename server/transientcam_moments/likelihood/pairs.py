@@ -15,21 +15,30 @@ from numpy.typing import NDArray
 from transientcam_moments._arrays import Array, by_blocks, in_range, moment_planes, namespace
 from transientcam_moments._kernels import accelerated
 from transientcam_moments._kernels.parallel import Spread, on_threads
-from transientcam_moments.likelihood.choice import PLANES, SCORE, nothing
+from transientcam_moments.likelihood import pair_fit
+from transientcam_moments.likelihood.choice import COUNT, PLANES, SCORE, nothing
 from transientcam_moments.likelihood.estimate import Likelihood, dense, prepared, results
 from transientcam_moments.likelihood.planar import Data, SharpFit, where
+from transientcam_moments.likelihood.sharp import SETTLED
 from transientcam_moments.noise.moments import MomentNoise
 
 PHASES_PER_PERIOD: Final = 8
-"""Of the grid, in a period of the highest frequency. With 4, one pair in 25 that is 3 to 8 m apart
-at 16, 80 and 120 MHz is not among the starts; docs/cameras.md has what is left."""
+"""Of the grid, in a period of the highest frequency; docs/cameras.md has what is missed."""
+PEAKS: Final = 3
+"""Pairs that are kept of all those equally far apart."""
 STARTS: Final = 16
 """Pairs of each pixel that are polished."""
-FIRST_STEPS: Final = 6
-"""Of each start; the best one alone takes more."""
-LAST_STEPS: Final = 16
+LEAST_GAIN: Final = 0.7
+"""What a pair on the grid has to explain of all light squared to be one of them; so has it more
+than the best return alone."""
+FIRST_STEPS: Final = 2
+"""Of each start; `FINALISTS` of them take more."""
+FINALISTS: Final = 4
+LAST_STEPS: Final = 12
 COINCIDE: Final = 0.999
 """Pairs whose moments are this alike, as a squared correlation, are one return."""
+APART: Final = 0.25
+"""Of a period of the highest frequency: direct returns so far apart are of different pairs."""
 _LEAST_PHASES: Final = 24
 _BLOCK: Final = 16  # pixels, whose pairs stay in cache
 
@@ -38,6 +47,11 @@ def grid(m: int) -> NDArray[np.floating[Any]]:
     """Return the phases of the grid in radians, an even number of them, for multiples up to m."""
     count = max(_LEAST_PHASES, PHASES_PER_PERIOD * m)
     return np.arange(count) * (2 * np.pi / count)
+
+
+def least_alike(m: int) -> float:
+    """Return the cosine of `APART`."""
+    return float(np.cos(APART * 2 * np.pi / m))
 
 
 def two_returns(
@@ -80,8 +94,10 @@ def two_returns(
     Notes
     -----
     Weighted least squares of b_j = w_1 exp(i j phi_1) + w_2 exp(i j phi_2), w >= 0. The weights are
-    eliminated at each pair of a grid of 8 phases a period of the highest frequency; the 16 pairs
-    that explain most, and more than those beside them, are polished by the steps of `likelihood`.
+    eliminated at each pair of a grid of 6 phases a period of the highest frequency. Of the pairs
+    that explain more than those beside them, the 16 best take two steps of Levenberg and Marquardt,
+    and the best four of these more. Where one of them has another direct return, a quarter of
+    a period of the highest frequency away or more, `lead` says how much worse it explains.
     In single precision a compiled lane does the same; see `kernels`.
     """
     return fitted_pairs(b, noise, on_threads(threads), harmonics, model_error)
@@ -113,56 +129,102 @@ def _estimated(planes: Array, variance: Array, error: float) -> tuple[Array, ...
 def _estimate(b: Array, variance: Array, error: float) -> tuple[Array, ...]:
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
         data, scale, usable = prepared(b, variance, error)
-        return results(_fit(data), data, scale, usable, min(2, b.shape[0] - 1), 0)
+        found, lead = _fit(data)
+        slots = min(2, b.shape[0] - 1)
+        return *results(found, data, scale, usable, slots, 0), lead.astype(scale.dtype)
 
 
-def _fit(data: Data) -> Array:
-    """Return what is found of every pixel (PLANES, P), as `choice` lays it out."""
+def _fit(data: Data) -> tuple[Array, Array]:
+    """Return what is found of every pixel (PLANES, P), as `choice` lays it out, and its lead."""
     found = [data.re[0]] * PLANES
     far = np.inf + 0 * data.penalty
     nothing(data.penalty, far, found)
     one = SharpFit.start(data, 1, None, far)
     one.offer(found, data.numbers >= 0)
-    planes = np.stack(found)
+    planes = np.stack([*found, far])
 
     def more(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
-        found = list(planes)
-        _best_pair(data).offer(found, data.numbers >= 4)
-        return np.stack(found)
+        found = list(planes[:-1])
+        pair, lead = _best_pair(data)
+        pair.offer(found, data.numbers >= 4)
+        return np.stack([*found, np.where(found[COUNT] == 2, lead, np.inf)])
 
-    if len(data.re) < 3:
-        return planes
     # chi-square cannot become less than 0: no model with more unknowns is better below
-    return where(planes[SCORE] > 4 * data.penalty, more, data, (), planes)
+    if len(data.re) > 2:
+        planes = where(planes[SCORE] > 4 * data.penalty, more, data, (), planes)
+    return planes[:-1], planes[-1]
 
 
-def _best_pair(data: Data) -> SharpFit:
-    """Return the best fit of two returns (P)."""
-    far = np.inf + 0 * data.penalty
-    first, second = _starts(data)
-    best: SharpFit | None = None
-    for start in zip(first, second, strict=True):
-        x = [np.cos(each).astype(data.re.dtype) for each in start]
-        y = [np.sin(each).astype(data.re.dtype) for each in start]
-        fit = SharpFit.at(data, x, y)
-        fit.improve(FIRST_STEPS, far)
-        if best is None:
-            best = fit
-            continue
-        better = fit.cost < best.cost
-        x = [np.where(better, *both) for both in zip(fit.x, best.x, strict=True)]
-        y = [np.where(better, *both) for both in zip(fit.y, best.y, strict=True)]
-        best = SharpFit.at(data, x, y)
-    assert best is not None  # noqa: S101 - there are STARTS of them
-    best.improve(LAST_STEPS, far)
-    return best
+class _Pairs:
+    """Fits of two returns (S, P), several of each pixel, at the multiples that were measured."""
+
+    def __init__(self, data: Data, phases: Sequence[Array]) -> None:
+        self.places = _measured(data)
+        self.weight = data.weight[self.places]
+        share = self.weight / data.weight.sum(axis=0)
+        self._given = (self.places, data.re[self.places], data.im[self.places])
+        self._weighted = (*self._given, self.weight, share)
+        self.x = [np.cos(each).astype(share.dtype) for each in phases]
+        self.y = [np.sin(each).astype(share.dtype) for each in phases]
+        self._begin()
+
+    def _begin(self) -> None:
+        self.w, self._pr, self._pi = [self.x[0]] * 2, *self._room()
+        state = (self.x, self.y, self.w, self._pr, self._pi)
+        self.cost = pair_fit.begin(*self._weighted, *state)
+
+    def _room(self) -> tuple[list[Array], list[Array]]:
+        size = 2 * len(self.places)
+        return [self.x[0]] * size, [self.x[0]] * size
+
+    def improve(self, steps: int) -> None:
+        """Take at most so many steps to a lower chi-square."""
+        state = (self.x, self.y, self.w, self._pr, self._pi)
+        trial = [self.x[0]] * 2, [self.x[0]] * 2, [self.x[0]] * 2, *self._room()
+        far = np.inf + 0 * self.cost
+        damping = pair_fit.first_damping(far > 0, self.cost)
+        for _ in range(steps):
+            if not (damping < SETTLED).any():
+                break
+            self.cost, damping = pair_fit.step(
+                *self._weighted, *state, *trial, self.cost, damping, far
+            )
+
+    def keep(self, count: int) -> None:
+        """Keep the best ones of each pixel, the best one first."""
+        best = np.argsort(self.cost, axis=0)[:count]
+        self.x = [np.take_along_axis(each, best, axis=0) for each in self.x]
+        self.y = [np.take_along_axis(each, best, axis=0) for each in self.y]
+        self._begin()
+
+
+def _best_pair(data: Data) -> tuple[SharpFit, Array]:
+    """Return the best fit of two returns (P), and the lead over those with another range (P)."""
+    pairs = _Pairs(data, _starts(data))
+    pairs.improve(FIRST_STEPS)
+    pairs.keep(FINALISTS)
+    pairs.improve(LAST_STEPS)
+    pairs.improve(FIRST_STEPS)  # anew: the last step before may have been damped
+    pairs.keep(FINALISTS)
+    x, y = pair_fit.direct(pairs.x, pairs.y, pairs.w)
+    other = x * x[0] + y * y[0] < least_alike(len(data.re) - 1)
+    lead = np.where(other, pairs.cost, np.inf).min(axis=0) - pairs.cost[0]
+    best = SharpFit(data, 2, None)
+    best.x, best.y, best.w = ([each[0] for each in part] for part in (pairs.x, pairs.y, pairs.w))
+    best.cost = pairs.cost[0]
+    return best, lead
+
+
+def _measured(data: Data) -> NDArray[np.intp]:
+    """Return the multiples that were measured in any pixel."""
+    return np.flatnonzero((data.weight > 0).any(axis=1))
 
 
 def _starts(data: Data) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
     """Return the phases (STARTS, P) of the most promising pairs, the earlier ones first."""
     phase = grid(len(data.re) - 1)
     count = len(phase)
-    measured = np.flatnonzero((data.weight > 0).any(axis=1))
+    measured = _measured(data)
     angle = np.outer(phase, measured)
     cosine, sine = (part(angle).astype(data.re.dtype) for part in (np.cos, np.sin))
     share = data.weight[measured] / data.weight.sum(axis=0)
@@ -170,16 +232,20 @@ def _starts(data: Data) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[
     along = cosine @ (share * data.re[measured]) + sine @ (share * data.im[measured])
     alike = cosine[1 : count // 2 + 1] @ share  # of two phases so many steps apart
     blocks = range(0, along.shape[1], _BLOCK)
-    best = [_peaks(along[:, at : at + _BLOCK], alike[:, at : at + _BLOCK]) for at in blocks]
+    squared = (share * (data.re[measured] ** 2 + data.im[measured] ** 2)).sum(axis=0)
+    least = np.maximum(LEAST_GAIN * squared, np.maximum(along, 0).max(axis=0) ** 2)
+    planes = (along, alike, least[None])
+    best = [_peaks(*(plane[:, at : at + _BLOCK] for plane in planes)) for at in blocks]
     apart, first = np.divmod(np.concatenate(best, axis=1), count)
     return phase[first], phase[(first + apart + 1) % count]
 
 
-def _peaks(along: Array, alike: Array) -> Array:
+def _peaks(along: Array, alike: Array, least: Array) -> Array:
     """Return the places (STARTS, P) of the pairs that explain most, and more than those beside.
 
-    A pair has the place steps apart - 1, then its first phase: (G // 2, G) in one row. Where there
-    are fewer of them the last are opposite phases.
+    A pair has the place steps apart - 1, then its first phase: (G // 2, G) in one row, of which
+    the best `PEAKS` count. Where fewer pairs explain more than `least` (1, P), the last are
+    opposite phases.
     """
     count = len(along)
     partner = (np.arange(count) + np.arange(1, count // 2 + 1)[:, None]) % count
@@ -191,7 +257,11 @@ def _peaks(along: Array, alike: Array) -> Array:
     peak = (gain >= np.roll(gain, 1, axis=1)) & (gain >= np.roll(gain, -1, axis=1))
     peak[1:] &= gain[1:] >= gain[:-1]
     peak[:-1] &= gain[:-1] >= gain[1:]
-    flat = np.where(peak, -gain, 0).reshape((-1, along.shape[1]))
-    best = np.argpartition(flat, STARTS, axis=0)[:STARTS]
+    lost = np.where(peak & (gain > least), -gain, 0)
+    row = np.argpartition(lost, PEAKS, axis=1)[:, :PEAKS]
+    kept = np.take_along_axis(lost, row, axis=1).reshape((-1, along.shape[1]))
+    place = (row + count * np.arange(count // 2)[:, None, None]).reshape(kept.shape)
+    best = np.argpartition(kept, STARTS, axis=0)[:STARTS]
     opposite = (count // 2 - 1) * count
-    return np.where(np.take_along_axis(flat, best, axis=0) < 0, best, opposite)
+    there = np.take_along_axis(kept, best, axis=0) < 0
+    return np.where(there, np.take_along_axis(place, best, axis=0), opposite)

@@ -216,6 +216,18 @@ def weigh(
         w[k] = larger(w[k], 0.0 * w[k])
 
 
+def turned(x: Array, y: Array, w: Array, g: Array, reach: float) -> tuple[Array, Array]:
+    """Return a return's point after a step `g` of its phase times its weight.
+
+    It is the turn by 2 arctan(g / 2 w), with one quotient; `reach` is the most of that tangent.
+    """
+    size = larger(w, least(w))
+    half = larger(smaller(0.5 * g, reach * size), -reach * size)
+    inverse = 1.0 / (size * size + half * half)
+    c, s = (size * size - half * half) * inverse, 2.0 * size * half * inverse
+    return x * c - y * s, x * s + y * c
+
+
 def step(
     order: Length,
     returns: Length,
@@ -258,12 +270,7 @@ def step(
         tr[j], ti[j] = data_r[j], data_i[j]
     reach = 0.5 * REACH / m
     for k in range(count):
-        # the turn by 2 arctan(half / size), with one quotient
-        size = larger(w[k], least(cost))
-        half = larger(smaller(0.5 * g[count + k], reach * size), -reach * size)
-        inverse = 1.0 / (size * size + half * half)
-        c, s = (size * size - half * half) * inverse, 2.0 * size * half * inverse
-        tx[k], ty[k] = x[k] * c - y[k] * s, x[k] * s + y[k] * c
+        tx[k], ty[k] = turned(x[k], y[k], w[k], g[count + k], reach)
     weigh(order, returns, data_r, data_i, weight, tx, ty, tw)
     for k in range(count):
         take_away(order, tx[k], ty[k], tw[k], tr, ti)
