@@ -28,7 +28,7 @@ class _CachedFront:
 
 
 class FrontCache:
-    """Pareto fronts of the present scene; on the event loop, computed on workers."""
+    """Pareto fronts of the present scene; on the event loop, computed elsewhere."""
 
     def __init__(
         self,
@@ -92,7 +92,9 @@ class FrontCache:
             range_std_m=_WIDE if by == "range_std_m" else None,
             bound_width=_WIDE if by == "bound_width" else None,
         )
-        return await self._queue.run(self._planner.tradeoff_document, goal, scene, predicting)
+        return await self._queue.run(
+            self._planner.tradeoff_document, goal, scene, progress=predicting
+        )
 
     async def _current(self, frame: Frame) -> dict[str, Any]:
         found = await frame.reconstruction("returns")

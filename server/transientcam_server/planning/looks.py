@@ -4,7 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import Final
+from typing import Final, Protocol
 
 from transientcam_driver import Sequence
 from transientcam_server.imaging.frame import Frame
@@ -16,12 +16,18 @@ from transientcam_server.planning.queue import PlanningQueue
 from transientcam_server.planning.scene import SceneStatistics
 
 KEPT_S: Final = 10.0
-Twin = Callable[[], AbstractContextManager[LookedThrough]]
-"""Opens a simulated camera before the same scene, in virtual time."""
+
+
+class Twin(Protocol):
+    """A simulated camera before the same scene, in virtual time; it is pickled."""
+
+    def open(self) -> AbstractContextManager[LookedThrough]:
+        """Open it."""
+        ...
 
 
 class Looks:
-    """Looks at the present scene; on the event loop, computed on workers.
+    """Looks at the present scene; on the event loop, computed elsewhere.
 
     A simulated camera has a twin that looks in its place, so that frames go on undisturbed and no
     busy machine loses images. Of any other camera the current frame has to be enough.
@@ -32,7 +38,7 @@ class Looks:
         planner: Planner,
         workers: Workers,
         queue: PlanningQueue,
-        twin: Twin | None,
+        twin: Callable[[], Twin] | None,
         *,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -59,11 +65,19 @@ class Looks:
         Problem
             ``target-unreachable`` where the scene has no light, or too much.
         """
+        assert self._twin is not None  # noqa: S101 - callers look at `needs_frame`
         self._planner.require_possible()
         async with self._looking:
             kept = self._kept
             if kept is None or kept[:2] != (base, ambient_dn_per_s) or self._clock() > kept[2]:
-                scene = await self._queue.run(self._look, base, ambient_dn_per_s, progress)
+                scene = await self._queue.run(
+                    look_through,
+                    self._planner,
+                    self._twin(),
+                    base,
+                    ambient_dn_per_s,
+                    progress=progress,
+                )
                 kept = self._kept = (base, ambient_dn_per_s, self._clock() + KEPT_S, scene)
             return kept[3]
 
@@ -86,11 +100,14 @@ class Looks:
         """Drop what was seen, as when the scene is another one."""
         self._kept = None
 
-    def _look(
-        self, base: Sequence, ambient_dn_per_s: float | None, progress: Progress
-    ) -> SceneStatistics:
-        assert self._twin is not None  # noqa: S101 - callers look at `needs_frame`
-        with self._twin() as camera:
-            return self._planner.look(
-                camera, base, ambient_dn_per_s=ambient_dn_per_s, progress=progress
-            )
+
+def look_through(
+    planner: Planner,
+    twin: Twin,
+    base: Sequence,
+    ambient_dn_per_s: float | None,
+    progress: Progress,
+) -> SceneStatistics:
+    """Look at the scene before a camera that is opened for that."""
+    with twin.open() as camera:
+        return planner.look(camera, base, ambient_dn_per_s=ambient_dn_per_s, progress=progress)

@@ -1,7 +1,6 @@
-"""Plans sequences for the scene that a camera sees. Runs on workers."""
+"""Plans sequences for the scene that a camera sees. Runs in `PlanningProcess`."""
 
 import itertools
-import threading
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
@@ -10,8 +9,6 @@ import numpy as np
 
 import transientcam_moments as tm
 from transientcam_driver import Capabilities, Sequence, Truth
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
 from transientcam_server.planning.choice import Choice
 from transientcam_server.planning.families import Family, families, require_plannable
 from transientcam_server.planning.goal import Goal
@@ -19,10 +16,9 @@ from transientcam_server.planning.look import STEPS, LookedThrough, look_at
 from transientcam_server.planning.plan import Plan, in_a_sentence, plan
 from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.progress import Progress
-from transientcam_server.planning.queue import Allowance, Rest
 from transientcam_server.planning.scene import SceneStatistics
 from transientcam_server.planning.search import Line, Search
-from transientcam_server.planning.timing import ReconstructionTimer
+from transientcam_server.planning.timing import ReconstructionTimer, timer_of
 from transientcam_server.settings import ReconstructionSettings
 
 
@@ -37,8 +33,6 @@ class Planner:
         Whose noise its images have.
     settings
         Of the reconstruction.
-    share
-        Returns the share of one processor that this may take for good; see `Allowance`.
     """
 
     def __init__(
@@ -46,19 +40,14 @@ class Planner:
         capabilities: Capabilities,
         sensor: tm.noise.Sensor,
         settings: ReconstructionSettings,
-        *,
-        share: Callable[[], float] = lambda: 1.0,
     ) -> None:
         self._capabilities = capabilities
         self._sensor = sensor
-        self._allowance = Allowance(share)
-        self._closing = threading.Event()
-        self.reconstruct_with(settings)
+        self._settings = settings
 
     def reconstruct_with(self, settings: ReconstructionSettings) -> None:
         """Predict with other settings of the reconstruction from now on."""
         self._settings = settings
-        self._computing = ReconstructionTimer(self._capabilities, settings)
 
     def look(
         self,
@@ -69,12 +58,8 @@ class Planner:
         progress: Progress | None = None,
     ) -> SceneStatistics:
         """Look at the scene before a camera; see `look_at`."""
-        pause, progress = self._pause(), progress or Progress()
+        shown = progress or Progress()
         done = itertools.count()
-
-        def checked(stage: str) -> None:
-            pause()
-            progress.at(next(done) / STEPS, stage)
 
         return look_at(
             camera,
@@ -82,7 +67,7 @@ class Planner:
             self._settings,
             base=base,
             ambient_dn_per_s=ambient_dn_per_s,
-            go_on=checked,
+            go_on=lambda stage: shown.at(next(done) / STEPS, stage),
         )
 
     def require_possible(self) -> None:
@@ -123,31 +108,14 @@ class Planner:
         progress.at(0.8, "lines")
         return _front_document(choices, search.lines(choices))
 
-    def close(self) -> None:
-        """End what is being computed: it raises Problem ``shutting-down``. From any thread."""
-        self._closing.set()
-
     def _predictor(
         self, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
     ) -> Predictor:
-        pause = self._pause()
+        return Predictor(scene, self._sensor, self._settings, go_on=go_on)
 
-        def checked() -> None:
-            pause()
-            go_on()
-
-        return Predictor(scene, self._sensor, self._settings, go_on=checked)
-
-    def _pause(self) -> Callable[[], None]:
-        """Return what work on this thread calls in between: it rests, or ends the work."""
-        rest = Rest(self._allowance, self._closing.wait)
-
-        def pause() -> None:
-            rest()
-            if self._closing.is_set():
-                raise Problem(kinds.SHUTTING_DOWN, "The service is shutting down.")
-
-        return pause
+    @property
+    def _computing(self) -> ReconstructionTimer:
+        return timer_of(self._capabilities, self._settings)
 
 
 def _front_document(choices: list[Choice], lines: list[Line]) -> dict[str, Any]:

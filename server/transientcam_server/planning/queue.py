@@ -1,20 +1,14 @@
-"""The queue of plans: one is computed at a time, few may wait, and frames go first.
-
-What plans is pure Python in large part: beside it, on another thread, whatever else holds the
-interpreter's lock for a moment waits for it, above all frames and their clients.
-"""
+"""The queue of plans: one is computed at a time, and few may wait."""
 
 import asyncio
-import threading
-import time
 from collections import Counter
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from typing import Any, Final, TypeVar
+from typing import Any, Final, Protocol, TypeVar
 
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.workers import Workers
+from transientcam_server.planning.progress import Progress
 
 MOST: Final = 8
 """Places: requests whose plan or front is computed, or is next."""
@@ -22,27 +16,47 @@ MOST_OF_ONE: Final = 4
 """Of one address."""
 WAIT_S: Final = 10.0
 RETRY_AFTER_S: Final = 10
-WATCHED_SHARE: Final = 0.25
-"""Of one processor, that planning takes for good while frames are sent or recorded."""
-AT_ONCE_S: Final = 20.0
-"""Processor time that planning may take before: that of a look, a plan and a front."""
+IDLE_S: Final = 60.0
+"""After which the process that plans is ended, until it is needed again."""
 _T = TypeVar("_T")
 
 
+class Planning(Protocol):
+    """Computes plans, one at a time; `PlanningProcess` does."""
+
+    def run(self, compute: Callable[..., _T], *arguments: object, progress: Progress) -> _T:
+        """Return ``compute(*arguments, progress)``; what ``progress`` raises ends the work."""
+        ...
+
+    def leave(self) -> None:
+        """Give memory back where nothing is computed."""
+        ...
+
+    def close(self) -> None:
+        """End what is computed."""
+        ...
+
+
 class PlanningQueue:
-    """Lets requests wait for plans; on the event loop, and what is planned on a worker.
+    """Lets requests wait for plans; on the event loop, and what is planned in another process.
 
     Parameters
     ----------
-    workers
-        That plan.
+    process
+        That plans.
     wait_s
         How long a request waits for a place.
+    idle_s
+        How long the process stays for the next plan.
     """
 
-    def __init__(self, workers: Workers, *, wait_s: float = WAIT_S) -> None:
-        self._workers = workers
+    def __init__(
+        self, process: Planning, *, wait_s: float = WAIT_S, idle_s: float = IDLE_S
+    ) -> None:
+        self._process = process
         self._wait_s = wait_s
+        self._idle_s = idle_s
+        self._idle: asyncio.TimerHandle | None = None
         self._one_at_a_time = asyncio.Lock()
         self._change = asyncio.Condition()
         self._placed: Counter[str] = Counter()
@@ -77,8 +91,8 @@ class PlanningQueue:
             async with self._change:
                 self._change.notify_all()
 
-    async def run(self, compute: Callable[..., _T], *arguments: object) -> _T:
-        """Return the result of ``compute`` on a worker, when no other plan is computed.
+    async def run(self, compute: Callable[..., _T], *arguments: object, progress: Progress) -> _T:
+        """Return ``compute(*arguments, progress)`` of the process, when no other plan is computed.
 
         Raises
         ------
@@ -88,23 +102,37 @@ class PlanningQueue:
         async with self._one_at_a_time:
             if self._closing:
                 raise _closing()
-            work = asyncio.ensure_future(self._workers.run_long(compute, *arguments))
+            self._stay()
+            # a thread that waits, and none of the workers
+            work = asyncio.ensure_future(
+                asyncio.to_thread(self._process.run, compute, *arguments, progress=progress)
+            )
             self._work = work
             try:
-                value, _ = await work
+                return await work
             except asyncio.CancelledError:
                 if self._closing:
                     raise _closing() from None
                 raise
-        return value
+            finally:
+                if not self._closing:
+                    loop = asyncio.get_running_loop()
+                    self._idle = loop.call_later(self._idle_s, self._process.leave)
 
     async def close(self) -> None:
-        """End all that waits, without waiting until the worker notices."""
+        """End all that waits, without waiting until the process has ended."""
         self._closing = True
+        self._stay()
+        self._process.close()
         if self._work is not None:
             self._work.cancel()
         async with self._change:
             self._change.notify_all()
+
+    def _stay(self) -> None:
+        if self._idle is not None:
+            self._idle.cancel()
+            self._idle = None
 
     def _has_room(self, client: str) -> bool:
         return self._placed[client] < MOST_OF_ONE and self._placed.total() < MOST
@@ -121,79 +149,3 @@ class PlanningQueue:
 
 def _closing() -> Problem:
     return Problem(kinds.SHUTTING_DOWN, "The service is shutting down.")
-
-
-class Allowance:
-    """Processor time that planning may take at once, before it has to keep to a share.
-
-    It is used up by what is planned, and comes back at the share; so a plan now and then is
-    computed without a rest, and one after the other keep to the share.
-
-    Parameters
-    ----------
-    share
-        Returns the share of one processor, above 0 to 1, that may be taken now for good.
-    at_once_s
-        Processor time that may be taken beyond it.
-    now_s
-        The time.
-    """
-
-    def __init__(
-        self,
-        share: Callable[[], float],
-        *,
-        at_once_s: float = AT_ONCE_S,
-        now_s: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._share = share
-        self._most_s = at_once_s
-        self._now_s = now_s
-        self._left_s = at_once_s
-        self._since_s = now_s()
-        self._lock = threading.Lock()
-
-    def take(self, cpu_s: float) -> float:
-        """Note what was computed, and return how long to rest now, in s."""
-        share = self._share()
-        with self._lock:
-            now_s = self._now_s()
-            back_s = share * (now_s - self._since_s)
-            self._since_s = now_s
-            self._left_s = min(self._left_s + back_s - cpu_s, self._most_s)
-            if share >= 1.0:
-                self._left_s = max(self._left_s, 0.0)
-            return max(-self._left_s / share, 0.0)
-
-
-class Rest:
-    """Lets the work of one thread rest in between, as its allowance says.
-
-    Parameters
-    ----------
-    allowance
-        Of all planning.
-    wait
-        Waits for so many seconds; may end sooner.
-    cpu_s
-        Processor time of the thread, which counts from now on.
-    """
-
-    def __init__(
-        self,
-        allowance: Allowance,
-        wait: Callable[[float], object],
-        *,
-        cpu_s: Callable[[], float] = time.thread_time,
-    ) -> None:
-        self._allowance = allowance
-        self._wait = wait
-        self._cpu_s = cpu_s
-        self._since_s = cpu_s()
-
-    def __call__(self) -> None:
-        """Rest for what was computed since the last call."""
-        rest_s = self._allowance.take(self._cpu_s() - self._since_s)
-        if rest_s:
-            self._wait(rest_s)
-        self._since_s = self._cpu_s()

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -84,6 +85,16 @@ class ReconstructionTimer:
         found = tm.reconstruct(images, settings, calibration=gains)
         _ = found.range_m, found.direct, found.flags
         return self._clock() - begin_s
+
+
+def timer_of(capabilities: Capabilities, settings: ReconstructionSettings) -> ReconstructionTimer:
+    """Return the timer of this process, which keeps what it has measured."""
+    return _timer_of(capabilities, settings.model_dump_json())
+
+
+@lru_cache(maxsize=8)
+def _timer_of(capabilities: Capabilities, settings: str) -> ReconstructionTimer:
+    return ReconstructionTimer(capabilities, ReconstructionSettings.model_validate_json(settings))
 
 
 def _images(harmonics: int, takes: int, shape: tuple[int, int]) -> NDArray[Any]:

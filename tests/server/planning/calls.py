@@ -1,0 +1,64 @@
+"""What tests let another process call; its modules are imported there."""
+
+import os
+from collections.abc import Callable
+from typing import NoReturn, TypeVar
+
+from transientcam_server.errors import Problem, kinds
+from transientcam_server.planning import Progress
+
+_T = TypeVar("_T")
+
+
+def pid(progress: Progress) -> int:
+    return os.getpid()
+
+
+def niceness(progress: Progress) -> int:
+    return os.nice(0)
+
+
+def steps(count: int, progress: Progress) -> int:
+    """Report each of these steps many times, and show it."""
+    for k in range(count):
+        progress.at(k / count, f"step {k}")
+        for _ in range(1000):
+            progress()
+        progress.show({"step": k})
+    return count
+
+
+def refuse(progress: Progress) -> NoReturn:
+    raise Problem(kinds.TARGET_UNREACHABLE, "Too far.", field="range_error_m", best=None)
+
+
+def go_on_for_ever(progress: Progress) -> NoReturn:
+    """Compute without ever asking whether to go on; the first step names this process."""
+    progress.at(0.5, str(os.getpid()))
+    while True:
+        sum(k * k for k in range(10_000))
+
+
+def end_at_once(progress: Progress) -> NoReturn:
+    os._exit(3)
+
+
+class Here:
+    """Calls in this process: what a test replaces is replaced for it, too."""
+
+    def run(self, compute: Callable[..., _T], *arguments: object, progress: Progress) -> _T:
+        return compute(*arguments, progress)
+
+    def leave(self) -> None:
+        """Stay."""
+
+    def close(self) -> None:
+        """End nothing."""
+
+
+def is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
