@@ -10,6 +10,7 @@ from transientcam_driver.clock import Clock
 from transientcam_driver.errors import CameraClosed, CameraLost
 from transientcam_driver.factory import FactoryCalibration
 from transientcam_driver.handle import Simulation
+from transientcam_driver.protocol import Status
 from transientcam_driver.receiving import Counters
 from transientcam_driver.sequence import Sequence
 
@@ -65,6 +66,16 @@ class HostCamera(ABC):
     def validate(self, sequence: Sequence) -> AppliedSequence:
         """Return what would be set, without a request to the device; the epoch is 0."""
         return self._capabilities.apply(sequence)
+
+    def _status(self, *, light_on: bool, temperature_c: float) -> Status:
+        return Status.of_host(
+            streaming=self._state is CameraState.STREAMING,
+            light_on=light_on,
+            epoch=self._applied.epoch,
+            next_image=self.counters.images + self.counters.lost,
+            device_time_s=self.device_time_s(),
+            temperature_c=temperature_c,
+        )
 
     @abstractmethod
     def stop(self) -> None:

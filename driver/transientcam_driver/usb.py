@@ -1,13 +1,13 @@
 """The USB transport: find a camera, send it requests, read its images.
 
-Errors of pyusb are translated in ``_translated`` and nowhere else.
+Errors of pyusb are translated in ``translated`` and nowhere else.
 """
 
 import array
 import errno
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import usb.backend.libusb1
 import usb.core
@@ -27,12 +27,7 @@ from transientcam_driver.plugin import FoundCamera
 from transientcam_driver.protocol import Request
 from transientcam_driver.protocol.requests import IMAGE_ENDPOINT, PRODUCT_ID, VENDOR_ID
 
-UDEV_RULE = (
-    f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{VENDOR_ID:04x}", '
-    f'ATTR{{idProduct}}=="{PRODUCT_ID:04x}", MODE="0660", GROUP="plugdev", TAG+="uaccess"'
-)
-
-_VENDOR_OUT, _VENDOR_IN = 0x40, 0xC0
+VENDOR_OUT, VENDOR_IN = 0x40, 0xC0
 _US_ENGLISH = 0x0409
 _INTERFACE = 0
 _CONTROL_TIMEOUT_MS = 1000
@@ -41,6 +36,20 @@ _SMALLEST_READ_BYTES = 16 * 1024
 
 # usb-protocol 10.7; which one depends on the host controller, the kernel and the moment
 _GONE = {errno.ENODEV, errno.EIO, errno.EPROTO, errno.ESHUTDOWN, errno.ENOENT, None}
+
+
+Claimed = TypeVar("Claimed")
+
+
+def udev_rule(vendor_id: int, product_id: int) -> str:
+    """Return the line for udev that lets users open such a device."""
+    return (
+        f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{vendor_id:04x}", '
+        f'ATTR{{idProduct}}=="{product_id:04x}", MODE="0660", GROUP="plugdev", TAG+="uaccess"'
+    )
+
+
+UDEV_RULE = udev_rule(VENDOR_ID, PRODUCT_ID)
 
 
 class Transport(Protocol):
@@ -85,25 +94,24 @@ class UsbTransport:
 
     def __init__(self, device: Any, serial: str) -> None:
         self._device = device
-        self._node = _node(device)
+        self._node = node_of(device)
         self.serial = serial
         self._buffer = array.array("B", bytes(_SMALLEST_READ_BYTES))
-        with self._translated("claiming the interface"):
-            usb.util.claim_interface(device, _INTERFACE)
+        claim(device)
 
     def control_in(self, request: Request, *, value: int = 0, length: int) -> bytes:
         """Send a request and return the answer; ``value`` has 32 bits (wValue, wIndex)."""
         with self._translated(request.name):
             return bytes(
                 self._device.ctrl_transfer(
-                    _VENDOR_IN, request, value & 0xFFFF, value >> 16, length, _CONTROL_TIMEOUT_MS
+                    VENDOR_IN, request, value & 0xFFFF, value >> 16, length, _CONTROL_TIMEOUT_MS
                 )
             )
 
     def control_out(self, request: Request, data: bytes = b"") -> None:
         """Send a request."""
         with self._translated(request.name):
-            self._device.ctrl_transfer(_VENDOR_OUT, request, 0, 0, data, _CONTROL_TIMEOUT_MS)
+            self._device.ctrl_transfer(VENDOR_OUT, request, 0, 0, data, _CONTROL_TIMEOUT_MS)
 
     def expect_transfers(self, transfer_bytes: int) -> None:
         """Allocate a buffer that takes one transfer and the packet that ends it."""
@@ -118,9 +126,7 @@ class UsbTransport:
         timeout_ms = max(1, round(timeout_s * 1e3))
         with self._translated("reading images"):
             try:
-                count = self._device.read(IMAGE_ENDPOINT, self._buffer, timeout_ms)
-            except usb.core.USBTimeoutError:
-                count = 0
+                count = read_bulk(self._device, IMAGE_ENDPOINT, self._buffer, timeout_ms)
             except usb.core.USBError as error:
                 half = len(self._buffer) // 2 // _PACKET_BYTES * _PACKET_BYTES
                 if error.errno != errno.ENOMEM or half < _SMALLEST_READ_BYTES:
@@ -142,14 +148,11 @@ class UsbTransport:
 
     def close(self) -> None:
         """Give the device back; no error if it is gone already."""
-        with suppress(usb.core.USBError, NotImplementedError):
-            usb.util.release_interface(self._device, _INTERFACE)
-        with suppress(usb.core.USBError, NotImplementedError):
-            usb.util.dispose_resources(self._device)
+        give_back(self._device)
 
     @contextmanager
     def _translated(self, action: str) -> Iterator[None]:
-        with _translated(action, self._node):
+        with translated(action, self._node):
             yield
 
 
@@ -167,19 +170,68 @@ def open_transport(serial: str | None = None, *, backend: Any = None) -> UsbTran
     ------
     CameraNotFound, PermissionDenied, CameraBusy, LibusbMissing
     """
+    found = devices(VENDOR_ID, PRODUCT_ID, backend=backend)
+    return first_of(found, serial, serial_of, UsbTransport)
+
+
+def first_of(
+    found: Iterable[Any],
+    serial: str | None,
+    serial_of: Callable[[Any], str],
+    claim: Callable[[Any, str], Claimed],
+) -> Claimed:
+    """Claim the device with a serial number, or the first that can be claimed.
+
+    Raises
+    ------
+    CameraError
+        Why the last one that might have been it could not, or `CameraNotFound`.
+    """
     trouble: CameraError = CameraNotFound(serial)
-    for device in _cameras(backend):
+    for device in found:
         try:
-            with _translated("reading the serial number", _node(device)):
-                found = usb.util.get_string(device, device.iSerialNumber, _US_ENGLISH)
-            if serial is None or found == serial:
-                return UsbTransport(device, found or "")
+            its = serial_of(device)
+            if serial in (None, its):
+                return claim(device, its)
         except CameraLost:
             pass  # it was unplugged meanwhile
         except CameraError as error:
             trouble = error
-        usb.util.dispose_resources(device)
+        forget(device)
     raise trouble
+
+
+def give_back(device: Any) -> None:
+    """Release a device; no error if it is gone already."""
+    with suppress(usb.core.USBError, NotImplementedError):
+        usb.util.release_interface(device, _INTERFACE)
+    with suppress(usb.core.USBError, NotImplementedError):
+        usb.util.dispose_resources(device)
+
+
+def claim(device: Any, rule: str = UDEV_RULE) -> None:
+    """Claim a device's interface; raises as `translated`."""
+    with translated("claiming the interface", node_of(device), rule):
+        usb.util.claim_interface(device, _INTERFACE)
+
+
+def read_bulk(device: Any, endpoint: int, buffer: "array.array[int]", timeout_ms: int) -> int:
+    """Read a transfer into a buffer; return how many bytes came, 0 where none did in time."""
+    try:
+        return int(device.read(endpoint, buffer, timeout_ms))
+    except usb.core.USBTimeoutError:
+        return 0
+
+
+def serial_of(device: Any, rule: str = UDEV_RULE) -> str:
+    """Return a device's serial number, empty where it has none; raises as `translated`."""
+    with translated("reading the serial number", node_of(device), rule):
+        return usb.util.get_string(device, device.iSerialNumber, _US_ENGLISH) or ""
+
+
+def forget(device: Any) -> None:
+    """Close what was opened to look at a device."""
+    usb.util.dispose_resources(device)
 
 
 def system_libusb() -> Any:
@@ -194,13 +246,13 @@ def list_cameras(*, backend: Any = None) -> tuple[FoundCamera, ...]:
     ------
     LibusbMissing
     """
-    return tuple(map(_described, _cameras(backend)))
+    return tuple(map(_described, devices(VENDOR_ID, PRODUCT_ID, backend=backend)))
 
 
 def _described(device: Any) -> FoundCamera:
-    node = _node(device)
+    node = node_of(device)
     try:
-        with _translated("reading its strings", node):
+        with translated("reading its strings", node):
             serial, product = (
                 usb.util.get_string(device, index, _US_ENGLISH)
                 for index in (device.iSerialNumber, device.iProduct)
@@ -217,22 +269,29 @@ def _spec(serial: str | None) -> str:
     return "usb" if serial is None else f"usb:{serial}"
 
 
-def _cameras(backend: Any) -> list[Any]:
+def devices(vendor_id: int, product_id: int, *, backend: Any = None) -> list[Any]:
+    """Return pyusb's devices with these numbers.
+
+    Raises
+    ------
+    LibusbMissing
+    """
     try:
         found: Any = usb.core.find(
-            find_all=True, idVendor=VENDOR_ID, idProduct=PRODUCT_ID, backend=backend
+            find_all=True, idVendor=vendor_id, idProduct=product_id, backend=backend
         )
         return list(found)
     except usb.core.NoBackendError as error:
         raise LibusbMissing from error
 
 
-def _node(device: Any) -> str:
+def node_of(device: Any) -> str:
+    """Return the device node of a device of pyusb."""
     return f"/dev/bus/usb/{device.bus:03d}/{device.address:03d}"
 
 
 @contextmanager
-def _translated(action: str, node: str) -> Iterator[None]:
+def translated(action: str, node: str, rule: str = UDEV_RULE) -> Iterator[None]:
     """Translate every error of pyusb into one of `transientcam_driver.errors`."""
     try:
         yield
@@ -244,7 +303,7 @@ def _translated(action: str, node: str) -> Iterator[None]:
         if error.errno in _GONE:
             raise CameraLost(f"{action}: {error.strerror}") from error
         if error.errno == errno.EACCES:
-            raise PermissionDenied(node, UDEV_RULE) from error
+            raise PermissionDenied(node, rule) from error
         if error.errno == errno.EBUSY:
             raise CameraBusy(node) from error
         if error.errno == errno.EPIPE:

@@ -12,8 +12,11 @@ LogFormat = Literal["auto", "text", "json"]
 request_id: Final[ContextVar[str | None]] = ContextVar("request_id", default=None)
 """The id of the request that is being answered; None outside of any."""
 
-_NOISY: Final = ("websockets", "asyncio", "multipart", "PIL", "numba", "h5py")
+_NOISY: Final = ("websockets", "asyncio", "multipart", "PIL", "numba", "h5py", "httpcore")
 """Libraries whose own messages at `debug` are left out; some of them contain headers."""
+
+_ROUTINE: Final = "httpx"
+"""Logs at `info` each request that a relay makes of its origin."""
 
 _CLIENT_MISTAKES: Final = frozenset(
     (
@@ -34,6 +37,7 @@ def configure(*, level: str, form: LogFormat, stream: TextIO = sys.stderr) -> No
     logging.basicConfig(level=level.upper(), handlers=[handler], force=True)
     for name in _NOISY:
         logging.getLogger(name).setLevel(max(logging.INFO, logging.getLevelName(level.upper())))
+    logging.getLogger(_ROUTINE).setLevel(logging.WARNING)
 
 
 def formatter(form: Literal["text", "json"]) -> logging.Formatter:

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import logging
+import secrets
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, replace
@@ -30,12 +31,15 @@ from transientcam_server.camera.events import (
     Event,
     Held,
     Lost,
+    OriginChanged,
     Released,
     SequenceChanged,
 )
 from transientcam_server.camera.jobs import Job
 from transientcam_server.camera.lease import Change, Lease, Timer
 from transientcam_server.camera.light import LightGuard
+from transientcam_server.camera.origin_lease import OriginLease
+from transientcam_server.camera.shared import SharedAcquisition
 from transientcam_server.camera.source import sensor_of, twin_of
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import (
@@ -51,9 +55,11 @@ from transientcam_server.imaging.pipeline import Pipeline
 from transientcam_server.imaging.recipe import SettingsVersion, require_estimator, suited
 from transientcam_server.imaging.workers import Workers
 from transientcam_server.planning import FrontCache, Looks, Planner
-from transientcam_server.planning.queue import WATCHED_SHARE, PlanningQueue
+from transientcam_server.planning.process import PlanningProcess
+from transientcam_server.planning.queue import PlanningQueue
 from transientcam_server.recording import Header, Library, RecordingOptions, ReplayCamera
 from transientcam_server.recording.frames import RecordedFramesCache
+from transientcam_server.relay import RelayCamera
 from transientcam_server.settings import ReconstructionSettings, Settings
 
 _log = logging.getLogger(__name__)
@@ -82,6 +88,8 @@ class Service:
 
     Attributes
     ----------
+    relay, origin_lease
+        The camera as that of another service, and the lease there; None of a camera here.
     applied
         The sequence that frames are captured with from now on.
     mjpeg_clients
@@ -92,6 +100,8 @@ class Service:
 
     def __init__(self, camera: Camera, settings: Settings) -> None:
         self.camera = camera
+        self.relay = camera if isinstance(camera, RelayCamera) else None
+        self._service_id = secrets.token_hex(8) if self.relay is None else self.relay.service_id
         self.settings = settings
         self.hub = Hub()
         self.history = History(settings.history)
@@ -104,13 +114,8 @@ class Service:
         self.workers = Workers(self._executor, count=settings.workers)
         self._sensor = sensor = sensor_of(camera, settings.sensor)
         reconstruction = suited(settings.reconstruction, camera.capabilities.sampling)
-        self.planner = Planner(
-            camera.capabilities,
-            sensor,
-            reconstruction,
-            share=lambda: WATCHED_SHARE if self.watched else 1.0,
-        )
-        self.planning = PlanningQueue(self.workers)
+        self.planner = Planner(camera.capabilities, sensor, reconstruction)
+        self.planning = PlanningQueue(PlanningProcess())
         kept = CalibrationStore(settings.calibrations, given=settings.calibration)
         self.pipeline = Pipeline(
             camera,
@@ -128,7 +133,14 @@ class Service:
         )
         self._loop: asyncio.AbstractEventLoop | None = None
         self._light = LightGuard(unserved_s=settings.limits.unserved_s)
-        self.acquisition = Acquisition(camera, report=self._from_acquisition, light=self._light)
+        self.acquisition = (
+            Acquisition(camera, report=self._from_acquisition, light=self._light)
+            if self.relay is None
+            else SharedAcquisition(self.relay, report=self._from_acquisition, light=self._light)
+        )
+        self.origin_lease = (
+            None if self.relay is None else OriginLease(self.relay, self.acquisition)
+        )
         self.applied: AppliedSequence = camera.applied
         self.jobs = Jobs(report=self._job_changed)
         self.calibrations = Calibrator(
@@ -150,7 +162,22 @@ class Service:
         self.recorded_frames = RecordedFramesCache(
             self.recordings, self.pipeline, lens=settings.lens
         )
-        self.identity = {"name": "transientcam", "version": VERSION}
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Which service this is, and through which others the frames come."""
+        path = (self._service_id,) if self.relay is None else self.relay.path
+        return {
+            "name": "transientcam",
+            "version": VERSION,
+            "service_id": self._service_id,
+            "path": list(path),
+        }
+
+    @property
+    def sensor(self) -> tm.noise.Sensor:
+        """The sensor of the camera, which predictions of noise rest on."""
+        return self._sensor
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
@@ -164,7 +191,7 @@ class Service:
             yield
         finally:
             turning.cancel()
-            self.planner.close()
+            await self.planning.close()
             self.lease.close()
             self.hub.close()
             self.jobs.cancel_all()
@@ -178,7 +205,6 @@ class Service:
 
     async def close_streams(self) -> None:
         """Close every stream, and give clients that still read the time to receive the reason."""
-        self.planner.close()
         await self.planning.close()
         self.hub.close()
         self.jobs.cancel_all()
@@ -207,6 +233,7 @@ class Service:
             reported=None if camera.factory is None else camera.factory.lens,
             scene_field_deg=None if simulation is None else simulation.field_of_view_deg,
             recorded=camera.intrinsics if isinstance(camera, ReplayCamera) else None,
+            relayed=None if self.relay is None else self.relay.origin.intrinsics,
         )
 
     def not_ready(self) -> list[str]:
@@ -313,10 +340,25 @@ class Service:
                 self.hub.notify("light-held", {"reason": reason})
             case Released():
                 self.hub.notify("light-released", {})
+            case OriginChanged():
+                self._adopt_calibration()
             case SequenceChanged(applied):
                 before, self.applied = self.applied, applied
                 self._notify_sequence_changed()
                 self._notify_calibration(before)
+
+    def _adopt_calibration(self) -> None:
+        """Calibrate as the origin does from the next frame on, unless a file was given here."""
+        if self.relay is None or self.settings.calibration is not None:
+            return
+        calibration = self.relay.origin.calibration
+        gains = None if calibration is None else calibration.gains
+        if calibration_id(gains) != self.calibrations.active_id:
+            if calibration is not None:
+                # before it is active: a relay of this one asks for what is; a file, but seldom
+                self.calibrations.store.keep(calibration.capture)
+            self.pipeline.calibration = calibration
+            self.hub.notify("calibration-changed", self.calibrations.notice(self.applied))
 
     def _report_superseded(self) -> None:
         """Report former frames to the observers once nothing of them is being computed."""
@@ -359,6 +401,8 @@ class Service:
         self.hub.notify("lease-changed", details | ({"from": former.holder} if former else {}))
         if change == "lapsed" and lease.on_lapse == "stop":
             self.acquisition.set_running(False).add_done_callback(_log_failure)
+        if self.origin_lease is not None and change != "granted":
+            self.origin_lease.release()  # behind the change above; a new holder takes it anew
 
     def _job_changed(self, job: Job) -> None:
         self.hub.notify("job-changed", {"job": job.to_document()})
@@ -389,6 +433,10 @@ def _log_failure(stopped: Future[None]) -> None:
 def _calibration(camera: Camera, settings: Settings, kept: CalibrationStore) -> Calibration | None:
     """Load the calibration that is given, or was active last; refuse one of another camera."""
     path = settings.calibration
+    if path is None and isinstance(camera, RelayCamera):
+        if camera.origin.calibration is not None:
+            kept.keep(camera.origin.calibration.capture)
+        return camera.origin.calibration
     if path is None:
         return _last_active(camera, kept)
     loaded = load_given(path)

@@ -58,7 +58,7 @@ def test_a_simulated_cameras_name_says_its_scene(spec: str, expected: SimulatedS
     ("spec", "reason"),
     [
         ("", "no camera is called ''"),
-        ("webcam", "no camera is called 'webcam'; known are kinect2, recording, sim"),
+        ("webcam", "no camera is called 'webcam'; known are kinect2, "),
         ("usb:A-17?speed=3", "unknown option 'speed'; there are none"),
         ("sim:", "it names no scene"),
         ("sim:mirrors?depth=3", "unknown option 'depth'"),

@@ -18,6 +18,7 @@ from transientcam_driver import (
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.errors import UDEV_RULES_FILE, TransferOverflow, TransferStalled
 from transientcam_driver.kinect2.usb_port import UDEV_RULES
+from transientcam_driver.opt8241 import usb_link
 from transientcam_driver.plugin import FoundCamera
 from transientcam_driver.protocol import Request
 from transientcam_driver.simulation.build import build, find_scene
@@ -237,7 +238,7 @@ def test_an_empty_bus_lists_no_camera() -> None:
 def test_the_file_for_udev_holds_the_rules_that_errors_name() -> None:
     file = Path(__file__).parents[2] / "packaging" / Path(UDEV_RULES_FILE).name
     rules = [line for line in file.read_text().splitlines() if not line.startswith("#")]
-    named = [UDEV_RULE, *(line.strip() for line in UDEV_RULES.splitlines())]
+    named = [UDEV_RULE, usb_link.UDEV_RULE, *(line.strip() for line in UDEV_RULES.splitlines())]
 
     # and more: the file also gives each camera a name by its serial number
     for rule, each in zip(rules, named, strict=True):

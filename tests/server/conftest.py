@@ -1,9 +1,14 @@
 """A daemon for each test that uses it, and a client that holds its answers to the contract."""
 
+import asyncio
 from collections.abc import Iterator
 
+import dask
 import httpx
 import pytest
+from fsspec.implementations.http import HTTPFileSystem
+from fsspec.implementations.reference import ReferenceFileSystem
+from zarr.core.sync import cleanup_resources
 
 from tests.server.contract import hold_to_contract
 from tests.serving import Served, serving
@@ -37,6 +42,21 @@ def steady(steady_daemon: Served) -> Iterator[httpx.Client]:
 def steady_stream(steady_daemon: Served) -> str:
     """Address of the shared daemon's stream."""
     return steady_daemon.stream_url
+
+
+@pytest.fixture(scope="module")
+def zarr_clients() -> Iterator[None]:
+    """Clients that compute on the thread that asks, and keep no connection afterwards."""
+    with dask.config.set(scheduler="synchronous"):
+        yield
+    # what fsspec keeps for the life of the process belongs to the loop that ends below
+    for each in (HTTPFileSystem, ReferenceFileSystem):
+        for system in each._cache.values():
+            session = getattr(system, "_session", None)
+            if session is not None:
+                asyncio.run_coroutine_threadsafe(session.close(), session._loop).result()
+        each.clear_instance_cache()
+    cleanup_resources()
 
 
 @pytest.fixture

@@ -18,12 +18,13 @@ from transientcam_server import (
     offline,
     planning,
     recording,
+    relay,
 )
 
 
 @pytest.mark.parametrize(
     "room",
-    [broadcast, camera, errors, imaging, offline, paper, planning, recording, tradeoff],
+    [broadcast, camera, errors, imaging, offline, paper, planning, recording, relay, tradeoff],
     ids=lambda room: room.__name__,
 )
 def test_a_room_shows_three_to_eight_names_that_exist_and_says_what_it_is(room: ModuleType) -> None:

@@ -107,6 +107,17 @@ def test_libraries_that_log_headers_stay_quiet_at_debug() -> None:
     assert "ours" in stream.getvalue()
 
 
+def test_requests_of_a_relay_to_its_origin_are_logged_only_where_they_go_wrong() -> None:
+    stream = io.StringIO()
+    logs.configure(level="info", form="text", stream=stream)
+
+    logging.getLogger("httpx").info("HTTP Request: GET http://lab:8000/api/v1/camera")
+    logging.getLogger("httpx").warning("what is wrong")
+
+    (line,) = lines(stream)
+    assert line.endswith("what is wrong")
+
+
 def test_what_clients_do_wrong_is_no_error_of_the_service() -> None:
     stream = io.StringIO()
     with serving("sim:wall?noise=off") as daemon:

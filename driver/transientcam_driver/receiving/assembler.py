@@ -10,6 +10,7 @@ from transientcam_driver.capabilities import AppliedSequence, Capabilities
 from transientcam_driver.protocol import ImageHeader
 from transientcam_driver.protocol.units import phase_word
 from transientcam_driver.receiving.decoder import ImagePacket
+from transientcam_driver.receiving.hop import Hop
 from transientcam_driver.sequence import ImageLabel
 
 
@@ -35,6 +36,8 @@ class RawFrame:
         Of the sensor, at the last image.
     lost_images
         Images lost or corrupt between the frame delivered before and this one.
+    hops
+        The relays that it came through, the first one first; of a camera on this machine none.
     """
 
     number: int
@@ -46,6 +49,7 @@ class RawFrame:
     capture_s: float
     temperature_c: float
     lost_images: int
+    hops: tuple[Hop, ...] = ()
 
     @property
     def by_take(self) -> NDArray[np.uint16]:

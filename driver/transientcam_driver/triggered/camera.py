@@ -89,14 +89,7 @@ class TriggeredCamera(HostCamera):
             self._require_connected()
             temperature_c = self._asked(self._device.temperature_c)
             streaming = self._state is CameraState.STREAMING
-            return Status.of_host(
-                streaming=streaming,
-                light_on=streaming,
-                epoch=self._applied.epoch,
-                next_image=self.counters.images + self.counters.lost,
-                device_time_s=self.device_time_s(),
-                temperature_c=temperature_c,
-            )
+            return self._status(light_on=streaming, temperature_c=temperature_c)
 
     # --- sequence and light ------------------------------------------------------------------
 

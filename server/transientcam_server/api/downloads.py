@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 from fastapi import Header
-from fastapi.responses import FileResponse
+from fastapi.responses import FileResponse, Response
 from starlette.types import Receive, Scope, Send
 
 from transientcam_server.errors import Problem, kinds
@@ -40,6 +40,30 @@ async def answer(path: Path, wanted: str | None, *, media_type: str, filename: s
     """
     usable = _is_usable(wanted, (await asyncio.to_thread(path.stat)).st_size)
     return _File(path, media_type=media_type, filename=filename, ranges=usable)
+
+
+def part(data: bytes, wanted: str | None, *, media_type: str, tag: str) -> Response:
+    """Return bytes, or the range of them that is wanted; of several ranges all.
+
+    Parameters
+    ----------
+    wanted
+        The Range header, None also where If-Range names something else than ``tag``.
+
+    Raises
+    ------
+    Problem
+        ``range-not-satisfiable``.
+    """
+    headers = {"ETag": tag, "Accept-Ranges": "bytes"}
+    size = len(data)
+    if wanted is None or "," in wanted or not _is_usable(wanted, size):
+        return Response(data, media_type=media_type, headers=headers)
+    first, _, last = (each.strip() for each in wanted.partition("=")[2].partition("-"))
+    begin = int(first) if first else max(0, size - int(last))
+    end = min(size, int(last) + 1) if first and last else size
+    headers["Content-Range"] = f"bytes {begin}-{end - 1}/{size}"
+    return Response(data[begin:end], 206, media_type=media_type, headers=headers)
 
 
 def _is_usable(wanted: str | None, size: int) -> bool:

@@ -28,7 +28,11 @@ CHANGING: Final[dict[int | str, dict[str, Any]]] = {200: {"headers": _HEADERS}}
 
 def etag(document: Mapping[str, Any]) -> str:
     """Return what names a document."""
-    content = json.dumps(document, sort_keys=True).encode()
+    return of_bytes(json.dumps(document, sort_keys=True).encode())
+
+
+def of_bytes(content: bytes) -> str:
+    """Return what names some bytes."""
     return f'"{hashlib.sha256(content).hexdigest()[:16]}"'
 
 

@@ -13,6 +13,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, InfoM
 from prometheus_client.registry import Collector
 
 import transientcam_moments as tm
+from transientcam_server.api.relay_metrics import RelayCollector
 from transientcam_server.camera.events import Back, Captured, Event, Lost
 from transientcam_server.imaging.calibration import NOMINAL_ID
 from transientcam_server.recording import Library
@@ -64,6 +65,7 @@ class Metrics:
         self.reconnects = 0
         self.registry.register(_ServiceCollector(service, self))
         self.registry.register(RecordingCollector(service.recordings))
+        self.registry.register(RelayCollector(service))
         prometheus.ProcessCollector(registry=self.registry)
         prometheus.PlatformCollector(registry=self.registry)
         prometheus.GCCollector(registry=self.registry)

@@ -19,6 +19,7 @@ from transientcam_driver import (
     Camera,
     CameraError,
     FrameTimeout,
+    RawFrame,
     Sequence,
     Status,
 )
@@ -287,6 +288,9 @@ class Acquisition:
         self._frames += 1
         self._moved_s = self._clock()
         self._arrivals_s.append(self._moved_s)
+        self._report_frame(raw)
+
+    def _report_frame(self, raw: RawFrame) -> None:
         self._report(Captured(raw, self._applied[raw.epoch]))
 
     def _remember(self, applied: AppliedSequence) -> None:
@@ -370,9 +374,12 @@ class Acquisition:
         self._camera.reconnect()
         self._connected = True
         self._moved_s = self._clock()
+        self._report_sequence()  # the same, but the device counts it anew
+
+    def _report_sequence(self) -> None:
+        """Report the sequence of the camera where it is not known yet."""
         applied = self._camera.applied
         if applied.epoch not in self._applied:
-            # the same sequence, but the device counts it anew
             self._remember(applied)
             self._report(SequenceChanged(applied))
 
@@ -395,6 +402,9 @@ class Acquisition:
 
     def _shut_down(self) -> None:
         self._run_commands(wait_s=0.0)
+        self._switch_off_at_end()
+
+    def _switch_off_at_end(self) -> None:
         try:
             self._camera.safe_off()
         except CameraError as error:

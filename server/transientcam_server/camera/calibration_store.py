@@ -144,6 +144,19 @@ class CalibrationStore:
                 raise self.not_stored(error) from error
             return self._move_in(part, capture)
 
+    def keep(self, capture: CalibrationCapture) -> None:
+        """Store the measurement of another service, which stays as it is where it is here already.
+
+        A failure is only logged: frames can be calibrated by it all the same.
+        """
+        try:
+            self.get(capture.id)
+        except Problem:
+            try:
+                self.add(capture)
+            except Problem as problem:
+                _log.warning("the calibration %s is not kept: %s", capture.id, problem.detail)
+
     def import_file(self, part: Path) -> StoredCalibration:
         """Store a file that was received; a calibration that exists stays as it is.
 

@@ -44,4 +44,9 @@ class SequenceChanged:
     applied: AppliedSequence
 
 
-Event = Captured | Lost | Back | Held | Released | SequenceChanged
+@dataclass(frozen=True, slots=True)
+class OriginChanged:
+    """The service that is relayed calibrates in another way, or its camera looks elsewhere."""
+
+
+Event = Captured | Lost | Back | Held | Released | SequenceChanged | OriginChanged

@@ -2,18 +2,25 @@
 
 import contextlib
 import logging
+from dataclasses import dataclass
 
 import transientcam_moments as tm
 from transientcam_driver import Camera, CameraError, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.recording.replay import ReplayCamera
+from transientcam_server.relay import RelayCamera
 from transientcam_server.settings import SensorSettings, SequenceSettings
 
 _log = logging.getLogger(__name__)
 
 
 def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:
-    """Return the sensor of a camera: a simulated one has its own, a real one the settings'."""
+    """Return the sensor of a camera: a simulated one has its own, a real one the settings'.
+
+    A relayed one has what its origin states.
+    """
+    if isinstance(camera, RelayCamera):
+        return camera.origin.sensor
     model = settings if camera.simulation is None else camera.simulation.sensor
     return tm.noise.Sensor(
         gain_e_per_dn=model.gain_e_per_dn,
@@ -27,9 +34,9 @@ def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:
 def start_with(camera: Camera, settings: SequenceSettings) -> None:
     """Set what the camera captures from the start, or what is nearest of that it can do.
 
-    A recording that is replayed stays as it was captured.
+    A recording that is replayed stays as it was captured, a relayed camera as its origin has it.
     """
-    if isinstance(camera, ReplayCamera):
+    if isinstance(camera, ReplayCamera | RelayCamera):
         return
     wanted = Sequence(**settings.model_dump())
     nearest = camera.capabilities.nearest(wanted)
@@ -38,30 +45,53 @@ def start_with(camera: Camera, settings: SequenceSettings) -> None:
     camera.configure(nearest)
 
 
-def twin_of(camera: Camera, spec: str) -> Camera:
-    """Open another simulated camera before the same scene, as old as the first, in virtual time.
+@dataclass(frozen=True, slots=True)
+class Twin:
+    """What another simulated camera is opened by, before the same scene, as old as the first.
 
-    Parameters
+    Attributes
     ----------
-    camera
-        A simulated one.
     spec
-        What it was opened with.
-
-    Raises
-    ------
-    SpecError, SceneError, CameraError
-        As `transientcam_driver.open_camera`.
+        What the first one was opened with.
+    age_s
+        Device time of the first one.
+    scene, effects, diffusor
+        What it simulates at present.
     """
+
+    spec: str
+    age_s: float
+    scene: str
+    effects: dict[str, str]
+    diffusor: bool
+
+    def open(self) -> Camera:
+        """Open it, in virtual time.
+
+        Raises
+        ------
+        SpecError, SceneError, CameraError
+            As `transientcam_driver.open_camera`.
+        """
+        clock = VirtualClock()
+        camera = open_camera(self.spec, clock=clock)
+        clock.sleep(self.age_s)
+        there = camera.simulation
+        assert there is not None  # noqa: S101 - of the same spec
+        if (there.scene, there.effects, there.diffusor) != (
+            self.scene,
+            self.effects,
+            self.diffusor,
+        ):
+            there.change(scene=self.scene, effects=self.effects, diffusor=self.diffusor)
+        return camera
+
+
+def twin_of(camera: Camera, spec: str) -> Twin:
+    """Return the twin of a simulated camera, which was opened with ``spec``."""
     own = camera.simulation
     assert own is not None  # noqa: S101 - callers look
-    clock = VirtualClock()
-    twin = open_camera(spec, clock=clock)
+    age_s = 0.0
     with contextlib.suppress(CameraError):  # an unplugged one is as new as the twin
-        clock.sleep(camera.status().device_time_s)
-    there = twin.simulation
-    assert there is not None  # noqa: S101 - of the same spec
-    same = (there.scene, there.effects, there.diffusor) == (own.scene, own.effects, own.diffusor)
-    if not same:
-        there.change(scene=own.scene, effects=own.effects, diffusor=own.diffusor)
-    return twin
+        age_s = camera.status().device_time_s
+    return Twin(spec, age_s, own.scene, own.effects, own.diffusor)

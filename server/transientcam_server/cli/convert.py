@@ -18,7 +18,7 @@ from transientcam_server.cli.progress import progress_bar
 def convert(
     recording: RecordingArgument,
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="The .npz, .nc, .zarr or .mcap to write.")
+        Path, typer.Option("--output", "-o", help="The .npz, .nc, .zarr, .mcap or .json to write.")
     ],
     product: Annotated[
         list[str] | None,
@@ -31,16 +31,29 @@ def convert(
         Literal["foxglove", "ros2"],
         typer.Option(help="Of an .mcap: whose messages it holds; a file holds those of one."),
     ] = "foxglove",
+    url: Annotated[
+        str | None,
+        typer.Option(
+            help="Of a .json: where readers find the recording, such as s3://bucket/corner.h5.  "
+            "[default: the file itself]"
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Convert a recording: .npz (NumPy), .nc (netCDF), .zarr (Dask), .mcap (Foxglove or ROS 2)."""
+    """Convert a recording: .npz (NumPy), .nc (netCDF), .zarr (Dask), .mcap (Foxglove or ROS 2).
+
+    A .json holds no images but where they are in the file: by it Zarr readers read the recording
+    from a disk or an object store (kerchunk).
+    """
     from transientcam_server.offline import convert_recording
     from transientcam_server.offline.mcap import lens_of
     from transientcam_server.recording import Recording
 
     products = [name.strip() for text in product or ["raw"] for name in text.split(",")]
     with Recording(recording) as opened, progress_bar("converting") as advance:
-        convert_recording(opened, output, products=products, schemas=schemas, progress=advance)
+        convert_recording(
+            opened, output, products=products, schemas=schemas, url=url, progress=advance
+        )
         frames, lens = opened.frames, lens_of(opened)
     if as_json:
         typer.echo(json.dumps({"file": str(output), "frames": frames}))

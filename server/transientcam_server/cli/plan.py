@@ -4,6 +4,7 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 """
 
 import json
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
@@ -16,9 +17,12 @@ if TYPE_CHECKING:
     from transientcam_driver import Camera, Sequence
     from transientcam_server.planning import Planner, SceneStatistics
     from transientcam_server.planning.progress import Report
+    from transientcam_server.planning.takes import TakesPrediction
 
 MOVING: Final = 0.02
 """Share of moving pixels from which on it is said."""
+LOOK_S: Final = 60.0
+"""How long a frame may take of a camera that is not planned for: an emulated one computes it."""
 
 
 def plan(
@@ -98,6 +102,8 @@ def plan(
     from transientcam_server.errors.exceptions import Problem
     from transientcam_server.planning import Goal, Planner, Progress, uniform_scene
     from transientcam_server.planning.estimation import ESTIMATORS
+    from transientcam_server.planning.families import require_plannable
+    from transientcam_server.planning.takes import predict_takes
     from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
     if estimator is not None and estimator not in ESTIMATORS:
@@ -119,12 +125,18 @@ def plan(
     )
     console = Console(stderr=True)
     virtual = camera.startswith("sim:") and not real_time
+    predicted: list[TakesPrediction] = []
     try:
         goal.require_sensible()
         with open_camera(camera, clock=VirtualClock() if virtual else RealClock()) as opened:
-            planner = Planner(
-                opened.capabilities, sensor_of(opened, SensorSettings()), ReconstructionSettings()
-            )
+            sensor = sensor_of(opened, SensorSettings())
+            try:
+                require_plannable(opened.capabilities)
+            except Problem:
+                with console.status("looking at the scene"):
+                    predicted = predict_takes(opened, sensor, read_s=LOOK_S)
+                raise
+            planner = Planner(opened.capabilities, sensor, ReconstructionSettings())
             if computing_share is not None:
                 with console.status("compiling kernels"):
                     tm.kernels.compile()  # the daemon's speed is timed
@@ -140,9 +152,11 @@ def plan(
             made = planner.plan(goal, scene, Progress(_shown(status)))
     except Problem as problem:
         if as_json:
-            typer.echo(json.dumps({"detail": problem.detail, **problem.extensions}))
+            takes = {"takes": [asdict(each) for each in predicted]} if predicted else {}
+            typer.echo(json.dumps({"detail": problem.detail, **problem.extensions, **takes}))
         else:
             console.print(problem.detail, style="red", soft_wrap=True)
+            _print_takes(predicted)
         raise typer.Exit(1) from problem
     if as_json:
         typer.echo(json.dumps(made.to_document()))
@@ -197,6 +211,12 @@ def _return(text: str) -> tuple[float, float]:
     if not all(0 < part < float("inf") for part in parts):
         raise typer.BadParameter(f"{text!r} is not RANGE_M:WEIGHT", param_hint="--return")
     return parts
+
+
+def _print_takes(predicted: "list[TakesPrediction]") -> None:
+    for each in predicted:
+        cost = f"{each.capture_s * 1e3:.1f} ms ({each.frame_rate_hz:.1f} Hz)"
+        typer.echo(f"takes {each.takes:>2}: {cost}, range to {each.range_std_m * 1e3:.2f} mm")
 
 
 def _print_plan(document: dict[str, Any], *, computing: bool) -> None:

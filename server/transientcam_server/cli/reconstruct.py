@@ -4,19 +4,24 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 """
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.console import Console
 
-from transientcam.cli.options import JsonOption, require_suffix
-from transientcam_server.cli.progress import progress_bar, progress_bars
+from transientcam.cli.options import JsonOption, TokenOption, require_suffix
+from transientcam_server.cli.cluster import DaskOption, WorkersOption
+from transientcam_server.cli.progress import progress_bars
+from transientcam_server.cli.reconstruct_recordings import (
+    Wanted,
+    reconstruct_on_cluster,
+    reconstruct_recording,
+    settings_of,
+)
 
 if TYPE_CHECKING:
     from transientcam_server.offline import Measurement, TransientCube
-    from transientcam_server.settings import ReconstructionSettings
 
 Background = Literal["none", "median"]
 _OF_MEASUREMENTS = {"smoothing_px": 0.0, "bias": 4e-3, "return_threshold": 0.1}
@@ -25,17 +30,21 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 def reconstruct(
     input: Annotated[  # noqa: A002 - it is what the argument is called in the help
-        Path,
+        str,
         typer.Argument(
             help="An .npz with moments and base_frequency_hz, counts and bin_s, h with "
             "start_opl_m and bin_opl_m, or transient (mitransient) with start_opl and "
-            "bin_width_opl; an HDF5 file of tal; or a recording."
+            "bin_width_opl; an HDF5 file of tal; or a recording: a file, the address of a daemon's "
+            "(http://HOST:8000/api/v1/recordings/ID), or with a cluster a directory of them."
         ),
     ],
     output: Annotated[
-        Path,
+        str,
         typer.Option(
-            "--output", "-o", help="The .npz to write; of a recording .h5, .npz, .nc or .zarr."
+            "--output",
+            "-o",
+            help="The .npz to write; of a recording .h5, .npz, .nc or .zarr. With a cluster a "
+            ".zarr, also at an address such as s3://bucket/corner.zarr.",
         ),
     ],
     frequency_hz: Annotated[
@@ -78,11 +87,15 @@ def reconstruct(
         typer.Option(help="Of a recording: what to compute; may be repeated.  [default: images]"),
     ] = None,
     plot: Annotated[Path | None, typer.Option(help="Also draw a picture into this .png.")] = None,
+    workers: WorkersOption = None,
+    dask: DaskOption = None,
+    token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Reconstruct a measurement in a file: density, cumulative density, range, direct, indirect.
 
     Of a recording every frame is reconstructed; a second run goes on where the first stopped.
+    `--workers` and `--dask` compute its frames on a cluster, each worker a part of them.
     """
     from transientcam_server import offline
     from transientcam_server.offline import plot as pictures
@@ -92,15 +105,18 @@ def reconstruct(
         pictures.require()
     options = {"smoothing_px": smoothing_px, "bias": bias, "return_threshold": threshold}
     given = {name: value for name, value in options.items() if value is not None}
-    if _is_recording(input):
-        _reconstruct_recording(
-            input, output, products=product, changes=given, bins=bins, as_json=as_json
-        )
+    clustered = workers is not None or dask is not None
+    if clustered or "://" in input or _is_recording(Path(input)):
+        wanted = Wanted(tuple(product or ()), given, bins)
+        if clustered:
+            reconstruct_on_cluster(input, output, wanted, workers, dask, token, as_json=as_json)
+        else:
+            reconstruct_recording(input, Path(output), wanted, token, as_json=as_json)
         return
-    require_suffix(output, ".npz")
-    settings = _settings(_OF_MEASUREMENTS | given)
+    require_suffix(Path(output), ".npz")
+    settings = settings_of(_OF_MEASUREMENTS | given)
     measurement = offline.load_measurement(
-        input, frequency_hz=frequency_hz, harmonics=harmonics, background=background
+        Path(input), frequency_hz=frequency_hz, harmonics=harmonics, background=background
     )
     console = Console(stderr=True)
     with progress_bars(console=console) as progress:
@@ -113,7 +129,7 @@ def reconstruct(
             measurement, bins=bins, settings=settings, progress=advance
         )
         progress.update(task, description="writing")
-        offline.save_cube(output, cube)
+        offline.save_cube(Path(output), cube)
         if plot is not None:
             progress.update(task, description="drawing")
             pictures.save_picture(plot, cube)
@@ -123,7 +139,7 @@ def reconstruct(
         _print_cube(console, _document(measurement, cube, output))
 
 
-def _document(measurement: "Measurement", cube: "TransientCube", output: Path) -> dict[str, Any]:
+def _document(measurement: "Measurement", cube: "TransientCube", output: str) -> dict[str, Any]:
     import numpy as np
 
     import transientcam_moments as tm
@@ -134,7 +150,7 @@ def _document(measurement: "Measurement", cube: "TransientCube", output: Path) -
         for flag in filter(None, tm.Flags)
     }
     return {
-        "file": str(output),
+        "file": output,
         "width": width,
         "height": height,
         "harmonics": measurement.harmonics,
@@ -155,19 +171,6 @@ def _print_cube(console: Console, document: dict[str, Any]) -> None:
             console.print(f"  {count} pixels flagged {flag.replace('_', ' ')}")
 
 
-def _settings(values: Mapping[str, Any]) -> "ReconstructionSettings":
-    """Return settings with these values, or refuse the one that cannot be used."""
-    from pydantic import ValidationError
-
-    from transientcam_server.settings import ReconstructionSettings
-
-    try:
-        return ReconstructionSettings.model_validate(dict(values))
-    except ValidationError as error:
-        mistake = error.errors()[0]
-        raise typer.BadParameter(f"{mistake['loc'][0]}: {mistake['msg']}") from error
-
-
 def _is_recording(path: Path) -> bool:
     """Whether a file is HDF5, and not an impulse response of tal."""
     from transientcam_server.offline.impulse_responses import is_tal
@@ -175,37 +178,3 @@ def _is_recording(path: Path) -> bool:
     with path.open("rb") as file:
         is_hdf5 = file.read(len(_HDF5)) == _HDF5
     return is_hdf5 and not is_tal(path)
-
-
-def _reconstruct_recording(
-    recording: Path,
-    output: Path,
-    *,
-    products: list[str] | None,
-    changes: dict[str, float],
-    bins: int,
-    as_json: bool = False,
-) -> None:
-    """Reconstruct every frame of a recording, continuing an interrupted run."""
-    from transientcam_server.offline import BatchOptions, reconstruct_recording
-    from transientcam_server.offline.recording import KNOWN_PRODUCTS, default_products
-    from transientcam_server.recording import Recording
-
-    for name in products or ():
-        if name not in KNOWN_PRODUCTS:
-            known = ", ".join(KNOWN_PRODUCTS)
-            raise typer.BadParameter(f"{name!r} is none of {known}", param_hint="--product")
-    with Recording(recording) as opened, progress_bar("reconstructing") as advance:
-        names = tuple(dict.fromkeys(products or default_products(opened.header.applied)))
-        settings = _settings({**opened.header.reconstruction, **changes})
-        options = BatchOptions(names, settings, bins)
-        before = reconstruct_recording(opened, output, options, progress=advance)
-        frames = opened.frames
-    if as_json:
-        document = {"file": str(output), "products": names, "frames": frames, "before": before}
-        typer.echo(json.dumps(document))
-        return
-    resumed = f", {before} of them before" if before else ""
-    Console(stderr=True).print(
-        f"{output}: {', '.join(names)} of {frames} frames{resumed}", soft_wrap=True
-    )

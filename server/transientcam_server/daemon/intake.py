@@ -5,6 +5,7 @@ Between the transport of a connection and its protocol stands an `Intake`. It re
 """
 
 import asyncio
+import threading
 from collections.abc import Callable
 from typing import Any, Final, cast
 
@@ -12,8 +13,17 @@ from transientcam_server.daemon.turns import Account
 
 PORTION_BYTES: Final = 2048
 """Read of one connection at once: 340 of the smallest WebSocket frames, 1.5 ms of parsing."""
-_buffer: Final = memoryview(bytearray(PORTION_BYTES))
-"""Of all connections: it is emptied before another one reads."""
+
+
+class _Portion(threading.local):
+    """A buffer for all connections of one loop: it is emptied before another one reads."""
+
+    def __init__(self) -> None:
+        self.buffer = memoryview(bytearray(PORTION_BYTES))
+
+
+_portion: Final = _Portion()
+"""Of each thread: several services in one process have a loop each."""
 
 
 class Intake(asyncio.BufferedProtocol):
@@ -57,12 +67,12 @@ class Intake(asyncio.BufferedProtocol):
 
     def get_buffer(self, sizehint: int) -> memoryview:
         """Return the buffer."""
-        return _buffer
+        return _portion.buffer
 
     def buffer_updated(self, nbytes: int) -> None:
         """Take a portion, and hand it over in turn."""
         assert self._valve is not None  # noqa: S101 - bytes come after the connection
-        self._portion += bytes(_buffer[:nbytes])
+        self._portion += bytes(_portion.buffer[:nbytes])
         if not self.account.run(self.hand_over):
             self._valve.shut("turn")
 

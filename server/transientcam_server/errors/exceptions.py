@@ -12,9 +12,12 @@
     │   ├── DamagedFrame     a frame's bytes are not the ones that were written
     │   ├── RecordingInUse   an unfinished recording is being written, recovered or deleted
     │   └── NotConvertible   a suffix names no format that something is written in
+    ├── ClusterError         a cluster cannot be reached, or gave up
+    ├── MixedVersions        a worker of a cluster has another version of a package
     ├── TokenFileError       the file of tokens cannot be read or written
     ├── UnknownToken         no token has this id
     ├── JobCancelled         a client cancelled a job
+    ├── OriginRefused        the service that is relayed refuses a change (a `CameraError`, too)
     ├── SequenceConflict     the running sequence is not the one that a change was made for
     └── Problem              a request cannot be answered; see `transientcam_server.api.problems`
 
@@ -22,11 +25,12 @@ Errors of the driver and of the arithmetic become problems in one place,
 `transientcam_server.errors.translation.problem_of`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from functools import partial
+from typing import Any, ClassVar
 
-from transientcam_driver import AppliedSequence
+from transientcam_driver import AppliedSequence, CameraError
 from transientcam_server.errors.kinds import ProblemKind
 
 
@@ -145,6 +149,26 @@ class NotConvertible(RecordingError):  # noqa: N818 - says what is wrong
 
 
 @dataclass(eq=False, repr=False)
+class ClusterError(ServerError):
+    """A cluster cannot be reached, or gave up; what it has written stays."""
+
+    address: str
+    reason: str
+    _sentence = "the cluster {address} failed: {reason}; the same command goes on where it stopped"
+
+
+@dataclass(eq=False, repr=False)
+class MixedVersions(ServerError):  # noqa: N818 - says what is wrong
+    """A worker would compute otherwise: ``found`` of ``package`` instead of ``wanted``."""
+
+    worker: str
+    package: str
+    found: str
+    wanted: str
+    _sentence = "the worker {worker} has {package} {found}, and not {wanted} as this process"
+
+
+@dataclass(eq=False, repr=False)
 class TokenFileError(ServerError):
     """The file of tokens cannot be read or written."""
 
@@ -178,6 +202,17 @@ class SequenceConflict(ServerError):  # noqa: N818 - says what is wrong
     _sentence = "the running sequence has epoch {running.epoch}"
 
 
+@dataclass(eq=False, repr=False)
+class OriginRefused(ServerError, CameraError):  # noqa: N818 - says what is wrong
+    """The service at ``url``, which is relayed, refuses a change with this problem document."""
+
+    url: str
+    problem: Mapping[str, object]
+
+    def __str__(self) -> str:
+        return f"the origin {self.url} refuses: {self.problem.get('detail', 'it gives no reason')}"
+
+
 class Problem(ServerError):  # noqa: N818 - RFC 9457 calls it so
     """A request that cannot be answered.
 
@@ -196,6 +231,10 @@ class Problem(ServerError):  # noqa: N818 - RFC 9457 calls it so
         self.kind = kind
         self.detail = detail
         self.extensions = extensions
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle it by its arguments."""
+        return partial(type(self), self.kind, self.detail, **self.extensions), ()
 
     def __str__(self) -> str:
         return f"{self.kind.title}: {self.detail}"

@@ -17,10 +17,11 @@ from transientcam_driver import (
 )
 from transientcam_moments import ParameterError
 from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors.exceptions import OriginRefused, Problem
 
 _SHOWN_CHARACTERS = 200
 _SHOWN_LEVELS = 8
+_OF_ANY_PROBLEM = frozenset(("type", "title", "status", "detail", "instance", "request_id"))
 
 
 class ProblemDocument(BaseModel):
@@ -63,6 +64,8 @@ def problem_of(error: Exception) -> Problem:
     match error:
         case Problem():
             return error
+        case OriginRefused():
+            return _of_origin(error)
         case SequenceError():
             return Problem(
                 kinds.INVALID_SEQUENCE,
@@ -101,6 +104,13 @@ def problem_of(error: Exception) -> Problem:
             )
         case _:
             return Problem(kinds.INTERNAL_ERROR, "The service failed; its log has the details.")
+
+
+def _of_origin(error: OriginRefused) -> Problem:
+    """Return the origin's problem as one of this service, where it has the same kind."""
+    slug = str(error.problem.get("type", "")).removeprefix("/problems/")
+    extensions = {key: each for key, each in error.problem.items() if key not in _OF_ANY_PROBLEM}
+    return Problem(kinds.KINDS.get(slug, kinds.CAMERA_FAILED), str(error), **extensions)
 
 
 def plain(value: object, *, levels: int = _SHOWN_LEVELS) -> object:

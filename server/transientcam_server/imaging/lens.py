@@ -16,7 +16,7 @@ from transientcam_server.settings import LensSettings
 
 ASSUMED_FIELD_OF_VIEW_DEG: Final = 45.0
 """Of a camera whose lens is not known."""
-Source = Literal["settings", "camera", "scene", "recording", "assumed"]
+Source = Literal["settings", "camera", "scene", "recording", "origin", "assumed"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class Intrinsics(Pinhole):
     ----------
     source
         Where they come from: the ``settings`` of the service, the ``camera`` itself, the simulated
-        ``scene``, the ``recording``, or none of these (``assumed``).
+        ``scene``, the ``recording``, the ``origin`` of a relay, or none of these (``assumed``).
     distortion, light_x_m
         As of `Lens`.
     """
@@ -62,8 +62,8 @@ class Intrinsics(Pinhole):
         return cls.of_field(field_deg, width=width, height=height, source="settings")
 
     @classmethod
-    def of_document(cls, document: Mapping[str, Any]) -> Self:
-        """Return the intrinsics that a recording holds.
+    def of_document(cls, document: Mapping[str, Any], *, source: Source = "recording") -> Self:
+        """Return the intrinsics that a recording holds, or another service states.
 
         Raises
         ------
@@ -74,7 +74,7 @@ class Intrinsics(Pinhole):
         distortion = tuple(float(each) for each in document.get("distortion", ()))
         lens = Lens(fx, fy, cx, cy, distortion, float(document.get("light_x_m", 0.0)))
         width, height = int(document["width"]), int(document["height"])
-        return cls.of_lens(lens, width=width, height=height, source="recording")
+        return cls.of_lens(lens, width=width, height=height, source=source)
 
     @classmethod
     def of_lens(cls, lens: Lens, *, width: int, height: int, source: Source) -> Self:
@@ -116,10 +116,11 @@ def known_intrinsics(
     reported: Lens | None = None,
     scene_field_deg: float | None = None,
     recorded: Mapping[str, Any] | None = None,
+    relayed: Mapping[str, Any] | None = None,
 ) -> Intrinsics:
     """Return the best that is known.
 
-    Settings go before what the camera reports, then scene and recording, then a guess.
+    Settings go before what the camera reports, then scene, recording or origin, then a guess.
     """
     given = Intrinsics.of_settings(settings, width=width, height=height)
     if given is not None:
@@ -128,7 +129,12 @@ def known_intrinsics(
         return Intrinsics.of_lens(reported, width=width, height=height, source="camera")
     if scene_field_deg is not None:
         return Intrinsics.of_field(scene_field_deg, width=width, height=height, source="scene")
-    if recorded is not None:
-        with contextlib.suppress(KeyError, TypeError, ValueError):
-            return Intrinsics.of_document(recorded)
+    sources: tuple[tuple[Mapping[str, Any] | None, Source], ...] = (
+        (recorded, "recording"),
+        (relayed, "origin"),
+    )
+    for document, source in sources:
+        if document is not None:
+            with contextlib.suppress(KeyError, TypeError, ValueError):
+                return Intrinsics.of_document(document, source=source)
     return Intrinsics.of_field(ASSUMED_FIELD_OF_VIEW_DEG, width=width, height=height)

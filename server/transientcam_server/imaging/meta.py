@@ -1,5 +1,6 @@
 """What is known of a frame, as the wire contract has it."""
 
+from dataclasses import asdict
 from typing import Any
 
 from transientcam_driver import RawFrame
@@ -39,6 +40,7 @@ def frame_meta(
         "height": height,
         "temperature_c": raw.temperature_c,
         "lost_images": raw.lost_images,
+        "hops": [asdict(hop) for hop in raw.hops],
         "rejected_images": None if found is None else found.rejected_images,
         "repaired_images": None if found is None else found.repaired_images,
         "unrepaired_images": None if found is None else found.unrepaired_images,

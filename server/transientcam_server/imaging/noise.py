@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_moments.reconstruction import OF_ANY_MULTIPLES
+from transientcam_moments.settings import OF_ANY_MULTIPLES
 from transientcam_server.imaging.recipe import Recipe
 
 _Array = NDArray[Any]

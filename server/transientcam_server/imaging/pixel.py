@@ -55,44 +55,50 @@ def describe_pixel(
     """Return range, returns, moments and impulse response of pixel (y, x) as plain values.
 
     The impulse response is given at ``bins`` times of flight, evenly spaced over one period of the
-    base frequency, its start included.
+    base frequency, its start included. Moments of multiples with gaps give none: it is then empty.
     """
     flags = tm.Flags(int(image.flags[y, x]))
-    # smoothing and biasing are done; flags are not to be judged a second time
-    found = tm.Reconstruction(
-        image.moments[:, y, x, np.newaxis], replace(image.settings, zeroth="low-frequency")
-    )
     rad_s = 2.0 * np.pi * recipe.base_frequency_hz
-    phase_rad = 2.0 * np.pi * np.arange(bins) / bins
-    density = rad_s * tm.density(found.coefficients, phase_rad)[:, 0]
-    cumulative = tm.cumulative(found.coefficients, phase_rad)[:, 0]
-    lower, upper = (
-        rad_s * bound[:, 0] for bound in tm.bounds(found.moments, phase_rad, BOUNDS_RADIUS)
-    )
+    found: tm.Reconstruction = image
+    at: tuple[Any, ...] = (..., y, x)
+    density: dict[str, Any] = {"time_s": [], "density_per_s": [], "cumulative": []}
+    lower, upper = np.empty((2, 0))
+    if recipe.applied.sequence.sampling.consecutive:
+        # smoothing and biasing are done; flags are not to be judged a second time
+        settings = replace(image.settings, zeroth="low-frequency")
+        found, at = tm.Reconstruction(image.moments[:, y, x, np.newaxis], settings), (..., 0)
+        phase_rad = 2.0 * np.pi * np.arange(bins) / bins
+        per_s = rad_s * tm.density(found.coefficients, phase_rad)[:, 0]
+        cumulative = tm.cumulative(found.coefficients, phase_rad)[:, 0]
+        bounds = tm.bounds(found.moments, phase_rad, BOUNDS_RADIUS)
+        lower, upper = (rad_s * bound[:, 0] for bound in bounds)
+        density = {
+            "time_s": [float(phase) / rad_s for phase in phase_rad],
+            "density_per_s": [_number(each) for each in per_s],
+            "cumulative": [_number(each) for each in cumulative],
+        }
     return {
         "x": x,
         "y": y,
-        "range_m": None if flags & tm.INVALID else _number(found.range_m[0]),
-        "direct": _number(found.direct[0]) or 0.0,
-        "indirect": _number(found.indirect[0]) or 0.0,
-        "brightness": _number(found.brightness[0]) or 0.0,
-        "uniform": _number(found.uniform[0]) or 0.0,
+        "range_m": None if flags & tm.INVALID else _number(found.range_m[at]),
+        "direct": _number(found.direct[at]) or 0.0,
+        "indirect": _number(found.indirect[at]) or 0.0,
+        "brightness": _number(found.brightness[at]) or 0.0,
+        "uniform": _number(found.uniform[at]) or 0.0,
         "validity": _number(image.validity[y, x]),
         "flags": [str(flag.name).lower() for flag in tm.Flags if flag and flag in flags],
         "moments": [
             {"re": _number(each.real) or 0.0, "im": _number(each.imag) or 0.0}
-            for each in found.moments[:, 0]
+            for each in found.moments[at]
         ],
         "returns": [
             {"time_s": float(phase) / rad_s, "weight": float(weight)}
             for phase, weight in zip(
-                found.returns.phase_rad[:, 0], found.returns.weight[:, 0], strict=True
+                found.returns.phase_rad[at], found.returns.weight[at], strict=True
             )
             if weight > 0.0 and math.isfinite(phase)
         ],
-        "time_s": [float(phase) / rad_s for phase in phase_rad],
-        "density_per_s": [_number(each) for each in density],
-        "cumulative": [_number(each) for each in cumulative],
+        **density,
         "bounds": {
             "radius": BOUNDS_RADIUS,
             "lower_per_s": [_number(each) for each in lower],

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import AppliedSequence, RawFrame, Sampling, Sequence
-from transientcam_moments.reconstruction import OF_ANY_MULTIPLES
+from transientcam_moments.settings import OF_ANY_MULTIPLES
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import FACTORY_ID, Gains, nominal_gains

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from transientcam_server.errors.exceptions import MissingExtra, NotConvertible
 from transientcam_server.imaging.labelling import Column, in_words
+from transientcam_server.recording.columns import as_json
 
 Row = tuple[str, int, NDArray[Any]]
 """Name of a block, number of the frame, and its values."""
@@ -27,12 +28,16 @@ Put = Callable[[str, int, NDArray[Any]], None]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """An array that is written frame by frame: all its axes, frames first, shape and type."""
+    """An array that is written frame by frame: all its axes, frames first, shape and type.
+
+    ``missing`` is what a Zarr store reads where nothing was written; None for 0.
+    """
 
     axes: tuple[str, ...]
     shape: tuple[int, ...]
     dtype: str
     attributes: Mapping[str, Any] = field(default_factory=dict)
+    missing: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,36 +169,69 @@ def _netcdf(path: Path, content: Content) -> Iterator[Put]:
 
 @contextmanager
 def _zarr(path: Path, content: Content) -> Iterator[Put]:
-    zarr = library("zarr", "a .zarr")
-    group = zarr.create_group(store=str(path), attributes=dict(content.attributes))
-    for name, column in content.columns.items():
-        group.create_array(
-            name,
-            data=column.values,
-            dimension_names=column.axes,
-            attributes=_as_json(column.attributes),
-        )
-    blocks = {
-        name: group.create_array(
-            name,
-            shape=block.shape,
-            dtype=block.dtype,
-            chunks=(1, *block.shape[1:]),
-            dimension_names=block.axes,
-            attributes=_as_json(block.attributes),
-        )
-        for name, block in content.blocks.items()
-    }
+    group = create_zarr(str(path), content)
+    blocks = {name: group[name] for name in content.blocks}
 
     def put(name: str, index: int, values: NDArray[Any]) -> None:
         blocks[name][index] = values
 
     yield put
+    finish_zarr(str(path))
+
+
+def create_zarr(
+    place: str,
+    content: Content,
+    *,
+    rows_of_chunk: Callable[[Block], int] = lambda block: 1,
+    overwrite: bool = False,
+) -> Any:
+    """Make a Zarr store with the columns of its content, and its blocks empty; return its group.
+
+    Parameters
+    ----------
+    place
+        A directory, or any address that fsspec knows.
+    rows_of_chunk
+        How many rows of a block make a chunk.
+    overwrite
+        Whether to replace what is there.
+
+    Raises
+    ------
+    MissingExtra
+        If zarr is not installed.
+    """
+    zarr = library("zarr", "a .zarr")
+    group = zarr.create_group(store=place, attributes=dict(content.attributes), overwrite=overwrite)
+    for name, column in content.columns.items():
+        group.create_array(
+            name,
+            data=column.values,
+            dimension_names=column.axes,
+            attributes=as_json(column.attributes),
+        )
+    for name, block in content.blocks.items():
+        group.create_array(
+            name,
+            shape=block.shape,
+            dtype=block.dtype,
+            chunks=(rows_of_chunk(block), *block.shape[1:]),
+            fill_value=block.missing,
+            dimension_names=block.axes,
+            attributes=as_json(block.attributes),
+        )
+    return group
+
+
+def finish_zarr(place: str) -> None:
+    """Write the metadata of all arrays into one document, which a complete store has."""
+    zarr = library("zarr", "a .zarr")
     with warnings.catch_warnings():
         # the third version of the format has consolidated metadata as an extension, which zarr and
         # xarray look for; without, each array costs a request to a remote store
         warnings.filterwarnings("ignore", message="Consolidated metadata")
-        zarr.consolidate_metadata(str(path))
+        zarr.consolidate_metadata(place)
 
 
 def _sizes(content: Content) -> dict[str, int]:
@@ -202,13 +240,6 @@ def _sizes(content: Content) -> dict[str, int]:
     arrays += [(each.axes, each.shape) for each in content.blocks.values()]
     return {
         axis: length for axes, shape in arrays for axis, length in zip(axes, shape, strict=True)
-    }
-
-
-def _as_json(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        name: value.tolist() if isinstance(value, np.ndarray) else value
-        for name, value in attributes.items()
     }
 
 

@@ -9,8 +9,8 @@ from transientcam_server.errors.exceptions import MissingExtra
 from transientcam_server.imaging.products import Product
 from transientcam_server.imaging.view import evenly
 from transientcam_server.offline.computing import known_product
-from transientcam_server.offline.convert import attributes_of, columns_of
 from transientcam_server.offline.images import ByFrame
+from transientcam_server.recording.columns import attributes_of, columns_of
 from transientcam_server.recording.reader import Recording
 
 try:

@@ -6,12 +6,13 @@ The arithmetic is the daemon's: the same recipe, stages and products. `transient
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, overload
+from typing import IO, TYPE_CHECKING, Any, cast, overload
 
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from transientcam.notebook import table_html
+from transientcam.opening import remote_recording
 from transientcam_driver import RawFrame
 from transientcam_server.errors.exceptions import InputError
 from transientcam_server.imaging.calibration import nominal_gains
@@ -31,16 +32,24 @@ _RECORDED_ID = 0
 
 
 def open_recording(
-    place: str, *, source: IO[bytes] | None = None, settings: Mapping[str, Any] | None = None
+    place: str,
+    *,
+    token: str | None = None,
+    settings: Mapping[str, Any] | None = None,
+    timeout_s: float = 10.0,
 ) -> "OpenedRecording":
-    """Open the recording at a path, or in an open binary file.
+    """Open the recording at a path, or a daemon's by its address.
 
     Parameters
     ----------
     place
-        Path of the file; only a name where there is a ``source``.
+        Path of the file, or ``URL/api/v1/recordings/ID``.
+    token
+        Bearer token, where the daemon requires one.
     settings
         Of the reconstruction, in place of the recorded ones.
+    timeout_s
+        How long to wait for a connection and for each answer.
 
     Raises
     ------
@@ -48,22 +57,41 @@ def open_recording(
         If it cannot be read as one.
     InputError
         If its settings cannot be used.
+    TransientcamError
+        If the daemon does not have it.
     OSError
         If there is no such file, or it may not be read.
     """
-    recording = Recording(Path(place), source=source)
+    recording = recording_at(place, token=token, timeout_s=timeout_s)
     try:
-        return OpenedRecording(recording, settings)
+        return OpenedRecording(recording, settings, place=place, token=token)
     except BaseException:
         recording.close()
         raise
 
 
+def recording_at(place: str, *, token: str | None = None, timeout_s: float = 10.0) -> Recording:
+    """Open the file at a path, or that of a daemon's recording; parameters as `open_recording`."""
+    if "://" not in place:
+        return Recording(Path(place))
+    source = remote_recording(place, token=token, timeout_s=timeout_s)
+    return Recording(Path(source.url), source=cast("IO[bytes]", source))
+
+
 class OpenedRecording(Sequence[ComputedFrame]):
     """A recording as a sequence of its frames; see `transientcam.Recording`."""
 
-    def __init__(self, recording: Recording, settings: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        settings: Mapping[str, Any] | None = None,
+        *,
+        place: str | None = None,
+        token: str | None = None,
+    ) -> None:
         self._recording = recording
+        # where other processes find it
+        self._place, self._token = place or str(recording.path), token
         header = recording.header
         given = dict(header.reconstruction if settings is None else settings)
         try:
@@ -130,6 +158,35 @@ class OpenedRecording(Sequence[ComputedFrame]):
         from transientcam_server.offline.in_xarray import dataset
 
         return dataset(self, self._recording, products)
+
+    def reconstruct(self, *products: str, bins: int = 256) -> "xarray.Dataset":
+        """Return an xarray.Dataset of these products as Dask arrays, in blocks of 64 frames.
+
+        Nothing is computed before Dask does it, here or on a cluster: workers open the recording by
+        its path or address, and no frame goes through a scheduler.
+
+        Parameters
+        ----------
+        products
+            Names; those of `transientcam reconstruct` when left out.
+        bins
+            Times of flight of products over time.
+
+        Raises
+        ------
+        MissingExtra
+            If Dask or xarray are not installed.
+        ParameterError
+            If a recording has no such product.
+        """
+        from transientcam_server.offline.in_dask import dataset
+        from transientcam_server.offline.job import Job
+        from transientcam_server.offline.recording import BatchOptions, default_products
+
+        names = products or default_products(self._recording.header.applied)
+        settings = ReconstructionSettings.model_validate(self.settings)
+        options = BatchOptions(tuple(dict.fromkeys(names)), settings, bins)
+        return dataset(self._recording, Job.of(self._place, options, token=self._token))
 
     @overload
     def __getitem__(self, index: int) -> ComputedFrame: ...

@@ -54,19 +54,19 @@ class BatchReconstructor:
 
     def __init__(self, recording: Recording, options: BatchOptions) -> None:
         capabilities = recording.header.capabilities
-        self._recipe = recorded_recipe(recording.header, SettingsVersion(1, options.settings))
+        self.recipe = recorded_recipe(recording.header, SettingsVersion(1, options.settings))
         self._size = capabilities.height, capabilities.width
         self.products = [PRODUCTS[name] for name in options.products]
-        self.time_s = np.arange(options.bins) / (options.bins * self._recipe.base_frequency_hz)
+        self.time_s = np.arange(options.bins) / (options.bins * self.recipe.base_frequency_hz)
 
     def shape(self, product: Product) -> tuple[int, ...]:
         """Shape of a product of one frame."""
-        return product.shape(self._recipe.applied, *self._size, times=len(self.time_s))
+        return product.shape(self.recipe.applied, *self._size, times=len(self.time_s))
 
     def compute(self, raw: RawFrame, previous: RawFrame | None = None) -> dict[str, NDArray[Any]]:
         """Return the products of a frame by name; it may be filled in from the ``previous`` one."""
         frames = [raw] if previous is None else [previous, raw]
-        frame = ComputedFrame(len(frames) - 1, self._recipe, frames.__getitem__)
+        frame = ComputedFrame(len(frames) - 1, self.recipe, frames.__getitem__)
         return {
             each.name: frame.product(
                 each.name, time_s=self.time_s.tolist() if each.over_time else None
@@ -109,7 +109,7 @@ def reconstruct_recording(
         sink = sink_of(output, SINKS, what="products of a recording", also=HDF5_SUFFIXES)
     reconstructor = BatchReconstructor(recording, options)
     part = output.with_name(output.name + ".part")
-    document = _document(recording, options)
+    document = document_of(recording, options)
     if part.exists():
         file = _resumed(part, document)
     else:
@@ -162,7 +162,7 @@ def _rows(file: swmr.File) -> Iterator[Row]:
             yield name, index, dataset[index]
 
 
-def _document(recording: Recording, options: BatchOptions) -> dict[str, str]:
+def document_of(recording: Recording, options: BatchOptions) -> dict[str, str]:
     """Return the attributes that must agree for an unfinished file to be continued."""
     header = recording.header
     return {
@@ -175,6 +175,29 @@ def _document(recording: Recording, options: BatchOptions) -> dict[str, str]:
         "calibration": json.dumps(dict(header.calibration)),
         "products": json.dumps([*options.products, options.bins]),
     }
+
+
+def content_of(
+    recording: Recording, reconstructor: BatchReconstructor, document: Mapping[str, str]
+) -> Content:
+    """Return what a store of products holds: all but the products, which are empty."""
+    columns = {
+        name: Column(("frame",), recording.series(name), {"units": "s"})
+        for name in _SERIES
+        if name != "frame"
+    }
+    blocks = {}
+    for product in reconstructor.products:
+        description, shape = product.description, reconstructor.shape(product)
+        attributes = {"units": description.unit, "long_name": description.summary}
+        axes = ("frame", *description.axes)
+        sizes = (recording.frames, *shape)
+        blocks[product.name] = Block(axes, sizes, description.dtype, attributes)
+        for name, size in zip(description.axes, shape, strict=True):
+            values = reconstructor.time_s if name == "time" else np.arange(size)
+            columns[name] = Column((name,), values)
+    versions = json.dumps(dict(recording.header.versions))
+    return Content(columns, blocks, {**document, "versions": versions})
 
 
 def _lay_out(
@@ -210,7 +233,7 @@ def _resumed(part: Path, document: Mapping[str, str]) -> swmr.File:
     scratch = part.with_name(part.name + ".resuming")
     try:
         with swmr.open_unfinished(part) as begun:
-            _require_same(part, begun.attrs, document)
+            require_same(part, begun.attrs, document)
             products: Sequence[str] = json.loads(document["products"])[:-1]
             rows = min(len(begun[name]) for name in (*products, *_SERIES))
             salvage(begun, scratch, rows, row_axis="frame")
@@ -222,7 +245,14 @@ def _resumed(part: Path, document: Mapping[str, str]) -> swmr.File:
     return swmr.open_file(part, "r+", libver=swmr.LIBVER)
 
 
-def _require_same(part: Path, begun: Mapping[str, Any], document: Mapping[str, str]) -> None:
+def require_same(part: Path | str, begun: Mapping[str, Any], document: Mapping[str, str]) -> None:
+    """Refuse to go on with products that were begun of something else, or otherwise.
+
+    Raises
+    ------
+    InputError
+        If they were.
+    """
     for key, value in document.items():
         if begun.get(key) != value:
             expected = f"{value} to go on with; delete the file to begin anew"

@@ -166,17 +166,17 @@ def timeline(host_time_s: NDArray[Any]) -> dict[str, Any]:
 
 
 def _read_header(find: Find) -> Header:
-    with _opened(find) as recording:
+    with open_found(find) as recording:
         return recording.header
 
 
 def _read_times(find: Find) -> NDArray[np.float64]:
-    with _opened(find) as recording:
+    with open_found(find) as recording:
         return recording.series("host_time_s")
 
 
 def _read_frame(find: Find, number: int) -> RawFrame:
-    with _opened(find) as recording:
+    with open_found(find) as recording:
         if not 1 <= number <= recording.frames:
             raise _unknown_frame(number, recording.frames)
         try:
@@ -186,7 +186,14 @@ def _read_frame(find: Find, number: int) -> RawFrame:
             raise Problem(kinds.RECORDING_DAMAGED, detail, field="frame", value=number) from error
 
 
-def _opened(find: Find) -> Recording:
+def open_found(find: Find) -> Recording:
+    """Open the file that ``find`` returns, also one that is finished, and renamed, this moment.
+
+    Raises
+    ------
+    Problem
+        Those of ``find``, and ``recording-damaged``.
+    """
     try:
         try:
             return Recording(find())

@@ -83,6 +83,16 @@ class Recording:
         images, height, width = self._raw.shape[1:]
         return self.frames, images, height, width
 
+    @property
+    def stored(self) -> swmr.Dataset:
+        """The images as HDF5 has them; see `transientcam_server.recording.storage`."""
+        return self._raw
+
+    @property
+    def descriptor(self) -> int:
+        """Descriptor of the open file, also after it got another name."""
+        return int(self._file.id.get_vfd_handle())
+
     def series(self, name: str) -> NDArray[Any]:
         """Return one of `layout.SERIES`, one value a frame."""
         values: NDArray[Any] = self._series[name][: self.frames]

@@ -28,6 +28,8 @@ _SEAL: Final = np.dtype(
 )
 """Packed, in this order; the CRC-32 of chunk and seal follows."""
 _CRC_BYTES: Final = 4
+SIZE_BYTES: Final = _SEAL.itemsize + _CRC_BYTES
+"""Of a seal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +50,23 @@ def seal(row: int, chunk: bytes, values: Mapping[str, object]) -> bytes:
         record[name] = values[name]
     data = record.tobytes()
     return data + isal_zlib.crc32(data, isal_zlib.crc32(chunk)).to_bytes(_CRC_BYTES, "little")
+
+
+def unsealed_size(size_bytes: int, end: bytes) -> int:
+    """Return how many bytes of a chunk are compressed data.
+
+    Parameters
+    ----------
+    size_bytes
+        Of the chunk, with a seal or without one.
+    end
+        Its last `SIZE_BYTES`, or all of a shorter one.
+    """
+    if len(end) == SIZE_BYTES and end.startswith(_MAGIC):
+        record = np.frombuffer(end[: _SEAL.itemsize], _SEAL)[0]
+        if int(record["size"]) == size_bytes - SIZE_BYTES:
+            return size_bytes - SIZE_BYTES
+    return size_bytes
 
 
 def sealed_frames(path: Path) -> list[SealedFrame]:

@@ -138,9 +138,35 @@ def read_rows(dataset: swmr.Dataset, first: int = 0, last: int | None = None) ->
     return found
 
 
+def place_of_chunk(
+    dataset: swmr.Dataset, corner: tuple[int, ...], size_bytes: int
+) -> tuple[int, int]:
+    """Return the offset and the size in bytes of a chunk in a file of ``size_bytes``.
+
+    Raises
+    ------
+    ValueError
+        If it was never written, or without its filters, or lies outside of the file.
+    """
+    found = dataset.id.get_chunk_info_by_coord(corner)
+    if found.byte_offset is None:
+        raise ValueError("a chunk was never written")
+    if found.filter_mask:
+        raise ValueError("a chunk was written without its filters")
+    if found.byte_offset + found.size > size_bytes:
+        raise ValueError("a chunk lies outside of the file")
+    return found.byte_offset, found.size
+
+
 def is_one_chunk_a_row(dataset: swmr.Dataset) -> bool:
     """Return whether a dataset is stored as `swmr.create_blocks` makes it."""
     return dataset.chunks == (1, *dataset.shape[1:]) and len(_filters(dataset)) > 1
+
+
+def is_shuffled(dataset: swmr.Dataset) -> bool | None:
+    """Return whether chunks are shuffled before they are deflated; None where they are as is."""
+    filters = _filters(dataset)
+    return len(filters) > 1 if filters else None
 
 
 def _require_inside(dataset: swmr.Dataset, name: str) -> None:

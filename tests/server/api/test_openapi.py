@@ -64,6 +64,8 @@ def test_every_resource_of_the_interface_is_described(document: dict[str, Any]) 
         "DELETE /api/v1/recordings/{recording}",
         "POST /api/v1/recordings/{recording}/stop",
         "GET /api/v1/recordings/{recording}/file",
+        "GET /api/v1/recordings/{recording}/zarr/{document}",
+        "GET /api/v1/recordings/{recording}/zarr/{array}/{part}",
         "GET /api/v1/recordings/{recording}/frames",
         "GET /api/v1/recordings/{recording}/frames/{frame}",
         "GET /api/v1/recordings/{recording}/frames/{frame}/pixel",

@@ -1,15 +1,18 @@
 """The contract of all cameras, for every plug-in of this distribution."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
 import pytest
 
+import transientcam
 from tests.driver.kinect2.standing import READ_S, camera_of, emulated
 from tests.driver.mounts import PyusbMount
+from tests.driver.opt8241 import standing as opt8241
 from tests.server.recording.made import record
+from tests.serving import serving
 from transientcam_driver import Camera, TriggeredCamera, open_camera
 from transientcam_driver.clock import RealClock, VirtualClock
 from transientcam_driver.contract import CLAUSES, Bench, Clause, ContractSkipped
@@ -18,6 +21,7 @@ from transientcam_driver.simulation.build import find_scene, without_noise
 from transientcam_driver.simulation.device import Fault
 from transientcam_driver.simulation.tofcam660 import build_tofcam660
 from transientcam_driver.tofcam660 import DeviceOptions, Region, Tofcam660
+from transientcam_server.relay import Origin, RelayCamera
 
 SKIPPED = {
     "recording": {
@@ -88,8 +92,49 @@ def emulated_kinect2(directory: Path, closing: ExitStack) -> Bench:
     )
 
 
+def emulated_opt8241(directory: Path, closing: ExitStack) -> Bench:
+    clock = VirtualClock(start_s=1.0)
+    device = opt8241.emulated(clock=clock)
+    return Bench(
+        lambda: opt8241.camera_of(device, clock=clock),
+        lit=lambda camera: device.lit,
+        unplug=lambda camera: device.unplug(),
+        replug=lambda camera: device.replug(),
+        lose_image=lambda camera: device.inject(Fault.CORRUPT_PIXELS),
+    )
+
+
+def relayed(directory: Path, closing: ExitStack) -> Bench:
+    """An origin that captures nothing: what a relay switches on there is its own."""
+    origin = closing.enter_context(serving("sim:wall?noise=off"))
+    camera = closing.enter_context(transientcam.Camera(origin.url, timeout_s=60.0))
+    origin.start_all_workers()
+    camera.latest(wait_s=10.0)
+    camera.stop()
+
+    def lit(relay: Camera) -> bool:
+        status = camera.camera["status"]
+        return status is not None and bool(status["light_on"])
+
+    def cause(fault: str) -> Callable[[Camera], None]:
+        def at_the_origin(relay: Camera) -> None:
+            camera.cause(fault)
+
+        return at_the_origin
+
+    return Bench(
+        lambda: RelayCamera(Origin(origin.url, None, timeout_s=60.0)),
+        lit=lit,
+        unplug=cause("unplug"),
+        replug=cause("replug"),
+        lose_image=cause("drop-image"),
+    )
+
+
 BENCHES = {
+    "relay": relayed,
     "kinect2": emulated_kinect2,
+    "opt8241": emulated_opt8241,
     "tofcam660": emulated_tofcam660,
     "sim": simulated,
     "usb": on_usb,

@@ -200,9 +200,11 @@ def test_what_they_cannot_give_is_absent_with_the_reason(
         refused = device.send("POST", "/api/v1/plan", json={"target": {"range_error_m": 0.01}})
         problem = device.refusal(refused, 409, "target-unreachable")
         pixel = device.send("GET", "/api/v1/frames/latest/pixel", params={"x": 1, "y": 1})
-        device.refusal(pixel, 409, "estimator-misfit")
+    curves = pixel.json()
 
     assert problem["field"] == "sampling"
+    assert curves["density_per_s"] == curves["cumulative"] == []
+    assert len(curves["returns"]) > 0
     assert "the multiples 2, 10 and 15 at 3" in problem["detail"]
     assert set(absent) == {*OF_CONSECUTIVE_MULTIPLES, "brightness", "uniform", "truth"}
     assert command(["doctor", fixed.url, "--seconds", "0.1", "--json"]) == 0

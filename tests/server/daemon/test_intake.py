@@ -1,6 +1,7 @@
 """Portions and turns: what arrives is handed over in turn, for so much of the loop's time."""
 
 import asyncio
+import threading
 from typing import Any, cast
 
 from tests.server.daemon.loops import SHARE, Loop
@@ -183,3 +184,19 @@ def test_another_protocol_takes_over_what_arrives_from_then_on() -> None:
 
     assert (connection.protocol.received, other.received) == ([b"head"], [b"frames"])
     assert connection.protocol.transport.get_protocol() is other
+
+
+def test_each_thread_reads_into_a_buffer_of_its_own() -> None:
+    """Several services in one process have a loop each, and each loop a thread."""
+
+    def buffer() -> memoryview:
+        nothing = cast("Any", None)
+        intake = Intake(nothing, requests=nothing, streams=nothing, lost=lambda: None)
+        return intake.get_buffer(0)
+
+    here, there = buffer(), []
+    thread = threading.Thread(target=lambda: there.append(buffer()))
+    thread.start()
+    thread.join()
+    assert buffer().obj is here.obj
+    assert there[0].obj is not here.obj

@@ -121,7 +121,7 @@ def test_zarr_opens_in_zarr_and_xarray(source: Path, tmp_path: Path) -> None:
     raw = group["raw"]
     assert isinstance(raw, zarr.Array)
     np.testing.assert_array_equal(raw[1], frame(1).images)
-    with xarray.open_zarr(tmp_path / "a.zarr", consolidated=True) as dataset:
+    with xarray.open_zarr(tmp_path / "a.zarr", consolidated=True, chunks=None) as dataset:
         assert_images_make_moments(dataset, frame(1).images)
         assert dataset["raw"].dims == ("frame", "image", "y", "x")
         np.testing.assert_array_equal(dataset["frame"], np.arange(FRAMES))

@@ -48,6 +48,17 @@ class RangeAccuracyDocument(Document):
     that predicts them is compiled."""
 
 
+class HopDocument(Document):
+    """One relay that a frame came through."""
+
+    service_id: str
+    """Which service relayed it, as its `GET /info` has it."""
+    latency_s: float
+    """From its arrival at the service before to that at this relay, by the clocks of both."""
+    missed_frames: int
+    """Frames that the service before had and this relay never got, since it began."""
+
+
 class FrameDocument(Document):
     """What is known of a frame, whatever product of it is fetched."""
 
@@ -77,6 +88,8 @@ class FrameDocument(Document):
     temperature_c: float
     lost_images: int
     """Images lost or corrupt between the frame before and this one."""
+    hops: tuple[HopDocument, ...] = ()
+    """The relays that it came through, the first one first; none where the camera is here."""
     rejected_images: int | None = None
     """Images left out of the average over takes as outliers; null until it was computed."""
     repaired_images: int | None = None

@@ -57,10 +57,11 @@ class PixelDocument(Document):
     flags: list[str]
     """What was wrong with the pixel; empty for nothing."""
     moments: list[ComplexDocument]
-    """b_0 to b_m in DN."""
+    """b_0 to b_m in DN; of multiples with gaps: b_0, or 0, and those."""
     returns: list[ReturnDocument]
-    """The sparse estimate (Theorem 2), by time of flight."""
+    """By time of flight: the sparse estimate (Theorem 2), with gaps the estimator's."""
     time_s: list[float]
+    """Of density, cumulative and bounds; all are empty for multiples with gaps."""
     density_per_s: list[float | None]
     """The maximum entropy estimate (Theorem 1) in DN/s; null where the pixel has none."""
     cumulative: list[float | None]

@@ -48,6 +48,10 @@ class InfoDocument(Document):
 
     name: str
     version: str
+    service_id: str
+    """Another one with each start of the service."""
+    path: list[str]
+    """The `service_id` of this service and of all that it relays; the camera's own is the last."""
     api: str
     stream: StreamDocument
     products: list[ProductDocument]

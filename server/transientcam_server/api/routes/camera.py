@@ -10,6 +10,7 @@ from fastapi import APIRouter
 from transientcam_driver import CameraError, Status
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.camera import CameraDocument
+from transientcam_server.relay import RelayCamera
 
 router = APIRouter(tags=["camera"])
 
@@ -29,8 +30,25 @@ async def read_camera(service: ServiceOf) -> CameraDocument:
         simulated=camera.simulation is not None,
         capabilities=asdict(camera.capabilities),
         intrinsics=CameraDocument.IntrinsicsDocument(**asdict(service.intrinsics)),
+        sensor=CameraDocument.SensorDocument(**asdict(service.sensor)),
+        origin=_origin(service.relay),
         status=status,
         counters=asdict(camera.counters),
+    )
+
+
+def _origin(relay: RelayCamera | None) -> CameraDocument.OriginDocument | None:
+    if relay is None:
+        return None
+    found = relay.origin
+    return CameraDocument.OriginDocument.model_validate(
+        {
+            "url": relay.url,
+            "service_id": found.service_id,
+            "version": found.version,
+            "role": found.role,
+            **asdict(relay.relayed),
+        }
     )
 
 

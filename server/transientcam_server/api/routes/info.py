@@ -30,6 +30,8 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
     return InfoDocument(
         name=service.identity["name"],
         version=service.identity["version"],
+        service_id=service.identity["service_id"],
+        path=service.identity["path"],
         api="v1",
         stream=InfoDocument.StreamDocument(
             path="/api/v1/stream",

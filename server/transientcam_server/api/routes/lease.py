@@ -39,7 +39,13 @@ async def read_lease(service: ServiceOf) -> LeaseDocument:
     "/lease",
     status_code=201,
     summary="Take control of the camera",
-    responses=documented(kinds.BAD_REQUEST, kinds.INVALID_REQUEST, kinds.LEASE_HELD),
+    responses=documented(
+        kinds.BAD_REQUEST,
+        kinds.INVALID_REQUEST,
+        kinds.LEASE_HELD,
+        kinds.CAMERA_FAILED,
+        kinds.CAMERA_LOST,
+    ),
 )
 @needs(Role.OPERATOR, lease=False)
 async def take_lease(
@@ -58,6 +64,12 @@ async def take_lease(
         on_lapse=wanted.on_lapse,
         takeover=wanted.takeover,
     )
+    if service.origin_lease is not None:
+        try:
+            await service.origin_lease.take(lease, takeover=wanted.takeover)
+        except BaseException:
+            service.lease.release(lease.id)
+            raise
     return _granted(service, response, lease)
 
 
@@ -87,6 +99,8 @@ async def renew_lease(
 async def give_lease_back(service: ServiceOf, lease_id: _LeaseId = None) -> LeaseDocument:
     """Allow changes by every client again; the camera goes on as it is."""
     service.lease.release(lease_id)
+    if service.origin_lease is not None:
+        await service.origin_lease.released()
     return LeaseDocument(held=False)
 
 

@@ -94,7 +94,10 @@ async def _made(
     async with service.planning.place_of(address):
         scene = await _scene(service, request, goal.base, progress.part(0.0, planned.LOOKED))
         made = await service.planning.run(
-            service.planner.plan_document, goal, scene, progress.part(planned.LOOKED, 1.0)
+            service.planner.plan_document,
+            goal,
+            scene,
+            progress=progress.part(planned.LOOKED, 1.0),
         )
         return PlanDocument.model_validate(made)
 

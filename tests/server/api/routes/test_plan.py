@@ -12,6 +12,7 @@ import httpx
 import pytest
 
 from tests.server.contract import hold_to_contract
+from tests.server.planning.calls import Here
 from tests.serving import Served, serving
 from transientcam import Camera
 from transientcam.wire import LEASE_HEADER
@@ -113,8 +114,9 @@ def test_a_request_that_cannot_be_meant_is_refused_by_name(
 
 
 def test_the_front_falls_and_the_current_frame_says_where_it_stands(
-    noisy: httpx.Client, monkeypatch: pytest.MonkeyPatch
+    noisy: httpx.Client, noisy_daemon: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(noisy_daemon.service.planning, "_process", Here())
     families = import_module("transientcam_server.planning.families")  # not the function
     monkeypatch.setattr(families, "HARMONICS", (3,))
     monkeypatch.setattr(families, "SEARCHED", ("maximum-entropy",))
@@ -175,6 +177,7 @@ def endless(
 ) -> Iterator[tuple[str, Endless]]:
     """What a plan or a front is computed by, and which; no scene is looked at for it."""
     planner, work = noisy_daemon.service.planner, Endless()
+    monkeypatch.setattr(noisy_daemon.service.planning, "_process", Here())
     monkeypatch.setattr(planner, f"{request.param}_document", work)
     monkeypatch.setattr(planner, "look", lambda *_, **__: None)
     noisy_daemon.service.fronts.forget()

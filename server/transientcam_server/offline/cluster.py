@@ -1,0 +1,186 @@
+"""Products of every frame of a recording, computed on a Dask cluster into a Zarr store.
+
+A task is some frames: its worker reads them from the recording and writes them into the store. No
+frame goes through the scheduler, and tasks write different chunks. Which frames are there the store
+itself says, so that a second run goes on with those that are missing.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import CancelledError
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+import transientcam_moments as tm
+from transientcam_server.errors.exceptions import ClusterError, MissingExtra
+from transientcam_server.offline.formats import Block, Content, create_zarr, finish_zarr, library
+from transientcam_server.offline.job import BLOCK_FRAMES, Job, computed, opened, spans
+from transientcam_server.offline.opening import recording_at
+from transientcam_server.offline.recording import (
+    BatchOptions,
+    BatchReconstructor,
+    content_of,
+    document_of,
+    require_same,
+)
+from transientcam_server.recording.reader import Recording
+
+try:
+    import distributed
+    from distributed.comm.core import CommClosedError
+except ModuleNotFoundError as error:
+    raise MissingExtra("a cluster", "distributed", "cluster") from error
+
+COUNTING: Final = "frame"
+"""The array that a task writes last: frames that it lacks are still to be computed."""
+MISSING: Final = 2**64 - 1
+_CHUNK_BYTES: Final = 8 * 1024**2
+"""Of a chunk, at most: objects of this size are what S3 moves well."""
+
+
+def reconstruct_on(
+    client: distributed.Client,
+    place: str,
+    output: str,
+    options: BatchOptions,
+    *,
+    token: str | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> tuple[int, int]:
+    """Compute products of all frames into a Zarr store; return all frames, and those it had before.
+
+    Parameters
+    ----------
+    client
+        Of the cluster.
+    place
+        Of the recording: a path that all workers can read, or the address of a daemon's recording.
+    output
+        A directory that all workers can write, or any address that fsspec knows. A store that is
+        not complete is gone on with.
+    token
+        Bearer token, where the daemon requires one.
+
+    Raises
+    ------
+    FileExistsError
+        If the output is there already, complete, or is a directory of something else.
+    InputError
+        If what was begun there is of another recording, or made with other settings.
+    MixedVersions
+        If a worker has other versions of what the values depend on.
+    ClusterError
+        If the scheduler is lost, or a task ended several workers.
+    DamagedFrame
+        If a frame is not what was recorded.
+    ServerError, TransientcamError, OSError
+        If the recording cannot be read, or the output not be written.
+    """
+    job = Job.of(place, options, token=token)
+    with recording_at(place, token=token) as recording:
+        group = _begun(recording, output, options)
+        frames = recording.frames
+    there = np.asarray(group[COUNTING][:]) != MISSING
+    missing = [(first, last) for first, last in spans(frames) if not there[first:last].all()]
+    left = sum(last - first for first, last in missing)
+    _compute(client, job, output, missing, lambda done: progress(frames - left + done, frames))
+    finish_zarr(output)
+    return frames, frames - left
+
+
+def write_block(job: Job, output: str, first: int, last: int) -> None:
+    """Compute some frames and write them: what a task is."""
+    tm.kernels.use_one_thread()  # a worker has a process, or a thread, for every core
+    group = _group(job, output)
+    recording, _ = opened(job)
+    rows = group[job.products[0]].chunks[0]
+    for begin in range(first, last, rows):  # all frames of a task might not fit in memory
+        end = min(begin + rows, last)
+        for name, values in computed(job, begin, end).items():
+            group[name][begin:end] = values
+    group[COUNTING][first:last] = recording.series(COUNTING)[first:last]
+
+
+@lru_cache(maxsize=2)
+def _group(job: Job, output: str) -> Any:
+    """Return the group of a store, which a worker opens once for each run."""
+    return library("zarr", "a .zarr").open_group(output, mode="r+", use_consolidated=False)
+
+
+def _begun(recording: Recording, output: str, options: BatchOptions) -> Any:
+    """Return the group of a store, new or begun before."""
+    document = document_of(recording, options) | {"frames": str(recording.frames)}
+    try:
+        group = library("zarr", "a .zarr").open_group(output, mode="r+")
+    except FileNotFoundError:
+        if "://" not in output and Path(output).is_dir() and any(Path(output).iterdir()):
+            raise FileExistsError(17, "it is there already, and no Zarr store", output) from None
+        return _laid_out(recording, output, options, document, overwrite=False)
+    require_same(output, group.attrs, document)
+    if group.metadata.consolidated_metadata is not None:
+        raise FileExistsError(17, "it is there already", output)
+    if COUNTING in group:
+        return group
+    # it was interrupted before its first frame
+    return _laid_out(recording, output, options, document, overwrite=True)
+
+
+def _laid_out(
+    recording: Recording,
+    output: str,
+    options: BatchOptions,
+    document: Mapping[str, str],
+    *,
+    overwrite: bool,
+) -> Any:
+    content = content_of(recording, BatchReconstructor(recording, options), document)
+    counting = Block((COUNTING,), (recording.frames,), "<u8", missing=MISSING)
+    rows = _rows_of_chunk(content.blocks.values())
+    return create_zarr(
+        output,
+        # the last one made, by which a whole layout is known
+        Content(content.columns, {**content.blocks, COUNTING: counting}, content.attributes),
+        rows_of_chunk=lambda block: BLOCK_FRAMES if block is counting else rows,
+        overwrite=overwrite,
+    )
+
+
+def _rows_of_chunk(blocks: Iterable[Block]) -> int:
+    """Return a power of two, so that a task writes whole chunks, of the largest product's size."""
+    row_bytes = max(math.prod(block.shape[1:]) * np.dtype(block.dtype).itemsize for block in blocks)
+    fitting = max(1, _CHUNK_BYTES // row_bytes)
+    return min(BLOCK_FRAMES, 1 << (fitting.bit_length() - 1))
+
+
+def _compute(
+    client: distributed.Client,
+    job: Job,
+    output: str,
+    blocks: list[tuple[int, int]],
+    progress: Callable[[int], None],
+) -> None:
+    """Have the blocks computed; whatever ends this before ends the tasks that are left."""
+    assert client.scheduler is not None  # noqa: S101 - it is connected
+    address = str(client.scheduler.address)
+    progress(0)
+    if not blocks:
+        return
+    lengths, futures = {}, []
+    done = 0
+    try:
+        for first, last in blocks:
+            future = client.submit(write_block, job, output, first, last, pure=False)
+            lengths[future.key] = last - first
+            futures.append(future)
+        for future in distributed.as_completed(futures, loop=client.loop):
+            future.result()
+            done += lengths[future.key]
+            progress(done)
+    except (distributed.KilledWorker, CommClosedError, CancelledError) as error:
+        raise ClusterError(address, str(error) or type(error).__name__) from error
+    finally:
+        if done < sum(lengths.values()) and client.status == "running":
+            client.cancel(futures)

@@ -1,0 +1,11 @@
+"""The camera of another service, subscribed to once and served again (docs/relay.md).
+
+`RelayCamera` is the camera, `Origin` the other service as its REST interface describes it, and
+`plugin` what opens ``relay:http://HOST:PORT``.
+"""
+
+from transientcam_server.relay.camera import RelayCamera
+from transientcam_server.relay.origin import Described, Origin
+from transientcam_server.relay.plugin import PLUGIN
+
+__all__ = ["PLUGIN", "Described", "Origin", "RelayCamera"]

@@ -1,0 +1,300 @@
+"""Recordings computed on a cluster, held against the run of one process."""
+
+import os
+import shutil
+import signal
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import dask
+import distributed
+import numpy as np
+import pytest
+import xarray
+import zarr
+from moto.server import ThreadedMotoServer
+
+import transientcam
+import transientcam_moments as tm
+from tests.server.recording.made import record
+from transientcam.cli import run
+from transientcam_server.errors.exceptions import ClusterError, InputError, MixedVersions
+from transientcam_server.offline import BatchOptions, cluster, job, reconstruct_recording
+from transientcam_server.offline.cluster import reconstruct_on
+from transientcam_server.offline.job import BLOCK_FRAMES, Job, spans
+from transientcam_server.recording import Recording
+from transientcam_server.settings import ReconstructionSettings
+
+FRAMES = 3 * BLOCK_FRAMES - 20
+OPTIONS = BatchOptions(("range", "validity"))
+LOAD_LANES = job._load_lanes
+NOTHING: Any = lambda *_: None  # noqa: E731 - in place of what compiles
+pytestmark = pytest.mark.usefixtures("zarr_clients")
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return record(tmp_path_factory.mktemp("cluster") / "a.h5", FRAMES)
+
+
+@pytest.fixture(scope="module")
+def serial(source: Path) -> dict[str, Any]:
+    """Every array, as one process writes it."""
+    output = source.with_name("serial.zarr")
+    with Recording(source) as recording:
+        reconstruct_recording(recording, output, OPTIONS)
+    return {name: np.asarray(array) for name, array in zarr.open_group(str(output)).arrays()}
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[distributed.Client]:
+    """Of a cluster of threads, which starts in no time and is reached by its address."""
+    quick = {"distributed.worker.profile.enabled": False}
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        dask.config.set(quick),
+        distributed.LocalCluster(
+            n_workers=2,
+            threads_per_worker=1,
+            processes=False,
+            protocol="tcp",
+            dashboard_address="127.0.0.1:0",
+        ) as local,
+        distributed.Client(local) as client,
+    ):
+        patch.setattr(job, "_load_lanes", NOTHING)  # these are compared on NumPy
+        for worker in client.scheduler_info(n_workers=-1)["workers"]:
+            client.submit(int, workers=[worker], pure=False).result()  # starts its thread
+        yield client
+
+
+def assert_same(output: str, serial: dict[str, Any]) -> None:
+    """Hold a store against the serial run, bit for bit."""
+    dataset = xarray.open_zarr(output)
+    assert set(dataset.variables) == serial.keys()
+    for name, expected in serial.items():
+        np.testing.assert_array_equal(dataset[name].to_numpy(), expected)
+        assert dataset[name].dtype == expected.dtype
+
+
+def test_a_cluster_computes_what_one_process_does(
+    client: distributed.Client, source: Path, serial: dict[str, Any], tmp_path: Path
+) -> None:
+    done: list[tuple[int, int]] = []
+    output = str(tmp_path / "a.zarr")
+
+    counts = reconstruct_on(
+        client, str(source), output, OPTIONS, progress=lambda *count: done.append(count)
+    )
+
+    assert counts == (FRAMES, 0)
+    assert_same(output, serial)
+    assert done[0] == (0, FRAMES)
+    assert done[-1] == (FRAMES, FRAMES)
+    assert len(done) == 1 + len(spans(FRAMES))
+    with pytest.raises(FileExistsError):
+        reconstruct_on(client, str(source), output, OPTIONS)
+
+
+def test_a_run_that_was_interrupted_is_gone_on_with(
+    client: distributed.Client, source: Path, serial: dict[str, Any], tmp_path: Path
+) -> None:
+    def interrupt(done: int, total: int) -> None:
+        if done:
+            raise KeyboardInterrupt
+
+    output = str(tmp_path / "a.zarr")
+    with pytest.raises(KeyboardInterrupt):
+        reconstruct_on(client, str(source), output, OPTIONS, progress=interrupt)
+    other = BatchOptions(OPTIONS.products, ReconstructionSettings(bias=0.01))
+    with pytest.raises(InputError, match="reconstruction"):
+        reconstruct_on(client, str(source), output, other)
+
+    frames, before = reconstruct_on(client, str(source), output, OPTIONS)
+
+    assert frames == FRAMES
+    assert before >= FRAMES % BLOCK_FRAMES
+    assert_same(output, serial)
+
+
+def test_a_store_that_was_not_yet_laid_out_is_begun_anew(
+    client: distributed.Client, source: Path, serial: dict[str, Any], tmp_path: Path
+) -> None:
+    def interrupt(done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    output = tmp_path / "a.zarr"
+    with pytest.raises(KeyboardInterrupt):
+        reconstruct_on(client, str(source), str(output), OPTIONS, progress=interrupt)
+    shutil.rmtree(output / cluster.COUNTING)
+
+    assert reconstruct_on(client, str(source), str(output), OPTIONS) == (FRAMES, 0)
+    assert_same(str(output), serial)
+
+
+def test_what_is_not_a_store_is_left_alone(
+    client: distributed.Client, source: Path, tmp_path: Path
+) -> None:
+    output = tmp_path / "a.zarr"
+    output.mkdir()
+    (output / "notes.txt").write_text("mine")
+
+    with pytest.raises(FileExistsError, match="no Zarr store"):
+        reconstruct_on(client, str(source), str(output), OPTIONS)
+    assert [each.name for each in output.iterdir()] == ["notes.txt"]
+
+
+def test_workers_that_stay_read_a_replaced_file_anew(
+    client: distributed.Client, tmp_path: Path
+) -> None:
+    source, output = tmp_path / "a.h5", tmp_path / "a.zarr"
+    shapes = []
+    for frames in (3, 5):
+        source.unlink(missing_ok=True)
+        record(source, frames)
+        reconstruct_on(client, str(source), str(output), BatchOptions(("range",)))
+        shapes.append(xarray.open_zarr(output)["range"].shape[0])
+        shutil.rmtree(output)
+
+    assert shapes == [3, 5]
+
+
+def kill_once(flag: Path) -> None:
+    """Have the first frames that this process computes end it as SIGKILL does."""
+    module: Any = cluster
+    real = module.computed
+
+    def computed(*arguments: Any) -> Any:
+        if not flag.exists():
+            flag.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return real(*arguments)
+
+    module.computed = computed
+
+
+def test_a_worker_that_is_killed_in_the_middle_spoils_nothing(
+    source: Path, serial: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TRANSIENTCAM_KERNELS", "off")
+    output, flag = str(tmp_path / "a.zarr"), tmp_path / "killed"
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=50
+        ) as local,
+        distributed.Client(local) as client,
+    ):
+        first = client.run(os.getpid)
+        client.run(partial(kill_once, flag))
+        reconstruct_on(client, str(source), output, OPTIONS)
+        assert client.run(os.getpid) != first
+
+    assert flag.exists()
+    assert_same(output, serial)
+
+
+def test_a_scheduler_that_goes_is_said_and_its_successor_goes_on(
+    client: distributed.Client, source: Path, serial: dict[str, Any], tmp_path: Path
+) -> None:
+    output = str(tmp_path / "a.zarr")
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"
+        ) as local,
+        distributed.Client(local) as lost,
+        pytest.raises(ClusterError, match="goes on where it stopped"),
+    ):
+        reconstruct_on(
+            lost,
+            str(source),
+            output,
+            OPTIONS,
+            progress=lambda done, total: local.close() if done else None,
+        )
+
+    _, before = reconstruct_on(client, str(source), output, OPTIONS)
+
+    assert before
+    assert_same(output, serial)
+
+
+def test_a_worker_with_other_versions_refuses(
+    client: distributed.Client, source: Path, tmp_path: Path
+) -> None:
+    made = Job.of(str(source), OPTIONS)
+    older = replace(made, versions=(("transientcam", "0.0.1"), *made.versions[1:]))
+
+    with pytest.raises(MixedVersions, match=r"worker tcp://.* and not 0\.0\.1"):
+        client.submit(job.computed, older, 0, 1).result()
+
+
+def test_the_output_may_be_an_address_as_of_s3(
+    client: distributed.Client,
+    source: Path,
+    serial: dict[str, Any],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    import s3fs
+
+    server = ThreadedMotoServer("127.0.0.1", 0, verbose=False)
+    server.start()
+    try:
+        host, port = server.get_host_and_port()
+        monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://{host}:{port}")
+        for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+            monkeypatch.setenv(name, "testing")
+        s3fs.S3FileSystem().mkdir("bucket")
+
+        reconstruct_on(client, str(source), "s3://bucket/a.zarr", OPTIONS)
+
+        assert_same("s3://bucket/a.zarr", serial)
+    finally:
+        server.stop()
+
+
+def test_the_command_takes_the_address_of_a_scheduler_and_a_directory(
+    client: distributed.Client, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recordings = tmp_path / "recordings"
+    recordings.mkdir()
+    for name in ("a", "b"):
+        record(recordings / f"{name}.h5", 2)
+    address = client.scheduler.address
+    options = ["--product", "range", "--dask", address]
+
+    assert run(["reconstruct", str(recordings), "-o", str(tmp_path / "out"), *options]) == 0
+    assert "range of 2 frames" in capsys.readouterr().err
+    for name in ("a", "b"):
+        assert xarray.open_zarr(tmp_path / "out" / f"{name}.zarr")["range"].shape[0] == 2
+    assert run(["reconstruct", str(source), "-o", "a.h5", *options]) == 2
+    assert run(["reconstruct", str(source), "-o", "a.zarr", *options, "--workers", "2"]) == 2
+    assert run(["reconstruct", str(tmp_path / "out"), "-o", "a.zarr", *options]) == 2
+
+
+def test_python_has_the_products_as_dask_arrays(source: Path, serial: dict[str, Any]) -> None:
+    with transientcam.open(source, settings=OPTIONS.settings.model_dump()) as recording:
+        dataset = recording.reconstruct("range", "validity")
+
+        assert dataset["range"].chunks == ((64, 64, 44), (12,), (16,))
+        part = dataset["range"][60:70].to_numpy()
+    # kernels that became ready between the two round otherwise
+    np.testing.assert_allclose(part, serial["range"][60:70], rtol=1e-5, atol=1e-5)
+
+
+def test_the_lanes_that_frames_need_are_made_ready_first(
+    source: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[dict[str, Any]] = []
+    monkeypatch.setattr(job, "_load_lanes", LOAD_LANES)
+    monkeypatch.setattr(tm.kernels, "compile", lambda **options: asked.append(options))
+    settings = ReconstructionSettings(estimator="likelihood")
+
+    job.computed(Job.of(str(source), BatchOptions(("range",), settings)), 0, 1)
+
+    (options,) = asked
+    assert options["harmonics"] == [2]
+    assert {"reconstruct", "likelihood"} <= set(options["names"])
+    assert "pairs" not in options["names"]

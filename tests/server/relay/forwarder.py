@@ -1,0 +1,79 @@
+"""An address whose service can be exchanged, and whose connections can be cut."""
+
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from urllib.parse import urlsplit
+
+
+class Forwarder:
+    """Passes connections on to another address, as a proxy or a network between them does."""
+
+    def __init__(self, url: str) -> None:
+        self.target = url
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._open: list[socket.socket] = []
+        self._threads: list[threading.Thread] = []
+        self._run(self._accept)
+
+    @property
+    def url(self) -> str:
+        """Where clients connect."""
+        return f"http://127.0.0.1:{self._listener.getsockname()[1]}"
+
+    def cut(self) -> None:
+        """Break every connection."""
+        for each in self._open:
+            with suppress(OSError):
+                each.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        """End all."""
+        with suppress(OSError):
+            self._listener.shutdown(socket.SHUT_RDWR)
+        self._listener.close()
+        self.cut()
+        for thread in self._threads:
+            thread.join()
+        for each in self._open:
+            each.close()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                client, _ = self._listener.accept()
+            except OSError:
+                return
+            self._open.append(client)
+            parts = urlsplit(self.target)
+            try:
+                service = socket.create_connection((parts.hostname, parts.port))
+            except OSError:  # nothing is there at the moment
+                client.shutdown(socket.SHUT_RDWR)
+                continue
+            self._open.append(service)
+            self._run(self._pass_on, client, service)
+            self._run(self._pass_on, service, client)
+
+    def _pass_on(self, source: socket.socket, sink: socket.socket) -> None:
+        with suppress(OSError):
+            while data := source.recv(1 << 16):
+                sink.sendall(data)
+        with suppress(OSError):
+            sink.shutdown(socket.SHUT_RDWR)
+
+    def _run(self, function: object, *arguments: socket.socket) -> None:
+        thread = threading.Thread(target=function, args=arguments, name="forwarder")  # type: ignore[arg-type]
+        self._threads.append(thread)
+        thread.start()
+
+
+@contextmanager
+def forwarding(url: str) -> Iterator[Forwarder]:
+    """Forward to an address until the end of the block."""
+    forwarder = Forwarder(url)
+    try:
+        yield forwarder
+    finally:
+        forwarder.close()
