@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from tests.browser.dashboard import choose, open_page
 from tests.browser.test_transient import stop
@@ -29,6 +29,7 @@ VIEWS = (
     "What happened",
     "Points in space",
     "Streak",
+    "Values",
 )
 
 
@@ -77,6 +78,9 @@ def test_the_page_on_a_phone_and_its_dialogs_offend_no_rule(page: Page, served: 
     look.click()
     assert offences_of(page, within=".look") == []
     page.keyboard.press("Escape")
-    page.keyboard.press("?")
-    page.locator("dialog[open]").wait_for()
-    assert offences_of(page) == []
+    for key in ("?", "k"):
+        page.keyboard.press(key)
+        page.locator("dialog[open]").wait_for()
+        assert offences_of(page, within="dialog[open]") == []
+        page.keyboard.press("Escape")
+        expect(page.locator("dialog[open]")).to_have_count(0)

@@ -1,5 +1,6 @@
 """The panel of sequence and accuracy: the front, the slider along it, plans, and the way back."""
 
+import re
 import threading
 from importlib import import_module
 from typing import Any
@@ -12,6 +13,7 @@ from tests.browser.conftest import SEQUENCE_FIELDS
 from tests.browser.dashboard import open_page, shows_frame, text
 from tests.browser.test_accessibility import offences_of
 from tests.browser.test_transient import stop
+from tests.server.planning.calls import Here
 from tests.serving import Served
 from transientcam_server.planning import Progress
 
@@ -21,8 +23,9 @@ PANEL = ".panel-sequence"
 
 
 @pytest.fixture(autouse=True)
-def few_families(monkeypatch: pytest.MonkeyPatch) -> None:
+def few_families(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is searched is no concern of the page's: little, so that it is found quickly."""
+    monkeypatch.setattr(served.service.planning, "_process", Here())
     families = import_module("transientcam_server.planning.families")  # not the function
     monkeypatch.setattr(families, "HARMONICS", (1, 4))
     monkeypatch.setattr(families, "FREQUENCY_FACTORS", (1.0,))
@@ -79,6 +82,12 @@ def test_the_front_fills_and_its_slider_sets_a_sequence_that_can_be_undone(
     assert [y for _, y in centres] == sorted(y for _, y in centres), "less error further down"
     expect(page.locator("[data-field=now]")).to_be_visible()
     expect(page.locator("[data-field=ghost]")).to_be_visible()
+    # header and panel state one figure
+    stated = page.locator(f"{PANEL} [data-field=now_range_error_m]")
+    expect(stated).to_have_attribute("title", re.compile("noise .* and bias together"))
+    header = page.locator("[data-field=deviation]")
+    assert text(page, ".bar", "deviation") == str(stated.text_content()).replace("\u202f", " ")
+    expect(header).not_to_contain_text("noise")
     assert offences_of(page, within=PANEL) == []
 
     # a point is looked at, and nothing set

@@ -2,14 +2,17 @@
 
 import json
 import re
+from pathlib import Path
 
 import httpx
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.dashboard import (
     canvas_pixels,
+    choose,
     choose_from,
     map_canvas,
     map_colours,
@@ -167,9 +170,48 @@ def test_pins_and_regions_measure_what_the_daemon_serves(page: Page, served: Ser
     expect(page.locator("[data-field=region-count]")).to_have_text(str(np.isfinite(inside).sum()))
     assert text(page, ".panel-map", "region-mean") == f"{np.nanmean(inside):.3f} m"
     assert text(page, ".panel-map", "region-std") == f"{np.nanstd(inside, ddof=1):.3f} m"
+    assert text(page, ".panel-map", "region-filled") == f"{100 * np.isfinite(inside).mean():.0f} %"
+    residual_m, tilt_deg = plane_of(ranges, lens, (50, 40), (69, 54))
+    figure, unit = text(page, ".panel-map", "plane-residual").split()
+    shown_m = float(figure) * {"m": 1, "mm": 1e-3, "µm": 1e-6}[unit]
+    assert shown_m == pytest.approx(residual_m, rel=0.06)  # two digits
+    assert text(page, ".panel-map", "plane-tilt") == f"{tilt_deg:.1f} °"
+    # the map along the line between the pins, and all of them in one frame of the last seconds
+    choose(page, "sequence", "Values")
+    series = page.locator(".plots-place")
+    expect(series).to_have_count(4)  # the selected pixel, A, B and the region
+    expect(page.locator("[data-place=B]")).to_contain_text(f"{ranges[70, 120]:.3f}")
+    expect(page.locator("[data-place=region]")).to_contain_text(f"{np.nanmean(inside):.3f}")
+    page.get_by_role("tab", name="Line A to B").click()
+    page.locator(".line-chart canvas").wait_for()
+    with page.expect_download() as download:
+        choose(page, "plots", "Values (CSV)")
+    rows = Path(download.value.path()).read_text().splitlines()[1:]
+    line = np.array([[float(each or "nan") for each in row.split(",")] for row in rows])
+    steps = np.arange(91) / 90  # from column 30 to column 120
+    along = ranges[np.floor(40 + 30 * steps + 0.5).astype(int), 30 + np.arange(91)]
+    np.testing.assert_allclose(line[:, 0], steps * np.hypot(90, 30), rtol=1e-6)
+    np.testing.assert_allclose(line[:, 1], along, rtol=1e-6)
     page.get_by_role("button", name="Remove region").click()
     page.get_by_role("button", name="Remove pins").click()
     expect(page.locator(".mark-region, .mark-pin")).to_have_count(0)
+
+
+def plane_of(
+    ranges: NDArray[np.float64],
+    lens: dict[str, float],
+    first: tuple[int, int],
+    last: tuple[int, int],
+) -> tuple[float, float]:
+    """Deviation from the nearest plane in m and its tilt in degrees, by singular values."""
+    y, x = np.mgrid[first[1] : last[1] + 1, first[0] : last[0] + 1]
+    across, down = (x - lens["cx"]) / lens["fx"], (y - lens["cy"]) / lens["fy"]
+    rays = np.stack([across, down, np.ones(x.shape)], axis=-1)
+    points = ranges[y, x][..., None] * rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+    found = points[np.isfinite(ranges[y, x])]
+    _, singular, axes = np.linalg.svd(found - found.mean(axis=0), full_matrices=False)
+    tilt = np.degrees(np.arccos(abs(axes[2, 2])))
+    return float(singular[2] / np.sqrt(len(found) - 3)), float(tilt)
 
 
 def test_a_copied_link_shows_the_same_page_to_another_user(

@@ -1,7 +1,7 @@
 import re
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 from tests.browser.dashboard import choose_from, open_page, point_at
 from tests.browser.test_transient import F_HZ
@@ -33,7 +33,7 @@ def test_the_address_follows_what_is_shown(page: Page) -> None:
     expect(page.locator(".panel-response h2")).to_have_text("Impulse response of pixel 7, 8")
 
 
-def test_the_list_of_keys_opens_and_closes(page: Page) -> None:
+def test_keys_are_listed_and_do_what_the_list_says(page: Page) -> None:
     open_page(page)
     page.keyboard.press("?")
     dialog = page.get_by_role("dialog", name="Keys")
@@ -45,10 +45,7 @@ def test_the_list_of_keys_opens_and_closes(page: Page) -> None:
     expect(dialog).to_be_visible()
     dialog.get_by_role("button", name="Close").click()
     expect(dialog).to_have_count(0)
-
-
-def test_keys_choose_maps_layouts_and_one_panel(page: Page) -> None:
-    open_page(page)
+    # keys choose maps, layouts and one panel
     page.keyboard.press("4")
     expect(page.get_by_role("tab", name="Brightness", exact=True)).to_have_attribute(
         "aria-selected", "true"
@@ -61,6 +58,35 @@ def test_keys_choose_maps_layouts_and_one_panel(page: Page) -> None:
     expect(page.locator("[data-view]")).to_have_count(4)
     page.keyboard.press("l")
     expect(page.locator("[data-view]")).to_have_count(6)
+    # all commands are found by words, and done by Enter
+    page.keyboard.press("Control+k")
+    search = page.get_by_role("combobox", name="Search a command")
+    expect(search).to_be_focused()
+    search.fill("maps two")
+    commands = page.get_by_role("listbox", name="Commands").get_by_role("option")
+    expect(commands).to_have_text(["Layout: Two maps"])
+    page.keyboard.press("Enter")
+    expect(search).to_have_count(0)
+    page.locator(".panel-second-map canvas[data-product=indirect][data-frame]").wait_for()
+    # a layout is kept under a name, and changes are undone
+    choose_from(page, PAGE_MENU, "Save or remove a layout…")
+    page.get_by_label("Name of the present layout").fill("pair")
+    page.get_by_role("button", name="Save").click()
+    page.locator(".panel-second-map .panel-title").drag_to(page.locator(".panel-plots"))
+    shown = page.locator("[data-view]")
+    assert views_of(shown) == ["map", "plots", "second-map", "transient"]
+    page.keyboard.press("z")
+    expect(shown.nth(1)).to_have_attribute("data-view", "second-map")
+    page.keyboard.press("z")
+    expect(shown).to_have_count(6)
+    choose_from(page, PAGE_MENU, "pair")
+    assert views_of(shown) == ["map", "second-map", "plots", "transient"]
+
+
+def views_of(panels: Locator) -> list[str]:
+    """The names of views, in their order."""
+    names: list[str] = panels.evaluate_all("(all) => all.map((each) => each.dataset.view)")
+    return names
 
 
 def test_light_and_dark_are_chosen_and_stay(page: Page) -> None:
@@ -80,17 +106,24 @@ def test_light_and_dark_are_chosen_and_stay(page: Page) -> None:
     expect(root).to_have_attribute("data-theme", "dark")
 
 
-@pytest.mark.parametrize("width", [390, 1280])
-@pytest.mark.parametrize("layout", ["Six views", "Projector", "One pixel"])
-def test_no_layout_hangs_over_the_edge(page: Page, layout: str, width: int) -> None:
-    page.set_viewport_size({"width": width, "height": 800})
+def test_nothing_hangs_over_the_edge_and_every_control_has_a_name(page: Page) -> None:
     open_page(page)
-    choose_from(page, PAGE_MENU, layout)
-    page.locator(".panel-transient").wait_for()
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    unnamed = page.evaluate(
-        """() => [...document.querySelectorAll("button, select, input, [role=application]")]
-             .filter((each) => !(each.ariaLabel || each.textContent.trim() || each.labels?.length))
-             .map((each) => each.outerHTML)"""
-    )
-    assert unnamed == []
+    layouts = ("Overview", "Six views", "Two maps", "Projector", "One pixel")
+    for layout in layouts:
+        choose_from(page, PAGE_MENU, layout)
+        page.locator(".panel-transient").wait_for()
+        if layout == "Overview":
+            page.get_by_role("button", name="Edit").click()
+        for width in (390, 1280):
+            page.set_viewport_size({"width": width, "height": 800})
+            page.evaluate(_PAINTED)
+            assert page.evaluate("document.documentElement.scrollWidth") <= width, layout
+        unnamed = page.evaluate(
+            """() => [...document.querySelectorAll("button, select, input, [role=application]")]
+                 .filter((it) => !(it.ariaLabel || it.textContent.trim() || it.labels?.length))
+                 .map((it) => it.outerHTML)"""
+        )
+        assert unnamed == [], layout
+
+
+_PAINTED = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"

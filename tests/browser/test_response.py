@@ -54,8 +54,32 @@ def moments_of(served: Served) -> NDArray[np.complex64]:
     return moments[:, PIXEL[1], PIXEL[0], np.newaxis]
 
 
-def test_the_bounds_are_those_of_the_moments_package(page: Page, served: Served) -> None:
+def test_the_curves_are_those_of_the_moments_package(page: Page, served: Served) -> None:
     select(page, served)
+    bounds_are_drawn(page, served)
+    cumulative_light_is_drawn(page, served)
+    # and every aspect is drawn on the screen
+    for aspect in ("Bounds", "Cumulative"):
+        page.get_by_role("tab", name=aspect).click()
+        page.locator(f".response-plot[data-aspect={aspect.lower()}] canvas").wait_for()
+        ink = page.locator(".response-plot canvas").evaluate(
+            """(canvas) => new Promise((done) => requestAnimationFrame(() => done(
+                 new Set(new Uint32Array(canvas.getContext('2d')
+                   .getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size)))"""
+        )
+        assert ink > 30, "an empty plot has but its axes' few colours"
+    # the moments stand on their plane where they are
+    page.get_by_role("tab", name="Moments").click()
+    moments = moments_of(served)[:, 0]
+    for j in range(1, len(moments)):
+        point = page.locator(f"[data-moment='{j}'] circle")
+        expected = moments[j] / moments[0].real
+        assert float(str(point.get_attribute("cx"))) == pytest.approx(expected.real, abs=1e-3)
+        assert -float(str(point.get_attribute("cy"))) == pytest.approx(expected.imag, abs=1e-3)
+
+
+def bounds_are_drawn(page: Page, served: Served) -> None:
+    """Sharp bounds, the smoothed estimate between them, and the truth."""
     drawn = curves(page, "Bounds")
     phase_rad = 2 * np.pi * F_HZ * drawn["time_ns"] * 1e-9
     per_ns = 2 * np.pi * F_HZ * 1e-9
@@ -70,8 +94,8 @@ def test_the_bounds_are_those_of_the_moments_package(page: Page, served: Served)
     assert drawn["truth_smoothed_dn_per_ns"].max() > 0
 
 
-def test_the_cumulative_curve_is_that_of_the_moments_package(page: Page, served: Served) -> None:
-    select(page, served)
+def cumulative_light_is_drawn(page: Page, served: Served) -> None:
+    """The light up to each time, beside the truth."""
     drawn = curves(page, "Cumulative")
     phase_rad = 2 * np.pi * F_HZ * drawn["time_ns"] * 1e-9
     moments = moments_of(served)
@@ -116,30 +140,6 @@ def test_returns_truth_and_flags_are_listed(page: Page, served: Served) -> None:
     assert isinstance(reported["flags"], list)
     expected = [WORDS[flag] for flag in reported["flags"]] or ["Nothing was wrong"]
     assert all(words in flags for words in expected)
-
-
-def test_the_moments_stand_on_the_plane_where_they_are(page: Page, served: Served) -> None:
-    select(page, served)
-    page.get_by_role("tab", name="Moments").click()
-    moments = moments_of(served)[:, 0]
-    for j in range(1, len(moments)):
-        point = page.locator(f"[data-moment='{j}'] circle")
-        expected = moments[j] / moments[0].real
-        assert float(str(point.get_attribute("cx"))) == pytest.approx(expected.real, abs=1e-3)
-        assert -float(str(point.get_attribute("cy"))) == pytest.approx(expected.imag, abs=1e-3)
-
-
-@pytest.mark.parametrize("aspect", ["Bounds", "Cumulative"])
-def test_every_aspect_is_drawn(page: Page, served: Served, aspect: str) -> None:
-    select(page, served)
-    page.get_by_role("tab", name=aspect).click()
-    page.locator(f".response-plot[data-aspect={aspect.lower()}] canvas").wait_for()
-    ink = page.locator(".response-plot canvas").evaluate(
-        """(canvas) => new Promise((done) => requestAnimationFrame(() => done(
-             new Set(new Uint32Array(canvas.getContext('2d')
-               .getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size)))"""
-    )
-    assert ink > 30, "an empty plot has but its axes' few colours"
 
 
 def hold(page: Page, served: Served) -> str:

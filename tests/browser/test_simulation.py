@@ -80,7 +80,7 @@ def test_an_effect_is_forced_on_and_left_to_the_scene_again(page: Page, served: 
     assert simulated(served)["effects"] == {}
 
 
-def test_the_cable_is_pulled_and_plugged_in_again(page: Page, served: Served) -> None:
+def test_the_cable_is_pulled_and_an_image_lost(page: Page, served: Served) -> None:
     open_page(page)
     choose(page, "sequence", "Simulated scene")
     panel = page.locator(".panel-simulation")
@@ -93,14 +93,7 @@ def test_the_cable_is_pulled_and_plugged_in_again(page: Page, served: Served) ->
     panel.get_by_role("button", name="Plug in").click()
     expect(page.locator("[data-field=state]")).to_have_text(LIVE)
     expect(panel.get_by_role("button", name="Unplug")).to_be_enabled()
-
-
-def test_a_lost_image_is_counted(page: Page, served: Served) -> None:
-    open_page(page)
-    choose(page, "sequence", "Simulated scene")
     before = page.evaluate("() => transientcam.store.status.lostImages.peek()")
-    panel = page.locator(".panel-simulation")
-    expect(panel.locator("[data-effect]").first).to_be_visible(timeout=PATIENCE_MS)
     panel.get_by_role("button", name="Lose an image").click()
     page.wait_for_function(
         "(before) => transientcam.store.status.lostImages.peek() > before", arg=before

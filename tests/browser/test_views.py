@@ -77,10 +77,7 @@ def test_the_streak_holds_the_light_that_the_daemon_integrates(page: Page, serve
     assert shown.shape == light.shape == (BINS, 163)
     brightness = cumulative[-1]
     np.testing.assert_allclose(shown / (BINS * F_HZ) / brightness, light / brightness, atol=2e-3)
-
-
-def test_the_streak_is_painted_as_its_numbers_say(page: Page, served: Served) -> None:
-    show(page, served, "Streak", "streak")
+    # and is painted as its numbers say
     page.locator(".panel-streak").get_by_label("Tone").select_option("linear")
     page.locator(".panel-streak").get_by_label("Colours").select_option("viridis")
     canvas = page.locator("canvas[data-product=streak]")
@@ -89,11 +86,7 @@ def test_the_streak_is_painted_as_its_numbers_say(page: Page, served: Served) ->
     shown = numbers(page, "streak", "Density in DN/s (NPY)")
     expected = colours(shown, 0.0, white, "viridis")
     np.testing.assert_allclose(canvas_pixels(canvas).astype(int), expected, atol=6)
-
-
-def test_a_click_into_the_streak_chooses_time_and_column(page: Page, served: Served) -> None:
-    show(page, served, "Streak", "streak")
-    canvas = page.locator("canvas[data-product=streak]")
+    # a click into it chooses time and column
     page.get_by_label("Scanline").fill("60")
     box = canvas.bounding_box()
     assert box is not None

@@ -3,10 +3,12 @@ import { effect } from "@preact/signals";
 
 import { useStore } from "./store/store";
 import { Help } from "./ui/Help";
+import { Palette } from "./views/palette/Palette";
 import { shortcuts } from "./ui/shortcuts";
 import { ReplayBar } from "./views/replay/ReplayBar";
 import { Banner } from "./views/status/Banner";
 import { ControlDialog } from "./views/status/ControlDialog";
+import { LayoutDialog } from "./views/status/LayoutDialog";
 import { StatusBar } from "./views/status/StatusBar";
 import { TokenDialog } from "./views/status/TokenDialog";
 import { Arrangement } from "./views/Arrangement";
@@ -29,6 +31,8 @@ export function App({ onRetry }: { onRetry: () => void }) {
       <Arrangement />
       <ReplayBar />
       <Help />
+      <Palette />
+      <LayoutDialog />
       <ControlDialog />
       <TokenDialog />
     </>

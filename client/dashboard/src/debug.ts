@@ -6,6 +6,8 @@ import { decodeMessage, type FrameMessage } from "./stream/protocol";
 import { frameOf } from "./store/frames";
 import { coefficientsOf, summarised } from "./stream/summary";
 import type { Store } from "./store/store";
+import { LAYOUTS } from "./views/layout";
+import { VIEW_NAMES } from "./views/names";
 
 /** A density read back from the renderer that the page's own pictures are made with. */
 interface Reading {
@@ -16,7 +18,17 @@ interface Reading {
 class Bench {
   #renderer: DensityRenderer | null = null;
 
+  /** What there is to show. */
+  readonly views = VIEW_NAMES;
+  readonly layouts = Object.keys(LAYOUTS);
+
   constructor(readonly store: Store) {}
+
+  /** Shows a layout, or one view alone. */
+  arrange(layout: string, view: string): void {
+    this.store.showLayout(LAYOUTS[layout]);
+    if (view !== "") this.store.alone.value = view;
+  }
 
   /** Shows a frame message as if it had been streamed. */
   show(body: ArrayBuffer): void {

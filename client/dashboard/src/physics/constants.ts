@@ -5,3 +5,6 @@ export const SPEED_OF_LIGHT_M_S = 299_792_458;
 export function rangeOfTime_m(time_s: number): number {
   return 0.5 * SPEED_OF_LIGHT_M_S * time_s;
 }
+
+/** A degree in rad. */
+export const DEGREE = Math.PI / 180;

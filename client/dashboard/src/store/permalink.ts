@@ -3,7 +3,7 @@ import { effect } from "@preact/signals";
 
 import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
-import { isLayout, type Layout } from "../views/layout";
+import { isLayout, viewsOf, type Layout } from "../views/layout";
 import { COLOUR_MAPS, type ColourMapName } from "../ui/colourMaps";
 import { RequestError } from "./api";
 import { isLimits, type LookChoice } from "./looks";
@@ -12,6 +12,8 @@ import type { Store } from "./store";
 
 export interface Place {
   readonly map?: string;
+  /** The map beside it, of a layout that shows two. */
+  readonly map2?: string;
   readonly pixel?: Pixel;
   readonly time_ns?: number;
   /** The view that is shown alone. */
@@ -28,7 +30,8 @@ export interface Place {
 /** What an address says; parts that make no sense are as if they were not there. */
 export function placeOf(hash: string): Place {
   const said = new URLSearchParams(hash.replace(/^#/, ""));
-  const map = said.get("map");
+  const [map, map2] = [said.get("map"), said.get("map2")];
+  const known = (name: string | null): name is string => MAP_PRODUCTS.some(({ product }) => product === name);
   const pixel = /^(\d{1,5}),(\d{1,5})$/.exec(said.get("pixel") ?? "");
   const time_ns = said.get("time_ns");
   const view = said.get("view");
@@ -37,7 +40,8 @@ export function placeOf(hash: string): Place {
   const layout = layoutOf(said.get("layout") ?? "");
   const looks = looksOf(said.getAll("look"));
   return {
-    ...(MAP_PRODUCTS.some(({ product }) => product === map) ? { map: map as string } : {}),
+    ...(known(map) ? { map } : {}),
+    ...(known(map2) ? { map2 } : {}),
     ...(pixel === null ? {} : { pixel: { x: Number(pixel[1]), y: Number(pixel[2]) } }),
     ...(time_ns !== null && /^\d+(\.\d+)?$/.test(time_ns) ? { time_ns: Number(time_ns) } : {}),
     ...((VIEW_NAMES as readonly (string | null)[]).includes(view) ? { view: view as string } : {}),
@@ -87,10 +91,23 @@ export function linkTo(target: Window, store: Store): string {
   return whole.href;
 }
 
+/** Puts that address on the clipboard, and says so; shows it to be copied by hand where the browser refuses. */
+export async function copyLink(target: Window, store: Store): Promise<void> {
+  const whole = linkTo(target, store);
+  try {
+    await target.navigator.clipboard.writeText(whole);
+    store.events.tell("The link was copied: it shows this layout, pixel, time and these colours.", "good");
+  } catch {
+    // Refused, or not over https.
+    store.status.unreadable.value = `The link to what is shown: ${whole}`;
+  }
+}
+
 /** The address of a place; "" for nothing in particular. */
-export function hashOf({ map, pixel, time_ns, view, recording, frame, layout, looks = {} }: Place): string {
+export function hashOf({ map, map2, pixel, time_ns, view, recording, frame, layout, looks = {} }: Place): string {
   const parts = [
     map === undefined ? "" : `map=${map}`,
+    map2 === undefined ? "" : `map2=${map2}`,
     pixel === undefined ? "" : `pixel=${pixel.x},${pixel.y}`,
     time_ns === undefined ? "" : `time_ns=${Number(time_ns.toFixed(3))}`,
     view === undefined ? "" : `view=${view}`,
@@ -135,6 +152,7 @@ function placeNow(store: Store): Place {
   const frame = store.replay.playing.value ? undefined : store.replay.frame.value;
   return {
     map: store.mapProduct.value,
+    ...(viewsOf(store.layout.value).includes("second-map") ? { map2: store.secondMapProduct.value } : {}),
     ...(pixel === null ? {} : { pixel }),
     ...(time_s === 0 ? {} : { time_ns: time_s * 1e9 }),
     ...(view === null ? {} : { view }),
@@ -142,12 +160,13 @@ function placeNow(store: Store): Place {
   };
 }
 
-function go(store: Store, { map, pixel, time_ns, view, recording, frame, layout, looks = {} }: Place): void {
+function go(store: Store, { map, map2, pixel, time_ns, view, recording, frame, layout, looks = {} }: Place): void {
   if (recording === undefined) store.replay.leave();
   else void open(store, recording, frame);
   if (layout !== undefined) store.layout.value = layout;
   for (const [product, choice] of Object.entries(looks)) store.looks.of(product).choice = choice;
   if (map !== undefined) store.mapProduct.value = map;
+  if (map2 !== undefined) store.secondMapProduct.value = map2;
   if (pixel !== undefined) store.selected.value = pixel;
   if (view !== undefined) store.alone.value = view;
   if (time_ns === undefined) return;

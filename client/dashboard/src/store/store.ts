@@ -10,12 +10,14 @@ import { Caller } from "./caller";
 import { Credentials } from "./credentials";
 import { Events } from "./events";
 import { Frames } from "./frames";
+import { Layouts } from "./layouts";
 import { Lease } from "./lease";
 import { Looks } from "./looks";
 import { Measures } from "./measures";
 import { Noises } from "./noise";
 import type { Pixel } from "./pixel";
 import { Player } from "./player";
+import { RangeErrors } from "./rangeErrors";
 import { Sequencing } from "./sequencing";
 import { aNumber, browserShelf, oneOf, remembered, sessionShelf, type Shelf } from "./settings";
 import { isLayout, OVERVIEW, type Layout } from "../views/layout";
@@ -48,6 +50,8 @@ export class Store {
   readonly simulation: Simulation;
   /** A recording in the place of the camera. */
   readonly replay: Replay;
+  /** How far the range is off. */
+  readonly rangeErrors: RangeErrors;
   /** What happened. */
   readonly events = new Events();
   readonly shelf: Shelf | null;
@@ -90,6 +94,8 @@ export class Store {
   readonly looks: Looks;
   /** The product that the map view shows. */
   readonly mapProduct: Signal<string>;
+  /** The product that the second map shows beside it. */
+  readonly secondMapProduct: Signal<string>;
   /** Whether the list of keys is open. */
   readonly help = signal(false);
   /** Whether it is asked who controls the camera. */
@@ -98,6 +104,12 @@ export class Store {
   readonly asksForToken = signal(false);
   /** Where the views stand. */
   readonly layout: Signal<Layout>;
+  /** Layouts under names, and the way back from changes of it. */
+  readonly layouts: Layouts;
+  /** Whether the list of all commands is open. */
+  readonly palette = signal(false);
+  /** Whether a name for the layout is asked for. */
+  readonly asksForLayout = signal(false);
   /** The one view that is shown alone; null while all are. */
   readonly alone = signal<string | null>(null);
 
@@ -113,17 +125,27 @@ export class Store {
     this.sequencing = new Sequencing(api, this.events, this.sequence);
     this.accuracy = new Accuracy(api);
     this.replay = new Replay(api, this.frames, this.status);
+    this.rangeErrors = new RangeErrors(this.frames, this.status, this.replay.active);
     api.onRefusal = (problem) => {
       this.lease.refused(kindOf(problem));
       if (problem.status === 401) this.asksForToken.value = true;
     };
     this.details = new Details(api);
     this.light = new TransientLook(this.frames.of("coefficients"), shelf);
-    this.mapProduct = remembered(shelf, "map.product", "range", oneOf(MAP_PRODUCTS.map(({ product }) => product)));
+    const aMap = oneOf(MAP_PRODUCTS.map(({ product }) => product));
+    this.mapProduct = remembered(shelf, "map.product", "range", aMap);
+    this.secondMapProduct = remembered(shelf, "second-map.product", "indirect", aMap);
     this.field_deg = remembered(shelf, "points.field_deg", 45, isField);
     this.looks = new Looks(this.frames, this.noises, shelf);
     this.layout = remembered<Layout>(shelf, "layout", OVERVIEW, (value): value is Layout => isLayout(value, VIEW_NAMES));
+    this.layouts = new Layouts(shelf, this.layout);
     this.theme = new Theme(shelf, systemScheme());
+  }
+
+  /** Shows all views of a layout. */
+  showLayout(layout: Layout): void {
+    this.layout.value = layout;
+    this.alone.value = null;
   }
 }
 

@@ -46,7 +46,7 @@ export class StreamClient {
       for (const take of this.#brought.splice(0)) take();
       return false;
     });
-    store.replay.loader = (path, products) => this.#bring(path, products);
+    store.replay.loader = store.rangeErrors.loader = (path, products) => this.#bring(path, products);
   }
 
   /** Connects, and keeps streaming what the store's views need. */
@@ -202,6 +202,7 @@ export class StreamClient {
         break;
       case "simulation-changed":
         this.#store.accuracy.sceneChanged();
+        this.#store.rangeErrors.sceneChanged();
         if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();
         break;
       case "recording-started":

@@ -12,6 +12,9 @@ interface PanelProps {
   readonly children: ComponentChildren;
 }
 
+/** The type of what is dragged: the name of a view. */
+export const DRAGGED = "application/x-transientcam-view";
+
 /** What a panel may do with its place on the page. */
 export const SlotContext = createContext<readonly ActionGroup[]>([]);
 
@@ -21,7 +24,8 @@ export function Panel({ name, title, tools, downloads = [], children }: PanelPro
   return (
     <section class={`panel panel-${name}`} aria-label={name} data-view={name}>
       <header class="panel-head">
-        <div class="panel-title">{title}</div>
+        {/* onto another panel, to change places with it; the menu does the same */}
+        <div class="panel-title" draggable onDragStart={(event) => event.dataTransfer?.setData(DRAGGED, name)}>{title}</div>
         <div class="panel-tools">
           {tools}
           <ActionMenu label={`Panel ${name}: views and downloads`} groups={[{ title: "Download", actions: downloads }, ...slot]} />

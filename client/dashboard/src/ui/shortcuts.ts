@@ -14,6 +14,8 @@ export interface Shortcut {
   /** As it is written in the list of keys. */
   readonly shown: string;
   readonly words: string;
+  /** It may be pressed together with Ctrl, as elsewhere. */
+  readonly withControl?: boolean;
   readonly run: (store: Store, event: KeyboardEvent) => void;
 }
 
@@ -50,16 +52,17 @@ export const SHORTCUTS: readonly Shortcut[] = [
   { keys: ["]"], shown: "]", words: "one frame on in the recording", run: ({ replay }) => { replay.step(1); } },
   { keys: ["f"], shown: "F", words: "show the panel under the pointer alone, or all again", run: ({ alone }) => { alone.value = alone.peek() === null ? panelNow() : null; } },
   { keys: ["l"], shown: "L", words: "the next layout", run: (store) => { nextLayout(store); } },
+  { keys: ["z"], shown: "Z", words: "undo the last change of the layout", withControl: true, run: ({ layouts }) => { layouts.undo(); } },
+  { keys: ["k"], shown: "K", words: "all commands, to be searched", withControl: true, run: ({ palette }) => { palette.value = true; } },
   { keys: ["t"], shown: "T", words: "light, dark, or as the system", run: ({ theme }) => { theme.next(); } },
   { keys: ["?"], shown: "?", words: "this list", run: ({ help }) => { help.value = !help.peek(); } },
 ]; // prettier-ignore
 
-function nextLayout({ layout, alone }: Store): void {
-  const all = Object.values(LAYOUTS);
-  const now = JSON.stringify(layout.peek());
+function nextLayout(store: Store): void {
+  const all = Object.values({ ...LAYOUTS, ...store.layouts.named.peek() });
+  const now = JSON.stringify(store.layout.peek());
   const at = all.findIndex((each) => JSON.stringify(each) === now);
-  layout.value = all[(at + 1) % all.length];
-  alone.value = null;
+  store.showLayout(all[(at + 1) % all.length]);
 }
 
 /** Keys for the whole page; the answer takes them away again. */
@@ -71,8 +74,9 @@ export function shortcuts(target: Window, store: Store): () => void {
   };
   const onKeyDown = (event: KeyboardEvent): void => {
     if (event.key === "Tab") clicked = null;
-    if (event.ctrlKey || event.metaKey || event.altKey || typesText(event.target)) return;
-    const shortcut = SHORTCUTS.find(({ keys }) => keys.includes(event.key));
+    if (event.altKey || typesText(event.target)) return;
+    const control = event.ctrlKey || event.metaKey;
+    const shortcut = SHORTCUTS.find(({ keys, withControl = false }) => keys.includes(event.key) && (withControl || !control));
     // A button that was reached by keys is pressed by the space bar already.
     if (shortcut === undefined || (event.key === " " && event.target instanceof HTMLButtonElement && event.target !== clicked)) return;
     event.preventDefault();

@@ -2,7 +2,7 @@ import { Fragment } from "preact";
 import { useRef } from "preact/hooks";
 
 import { useStore } from "../store/store";
-import { SlotContext } from "../ui/Panel";
+import { DRAGGED, SlotContext } from "../ui/Panel";
 import { below, beside, closed, replaced, split, viewsOf, type Layout, type Row } from "./layout";
 import { VIEWS } from "./registry";
 
@@ -79,7 +79,19 @@ function Place({ view, share }: { view: string; share: number }) {
     },
   ]; // prettier-ignore
   return (
-    <div class="place" style={{ "--share": share }}>
+    <div
+      class="place"
+      style={{ "--share": share }}
+      onDragOver={(event) => {
+        if (event.dataTransfer?.types.includes(DRAGGED)) event.preventDefault();
+      }}
+      onDrop={(event) => {
+        const dragged = event.dataTransfer?.getData(DRAGGED) ?? "";
+        if (!viewsOf(layout).includes(dragged) || dragged === view) return;
+        event.preventDefault();
+        set(replaced(layout, view, dragged))();
+      }}
+    >
       <SlotContext.Provider value={groups}>
         <View />
       </SlotContext.Provider>

@@ -2,7 +2,8 @@ import type { ComponentType } from "preact";
 
 import { CalibrationView } from "./calibration/CalibrationView";
 import { EventsView } from "./events/EventsView";
-import { MapView } from "./map/MapView";
+import { MapView, SecondMapView } from "./map/MapView";
+import { PlotsView } from "./plots/PlotsView";
 import { PointsView } from "./points/PointsView";
 import { ReconstructionView } from "./reconstruction/ReconstructionView";
 import { RecordingsView } from "./recordings/RecordingsView";
@@ -20,8 +21,10 @@ import type { ViewName } from "./names";
  */
 export const VIEWS: readonly { readonly name: ViewName; readonly title: string; readonly view: ComponentType }[] = [
   { name: "map", title: "Maps", view: MapView },
+  { name: "second-map", title: "Second map", view: SecondMapView },
   { name: "transient", title: "Light in flight", view: TransientView },
   { name: "response", title: "Impulse response", view: ResponseView },
+  { name: "plots", title: "Values", view: PlotsView },
   { name: "streak", title: "Streak", view: StreakView },
   { name: "points", title: "Points in space", view: PointsView },
   { name: "validity", title: "Validity", view: ValidityView },

@@ -9,6 +9,12 @@ describe("an address", () => {
     expect(placeOf(hashOf(place))).toEqual(place);
   });
 
+  test("of two maps says both", () => {
+    expect(hashOf({ map: "direct", map2: "indirect" })).toBe("#map=direct&map2=indirect");
+    expect(placeOf("#map=direct&map2=indirect")).toEqual({ map: "direct", map2: "indirect" });
+    expect(placeOf("#map2=gone")).toEqual({});
+  });
+
   test("of a recording says which, and which frame", () => {
     const place = { recording: "20261120T081500Z-3f9c2a", frame: 17 };
     expect(hashOf(place)).toBe("#recording=20261120T081500Z-3f9c2a&frame=17");

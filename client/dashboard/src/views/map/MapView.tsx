@@ -1,4 +1,4 @@
-import { computed, type ReadonlySignal } from "@preact/signals";
+import { computed, type ReadonlySignal, type Signal } from "@preact/signals";
 import type { RefObject } from "preact";
 import { useMemo, useRef } from "preact/hooks";
 
@@ -15,14 +15,28 @@ import { LimitFields } from "../../ui/LimitFields";
 import { paint } from "../../ui/paint";
 import { Panel } from "../../ui/Panel";
 import { Stage } from "../../ui/Stage";
+import type { ViewName } from "../names";
 import { AMPLITUDE, MAP_PRODUCTS } from "./catalogue";
 import { Measured } from "./Measured";
 import { Readout, valueAtPixel } from "./Readout";
 
-/** A map of one number a pixel: range, one of the lights, or how sure these are. */
 export function MapView() {
+  return <MapPanel name="map" choice={useStore().mapProduct} />;
+}
+
+/** Another map beside the first, to compare the two. */
+export function SecondMapView() {
+  return <MapPanel name="second-map" choice={useStore().secondMapProduct} />;
+}
+
+interface MapPanelProps {
+  readonly name: ViewName;
+  readonly choice: Signal<string>;
+}
+
+/** A map of one number a pixel: range, one of the lights, or how sure these are. */
+function MapPanel({ name, choice }: MapPanelProps) {
   const store = useStore();
-  const choice = store.mapProduct;
   const shown = MAP_PRODUCTS.find(({ product }) => product === choice.value) ?? MAP_PRODUCTS[0];
   const look = store.looks.of(shown.product);
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -34,7 +48,7 @@ export function MapView() {
   };
   return (
     <Panel
-      name="map"
+      name={name}
       downloads={[
         { text: "Picture (PNG)", run: () => { savePicture(`${shown.product}-${look.frame.peek()?.meta.frame ?? 0}`, canvas.current); } },
         { text: "Figure (PNG)", run: () => { figure("png"); } },
@@ -43,7 +57,7 @@ export function MapView() {
       ]} // prettier-ignore
       title={
         <Tabs
-          label="Map"
+          label={name === "map" ? "Map" : "Second map"}
           value={shown.product}
           options={MAP_PRODUCTS.map(({ product, name, hint }) => ({ value: product, text: name, hint }))}
           onChange={(product) => (choice.value = product)}

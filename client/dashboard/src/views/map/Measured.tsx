@@ -1,13 +1,16 @@
-import { computed } from "@preact/signals";
+import { computed, useComputed, type ReadonlySignal } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 
+import { DEGREE } from "../../physics/constants";
+import { tiltOf } from "../../physics/plane";
 import type { Look } from "../../store/looks";
-import { figuresOf, PIN_COLOURS, type Pin } from "../../store/measures";
+import { figuresOf, PIN_COLOURS, type Pin, type RegionFigures } from "../../store/measures";
 import { useStore } from "../../store/store";
-import { deviation, fixed, grouped } from "../../ui/format";
+import { deviation, engineering, fixed, grouped } from "../../ui/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { histogram } from "../../ui/scale";
 import { distanceOf, lensOf, type Ranged } from "../points/lens";
+import { planeOf } from "./plane";
 import { valueAtPixel } from "./Readout";
 
 const BINS = 64;
@@ -26,8 +29,8 @@ export function Measured({ look }: { look: Look }) {
 
 /** Figures of the region's pixels on the map that is shown, and how often each value occurs. */
 function RegionRow({ look }: { look: Look }) {
-  const { measures } = useStore();
-  const canvas = useRef<HTMLCanvasElement>(null);
+  const store = useStore();
+  const { measures } = store;
   const { unit, decimals } = look.product;
   const figures = useMemo(
     () =>
@@ -37,6 +40,45 @@ function RegionRow({ look }: { look: Look }) {
       }),
     [look, measures],
   );
+  const found = figures.value;
+  const plane = useComputed(() => {
+    const [frame, region] = [look.frame.value, measures.region.value];
+    if (look.product.product !== "range" || frame === null || region === null) return null;
+    const [height, width] = frame.shape;
+    return planeOf(frame.values, width, height, region, lensOf(store, width, height));
+  }).value;
+  if (found === null) return null;
+  return (
+    <div class="panel-row measured" role="group" aria-label="Region">
+      <span>
+        <span class="quiet">region mean</span> <span data-field="region-mean">{fixed(found.mean, decimals, unit)}</span>
+      </span>
+      <span title="Standard deviation over the pixels of the region: of noise and of shape">
+        <span class="quiet">σ</span> <span data-field="region-std">{fixed(found.std, decimals, unit)}</span>
+      </span>
+      <span title="Pixels that have a value">
+        <span class="quiet">N</span> <span data-field="region-count">{grouped(found.count)}</span>{" "}
+        <span class="quiet">
+          of {grouped(found.pixels)}, <span data-field="region-filled">{fixed((100 * found.count) / found.pixels, 0, "%")}</span>
+        </span>
+      </span>
+      {plane !== null && (
+        <span title="The plane that the points of the region are nearest to: standard deviation of their distances from it, and the angle between its normal and the camera's axis">
+          <span class="quiet">plane σ</span> <span data-field="plane-residual">{engineering(plane.residual, "m", 2)}</span> <span class="quiet">tilt</span>{" "}
+          <span data-field="plane-tilt">{fixed(tiltOf(plane) / DEGREE, 1, "°")}</span>
+        </span>
+      )}
+      <RegionHistogram look={look} figures={figures} />
+      <button type="button" onClick={() => (measures.region.value = null)}>
+        Remove region
+      </button>
+    </div>
+  );
+}
+
+/** How often each value occurs in the region, over the colour scale. */
+function RegionHistogram({ look, figures }: { look: Look; figures: ReadonlySignal<RegionFigures | null> }) {
+  const canvas = useRef<HTMLCanvasElement>(null);
   useDrawing(() => {
     const context = canvas.current?.getContext("2d");
     const values = figures.value?.values;
@@ -49,26 +91,7 @@ function RegionRow({ look }: { look: Look }) {
       context.fillRect(bin, HEIGHT_PX * (1 - count / most), 1, (HEIGHT_PX * count) / most);
     });
   }, [look, figures]);
-  const found = figures.value;
-  if (found === null) return null;
-  return (
-    <div class="panel-row measured" role="group" aria-label="Region">
-      <span>
-        <span class="quiet">region mean</span> <span data-field="region-mean">{fixed(found.mean, decimals, unit)}</span>
-      </span>
-      <span title="Standard deviation over the pixels of the region: of noise and of shape">
-        <span class="quiet">σ</span> <span data-field="region-std">{fixed(found.std, decimals, unit)}</span>
-      </span>
-      <span title="Pixels that have a value">
-        <span class="quiet">N</span> <span data-field="region-count">{grouped(found.count)}</span>{" "}
-        <span class="quiet">of {grouped(found.pixels)}</span>
-      </span>
-      <canvas ref={canvas} class="measured-histogram" width={BINS} height={HEIGHT_PX} role="img" aria-label="Histogram of the region over the colour scale" />
-      <button type="button" onClick={() => (measures.region.value = null)}>
-        Remove region
-      </button>
-    </div>
-  );
+  return <canvas ref={canvas} class="measured-histogram" width={BINS} height={HEIGHT_PX} role="img" aria-label="Histogram of the region over the colour scale" />;
 }
 
 /** The values at the pins, and how far what two of them see is apart. */

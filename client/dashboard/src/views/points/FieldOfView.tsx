@@ -1,9 +1,8 @@
+import { DEGREE } from "../../physics/constants";
 import { isField, useStore } from "../../store/store";
 import { fixed } from "../../ui/format";
 import { fieldOfView } from "./cloud";
 import { knownLens } from "./lens";
-
-const DEGREE = Math.PI / 180;
 
 /** How wide the camera looks: as the service says, or to be set where it does not know. */
 export function FieldOfView() {

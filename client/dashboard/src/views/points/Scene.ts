@@ -17,6 +17,7 @@ import {
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
+import { DEGREE } from "../../physics/constants";
 import { fieldOfView, makeCloud, type Cloud, type Pinhole } from "./cloud";
 import { EyeDome } from "./eyeDome";
 import { onScreen, pointUnder } from "./picking";
@@ -24,8 +25,6 @@ import { axesLines, floorOf, frustumLines, gridLabels, gridLines, type Floor, ty
 
 // Colours are those of the maps, byte for byte.
 ColorManagement.enabled = false;
-
-const DEGREE = Math.PI / 180;
 
 /** Of the grid, the camera's field of view, and its axes: x, y, z. */
 const GRID: readonly number[] = [112, 120, 130];

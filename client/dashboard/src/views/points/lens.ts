@@ -1,10 +1,9 @@
 /** Where pixels look: as the service says, or by a field of view that is assumed. */
+import { DEGREE } from "../../physics/constants";
 import type { Pixel } from "../../store/pixel";
 import type { Store } from "../../store/store";
 import type { Intrinsics } from "../../stream/protocol";
 import { fillCloud, makeCloud, pinholeOf, type Pinhole } from "./cloud";
-
-const DEGREE = Math.PI / 180;
 
 /** What the service knows of the lens; null where it only assumes. */
 export function knownLens({ camera }: Store): Intrinsics | null {

@@ -10,6 +10,7 @@ import { FrontPlot } from "./FrontPlot";
 import { FrontSlider } from "./FrontSlider";
 import { GoalForm } from "./GoalForm";
 import { sameSequence, standingOf } from "./place";
+import { errorWords } from "./words";
 import { Summary } from "./Summary";
 
 /** What accuracy costs in time on the scene before the camera: the front, and a slider along it that sets the sequence. */
@@ -40,7 +41,7 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
     <div class="accuracy" data-predicted={tradeoff !== null}>
       {tradeoff !== null && <FrontPlot tradeoff={tradeoff} now={now} chosen={looked} onChoose={look} />}
       <div class="accuracy-control">
-        <p class="accuracy-figures">{looked === null ? <NowFigures applied={applied} error_m={now?.range_error_m ?? null} truth_m={truth_m} /> : <LookedFigures choice={looked} />}</p>
+        <p class="accuracy-figures">{looked === null ? <NowFigures applied={applied} truth_m={truth_m} /> : <LookedFigures choice={looked} />}</p>
         <FrontSlider front={tradeoff?.front ?? []} now_s={applied.capture_s} looked={looked} onLook={look} onRelease={() => void apply()} />
         <Finding task={task} />
         {tradeoff !== null && <Obstacle />}
@@ -75,13 +76,16 @@ function LookedFigures({ choice }: { choice: Choice }) {
   );
 }
 
-/** How well the camera does now; noise and bias together once that is known, and where the truth is known how far it is off. */
-function NowFigures({ applied, error_m, truth_m }: { applied: AppliedSequence; error_m: number | null; truth_m: number | null }) {
-  const newest = useStore().status.newest.value;
-  const noise_m = newest?.sequence_id === applied.sequence_id ? newest.predicted_range_std_m?.median : null;
+/** How well the camera does now, by the figure of the header; and where the truth is known how far it is off. */
+function NowFigures({ applied, truth_m }: { applied: AppliedSequence; truth_m: number | null }) {
+  const { status, rangeErrors } = useStore();
+  const error = status.newest.value?.sequence_id === applied.sequence_id ? rangeErrors.now.value : null;
   return (
     <>
-      <strong data-field="now_range_error_m">± {engineering(error_m ?? noise_m, "m", 2)}</strong> <span>{engineering(applied.capture_s, "s")}</span> <span>{fixed(applied.frame_rate_hz, 1, "Hz")}</span>{" "}
+      <strong data-field="now_range_error_m" title={`Of the range in the median pixel: ${errorWords(error)}`}>
+        ± {engineering(error?.error_m, "m", 2)}
+      </strong>{" "}
+      {error?.of === "noise" && <span class="quiet">noise</span>} <span>{engineering(applied.capture_s, "s")}</span> <span>{fixed(applied.frame_rate_hz, 1, "Hz")}</span>{" "}
       <span class="quiet">
         now
         {truth_m !== null && `, ${engineering(truth_m, "m", 2)} off the truth`}

@@ -6,6 +6,7 @@ import { useStore } from "../../store/store";
 import { Obstacle, Steer } from "../../ui/Steer";
 import type { AppliedSequence, Problem, SequenceDocument, Zeroth } from "../../stream/protocol";
 import { fieldOf, sequenceProblem, TAKE_ORDER_NAMES, ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
+import { PRESETS } from "./presets";
 import { DRAFT_FIELD, documentOf, draftOf, type Draft } from "./draft";
 import { Figures } from "./Figures";
 
@@ -92,6 +93,24 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
       }}
     >
       <div class="fields">
+        <label class="field field-wide">
+          <span>Begin with</span>
+          <select
+            name="preset"
+            value=""
+            onChange={(event) => {
+              const preset = PRESETS.find(({ name }) => name === event.currentTarget.value);
+              if (preset !== undefined) draft.value = draftOf({ ...base, ...preset.sequence });
+            }}
+          >
+            <option value="">the sequence in use</option>
+            {PRESETS.map(({ name, words }) => (
+              <option key={name} value={name}>
+                {name}: {words}
+              </option>
+            ))}
+          </select>
+        </label>
         {field("base_frequency_mhz", "Base frequency", "MHz")}
         {field("harmonics", "Harmonics m", "")}
         {field("exposure_ms", "Exposure", "ms")}

@@ -1,5 +1,6 @@
 import { plainWords } from "../../store/api";
 import type { Problem, Zeroth } from "../../stream/protocol";
+import type { RangeError } from "../../store/rangeErrors";
 import { engineering } from "../../ui/format";
 
 /** Names of the fields as the form has them. */
@@ -57,3 +58,9 @@ export const TAKE_ORDER_NAMES: Readonly<Record<string, string | undefined>> = {
   sequential: "one after another",
   interleaved: "image by image",
 };
+
+/** What an error of the range holds. */
+export function errorWords(error: RangeError | null): string {
+  if (error === null) return "not known yet";
+  return error.of === "noise" ? "noise alone (1 σ), as its bias is not known" : "noise (1 σ) and bias together";
+}

@@ -1,4 +1,4 @@
-import { linkTo } from "../../store/permalink";
+import { copyLink } from "../../store/permalink";
 import { useStore } from "../../store/store";
 import { ActionMenu } from "../../ui/ActionMenu";
 import { THEMES, type ThemeChoice } from "../../ui/theme";
@@ -9,36 +9,25 @@ export function PageMenu() {
   const store = useStore();
   const { choice } = store.theme;
   const { credentials } = store.api;
-  const link = async (): Promise<void> => {
-    const whole = linkTo(window, store);
-    try {
-      await navigator.clipboard.writeText(whole);
-      store.events.tell("The link was copied: it shows this layout, pixel, time and these colours.", "good");
-    } catch {
-      // Refused, or not over https: to be copied by hand.
-      store.status.unreadable.value = `The link to what is shown: ${whole}`;
-    }
-  };
   return (
     <ActionMenu
       label="Page: layout, colours, help"
       groups={[
         {
           title: "Layout",
-          actions: Object.entries(LAYOUTS).map(([text, layout]) => ({
-            text,
-            run: () => {
-              store.layout.value = layout;
-              store.alone.value = null;
-            },
-          })),
+          actions: [
+            ...Object.entries({ ...LAYOUTS, ...store.layouts.named.value }).map(([text, layout]) => ({ text, run: () => { store.showLayout(layout); } })),
+            { text: "Save or remove a layout…", run: () => (store.asksForLayout.value = true) },
+            ...(store.layouts.undoable.value ? [{ text: "Undo the last change (Z)", run: () => { store.layouts.undo(); } }] : []),
+          ],
         },
         { title: "Colours", actions: THEMES.map((theme) => ({ text: THEME_NAMES[theme] + (theme === choice.value ? " ✓" : ""), run: () => (choice.value = theme) })) },
         {
           title: "Help",
           actions: [
+            { text: "All commands (K)", run: () => (store.palette.value = true) },
             { text: "Keys (?)", run: () => (store.help.value = true) },
-            { text: "Copy a link to what is shown", run: () => void link() },
+            { text: "Copy a link to what is shown", run: () => void copyLink(window, store) },
           ],
         },
         {

@@ -3,6 +3,7 @@ import { useComputed } from "@preact/signals";
 import { flowTrouble } from "../../store/status";
 import { useStore } from "../../store/store";
 import { deviation, fixed } from "../../ui/format";
+import { errorWords } from "../sequence/words";
 import { useNow } from "../../ui/hooks";
 import { Figures } from "./Figures";
 import { Steering } from "./Steering";
@@ -65,10 +66,9 @@ function slowed(state: State, trouble: string | null): State {
 
 /** Frames a second and how well they measure; leads to what accuracy costs. */
 function Performance() {
-  const { status, alone, accuracy } = useStore();
+  const { status, alone, accuracy, rangeErrors } = useStore();
   const rate = useComputed(() => fixed(status.rate_hz.value, 1, "Hz"));
-  // Noise and bias together where the frames say so, which costs the service something; else noise alone.
-  const error = useComputed(() => deviation(status.newest.value?.accuracy?.range_error_m ?? status.newest.value?.predicted_range_std_m?.median, "m"));
+  const error = rangeErrors.now.value;
   const open = (): void => {
     alone.value = alone.peek() === "sequence" ? null : "sequence";
     if (alone.peek() !== null && accuracy.tradeoff.peek() === null && status.newest.peek() !== null) void accuracy.predict();
@@ -77,12 +77,13 @@ function Performance() {
     <button
       type="button"
       class="performance"
-      title="Frames drawn a second, and the error of the range in the median pixel: its noise (1 σ), with its bias where that is known; shows what accuracy costs"
+      title={`Frames drawn a second, and the error of the range in the median pixel: ${errorWords(error)}. Shows what accuracy costs`}
       onClick={open}
     >
       <span data-field="rate">{rate}</span>
       <span class="quiet" data-field="deviation">
-        {error}
+        {deviation(error?.error_m, "m")}
+        {error?.of === "noise" && " noise"}
       </span>
     </button>
   );

@@ -1,0 +1,71 @@
+/** Layouts that the user named, and the way back from changes. */
+import { computed, effect, signal, untracked, type Signal } from "@preact/signals";
+
+import { isLayout, type Layout } from "../views/layout";
+import { VIEW_NAMES } from "../views/names";
+import { remembered, type Shelf } from "./settings";
+
+/** Changes that can be undone, the last first. */
+const MOST_STEPS = 50;
+/** Longest name of a layout. */
+export const LONGEST_NAME = 40;
+
+type Named = Readonly<Record<string, Layout>>;
+
+export class Layouts {
+  /** By their names, in the order in which they were saved. */
+  readonly named: Signal<Named>;
+  readonly undoable = computed(() => this.#former.value.length > 0);
+  readonly #current: Signal<Layout>;
+  readonly #former = signal<readonly Layout[]>([]);
+  #last: Layout;
+
+  constructor(shelf: Shelf | null, current: Signal<Layout>) {
+    this.#current = current;
+    this.#last = current.peek();
+    this.named = remembered<Named>(shelf, "layouts", {}, isNamed);
+    effect(() => {
+      const [before, now] = [this.#last, current.value];
+      this.#last = now;
+      untracked(() => {
+        this.#keep(before, now);
+      });
+    });
+  }
+
+  /** Keeps the present layout under a name; one that had it is replaced. */
+  save(name: string): void {
+    this.named.value = { ...this.named.peek(), [name]: this.#current.peek() };
+  }
+
+  remove(name: string): void {
+    const { [name]: _, ...others } = this.named.peek();
+    this.named.value = others;
+  }
+
+  /** Returns to the layout before the last change; a splitter that was moved any number of times is one. */
+  undo(): void {
+    const [former, ...others] = this.#former.peek();
+    if (former === undefined) return;
+    this.#last = former; // this change itself is none that can be undone
+    this.#former.value = others;
+    this.#current.value = former;
+  }
+
+  #keep(before: Layout, now: Layout): void {
+    if (before === now) return;
+    const former = this.#former.peek();
+    const resizedBefore = former.length > 0 && placesOf(former[0]) === placesOf(before);
+    if (placesOf(before) === placesOf(now) && resizedBefore) return;
+    this.#former.value = [before, ...former].slice(0, MOST_STEPS);
+  }
+}
+
+/** Which view stands where, whatever the sizes. */
+function placesOf(layout: Layout): string {
+  return layout.map(({ slots }) => slots.map(({ view }) => view).join()).join("/");
+}
+
+function isNamed(value: unknown): value is Named {
+  return typeof value === "object" && value !== null && Object.values(value).every((each) => isLayout(each, VIEW_NAMES));
+}

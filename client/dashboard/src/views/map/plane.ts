@@ -1,0 +1,15 @@
+/** The plane that a region of the range map is nearest to. */
+import { planeThrough, type Plane } from "../../physics/plane";
+import type { Region } from "../../store/measures";
+import { fillCloud, makeCloud, type Pinhole } from "../points/cloud";
+
+/** The plane through what the pixels of a region see, in m; null where too few have a range. */
+export function planeOf(range_m: ArrayLike<number>, width: number, height: number, region: Region, lens: Pinhole): Plane | null {
+  const columns = Math.min(region.x1, width - 1) - region.x0 + 1;
+  const rows = Math.min(region.y1, height - 1) - region.y0 + 1;
+  if (columns < 1 || rows < 1) return null;
+  const inside = Float32Array.from({ length: columns * rows }, (_, at) => range_m[(region.y0 + Math.floor(at / columns)) * width + region.x0 + (at % columns)]);
+  const cloud = makeCloud(inside.length);
+  const count = fillCloud(cloud, inside, columns, { ...lens, cx: lens.cx - region.x0, cy: lens.cy - region.y0 });
+  return planeThrough(cloud.positions.subarray(0, 3 * count));
+}

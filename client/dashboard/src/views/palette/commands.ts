@@ -1,0 +1,57 @@
+/** All that the page can do at once, to be searched by words. */
+import { RequestError } from "../../store/api";
+import { copyLink } from "../../store/permalink";
+import type { Store } from "../../store/store";
+import { SHORTCUTS } from "../../ui/shortcuts";
+import { THEMES } from "../../ui/theme";
+import { LAYOUTS } from "../layout";
+import { MAP_PRODUCTS } from "../map/catalogue";
+import { VIEWS } from "../registry";
+import { PRESETS } from "../sequence/presets";
+
+export interface Command {
+  /** Kind and name: "Map: Range". */
+  readonly words: string;
+  /** The key that does the same; "" for none. */
+  readonly key: string;
+  readonly run: () => void;
+}
+
+/** Everything that can be done now. What changes the camera is there only while it may be changed from here. */
+export function commandsOf(store: Store): Command[] {
+  const steering = store.obstacle.value === null;
+  const scenes = steering ? (store.simulation.world.value?.scenes ?? []) : [];
+  const applied = store.sequence.value;
+  return [
+    ...MAP_PRODUCTS.map(({ product, name }, at) => ({ words: `Map: ${name}`, key: String(at + 1), run: () => void (store.mapProduct.value = product) })),
+    ...VIEWS.map(({ name, title }) => ({ words: `Show alone: ${title}`, key: "", run: () => void (store.alone.value = name) })),
+    ...Object.entries({ ...LAYOUTS, ...store.layouts.named.value }).map(([name, layout]) => ({ words: `Layout: ${name}`, key: "", run: () => store.showLayout(layout) })),
+    { words: "Layout: save or remove…", key: "", run: () => void (store.asksForLayout.value = true) },
+    ...(steering && applied !== null ? PRESETS.map(({ name, sequence }) => ({ words: `Sequence: ${name}`, key: "", run: () => void told(store, () => store.sequencing.set({ ...applied, ...sequence })) })) : []),
+    ...scenes.map(({ name }) => ({ words: `Scene: ${name}`, key: "", run: () => void told(store, () => store.simulation.stage(name)) })),
+    ...THEMES.map((theme) => ({ words: `Colours: ${theme === "auto" ? "as the system" : theme}`, key: "", run: () => void (store.theme.choice.value = theme) })),
+    { words: "Copy a link to what is shown", key: "", run: () => void copyLink(window, store) },
+    ...SHORTCUTS.filter(({ shown }) => shown.length === 1 && shown !== "K").map(({ keys, shown, words, run }) => ({
+      words: `Page: ${words}`,
+      key: shown,
+      run: () => run(store, new KeyboardEvent("keydown", { key: keys[0] })),
+    })),
+  ]; // prettier-ignore
+}
+
+/** Runs a request of the service; says in the page's events why it was refused. */
+async function told(store: Store, work: () => Promise<unknown>): Promise<void> {
+  try {
+    await work();
+  } catch (error) {
+    if (!(error instanceof RequestError)) throw error;
+    store.events.tell(error.message, "bad");
+  }
+}
+
+/** Those that hold every word of a query, whatever its case and order; at whose beginning one stands come first. */
+export function matching<T extends { readonly words: string }>(commands: readonly T[], query: string): T[] {
+  const sought = query.toLowerCase().split(/\s+/).filter((word) => word !== "");
+  const begun = ({ words }: T): number => sought.filter((word) => words.toLowerCase().split(/[\s:]+/).some((each) => each.startsWith(word))).length;
+  return commands.filter(({ words }) => sought.every((word) => words.toLowerCase().includes(word))).sort((a, b) => begun(b) - begun(a));
+}

@@ -1,0 +1,66 @@
+import { useSignal } from "@preact/signals";
+
+import { LONGEST_NAME } from "../../store/layouts";
+import { useStore } from "../../store/store";
+import { Dialog } from "../../ui/Dialog";
+import { LAYOUTS } from "../layout";
+
+/** Saves the present layout under a name, and removes saved ones. */
+export function LayoutDialog() {
+  const { asksForLayout } = useStore();
+  const close = (): void => {
+    asksForLayout.value = false;
+  };
+  return (
+    <Dialog open={asksForLayout.value} title="Layouts" onClose={close}>
+      <Saved onDone={close} />
+    </Dialog>
+  );
+}
+
+function Saved({ onDone }: { onDone: () => void }) {
+  const { layouts } = useStore();
+  const text = useSignal("");
+  const name = text.value.trim();
+  const taken = name in LAYOUTS;
+  const names = Object.keys(layouts.named.value);
+  return (
+    <form
+      class="control"
+      onSubmit={(event) => {
+        event.preventDefault();
+        layouts.save(name);
+        onDone();
+      }}
+    >
+      <label class="field">
+        <span>Name of the present layout</span>
+        <input type="text" name="layout" autocomplete="off" maxLength={LONGEST_NAME} value={text.value} aria-invalid={taken} onInput={(event) => (text.value = event.currentTarget.value)} />
+      </label>
+      <p class={taken ? "refusal" : "quiet"} role="status">
+        {taken ? `${name} is a layout of the page's own: choose another name.` : "It is kept in this browser; a copied link shows it to others."}
+      </p>
+      {names.length > 0 && (
+        <ul class="saved-layouts" aria-label="Saved layouts">
+          {names.map((each) => (
+            <li key={each}>
+              {each}
+              <button type="button" aria-label={`Remove ${each}`} onClick={() => layouts.remove(each)}>
+                Remove
+              </button>
+            </li>
+          ))}
+        </ul>
+      )}
+      <div class="dialog-actions">
+        <span class="spring" />
+        <button type="button" onClick={onDone}>
+          Close
+        </button>
+        <button type="submit" class="primary" disabled={name === "" || taken}>
+          Save
+        </button>
+      </div>
+    </form>
+  );
+}
