@@ -19,6 +19,7 @@ from transientcam.errors import (
 from transientcam.frame import Frame
 from transientcam.lease import AsyncLease, Lease
 from transientcam.opening import RecordedFrame, Recording, open  # noqa: A004 - as of gzip
+from transientcam.playing import player
 from transientcam.stream import Stream
 from transientcam.stream_state import Reconnect
 from transientcam.wire import Notice, Subscription
@@ -51,5 +52,6 @@ __all__ = [
     "density",
     "discover",
     "open",
+    "player",
     "transient",
 ]

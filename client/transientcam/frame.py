@@ -56,6 +56,16 @@ class RangeAccuracy(TypedDict):
     """The errors are those of one pixel in so many rows and columns."""
 
 
+class RelayHop(TypedDict):
+    """One relay that a frame came through (docs/relay.md)."""
+
+    service_id: str
+    latency_s: float
+    """From its arrival at the service before to that at this relay, by the clocks of both."""
+    missed_frames: int
+    """Frames that this relay never got, since it began."""
+
+
 class FrameMeta(TypedDict):
     """Metadata of a frame, the same for all its products."""
 
@@ -84,6 +94,8 @@ class FrameMeta(TypedDict):
     temperature_c: float
     lost_images: int
     """Images lost or corrupt between the frame before and this one."""
+    hops: NotRequired[list[RelayHop]]
+    """The relays that it came through, the first one first; absent from older daemons."""
     rejected_images: int | None
     """Images left out of the average over takes as outliers; None until it was computed."""
     repaired_images: int | None

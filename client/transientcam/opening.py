@@ -92,6 +92,10 @@ class Recording(Protocol):
         """Return an xarray.Dataset that reads and computes what is indexed."""
         ...
 
+    def reconstruct(self, *products: str, bins: int = 256) -> Any:
+        """Return an xarray.Dataset of the products of all frames, as Dask arrays."""
+        ...
+
     def close(self) -> None:
         """Close the file."""
         ...
@@ -145,15 +149,28 @@ def open(  # noqa: A001 - it is called as transientcam.open
         If the file cannot be read.
     """
     opener = _opener()
-    if isinstance(path_or_url, str) and "://" in path_or_url:
-        url = _file_url(path_or_url)
-        remote = RemoteFile(url, token=token, timeout_s=timeout_s)
-        try:
-            return cast("Recording", opener(url, source=remote, settings=settings))
-        except BaseException:
-            remote.close()
-            raise
-    return cast("Recording", opener(os.fspath(path_or_url), settings=settings))
+    place = os.fspath(path_or_url)
+    if "://" in place:
+        place = _file_url(place)
+    return cast("Recording", opener(place, token=token, settings=settings, timeout_s=timeout_s))
+
+
+def remote_recording(url: str, *, token: str | None = None, timeout_s: float = 10.0) -> RemoteFile:
+    """Return the file of a daemon's recording, of which what is read travels.
+
+    Parameters
+    ----------
+    url
+        Of the recording, ``URL/api/v1/recordings/ID``, or of its file.
+
+    Raises
+    ------
+    ParameterError
+        If it is another address.
+    ServerUnreachable, ProblemError, ProtocolError
+        If the daemon does not have it.
+    """
+    return RemoteFile(_file_url(url), token=token, timeout_s=timeout_s)
 
 
 def _opener() -> Any:

@@ -5,6 +5,7 @@ Each kind of camera lists its own, through its entry point of the group ``transi
 
 import json
 from dataclasses import asdict
+from datetime import datetime
 from importlib.metadata import EntryPoint, entry_points
 from itertools import chain
 from typing import Annotated, Any, Final
@@ -14,6 +15,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from transientcam.cli import presence
 from transientcam.cli.options import JsonOption
 from transientcam.cli.verbs import extra_of
 from transientcam.discovery import FoundCamera, discover
@@ -36,6 +38,10 @@ def devices(
         list[str] | None,
         typer.Option(help="Search only on the interface of this address; may be repeated."),
     ] = None,
+    watch: Annotated[
+        bool,
+        typer.Option("--watch", help="Print what comes and goes on the network, until Ctrl-C."),
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """List the cameras that each plug-in finds, those on the network, and how to open each.
@@ -44,6 +50,8 @@ def devices(
     `transientcam doctor --camera CAMERA`, or `transientcam doctor URL` for one on the network,
     lists the products that it cannot give, each with the reason.
     """
+    if watch:
+        presence.watch(lambda: _searched(timeout_s, interface), now=datetime.now, as_json=as_json)
     document = {**_found(network=network), "network": [], "network_problem": None}
     console = Console(stderr=True)
     if network:
@@ -91,6 +99,15 @@ def _look(point: EntryPoint, document: dict[str, Any], *, network: bool) -> None
             document["simulated"].append(camera.spec)
         else:
             document["cameras"].append({"kind": point.name, **found})
+
+
+def _searched(timeout_s: float, interfaces: list[str] | None) -> tuple[FoundCamera, ...]:
+    """Return what announces itself; without a network there is nothing to watch."""
+    found, problem = _announced(timeout_s, interfaces)
+    if problem is not None:
+        typer.echo(problem, err=True)
+        raise typer.Exit(code=1)
+    return found
 
 
 def _announced(

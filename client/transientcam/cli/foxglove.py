@@ -8,10 +8,8 @@ from rich.console import Console
 
 from transientcam.camera import Camera
 from transientcam.cli.options import JsonOption, TokenOption, UrlArgument
+from transientcam.cli.showing import shown_on
 from transientcam.robotics.foxglove_bridge import SHOWN, FoxgloveBridge
-from transientcam.robotics.reports import Report
-
-_STYLES = {"info": "green", "warning": "yellow", "error": "red"}
 
 
 def foxglove(
@@ -31,21 +29,22 @@ def foxglove(
     max_rate_hz: Annotated[
         float, typer.Option(min=0.01, help="No more frames a second than this are shown.")
     ] = 10.0,
+    control: Annotated[
+        bool,
+        typer.Option(
+            "--control",
+            help="Let viewers set parameters, and start a stopped camera for one capture; whoever "
+            "reaches the port can.",
+        ),
+    ] = False,
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show a camera live in Foxglove, until interrupted: images, points, lens and pose.
 
-    It only subscribes, and only to what somebody looks at.
+    Without --control it only subscribes, and only to what is looked at.
     """
     console = Console(stderr=True)
-
-    def show(report: Report) -> None:
-        if as_json:
-            typer.echo(json.dumps(report.to_document()))
-        else:
-            console.print(report.text, style=_STYLES[report.level], soft_wrap=True, markup=False)
-
     with (
         Camera(url, token=token) as camera,
         FoxgloveBridge(
@@ -54,7 +53,8 @@ def foxglove(
             host=host,
             port=port,
             max_rate_hz=max_rate_hz,
-            on_report=show,
+            control=control,
+            on_report=shown_on(console, as_json=as_json),
         ) as bridge,
     ):
         address = f"ws://{host}:{bridge.port}"

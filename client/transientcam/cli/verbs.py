@@ -17,6 +17,7 @@ GROUP: Final = "transientcam.commands"
 _EXTRA_OF_PACKAGE: Final = {
     "foxglove": "foxglove",
     "matplotlib": "plot",
+    "rerun": "rerun",
     "transientcam_driver": "driver",
     "transientcam_moments": "server",
     "transientcam_server": "server",

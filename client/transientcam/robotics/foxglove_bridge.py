@@ -1,46 +1,41 @@
 """A camera's frames, live, for viewers that speak Foxglove's WebSocket protocol.
 
-What nobody looks at is neither asked of the camera nor encoded. Viewers can only look: the server
-offers them no parameter and no service.
+What nobody looks at is neither asked of the camera nor encoded. Viewers see the parameters; they
+set them only where the bridge was given control.
 """
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
 from typing import Any, Final
 
 import foxglove
 from foxglove import StatusLevel
+from foxglove.websocket import Capability
 from numpy.typing import NDArray
 
 from transientcam.camera import Camera
-from transientcam.errors import (
-    ParameterError,
-    ProblemError,
-    ServerUnreachable,
-    StreamClosed,
-)
+from transientcam.errors import ParameterError, TransientcamError
 from transientcam.frame import Frame
+from transientcam.robotics.controls import Controls
 from transientcam.robotics.foxglove_messages import PROTOBUF, encode, schema_of
 from transientcam.robotics.messages import (
     Calibration,
     Message,
-    Pinhole,
     Transform,
     messages_of,
     products_of,
     topics_of,
     viewable,
 )
-from transientcam.robotics.reports import Report, report_of
-from transientcam.robotics.watching import Watching
-from transientcam.stream import Stream
+from transientcam.robotics.reports import Report
+from transientcam.robotics.source import Source
+from transientcam.robotics.watching import Watching, capture_service, parameters_of
 from transientcam.wire import PRODUCTS, Notice
 
 SHOWN: Final = ("range", "direct", "indirect", "brightness", "pointcloud")
 """Products that viewers can choose from, if nothing else is said."""
-RETRY_S: Final = 2.0
-DROPPED_EVERY_NS: Final = 5 * 10**9
-"""How often the count of dropped frames is shown; it changes with each of them."""
 _BACKLOG: Final = 32
 """Messages kept for a viewer that is too slow; the oldest are dropped."""
 _FIXED: Final = frozenset((Transform.topic, Calibration.topic))
@@ -49,7 +44,7 @@ _LEVELS: Final = {
     "warning": StatusLevel.Warning,
     "error": StatusLevel.Error,
 }
-_LENS_MAY_CHANGE: Final = ("reconnected", "sequence-changed", "simulation-changed")
+_PARAMETERS_CHANGE: Final = ("reconnected", "sequence-changed", "reconstruction-changed")
 
 
 class FoxgloveBridge:
@@ -67,6 +62,8 @@ class FoxgloveBridge:
         Where viewers find it; port 0 chooses a free one.
     max_rate_hz
         No more frames a second than this; None for all.
+    control
+        Whether viewers may set parameters, and start a camera that is stopped for one capture.
     on_report
         Called with what viewers are shown, too: losses and lost connections.
     now_ns
@@ -90,6 +87,7 @@ class FoxgloveBridge:
         host: str = "127.0.0.1",
         port: int = 8765,
         max_rate_hz: float | None = 10.0,
+        control: bool = False,
         on_report: Callable[[Report], object] = lambda report: None,
         now_ns: Callable[[], int] = time.time_ns,
     ) -> None:
@@ -97,15 +95,17 @@ class FoxgloveBridge:
         for name in products:
             if name not in can_be_shown:
                 raise ParameterError("products", name, f"some of {', '.join(can_be_shown)}")
-        self._camera = camera
         self._max_rate_hz = max_rate_hz
-        self._on_report = on_report
         self._now_ns = now_ns
-        self._last_report: Report | None = None
-        self._dropped_ns = 0
-        self._watching = Watching()
-        self._stream: Stream | None = None
-        self._ask_lens()
+        self._controls = Controls(camera, holder="transientcam foxglove", writable=control)
+        self._source = Source(
+            camera,
+            on_report=on_report,
+            publish=self._publish,
+            on_notice=self._noticed,
+            now_ns=now_ns,
+        )
+        self._watching = Watching(self._controls)
         self._newest = 0
         self._direct: Frame | None = None
         self._context = foxglove.Context()
@@ -126,12 +126,16 @@ class FoxgloveBridge:
                 name=f"transientcam {camera.url}",
                 host=host,
                 port=port,
+                capabilities=[Capability.Parameters, Capability.Services],
+                supported_encodings=["json"],
+                services=[capture_service(self._controls)],
                 server_listener=self._watching,
                 context=self._context,
                 message_backlog_size=_BACKLOG,
             )
         except RuntimeError as error:
             raise OSError(None, f"cannot serve viewers ({error})", f"{host}:{port}") from error
+        self._watching.on_report = self._source.report
 
     @property
     def port(self) -> int:
@@ -141,25 +145,17 @@ class FoxgloveBridge:
     def run(self) -> None:
         """Send frames to whoever looks, until it is closed."""
         topics: frozenset[str] = frozenset()
-        while not self._watching.closed:
+        while not self._source.closed:
             topics = self._watching.other_than(topics)
             # lens and pose come with frames, but can also be looked at alone
             self._send({}, self._now_ns(), topics)
-            if not products_of(topics):
-                continue
-            try:
-                topics = self._follow(topics)
-            except (ServerUnreachable, StreamClosed, ProblemError) as error:
-                topics = frozenset()
-                if not self._watching.closed:
-                    self._report(Report("error", "connection", str(error)))
-                    self._watching.pause(RETRY_S)
+            if products_of(topics):
+                topics = self._source.attempt(partial(self._follow, topics), frozenset())
 
     def close(self) -> None:
         """Disconnect viewers and camera; ``run`` returns."""
+        self._source.close()
         self._watching.close()
-        if self._stream is not None:
-            self._stream.close()
         self._server.stop()
         for channel in self._channels.values():
             channel.close()
@@ -173,12 +169,8 @@ class FoxgloveBridge:
     def _follow(self, topics: frozenset[str]) -> frozenset[str]:
         """Send frames while they are looked at; return the topics that were last."""
         wanted = products_of(topics)
-        self._ask_lens()
-        self._stream = self._camera.stream(
-            *wanted, on_notice=self._noticed, reconnect=True, max_rate_hz=self._max_rate_hz
-        )
-        with self._stream as stream:
-            self._report(Report("info", "connection", f"streaming {', '.join(wanted)}"))
+        with self._source.stream(*wanted, max_rate_hz=self._max_rate_hz) as stream:
+            self._source.report(Report("info", "connection", f"streaming {', '.join(wanted)}"))
             while wanted:
                 self._send_frame(stream.receive(), topics)
                 topics = self._watching.topics
@@ -186,14 +178,11 @@ class FoxgloveBridge:
                 if now and now != wanted:
                     stream.subscribe(*now, max_rate_hz=self._max_rate_hz)
                 wanted = now
-        self._report(Report("info", "connection", "nobody looks: the stream is closed"))
+        self._source.report(Report("info", "connection", "nobody looks: the stream is closed"))
         return topics
 
     def _send_frame(self, frame: Frame, topics: frozenset[str]) -> None:
-        if "intrinsics" in frame.extra:
-            self._lens = Pinhole.of_document(frame.extra["intrinsics"])
-        elif self._lens_is_old:
-            self._ask_lens()
+        self._source.lens_of(frame)
         if frame.product == "direct":
             self._direct = frame
         if frame.frame == self._newest:
@@ -207,28 +196,14 @@ class FoxgloveBridge:
     ) -> None:
         of_frame = self._direct if self._direct and self._direct.frame == self._newest else None
         intensity = None if of_frame is None else of_frame.array
-        for message in messages_of(arrays, self._lens, intensity=intensity, topics=topics):
+        for message in messages_of(arrays, self._source.lens, intensity=intensity, topics=topics):
             encoded = encode(message, time_ns)
             self._channels[message.topic].log(encoded.data, log_time=time_ns)
 
-    def _ask_lens(self) -> None:
-        self._lens = Pinhole.of_document(self._camera.camera["intrinsics"])
-        self._lens_is_old = False
-
     def _noticed(self, notice: Notice) -> None:
-        self._lens_is_old |= notice.kind in _LENS_MAY_CHANGE
-        report = report_of(notice)
-        if report is None:
-            return
-        if report.about == "dropped":
-            now_ns = self._now_ns()
-            if now_ns - self._dropped_ns < DROPPED_EVERY_NS:
-                return
-            self._dropped_ns = now_ns
-        self._report(report)
+        if notice.kind in _PARAMETERS_CHANGE:
+            with suppress(TransientcamError):  # the stream reports what is wrong with the camera
+                self._server.publish_parameter_values(parameters_of(self._controls))
 
-    def _report(self, report: Report) -> None:
-        if report != self._last_report:
-            self._last_report = report
-            self._on_report(report)
+    def _publish(self, report: Report) -> None:
         self._server.publish_status(report.text, _LEVELS[report.level], report.about)

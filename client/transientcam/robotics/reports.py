@@ -14,7 +14,7 @@ class Report:
     """Something that happened; one with the same ``about`` takes the place of the one before."""
 
     level: Level
-    about: Literal["connection", "camera", "dropped", "lost-images", "product"]
+    about: Literal["connection", "camera", "dropped", "lost-images", "product", "parameter"]
     text: str
 
     def to_document(self) -> dict[str, Any]:

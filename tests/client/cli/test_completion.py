@@ -26,7 +26,7 @@ def offered(
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["re"], {"record", "recover", "reconstruct", "replay"}),
+        (["re"], {"record", "recover", "reconstruct", "replay", "rerun"}),
         (["doc"], {"doctor"}),
         (["token", "re"], {"revoke"}),
         (["token", "create", "--role", ""], {"viewer", "operator", "admin"}),

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.client.robotics.reporting import WAIT_S, said
 from tests.client.robotics.viewer import viewing
 from tests.serving import Served, serving
 from transientcam import Camera, Notice, ParameterError
@@ -22,7 +23,6 @@ from transientcam.robotics.reports import Report
 
 SPEC = "sim:mirrors?noise=off"
 SEQUENCE: dict[str, Any] = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}
-WAIT_S = 120.0
 
 
 @pytest.fixture(scope="module")
@@ -66,14 +66,6 @@ def running(camera: Camera, **options: Any) -> Iterator[FoxgloveBridge]:
             thread.join()
 
 
-def said(reports: queue.Queue[Report], text: str) -> Report:
-    """Wait for a report that contains a text."""
-    while True:
-        report = reports.get(timeout=WAIT_S)
-        if text in report.text:
-            return report
-
-
 def pixels(message: Any) -> NDArray[Any]:
     assert message.encoding == "32FC1"
     return np.frombuffer(message.data, "<f4").reshape(message.height, message.step // 4)
@@ -82,7 +74,6 @@ def pixels(message: Any) -> NDArray[Any]:
 def test_a_viewer_sees_the_values_of_the_camera(served: Served) -> None:
     topics = ("/range", "/depth", "/pointcloud", "/camera_info", "/tf_static")
     with bridged(served.url) as (bridge, _), viewing(bridge.port) as viewer:
-        assert viewer.info["capabilities"] == []  # nothing that could change the camera
         assert set(viewer.channels) == {*topics, "/direct", "/indirect", "/brightness"}
         viewer.subscribe(*topics)
         seen = viewer.frame(*topics)
@@ -134,6 +125,84 @@ def test_a_viewer_that_leaves_without_a_word_is_no_longer_served(served: Served)
         said(reports, "nobody looks")
 
 
+def test_viewers_see_the_parameters_and_cannot_set_them(served: Served) -> None:
+    with bridged(served.url) as (bridge, _), viewing(bridge.port) as viewer:
+        values = viewer.parameters("sequence.harmonics", "sequence.exposure_s", "sequence.zeroth")
+        assert values == {
+            "sequence.harmonics": 3,
+            "sequence.exposure_s": 0.0005,
+            "sequence.zeroth": "estimated",
+        }
+        assert viewer.parameters().keys() > {*values, "reconstruction.bias", "acquisition.running"}
+
+        answer = viewer.set_parameters(sequence__harmonics=4, acquisition__running=False)
+
+        assert (answer["sequence.harmonics"], answer["acquisition.running"]) == (3, True)
+        assert "--control" in viewer.status("sequence.harmonics is 4")["message"]
+    with Camera(served.url, timeout_s=60.0) as camera:
+        assert camera.sequence["harmonics"] == 3
+
+
+def test_viewers_that_were_given_control_set_parameters_and_see_those_of_others(
+    served: Served,
+) -> None:
+    with (
+        Camera(served.url, timeout_s=60.0) as other,
+        bridged(served.url, control=True) as (bridge, _),
+        viewing(bridge.port) as viewer,
+    ):
+        before = other.sequence, other.reconstruction
+        answer = viewer.set_parameters(
+            sequence__exposure_s=0.0004,
+            sequence__sub_phases__n=4.0,
+            reconstruction__return_threshold=0.2,
+        )
+        assert answer["sequence.exposure_s"] == other.sequence["exposure_s"] == 0.0004
+        assert other.sequence["sub_phases"]["n"] == 4
+        assert other.reconstruction["return_threshold"] == 0.2
+        assert other.sequence["zeroth"] == before[0]["zeroth"]
+
+        viewer.set_parameters(sequence__harmonics=99)
+        assert "harmonics" in viewer.status("99")["message"]
+        viewer.set_parameters(history__seconds=1.0)
+        assert "read-only" in viewer.status("history.seconds")["message"]
+        viewer.set_parameters(nonsense=1)
+        viewer.status("parameter is 'nonsense'")
+        with other.lease("the one in control"):
+            viewer.set_parameters(sequence__exposure_s=0.0006)
+            assert "the one in control" in viewer.status("control")["message"]
+            assert other.sequence["exposure_s"] == 0.0004
+
+        viewer.follow_parameters("sequence.exposure_s")
+        viewer.subscribe("/brightness")
+        viewer.message("/brightness")
+        other.sequence, other.reconstruction = before
+        while viewer.update().get("sequence.exposure_s") != 0.0005:
+            pass
+
+
+def test_a_capture_answers_with_a_frame_that_was_not_there_before(served: Served) -> None:
+    with (
+        Camera(served.url, timeout_s=60.0) as camera,
+        bridged(served.url) as (bridge, _),
+        bridged(served.url, control=True) as (in_control, _),
+        viewing(bridge.port) as viewer,
+        viewing(in_control.port) as operator,
+    ):
+        newest = camera.frames["last"]
+        found = viewer.call("/capture")
+        assert found["frame"] > newest
+        assert (found["harmonics"], found["width"]) == (3, 163)
+
+        camera.stop()
+        newest = camera.frames["last"]
+        assert "--control was not given" in viewer.call("/capture")["message"]
+        assert operator.call("/capture")["frame"] > newest
+        assert camera.acquisition["running"] is False
+        camera.start()
+        camera.latest(after=camera.frames["last"], wait_s=10)
+
+
 def test_lens_and_pose_can_be_looked_at_alone(silent: Camera) -> None:
     reports: list[Report] = []
     with (
@@ -171,7 +240,7 @@ def test_dropped_frames_are_counted_for_viewers_every_few_seconds(silent: Camera
         viewing(bridge.port) as viewer,
     ):
         for total in (1, 2, 3):
-            bridge._noticed(Notice("dropped", {"channel": 0, "count": 1, "total": total}))
+            bridge._source.noticed(Notice("dropped", {"channel": 0, "count": 1, "total": total}))
         assert viewer.status("1 frames dropped")["level"] == 1
         assert viewer.status("3 frames dropped")["id"] == "dropped"
     assert [report.text.split()[0] for report in reports] == ["1", "3"]

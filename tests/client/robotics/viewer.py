@@ -1,7 +1,9 @@
 """A viewer of Foxglove's WebSocket protocol that is nobody's library but the decoder of messages.
 
 Its words are those of the protocol's specification: text frames are JSON with ``op``; a binary
-frame is 1, the subscription (u32), the time in ns (u64), all little-endian, and the message.
+frame is 1, the subscription (u32), the time in ns (u64), all little-endian, and the message. A call
+of a service is 2, the service (u32), the call (u32), the length (u32) and name of the encoding, and
+the request; its response is 3 and the same.
 """
 
 import base64
@@ -17,9 +19,11 @@ from mcap_protobuf.decoder import DecoderFactory
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from tests.client.robotics.reporting import WAIT_S
+
 _MESSAGE = struct.Struct("<BIQ")
-_WAIT_S = 120.0
-"""For an event that comes, on a machine that is laden; not a measurement."""
+_CALL = struct.Struct("<BIII")
+_ENCODING = b"json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +43,9 @@ class Viewer:
         self.info: dict[str, Any] = {}
         self.channels: dict[str, dict[str, Any]] = {}
         self.statuses: list[dict[str, Any]] = []
+        self.services: dict[str, dict[str, Any]] = {}
+        self._values: list[dict[str, Any]] = []
+        self._answers: list[dict[str, Any]] = []
         while not self.channels:
             self._next()
 
@@ -90,8 +97,50 @@ class Viewer:
                     return each
             self._next()
 
+    def parameters(self, *names: str) -> dict[str, Any]:
+        """Ask for parameters; all, if none is named."""
+        self._send({"op": "getParameters", "parameterNames": names, "id": "get"})
+        return self._values_of("get")
+
+    def set_parameters(self, **values: Any) -> dict[str, Any]:
+        """Set parameters, ``__`` for a dot; return all as they are then."""
+        pairs = [{"name": name.replace("__", "."), "value": each} for name, each in values.items()]
+        self._send({"op": "setParameters", "parameters": pairs, "id": "set"})
+        return self._values_of("set")
+
+    def follow_parameters(self, *names: str) -> None:
+        """Ask to be sent these parameters when they change."""
+        self._send({"op": "subscribeParameterUpdates", "parameterNames": names})
+
+    def update(self) -> dict[str, Any]:
+        """Wait for parameters that were not asked for."""
+        return self._values_of(None)
+
+    def call(self, service: str) -> dict[str, Any]:
+        """Call a service with an empty object, and wait for its response or its refusal."""
+        while service not in self.services:
+            self._next()
+        number = self.services[service]["id"]
+        head = _CALL.pack(2, number, 1, len(_ENCODING))
+        self._connection.send(head + _ENCODING + b"{}")
+        while not self._answers:
+            self._next()
+        return self._answers.pop()
+
+    def _values_of(self, request: str | None) -> dict[str, Any]:
+        while True:
+            for place, each in enumerate(self._values):
+                if each.get("id") == request:
+                    del self._values[place]
+                    return {one["name"]: one["value"] for one in each["parameters"]}
+            self._next()
+
     def _next(self) -> Message | None:
-        data = self._connection.recv(_WAIT_S)
+        data = self._connection.recv(WAIT_S)
+        if isinstance(data, bytes) and data[0] == 3:
+            length = _CALL.unpack_from(data)[3]
+            self._answers.append(json.loads(data[_CALL.size + length :]))
+            return None
         if isinstance(data, bytes):
             kind, number, time_ns = _MESSAGE.unpack_from(data)
             assert kind == 1
@@ -104,6 +153,12 @@ class Viewer:
             self.channels |= {each["topic"]: each for each in document["channels"]}
         elif document["op"] == "status":
             self.statuses.append(document)
+        elif document["op"] == "advertiseServices":
+            self.services |= {each["name"]: each for each in document["services"]}
+        elif document["op"] == "parameterValues":
+            self._values.append(document)
+        elif document["op"] == "serviceCallFailure":
+            self._answers.append(document)
         return None
 
     def _send(self, document: dict[str, Any]) -> None:

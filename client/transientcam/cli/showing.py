@@ -1,0 +1,23 @@
+"""How verbs that run until interrupted show what happens meanwhile."""
+
+import json
+from collections.abc import Callable
+
+import typer
+from rich.console import Console
+
+from transientcam.robotics.reports import Report
+
+_STYLES = {"info": "green", "warning": "yellow", "error": "red"}
+
+
+def shown_on(console: Console, *, as_json: bool) -> Callable[[Report], None]:
+    """Return what prints reports: in colours on ``console``, or as JSON on standard output."""
+
+    def show(report: Report) -> None:
+        if as_json:
+            typer.echo(json.dumps(report.to_document()))
+        else:
+            console.print(report.text, style=_STYLES[report.level], soft_wrap=True, markup=False)
+
+    return show
