@@ -44,9 +44,12 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 	$(BIN)/python -m benchmarks.simulation --write
 	$(BIN)/python -m benchmarks.recording --write
 	$(BIN)/python -m benchmarks.by_hand --write
+	$(BIN)/python -m benchmarks.cluster --write
 	$(BIN)/python -m benchmarks.cameras --write
 	$(BIN)/python -m benchmarks.first_light --write
+	$(BIN)/python -m benchmarks.first_program --write
 	$(BIN)/python -m benchmarks.stream_load --write
+	$(BIN)/python -m benchmarks.relay --write
 	$(BIN)/python -m benchmarks.robustness --write
 	$(BIN)/python -m benchmarks.fuzz_recordings --write
 	$(BIN)/python -m benchmarks.power_cuts --write
@@ -61,9 +64,11 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 docs-site: .venv/test.stamp  ## Write the documentation as a site: open build/site/index.html
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs build/site
 
-# The time of the last commit stands for now, so that the same commit gives the same bytes.
+# The time of the last commit stands for now, so that the same commit gives the same bytes. An unpacked
+# sdist is no repository, or lies in another one: its files have that time.
+EPOCH_S = $(shell git ls-files --error-unmatch Makefile >/dev/null 2>&1 && git log -1 --format=%ct || date -r pyproject.toml +%s)
 dist: .venv/test.stamp dashboard  ## Build the sdist and, from it, the wheel (dist/)
-	SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) \
+	SOURCE_DATE_EPOCH=$${SOURCE_DATE_EPOCH:-$(EPOCH_S)} \
 		$(BIN)/python -m build --no-isolation --outdir dist
 
 clean:  ## Remove everything that was built or installed here

@@ -1,4 +1,4 @@
-"""Build hook: the wheel carries the finished dashboard, or the build fails and says why."""
+"""Build hook: the wheel carries what npm builds, or the build fails and says why."""
 
 import shutil
 import subprocess
@@ -16,15 +16,18 @@ class DashboardBuildHook(BuildHookInterface):  # type: ignore[misc]  # hatchling
         if version == "editable":
             return
         page = Path(self.root, "server", "transientcam_server", "static", "index.html")
+        player = Path(self.root, "client", "transientcam", "static", "player.js")
         dashboard = Path(self.root, "client", "dashboard")
-        if page.exists():
+        if page.exists() and player.exists():
             return
         if shutil.which("npm") is None:
             raise RuntimeError(
                 "The dashboard is not built and npm was not found. Install Node.js 20 or newer, "
-                "or put a finished build into server/transientcam_server/static."
+                "or put a finished build into server/transientcam_server/static and "
+                "client/transientcam/static."
             )
         subprocess.run(["npm", "ci"], cwd=dashboard, check=True)
         subprocess.run(["npm", "run", "build"], cwd=dashboard, check=True)
-        if not page.exists():
-            raise RuntimeError(f"npm run build finished without writing {page}")
+        for built in (page, player):
+            if not built.exists():
+                raise RuntimeError(f"npm run build finished without writing {built}")

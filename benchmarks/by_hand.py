@@ -21,7 +21,7 @@ from rich.console import Console
 import transientcam_moments as tm
 from benchmarks.daemon import daemon
 from benchmarks.machine import machine
-from benchmarks.tables import Table
+from benchmarks.tables import Table, write_section
 from transientcam import Camera
 from transientcam_server.offline.opening import open_recording
 from transientcam_server.settings import ReconstructionSettings
@@ -29,7 +29,6 @@ from transientcam_server.settings import ReconstructionSettings
 PAGE: Final = Path(__file__).parents[1] / "docs" / "recordings.md"
 CAMERA: Final = "sim:mirrors?seed=1"
 LABELS: Final = ("harmonic", "phase_rad", "frequency_hz", "illumination", "take")
-_MARKS: Final = ("<!-- by hand: begin -->", "<!-- by hand: end -->")
 _Array = NDArray[Any]
 
 
@@ -171,7 +170,8 @@ def main() -> None:
     for made in _tables():
         made.show(Console(width=140))
         if arguments.write:
-            _write(made)
+            said = f"Written by `python -m benchmarks.by_hand --write` on: {machine()}."
+            write_section(PAGE, "by hand", [made], said)
 
 
 def _tables() -> Iterator[Table]:
@@ -186,16 +186,6 @@ def _tables() -> Iterator[Table]:
             Camera(process.url, timeout_s=60.0) as camera,
         ):
             yield table(camera, Path(downloads))
-
-
-def _write(made: Table) -> None:
-    text = PAGE.read_text(encoding="utf-8")
-    before, rest = text.split(_MARKS[0])
-    _, after = rest.split(_MARKS[1])
-    body = made.markdown().replace("## ", "### ", 1)
-    said = f"Written by `python -m benchmarks.by_hand --write` on: {machine()}."
-    page = f"{before}{_MARKS[0]}\n{body}\n{said}\n{_MARKS[1]}{after}"
-    PAGE.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

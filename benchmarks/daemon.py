@@ -38,8 +38,9 @@ class Process:
             line = self._process.stdout.readline()
             if not line:
                 raise RuntimeError("the program ended before it said where it serves")
-            found = re.search(r"(http|ws)s?://\S+", line)
-        self.url = found.group()
+            # the last one: the name of a camera may hold an address, too
+            found = re.search(r".*\b((http|ws)s?://\S+)", line)
+        self.url = found.group(1)
         self.address_s = self.age_s()
 
     def age_s(self) -> float:

@@ -68,3 +68,12 @@ def write_page(path: Path, tables: Sequence[Table], *, machine: str, command: st
         "",
     ]
     path.write_text("\n".join([*head, *(table.markdown() for table in tables)]), encoding="utf-8")
+
+
+def write_section(path: Path, name: str, tables: Sequence[Table], said: str) -> None:
+    """Write tables between the marks that a page has for them, with how they were made."""
+    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+    before, rest = path.read_text(encoding="utf-8").split(begin)
+    _, after = rest.split(end)
+    body = "\n".join(table.markdown().replace("## ", "### ", 1) for table in tables)
+    path.write_text(f"{before}{begin}\n{body}\n{said}\n{end}{after}", encoding="utf-8")

@@ -40,6 +40,11 @@ _LIBRARY_THREADS = (
     "transientcam-lane",
     "AnyIO worker",
     "uvloop_",
+    "zarr_io",
+    "asyncio_",  # the executor of zarr's loop
+    "fsspecIO",
+    "Dask-",
+    "IO loop",
 )
 
 
@@ -111,6 +116,8 @@ def nothing_left_behind() -> Iterator[None]:
         if thread not in before
         and thread.is_alive()
         and not thread.name.startswith(_LIBRARY_THREADS)
+        # no Python code started it: a library's own, known here since it called something
+        and not isinstance(thread, threading._DummyThread)
     ]
     for thread in left:
         thread.join(timeout=2.0)

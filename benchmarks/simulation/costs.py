@@ -73,12 +73,12 @@ def _world(scene: Scene, effects: Mapping[str, str], size: tuple[int, int]) -> W
 
 def _frames(world: World) -> Callable[[], None]:
     """Return what makes one frame after the other, in the device's time."""
-    period_s = VIDEO.exposure_s + READOUT_S
+    period_s, labels = VIDEO.exposure_s + READOUT_S, VIDEO.labels
     made = 0
 
     def frame() -> None:
         nonlocal made
-        for label in VIDEO.labels:
+        for label in labels:
             # a visitor is there from the fifth second on
             world.image(label, number=made, device_time_s=5.0 + made * period_s)
             made += 1
@@ -119,7 +119,8 @@ def cost_lines(scenes: list[Scenes], effects: dict[str, list[tuple[str, float]]]
         "Frames of the paper's video setting (m = 3, 0.5 ms, 12 images); processor time, one core.",
         f"At {VIDEO_HZ} Hz a frame may take {1e3 / VIDEO_HZ:.0f} ms. In a scene that stands still",
         "light is computed once, so that leaving effects out saves nothing but their share of the",
-        "opening; what is called for saves time where something moves.",
+        "opening; what is called for saves time where something moves. Light of what moves is",
+        "computed by compiled lanes, as it is from some seconds after a scene is first opened.",
         "",
         "| scene | pixels | none | called for | everything | everything / called for "
         "| frames/s, called for | opening, called for | what is called for |",

@@ -27,9 +27,11 @@ needs_octave = pytest.mark.skipif(
 )
 
 
-@pytest.fixture
+# of all examples: none relies on what another one has set
+@pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
     with serving("sim:mirrors?noise=off") as daemon:
+        daemon.start_all_workers()  # later they would look like threads that a test left behind
         yield daemon
 
 

@@ -78,6 +78,27 @@ def test_the_settings_of_a_container_are_settings(name: str) -> None:
         assert settings.camera in ("sim:mirrors", "usb")
 
 
+@pytest.mark.parametrize("name", ["scheduler", "worker"])
+def test_a_cluster_writes_recordings_and_kernels_alone_and_is_this_machine_s(name: str) -> None:
+    service = services()[name]
+
+    assert service["read_only"] is True
+    assert service["cap_drop"] == ["ALL"]
+    mounts = {each.rpartition(":")[2] for each in service["volumes"]}
+    assert mounts == {"/recordings", "/var/cache/transientcam"}
+    assert all(each.startswith("127.0.0.1:") for each in service.get("ports", []))
+
+
+def test_a_cluster_s_image_has_dask_and_its_store_the_same_secret() -> None:
+    found = services()
+    store, worker = found["s3"]["environment"], found["worker"]["environment"]
+
+    assert ",cluster]'" in (_DOCKER / "Dockerfile").read_text()
+    assert found["s3"]["ports"] == ["127.0.0.1:9000:9000"]
+    assert worker["AWS_ACCESS_KEY_ID"] == store["MINIO_ROOT_USER"]
+    assert worker["AWS_SECRET_ACCESS_KEY"] == store["MINIO_ROOT_PASSWORD"]
+
+
 def test_the_image_alone_admits_no_client_without_a_token() -> None:
     with pytest.raises(SettingsError, match="clients will need a token"):
         load_settings({}, environment=image_environment())

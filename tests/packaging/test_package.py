@@ -214,23 +214,44 @@ def test_what_is_not_declared_is_not_there(installed: Path) -> None:
     assert done.stdout.split() == ["True", "True", "True", "False", "True"]
 
 
-def test_the_wheel_lists_the_licences_of_all_that_its_page_carries(
-    built: tuple[Path, Path],
-) -> None:
+def test_the_wheel_lists_the_licences_of_all_that_it_carries(built: tuple[Path, Path]) -> None:
+    within = f"transientcam-{_VERSION}.dist-info"
     with ZipFile(built[1]) as archive:
-        listed = json.loads(archive.read("transientcam_server/static/licences.json"))
+        metadata = archive.read(f"{within}/METADATA").decode()
+        listed = [
+            json.loads(archive.read(f"{within}/licenses/{where}/static/licences.json"))
+            for where in ("server/transientcam_server", "client/transientcam")
+        ]
     dashboard = json.loads((ROOT / "client" / "dashboard" / "package.json").read_text("utf-8"))
+    page, player = ({each["name"] for each in one} for one in listed)
 
-    assert set(dashboard["dependencies"]) <= {each["name"] for each in listed}
-    # those that ask for no more than to be named with their text, as the list does
-    assert {each["identifier"] for each in listed} <= {
-        "0BSD",
-        "BSD-3-Clause",
-        "ISC",
-        "MIT",
-        "OFL-1.1",
-    }
-    assert all(len(each["text"]) > 500 for each in listed)
+    assert set(dashboard["dependencies"]) <= page
+    assert "@preact/signals" in player
+    # those that ask for no more than to be named with their text, as the lists do
+    expression = re.findall(r"^License-Expression: (.*)$", metadata, re.MULTILINE)
+    carried = {each["identifier"] for one in listed for each in one}
+    assert expression == [" AND ".join(sorted({"BSD-3-Clause", *carried}))]
+    assert carried <= {"0BSD", "BSD-3-Clause", "ISC", "MIT", "OFL-1.1"}
+    assert all(len(each["text"]) > 500 for one in listed for each in one)
+
+
+def epoch_s(directory: Path) -> int:
+    """Return the time that ``make dist`` takes for now."""
+    command = ["make", "--silent", "--eval", "epoch:; @echo $(EPOCH_S)", "epoch"]
+    done = subprocess.run(command, cwd=directory, capture_output=True, text=True, check=True)
+    return int(done.stdout)
+
+
+def test_an_unpacked_sdist_is_built_with_the_time_of_its_files(unpacked: Path) -> None:
+    assert epoch_s(unpacked) == int(1e9)
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is no repository")
+def test_a_commit_is_built_with_its_own_time() -> None:
+    command = ["git", "log", "-1", "--format=%ct"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+
+    assert epoch_s(ROOT) == int(done.stdout)
 
 
 # -- what is said of it ------------------------------------------------------------------------
