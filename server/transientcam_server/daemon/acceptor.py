@@ -116,9 +116,13 @@ class Acceptor:
         self._tls = tls
         self._limits = limits
         self._requests = Turns(
-            self._loop, share=lambda: REQUESTS_SHARE if watched() else UNWATCHED_SHARE
+            self._loop,
+            share=lambda: REQUESTS_SHARE if watched() else UNWATCHED_SHARE,
+            share_of_one=lambda: limits.address_share if watched() else UNWATCHED_SHARE,
         )
-        self._streams = Turns(self._loop, share=lambda: STREAMS_SHARE)
+        self._streams = Turns(
+            self._loop, share=lambda: STREAMS_SHARE, share_of_one=lambda: STREAMS_SHARE
+        )
         self._admission = Admission(limits, clock=self._loop.time)
         self._refusals: dict[str, bytes] = {}
         self._handshakes: set[asyncio.Task[None]] = set()

@@ -15,6 +15,12 @@ class Handle:
         self.due_s = due_s
         self.callback = callback
 
+    def cancel(self) -> None:
+        self.callback = _nothing
+
+
+def _nothing() -> None: ...
+
 
 class Loop:
     """A loop with two clocks: real time, and the processor's."""
@@ -48,11 +54,12 @@ class Loop:
         """Spend processor time."""
         self.spent_s += costs_s
 
-    def turns(self, share: float = SHARE) -> Turns:
-        """Return turns by these clocks."""
+    def turns(self, share: float = SHARE, *, share_of_one: float | None = None) -> Turns:
+        """Return turns by these clocks; one address may have all unless it is given less."""
         return Turns(
             cast("Any", self),
             share=lambda: share,
+            share_of_one=lambda: share if share_of_one is None else share_of_one,
             clock=lambda: self.now_s,
             spent=lambda: self.spent_s,
         )
