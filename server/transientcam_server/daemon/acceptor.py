@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Final
 
 from transientcam_server.daemon.intake import PORTION_BYTES, Intake
+from transientcam_server.daemon.metering import metered
 from transientcam_server.daemon.rate_limit import RateLimiter
 from transientcam_server.daemon.refusals import refusal
 from transientcam_server.daemon.turns import Turns
@@ -161,7 +162,8 @@ class Acceptor:
     def _begin(self, connection: socket.socket, host: str) -> None:
         problem = self._admission.admit(host)
         if problem is None:
-            task = self._loop.create_task(self._connect(connection, host))
+            connecting = metered(self._connect(connection, host), self._requests.account(host))
+            task = self._loop.create_task(connecting)
             self._handshakes.add(task)
             task.add_done_callback(self._handshakes.discard)
             return

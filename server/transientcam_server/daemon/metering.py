@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import time
-from collections.abc import Awaitable, Callable, Generator
+from collections.abc import Awaitable, Callable, Coroutine, Generator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextvars import ContextVar
 from functools import partial
@@ -39,6 +39,12 @@ class Metered:
                 step = partial(self._coroutine.throw, error)
             else:
                 step = partial(self._coroutine.send, value)
+
+
+async def metered(coroutine: Coroutine[Any, Any, _T], account: Account) -> _T:
+    """Return what a coroutine returns, with the processor time of its steps counted."""
+    result: _T = await Metered(coroutine, account)
+    return result
 
 
 def in_turns(app: ASGIApp, account: Account) -> ASGIApp:
