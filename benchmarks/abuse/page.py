@@ -110,6 +110,26 @@ def page(found: Sequence[Found], *, duration_s: float, command: str) -> str:
     )
 
 
+def page_with(text: str, found: Sequence[Found], *, command: str) -> str:
+    """Return a page with some of its lines measured anew, which it then says.
+
+    Raises
+    ------
+    ValueError
+        If it has no such line.
+    """
+    lines = text.splitlines()
+    for each in found:
+        begin = f"| {each[0]} | {each[1]} |"
+        place = next((at for at, line in enumerate(lines) if line.startswith(begin)), None)
+        if place is None:
+            raise ValueError(f"{PAGE.name} has no line that begins with {begin}")
+        lines[place] = row(*each)
+    names = ", ".join(dict.fromkeys(name for name, *_ in found))
+    again = f"- Measured again later, {names}: `{command}` on {machine()}."
+    return "\n".join([*lines, again, ""])
+
+
 def mixed_page(result: Soak) -> str:
     """Return the page of a long mix."""
     return "\n".join(
