@@ -5,6 +5,7 @@ import contextlib
 import logging
 import socket
 import ssl
+import time
 from collections import Counter
 from collections.abc import Callable
 from typing import Final
@@ -29,6 +30,24 @@ UNWATCHED_SHARE: Final = 0.9
 STREAMS_SHARE: Final = 0.2
 """Of it, for what the clients of streams send. The rest is for what these are sent."""
 _REMEMBERED_ADDRESSES: Final = 1024
+
+
+def turns_of_requests(
+    loop: asyncio.AbstractEventLoop,
+    *,
+    limits: LimitSettings,
+    watched: Callable[[], bool],
+    clock: Callable[[], float] = time.monotonic,
+    spent: Callable[[], float] = time.thread_time,
+) -> Turns:
+    """Return what shares a loop's time between requests: nearly all of it while none watches."""
+    return Turns(
+        loop,
+        share=lambda: REQUESTS_SHARE if watched() else UNWATCHED_SHARE,
+        share_of_one=lambda: limits.address_share if watched() else UNWATCHED_SHARE,
+        clock=clock,
+        spent=spent,
+    )
 
 
 class Admission:
@@ -116,11 +135,7 @@ class Acceptor:
         self._protocol = protocol
         self._tls = tls
         self._limits = limits
-        self._requests = Turns(
-            self._loop,
-            share=lambda: REQUESTS_SHARE if watched() else UNWATCHED_SHARE,
-            share_of_one=lambda: limits.address_share if watched() else UNWATCHED_SHARE,
-        )
+        self._requests = turns_of_requests(self._loop, limits=limits, watched=watched)
         self._streams = Turns(
             self._loop, share=lambda: STREAMS_SHARE, share_of_one=lambda: STREAMS_SHARE
         )

@@ -5,36 +5,14 @@ from functools import partial
 
 import pytest
 
-from tests.server.daemon.loops import SHARE, Loop
+from tests.server.daemon.loops import SHARE, STEP_S, Client, Loop
 from transientcam_server.daemon.turns import (
     BURST_OF_ONE_S,
     BURST_S,
     MOST_DEBT_S,
     MOST_LEAD_S,
     SLICE_S,
-    Account,
 )
-
-STEP_S = 0.0005
-
-
-class Client:
-    """Always has something to do, on as many connections as it likes."""
-
-    def __init__(self, loop: Loop, account: Account, *, costs_s: float = STEP_S) -> None:
-        self.had = 0
-        self._loop = loop
-        self._account = account
-        self._costs_s = costs_s
-
-    def ask(self, connections: int = 1) -> None:
-        for _ in range(connections):
-            self._account.run(self._have)
-
-    def _have(self) -> None:
-        self.had += 1
-        self._loop.work(self._costs_s)
-        self._loop.call_soon(self.ask)  # the next one, as soon as this is done
 
 
 def test_all_together_have_their_share_of_the_time() -> None:
