@@ -15,7 +15,7 @@ from typing import Final, TypeVar
 BURST_S: Final = 0.01
 """Processor time that may be spent at once where little was spent before."""
 BURST_OF_ONE_S: Final = 0.1
-"""The same, by one address: half of what it takes to open a dashboard."""
+"""The same, by one address: what it takes to open a dashboard."""
 SLICE_S: Final = 0.001
 """Processor time after which the rest of the loop has its turn."""
 MOST_DEBT_S: Final = 0.1
