@@ -1,9 +1,10 @@
 """Damaged and forged recordings in a service's directory: what becomes of it.
 
 Run it with ``python -m benchmarks.fuzz_recordings [--cases 100000] [--jobs 2] [--write]``; with
-``--keep FILE`` it goes on where it was ended. Cases follow from their numbers, so that one can be
-tried again alone. They run in processes of their own: one that crashes or hangs is noted, and the
-next process goes on after it.
+``--keep FILE`` it goes on where it was ended, and an interrupt ends it with the page of what was
+tried until then. Cases follow from their numbers, so that one can be tried again alone. They run in
+processes of their own: one that crashes or hangs is noted, and the next process goes on after it.
+A case may take so much of the processor; how long it takes on a busy machine says nothing.
 """
 
 import argparse
@@ -11,9 +12,11 @@ import collections
 import json
 import os
 import selectors
+import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -24,12 +27,20 @@ from typing import Any
 import h5py
 
 from benchmarks.machine import machine
-from tests.server.fuzzing.recordings import BEYOND_BYTES, KINDS, MEMORY_BYTES, in_memory
+from tests.server.fuzzing.recordings import (
+    BEYOND_BYTES,
+    KINDS,
+    MEMORY_BYTES,
+    MOST_SPENT_S,
+    in_memory,
+)
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "fuzzed-recordings.md"
-BATCH = 500
-HANGS_S = 120.0
+BATCH = 2000
+SILENT_S = 900.0
+"""Without a word for so long, a process is ended, and its case tried once more alone."""
+LOOK_S = 1.0
 OVER_HTTP_EVERY = 10
 
 
@@ -45,42 +56,55 @@ class Findings:
         Cases by what should not have happened: crashes, hangs, server errors.
     grown_bytes
         The most memory that each case took.
+    spent_s
+        The processor time that each case took.
     """
 
     states: collections.Counter[tuple[str, str]] = field(default_factory=collections.Counter)
     wrong: dict[str, list[int]] = field(default_factory=dict)
     grown_bytes: list[int] = field(default_factory=list)
+    spent_s: list[float] = field(default_factory=list)
 
     def take(self, outcome: dict[str, Any]) -> None:
         """Count a case."""
         self.states[outcome["kind"], outcome["state"]] += 1
         self.grown_bytes.append(outcome["grown_bytes"])
+        self.spent_s.append(outcome["spent_s"])
         for each in outcome["wrong"]:
             self.wrong.setdefault(each, []).append(outcome["number"])
 
 
-def attempt(first: int, last: int) -> Iterator[dict[str, Any]]:
-    """Try some cases, and go on after one that ends the process."""
+def attempt(first: int, last: int, *, stop: threading.Event) -> Iterator[dict[str, Any]]:
+    """Try some cases until ``stop`` is set, and go on after one that ends the process."""
+    silent = None
     while first < last:
-        number = first
+        number, ended = first, None
         with tempfile.TemporaryDirectory(dir=in_memory()) as name:
-            for line in _lines(Path(name), first, last):
+            for line in _lines(Path(name), first, last, stop=stop):
                 if "begin" in line:
                     number = line["begin"]
                 elif "ended" in line:
-                    if line["ended"] != 0:
-                        how = {"kind": KINDS[number % len(KINDS)], "state": "lost"}
-                        wrong = [f"the process ended: {line['ended']}"]
-                        yield how | {"number": number, "wrong": wrong, "grown_bytes": 0}
-                    elif number < last - 1:
-                        raise RuntimeError(f"the process ended after case {number}")
+                    ended = line["ended"]
                 else:
                     yield line
+        if stop.is_set():
+            return
+        if ended == 0 and number != last - 1:
+            raise RuntimeError(f"the process ended after case {number}")
+        if ended is None and silent != number:
+            first = silent = number  # it may have waited for the machine: once more
+            continue
+        if ended != 0:
+            what = "no answer" if ended is None else f"the process ended: {ended}"
+            how = {"kind": KINDS[number % len(KINDS)], "state": "lost", "wrong": [what]}
+            yield how | {"number": number, "grown_bytes": 0, "spent_s": 0.0}
         first = number + 1
 
 
-def _lines(directory: Path, first: int, last: int) -> Iterator[dict[str, Any]]:
-    """Run a process, and return what it writes, and with what it ended."""
+def _lines(
+    directory: Path, first: int, last: int, *, stop: threading.Event
+) -> Iterator[dict[str, Any]]:
+    """Run a process, and return what it writes, and with what it ended: None if it was killed."""
     command = [sys.executable, "-m", "tests.server.fuzzing.recordings", str(directory / "tried")]
     environment = os.environ | {"TRANSIENTCAM_KERNELS": "off"}
     with (
@@ -90,48 +114,68 @@ def _lines(directory: Path, first: int, last: int) -> Iterator[dict[str, Any]]:
             env=environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
+            start_new_session=True,  # an interrupt is for this process
         ) as process,
         selectors.DefaultSelector() as selector,
     ):
         assert process.stdout is not None
         selector.register(process.stdout, selectors.EVENT_READ)
         rest = b""
+        heard_s = time.monotonic()
         while True:
-            if not selector.select(HANGS_S):
+            if selector.select(LOOK_S):
+                data = os.read(process.stdout.fileno(), 65536)
+                if not data:
+                    break
+                heard_s = time.monotonic()
+                *lines, rest = (rest + data).split(b"\n")
+                yield from map(json.loads, lines)
+            elif stop.is_set() or time.monotonic() - heard_s > SILENT_S:
                 process.kill()
-                yield {"ended": f"no answer for {HANGS_S:g} s"}
+                yield {"ended": None}
                 return
-            data = os.read(process.stdout.fileno(), 65536)
-            if not data:
-                break
-            *lines, rest = (rest + data).split(b"\n")
-            yield from map(json.loads, lines)
+            if stop.is_set():
+                process.kill()
+                return
     yield {"ended": process.returncode}
 
 
 def measure(*, cases: int, jobs: int, kept: Path | None = None) -> Findings:
     """Try so many cases, some at the same time; what a file keeps is not tried again.
 
-    Outcomes are appended to the file, a line for each, when a batch of them is there.
+    Outcomes are appended to the file, a line for each. An interrupt ends it with what there is.
     """
     findings = Findings()
     known = _known(kept)
-    batches = [(begin, min(begin + BATCH, cases)) for begin in range(0, cases, BATCH)]
+    for number, outcome in known.items():
+        if number < cases:
+            findings.take(outcome)
+    taking, stop = threading.Lock(), threading.Event()
 
-    def outcomes_of(batch: tuple[int, int]) -> list[dict[str, Any]]:
-        numbers = range(*batch)
-        if all(number in known for number in numbers):
-            return [known[number] for number in numbers]
-        return list(attempt(*batch))
-
-    with ThreadPoolExecutor(jobs) as threads:
-        for outcomes in threads.map(outcomes_of, batches):
-            new = [each for each in outcomes if each["number"] not in known]
-            if kept is not None and new:
+    def take(outcome: dict[str, Any]) -> None:
+        with taking:
+            findings.take(outcome)
+            if kept is not None:
                 with kept.open("a", encoding="utf-8") as file:
-                    file.writelines(json.dumps(each) + "\n" for each in new)
-            for outcome in outcomes:
-                findings.take(outcome)
+                    file.write(json.dumps(outcome) + "\n")
+
+    def try_batch(begin: int) -> None:
+        last = min(begin + BATCH, cases)
+        left = [number for number in range(begin, last) if number not in known]
+        if left:
+            for outcome in attempt(left[0], last, stop=stop):
+                if outcome["number"] not in known:
+                    take(outcome)
+
+    threads = ThreadPoolExecutor(jobs)
+    try:
+        for _ in threads.map(try_batch, range(0, cases, BATCH)):
+            pass
+    except KeyboardInterrupt:
+        pass
+    finally:
+        stop.set()
+        threads.shutdown(cancel_futures=True)
     return findings
 
 
@@ -157,9 +201,10 @@ def report(findings: Findings, *, elapsed_s: float | None) -> str:
         f"{machine()},",
         f"h5py {h5py.version.version} (HDF5 {h5py.version.hdf5_version}).",
         "",
-        f"{cases} files were put into the directory of a service, beside a good recording"
-        f"{took}. Each was listed, described, read frame by frame, replayed, "
-        "recovered if unfinished, and deleted; every tenth over HTTP. A file is bytes damaged "
+        f"{cases:,} files were put into the directory of a service, beside a good recording"
+        f"{took}. Each was listed, described and deleted, every tenth over HTTP and read there. "
+        "Whatever could be opened, and a quarter of the rest, was replayed frame by frame; a "
+        "quarter of the unfinished was recovered. A file is bytes damaged "
         "(`flipped`, `cut`, `overwritten`, `resummed`: changed with HDF5's checksum made right), "
         "or rewritten by h5py with wrong types, shapes, places and values.",
         "",
@@ -169,10 +214,12 @@ def report(findings: Findings, *, elapsed_s: float | None) -> str:
         f"good recording not listed as complete | {sum(map(len, findings.wrong.values()))} |",
         f"| most memory that one case took | {max(findings.grown_bytes) / 2**20:.0f} MiB |",
         f"| cases that took more than {BEYOND_BYTES / 2**20:.0f} MiB | {len(beyond)} |",
+        f"| most processor time that one case took | {max(findings.spent_s):.1f} s |",
         "",
         f"The processes could take {MEMORY_BYTES / 2**30:.0f} GiB beyond what they began with. The "
         "length of a text attribute is the one size that cannot be looked at before HDF5 allocates "
-        "it, up to 4 GiB for a moment.",
+        "it, up to 4 GiB for a moment. A case that takes more than "
+        f"{MOST_SPENT_S:g} s of processor time counts as one that hangs.",
         "",
         "| damage | " + " | ".join(states) + " |",
         "|---|" + "---:|" * len(states),
@@ -202,6 +249,7 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, help="file of outcomes, to go on where it was ended")
     parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
     arguments = parser.parse_args()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     begin_s = time.perf_counter()
     findings = measure(cases=arguments.cases, jobs=arguments.jobs, kept=arguments.keep)
     elapsed_s = time.perf_counter() - begin_s

@@ -3,7 +3,8 @@
 Each attack goes on at full speed from 1 and from 16 connections against a daemon of its own, with
 the simulated camera at the paper's video setting (Sec. 6.3: 18.6 Hz). Meanwhile a viewer streams
 range, /livez is asked, a lease lapses, the light is switched off, and SIGTERM ends it: half a
-minute each. ``--against CHECKOUT`` attacks the daemon of another checkout too, for comparison;
+minute each. With ``--write`` and the names of some attacks their lines of the page are replaced.
+``--against CHECKOUT`` attacks the daemon of another checkout too, for comparison;
 ``--minutes 10`` mixes all attacks for so long instead.
 """
 
@@ -12,7 +13,7 @@ from pathlib import Path
 
 from benchmarks.abuse.attacks import ATTACKS
 from benchmarks.abuse.measuring import measure
-from benchmarks.abuse.page import PAGE, mixed_page, page, row
+from benchmarks.abuse.page import PAGE, mixed_page, page, page_with, row
 from benchmarks.abuse.soaking import soak
 
 CONNECTIONS = (1, 16)
@@ -52,7 +53,11 @@ def main() -> None:
             now = measure(name, connections, duration_s=duration_s)
             found.append((name, connections, before, now))
             print(row(*found[-1]), flush=True)
-    text = page(found, duration_s=duration_s, command=_command(arguments))
+    command = _command(arguments)
+    if arguments.attacks and arguments.write:
+        text = page_with(PAGE.read_text(encoding="utf-8"), found, command=command)
+    else:
+        text = page(found, duration_s=duration_s, command=command)
     print(text)
     if arguments.write:
         PAGE.write_text(text, encoding="utf-8")
@@ -60,7 +65,7 @@ def main() -> None:
 
 def _command(arguments: argparse.Namespace) -> str:
     """Return what was asked for, as far as it differs from the defaults."""
-    parts = ["python -m benchmarks.abuse"]
+    parts = ["python -m benchmarks.abuse", *map(repr, arguments.attacks)]
     if tuple(arguments.connections) != CONNECTIONS:
         parts += ["--connections", *map(str, arguments.connections)]
     if arguments.seconds != DURATION_S:

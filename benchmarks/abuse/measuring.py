@@ -28,6 +28,8 @@ _PROBE_EVERY_S = 0.2
 _COMPILED_WITHIN_S = 900.0
 _LIGHT_OFF_S: Final = 1.5
 COMES_BACK_S: Final = 3.0
+_FIRST_FRAMES_S: Final = 1.0
+_WAITING_S: Final = 0.1
 _HISTORY_S: Final = 2.0
 """Frames are kept for so long, and memory grows until then."""
 
@@ -133,6 +135,8 @@ def measure(
     ):
         prepare(client)
         viewer = None if tls else Viewer(stream_url(process), RANGE)  # the viewers speak no TLS
+        if viewer is not None:
+            watch([viewer], duration_s=_FIRST_FRAMES_S)
         before = _frames(viewer, client, duration_s)
         memory_bytes = process.resident_bytes()
         probe = Probe(process, client)
@@ -196,6 +200,7 @@ def _frames(viewer: Viewer | None, client: httpx.Client, duration_s: float) -> f
         before = _captured(client)
         time.sleep(duration_s)
         return (_captured(client) - before) / duration_s
+    watch([viewer], duration_s=_WAITING_S)  # what came since it read last
     count = len(viewer.seen.numbers)
     took_s = watch([viewer], duration_s=duration_s)
     return (len(viewer.seen.numbers) - count) / took_s

@@ -110,6 +110,22 @@ def page(found: Sequence[Found], *, duration_s: float, command: str) -> str:
     )
 
 
+def page_with(text: str, found: Sequence[Found], *, command: str) -> str:
+    """Return a page with some of its lines measured anew or added, which it then says."""
+    lines = text.splitlines()
+    for each in found:
+        name, connections, *_ = each
+        ours = f"| {name} | {connections} |"
+        place = next(at for at, line in enumerate(lines) if line.startswith(f"| {name} |"))
+        if any(line.startswith(ours) for line in lines):
+            lines = [row(*each) if line.startswith(ours) else line for line in lines]
+        else:
+            lines.insert(place, row(*each))
+    names = ", ".join(dict.fromkeys(name for name, *_ in found))
+    again = f"- Measured again later, {names}: `{command}` on {machine()}."
+    return "\n".join([*lines, again, ""])
+
+
 def mixed_page(result: Soak) -> str:
     """Return the page of a long mix."""
     return "\n".join(

@@ -208,6 +208,9 @@ class LimitSettings(_Group):
     """The same, of one address; a proxy is one address."""
     max_connects_hz: _Finite = Field(default=100.0, gt=0.0, le=1e6)
     """New connections a second from one address; max_connections_per_address may come at once."""
+    address_share: _Finite = Field(default=0.15, gt=0.0, le=1.0)
+    """Of the processor time of the event loop's thread: what answering one address may take while
+    frames are sent or recorded. Nothing is refused; its next request is read later."""
     unserved_s: _Finite = Field(default=1.0, ge=0.5, le=60.0)
     """Time without any client being served, after which the light is switched off until they are:
     no client could switch it off meanwhile."""

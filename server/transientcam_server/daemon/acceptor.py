@@ -5,11 +5,13 @@ import contextlib
 import logging
 import socket
 import ssl
+import time
 from collections import Counter
 from collections.abc import Callable
 from typing import Final
 
 from transientcam_server.daemon.intake import PORTION_BYTES, Intake
+from transientcam_server.daemon.metering import metered
 from transientcam_server.daemon.rate_limit import RateLimiter
 from transientcam_server.daemon.refusals import refusal
 from transientcam_server.daemon.turns import Turns
@@ -28,6 +30,24 @@ UNWATCHED_SHARE: Final = 0.9
 STREAMS_SHARE: Final = 0.2
 """Of it, for what the clients of streams send. The rest is for what these are sent."""
 _REMEMBERED_ADDRESSES: Final = 1024
+
+
+def turns_of_requests(
+    loop: asyncio.AbstractEventLoop,
+    *,
+    limits: LimitSettings,
+    watched: Callable[[], bool],
+    clock: Callable[[], float] = time.monotonic,
+    spent: Callable[[], float] = time.thread_time,
+) -> Turns:
+    """Return what shares a loop's time between requests: nearly all of it while none watches."""
+    return Turns(
+        loop,
+        share=lambda: REQUESTS_SHARE if watched() else UNWATCHED_SHARE,
+        share_of_one=lambda: limits.address_share if watched() else UNWATCHED_SHARE,
+        clock=clock,
+        spent=spent,
+    )
 
 
 class Admission:
@@ -115,10 +135,10 @@ class Acceptor:
         self._protocol = protocol
         self._tls = tls
         self._limits = limits
-        self._requests = Turns(
-            self._loop, share=lambda: REQUESTS_SHARE if watched() else UNWATCHED_SHARE
+        self._requests = turns_of_requests(self._loop, limits=limits, watched=watched)
+        self._streams = Turns(
+            self._loop, share=lambda: STREAMS_SHARE, share_of_one=lambda: STREAMS_SHARE
         )
-        self._streams = Turns(self._loop, share=lambda: STREAMS_SHARE)
         self._admission = Admission(limits, clock=self._loop.time)
         self._refusals: dict[str, bytes] = {}
         self._handshakes: set[asyncio.Task[None]] = set()
@@ -157,7 +177,8 @@ class Acceptor:
     def _begin(self, connection: socket.socket, host: str) -> None:
         problem = self._admission.admit(host)
         if problem is None:
-            task = self._loop.create_task(self._connect(connection, host))
+            connecting = metered(self._connect(connection, host), self._requests.account(host))
+            task = self._loop.create_task(connecting)
             self._handshakes.add(task)
             task.add_done_callback(self._handshakes.discard)
             return

@@ -24,6 +24,7 @@ from transientcam_server.daemon.acceptor import Acceptor
 from transientcam_server.daemon.announcement import announced
 from transientcam_server.daemon.connections import BoundedConnection
 from transientcam_server.daemon.memory import give_back_large_blocks
+from transientcam_server.daemon.metering import CountingExecutor
 from transientcam_server.daemon.streams import BoundedStream
 from transientcam_server.daemon.systemd import ServiceManager, supervised
 from transientcam_server.errors.exceptions import AddressUnavailable
@@ -128,6 +129,9 @@ class Server(uvicorn.Server):
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Start, then report it."""
+        asyncio.get_running_loop().set_default_executor(
+            CountingExecutor(thread_name_prefix="requests")
+        )
         await super().startup([])  # it would accept without counting, and 1024 at once
         if self.started and sockets:
             self._acceptor = self._accept_from(sockets[0])

@@ -1,8 +1,9 @@
 """Shares the time of the event loop between clients, by address.
 
 What clients ask for has so much of the loop's processor time and no more, so that frames are made
-and sent beside it whatever is asked. Where it is not enough for all, each address has as much as
-any other (start-time fair queueing: Goyal, Vin & Cheng 1996), and its connections take turns.
+and sent beside it whatever is asked, and one address has less of it. Where it is not enough for
+all, each address has as much as any other (start-time fair queueing: Goyal, Vin & Cheng 1996), and
+its connections take turns.
 """
 
 import asyncio
@@ -13,6 +14,8 @@ from typing import Final, TypeVar
 
 BURST_S: Final = 0.01
 """Processor time that may be spent at once where little was spent before."""
+BURST_OF_ONE_S: Final = 0.1
+"""The same, by one address: what it takes to open a dashboard."""
 SLICE_S: Final = 0.001
 """Processor time after which the rest of the loop has its turn."""
 MOST_DEBT_S: Final = 0.1
@@ -29,6 +32,8 @@ class Account:
 
     def __init__(self, turns: "Turns") -> None:
         self.had_s = 0.0
+        self.left_s = BURST_OF_ONE_S
+        self.counted_s = 0.0
         self.waiting: deque[Callable[[], None]] = deque()
         self._turns = turns
 
@@ -42,6 +47,10 @@ class Account:
     def count(self, step: Callable[[], _T]) -> _T:
         """Return what a step returns, and count its processor time."""
         return self._turns.count(self, step)
+
+    def charge(self, spent_s: float) -> None:
+        """Count processor time that another thread has spent for it."""
+        self.left_s = max(-MOST_DEBT_S, self.left_s - spent_s)
 
     async def turn(self) -> None:
         """Wait until there is time."""
@@ -59,6 +68,8 @@ class Turns:
         Whose time is shared.
     share
         How much of its thread's processor time there is to share at present, in the long run.
+    share_of_one
+        How much of it one address may have.
     clock
         Real time in s.
     spent
@@ -70,11 +81,13 @@ class Turns:
         loop: asyncio.AbstractEventLoop,
         *,
         share: Callable[[], float],
+        share_of_one: Callable[[], float],
         clock: Callable[[], float] = time.monotonic,
         spent: Callable[[], float] = time.thread_time,
     ) -> None:
         self._loop = loop
         self._share = share
+        self._share_of_one = share_of_one
         self._clock = clock
         self._spent = spent
         self._accounts: dict[str, Account] = {}
@@ -85,6 +98,7 @@ class Turns:
         self._counted_s = clock()
         self._counting = False
         self._later: asyncio.Handle | None = None
+        self._due_s = 0.0
 
     def account(self, address: str) -> Account:
         """Return the account of an address."""
@@ -92,20 +106,23 @@ class Turns:
         if found is None:
             if len(self._accounts) >= _REMEMBERED:
                 self._accounts = {
-                    key: each
-                    for key, each in self._accounts.items()
-                    if each.waiting or each.had_s > self._now_s
+                    key: each for key, each in self._accounts.items() if self._is_remembered(each)
                 }
             found = self._accounts[address] = Account(self)
+            found.counted_s = self._clock()
         return found
 
     def run(self, account: Account, work: Callable[[], None]) -> bool:
         """Do as `Account.run` says."""
-        if not self._waiting and self._slice_s > 0.0 and self._has_time():
+        if (
+            not self._waiting
+            and self._slice_s > 0.0
+            and self._has_time()
+            and self._has_time_for(account)
+        ):
             self._now_s = max(self._now_s, account.had_s)  # none waits, so none had more
             self.count(account, work)
-            if self._later is None:
-                self._later = self._loop.call_soon(self._serve)
+            self._serve_within(0.0)
             return True
         account.waiting.append(work)
         if account not in self._waiting:
@@ -127,6 +144,7 @@ class Turns:
             self._charge(account, self._spent() - begin_s)
 
     def _charge(self, account: Account, spent_s: float) -> None:
+        account.charge(spent_s)
         self._left_s = max(-MOST_DEBT_S, self._left_s - spent_s)
         self._slice_s -= spent_s
         begun_s = max(account.had_s, self._now_s)
@@ -135,8 +153,11 @@ class Turns:
     def _serve(self) -> None:
         self._later = None
         self._slice_s = SLICE_S
-        while self._waiting and self._slice_s > 0.0 and self._has_time():
-            account = min(self._waiting, key=lambda each: each.had_s)
+        while self._slice_s > 0.0 and self._has_time():
+            ready = [each for each in self._waiting if self._has_time_for(each)]
+            if not ready:
+                break
+            account = min(ready, key=lambda each: each.had_s)
             self._now_s = account.had_s
             work = account.waiting.popleft()
             if not account.waiting:
@@ -151,9 +172,37 @@ class Turns:
         self._counted_s = now_s
         return self._left_s > 0.0
 
+    def _has_time_for(self, account: Account) -> bool:
+        now_s = self._clock()
+        earned_s = self._share_of_one() * (now_s - account.counted_s)
+        account.left_s = min(BURST_OF_ONE_S, account.left_s + earned_s)
+        account.counted_s = now_s
+        return account.left_s > 0.0
+
+    def _is_remembered(self, account: Account) -> bool:
+        """Whether an address would have more as a new one."""
+        self._has_time_for(account)
+        had = account.had_s > self._now_s or account.left_s < BURST_OF_ONE_S
+        return had or bool(account.waiting)
+
     def _go_on_later(self) -> None:
-        if self._later is None and self._has_time():
-            self._later = self._loop.call_soon(self._serve)
-        elif self._later is None:
-            pause_s = max(_LEAST_PAUSE_S, -self._left_s / self._share())
-            self._later = self._loop.call_later(pause_s, self._serve)
+        pauses_s = [0.0]
+        if not self._has_time():
+            pauses_s += [_LEAST_PAUSE_S, -self._left_s / self._share()]
+        if not any(map(self._has_time_for, self._waiting)):
+            least_debt_s = min(-each.left_s for each in self._waiting)
+            pauses_s += [_LEAST_PAUSE_S, least_debt_s / self._share_of_one()]
+        self._serve_within(max(pauses_s))
+
+    def _serve_within(self, pause_s: float) -> None:
+        due_s = self._clock() + pause_s
+        if self._later is not None:
+            if self._due_s <= due_s:
+                return
+            self._later.cancel()
+        self._due_s = due_s
+        self._later = (
+            self._loop.call_later(pause_s, self._serve)
+            if pause_s
+            else self._loop.call_soon(self._serve)
+        )

@@ -3,9 +3,10 @@
 from collections.abc import Callable
 from typing import Any, cast
 
-from transientcam_server.daemon.turns import Turns
+from transientcam_server.daemon.turns import Account, Turns
 
 SHARE = 0.3
+STEP_S = 0.0005
 
 
 class Handle:
@@ -14,6 +15,12 @@ class Handle:
     def __init__(self, due_s: float, callback: Callable[[], None]) -> None:
         self.due_s = due_s
         self.callback = callback
+
+    def cancel(self) -> None:
+        self.callback = _nothing
+
+
+def _nothing() -> None: ...
 
 
 class Loop:
@@ -48,11 +55,31 @@ class Loop:
         """Spend processor time."""
         self.spent_s += costs_s
 
-    def turns(self, share: float = SHARE) -> Turns:
-        """Return turns by these clocks."""
+    def turns(self, share: float = SHARE, *, share_of_one: float | None = None) -> Turns:
+        """Return turns by these clocks; one address may have all unless it is given less."""
         return Turns(
             cast("Any", self),
             share=lambda: share,
+            share_of_one=lambda: share if share_of_one is None else share_of_one,
             clock=lambda: self.now_s,
             spent=lambda: self.spent_s,
         )
+
+
+class Client:
+    """Always has something to do, on as many connections as it likes."""
+
+    def __init__(self, loop: Loop, account: Account, *, costs_s: float = STEP_S) -> None:
+        self.had = 0
+        self._loop = loop
+        self._account = account
+        self._costs_s = costs_s
+
+    def ask(self, connections: int = 1) -> None:
+        for _ in range(connections):
+            self._account.run(self._have)
+
+    def _have(self) -> None:
+        self.had += 1
+        self._loop.work(self._costs_s)
+        self._loop.call_soon(self.ask)  # the next one, as soon as this is done

@@ -6,14 +6,16 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from time import monotonic
+from typing import Any, cast
 from urllib.parse import urlsplit
 
 import httpx
 import pytest
 import trustme
 
+from tests.server.daemon.loops import Client, Loop
 from tests.serving import serving
-from transientcam_server.daemon.acceptor import Admission
+from transientcam_server.daemon.acceptor import Admission, turns_of_requests
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.settings import LimitSettings
 
@@ -82,6 +84,28 @@ def test_addresses_that_were_seen_long_ago_are_forgotten(time: Time) -> None:
 
     assert counted.open == 0
     assert len(counted._rates) <= 1024
+
+
+@pytest.mark.parametrize(
+    ("watched", "addresses", "share"), [(True, 1, 0.1), (True, 9, 0.4), (False, 1, 0.9)]
+)
+def test_requests_leave_time_for_frames_where_there_are_viewers(
+    watched: bool, addresses: int, share: float
+) -> None:
+    loop = Loop()
+    turns = turns_of_requests(
+        cast("Any", loop),
+        limits=LimitSettings(address_share=0.1),
+        watched=lambda: watched,
+        clock=lambda: loop.now_s,
+        spent=lambda: loop.spent_s,
+    )
+    for address in range(addresses):
+        Client(loop, turns.account(str(address))).ask(4)
+    for _ in range(20_000):
+        loop.pass_s(0.001)
+
+    assert loop.spent_s / loop.now_s == pytest.approx(share, rel=0.1)
 
 
 def test_handshakes_that_never_come_count_and_are_given_up(tmp_path: Path) -> None:

@@ -1,13 +1,14 @@
 """What answering a request takes of the loop's time, by a clock that the application moves."""
 
 import asyncio
+import time
 from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
 
 from tests.server.daemon.loops import Loop
-from transientcam_server.daemon.metering import Metered, in_turns
+from transientcam_server.daemon.metering import CountingExecutor, Metered, in_turns
 from transientcam_server.daemon.turns import BURST_S, Turns
 
 Application = Callable[[Any, Any, Any], Awaitable[None]]
@@ -20,7 +21,10 @@ class Served:
         self.time = Loop()
         self.sent: list[Any] = []
         self.turns = Turns(
-            asyncio.get_running_loop(), share=lambda: 0.5, spent=lambda: self.time.spent_s
+            asyncio.get_running_loop(),
+            share=lambda: 0.5,
+            share_of_one=lambda: 0.5,
+            spent=lambda: self.time.spent_s,
         )
         self.account = self.turns.account("client")
 
@@ -83,6 +87,37 @@ def test_what_is_sent_by_a_task_of_its_own_counts_and_waits_for_its_turn() -> No
         assert took_s >= (3 * cost_s - BURST_S) / 0.5
 
     asyncio.run(run())
+
+
+def test_what_a_request_does_on_another_thread_counts() -> None:
+    async def run() -> float:
+        served = Served()
+        asyncio.get_running_loop().set_default_executor(CountingExecutor(1))
+
+        async def app(scope: Any, receive: Any, send: Any) -> None:
+            assert await asyncio.to_thread(_spend, 0.02) == "done"
+            with pytest.raises(LookupError):
+                await asyncio.to_thread(_spend_in_vain, 0.02)
+            await asyncio.sleep(0)
+
+        before_s = served.account.left_s
+        await asyncio.create_task(served.answer(app))  # in a context of its own
+        await asyncio.to_thread(_spend, 0.02)  # for no request
+        return before_s - served.account.left_s
+
+    assert 0.04 <= asyncio.run(run()) < 0.06
+
+
+def _spend(duration_s: float) -> str:
+    end_s = time.thread_time() + duration_s
+    while time.thread_time() < end_s:
+        pass
+    return "done"
+
+
+def _spend_in_vain(duration_s: float) -> None:
+    _spend(duration_s)
+    raise LookupError
 
 
 def test_errors_and_cancellation_reach_the_application() -> None:

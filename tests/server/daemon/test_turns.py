@@ -5,35 +5,14 @@ from functools import partial
 
 import pytest
 
-from tests.server.daemon.loops import SHARE, Loop
+from tests.server.daemon.loops import SHARE, STEP_S, Client, Loop
 from transientcam_server.daemon.turns import (
+    BURST_OF_ONE_S,
     BURST_S,
     MOST_DEBT_S,
     MOST_LEAD_S,
     SLICE_S,
-    Account,
 )
-
-STEP_S = 0.0005
-
-
-class Client:
-    """Always has something to do, on as many connections as it likes."""
-
-    def __init__(self, loop: Loop, account: Account, *, costs_s: float = STEP_S) -> None:
-        self.had = 0
-        self._loop = loop
-        self._account = account
-        self._costs_s = costs_s
-
-    def ask(self, connections: int = 1) -> None:
-        for _ in range(connections):
-            self._account.run(self._have)
-
-    def _have(self) -> None:
-        self.had += 1
-        self._loop.work(self._costs_s)
-        self._loop.call_soon(self.ask)  # the next one, as soon as this is done
 
 
 def test_all_together_have_their_share_of_the_time() -> None:
@@ -59,6 +38,61 @@ def test_an_address_has_no_more_for_having_more_connections_or_dearer_requests()
         loop.pass_s(0.001)
 
     assert one.had * STEP_S == pytest.approx(many.had * 4 * STEP_S, rel=0.05)
+
+
+def test_one_address_has_its_own_share_though_no_other_asks() -> None:
+    loop = Loop()
+    turns = loop.turns(share_of_one=SHARE / 3)
+    Client(loop, turns.account("one")).ask(16)
+    for _ in range(3000):
+        loop.pass_s(0.001)
+
+    allowed_s = BURST_OF_ONE_S + SHARE / 3 * loop.now_s
+    assert allowed_s - 2 * STEP_S <= loop.spent_s <= allowed_s + STEP_S
+
+
+def test_addresses_that_have_had_their_own_share_hold_no_other_back() -> None:
+    loop = Loop()
+    turns = loop.turns(share_of_one=SHARE / 3)
+    Client(loop, turns.account("one")).ask(16)
+    loop.pass_s(0.01)
+    while loop.spent_s < BURST_OF_ONE_S:
+        loop.pass_s(0.001)
+    asked_s = loop.now_s
+    answered: list[float] = []
+    turns.account("another").run(partial(_note, answered, loop))
+    while not answered:
+        loop.pass_s(0.0001)
+
+    assert answered[0] - asked_s <= 2 * STEP_S / SHARE
+
+
+def test_what_other_threads_spend_for_an_address_counts_against_its_share_alone() -> None:
+    loop = Loop()
+    turns = loop.turns(share_of_one=SHARE / 3)
+    account, another = turns.account("a"), turns.account("another")
+    account.charge(BURST_OF_ONE_S + STEP_S)
+    answered: list[float] = []
+
+    assert another.run(_nothing)
+    assert not account.run(partial(_note, answered, loop))
+    loop.pass_s(STEP_S / (SHARE / 3) - 1e-6)
+    assert not answered
+    loop.pass_s(0.002)
+    assert answered
+
+
+def test_an_address_saves_up_no_more_than_a_burst() -> None:
+    loop = Loop()
+    turns = loop.turns(share_of_one=SHARE / 3)
+    client = Client(loop, turns.account("one"))
+    loop.pass_s(3600.0)
+    begin_s = loop.now_s
+    client.ask(16)
+    for _ in range(1000):
+        loop.pass_s(0.001)
+
+    assert loop.spent_s <= BURST_OF_ONE_S + SHARE / 3 * (loop.now_s - begin_s) + STEP_S
 
 
 def test_an_occasional_address_waits_for_one_turn_of_each_other_address_at_most() -> None:

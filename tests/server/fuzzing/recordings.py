@@ -12,7 +12,9 @@ import os
 import random
 import resource
 import shutil
+import signal
 import sys
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,6 +43,8 @@ MEMORY_BYTES: Final = 2 * 1024**3
 """May be taken beyond what there is before the first case, by the kernel's own limit."""
 BEYOND_BYTES: Final = 64 * 1024**2
 """More than any case has to take: the largest chunk of a series and a frame."""
+MOST_SPENT_S: Final = 60.0
+"""Of processor time: the kernel ends a process that takes more for one case."""
 READS: Final = (
     "frames",
     "frames/1",
@@ -63,12 +67,15 @@ class Outcome:
         Whatever should not have happened.
     grown_bytes
         The most memory beyond what was there before it.
+    spent_s
+        The processor time of what was done with it.
     """
 
     kind: str
     state: str
     wrong: list[str]
     grown_bytes: int
+    spent_s: float
 
 
 def in_memory() -> str | None:
@@ -152,19 +159,19 @@ class Subject:
         target = self.kept / (NAME + ".h5" + (".part" if seed.name.endswith(".part") else ""))
         forge(seed, target, kind, draw)
         wrong: list[str] = []
-        before_bytes = _reset_peak()
+        before_bytes, begin_s = _reset_peak(), time.process_time()
         state = await self._read_over_http(wrong) if over_http else self._read(wrong)
         if state != "damaged" or draw.random() < 0.25:  # of these each takes the same way out
             wrong += _replayed(target)
-        if target.name.endswith(".part") and draw.random() < 0.5:
+        if target.name.endswith(".part") and draw.random() < 0.25:
             with _only(wrong, "recover", RecordingError, OSError):
                 recover(target)
         await self._delete(wrong, over_http=over_http)
-        grown = _peak_bytes() - before_bytes
+        grown, spent_s = _peak_bytes() - before_bytes, time.process_time() - begin_s
         for left in self.kept.glob(f"{NAME}*"):
             wrong.append(f"{left.name} is left")
             left.unlink()
-        return Outcome(kind, state, wrong, grown)
+        return Outcome(kind, state, wrong, grown, round(spent_s, 4))
 
     async def _read_over_http(self, wrong: list[str]) -> str:
         async with self._client() as client:
@@ -272,6 +279,7 @@ def _peak_bytes() -> int:
 async def _attempt_all(subject: Subject, first: int, last: int, every: int) -> None:
     for number in range(first, last):
         os.write(1, b'{"begin": %d}\n' % number)
+        signal.setitimer(signal.ITIMER_PROF, MOST_SPENT_S)
         outcome = await subject.attempt(number, over_http=number % every == 0)
         os.write(1, json.dumps(vars(outcome) | {"number": number}).encode() + b"\n")
 
