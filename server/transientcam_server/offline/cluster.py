@@ -6,8 +6,9 @@ itself says, so that a second run goes on with those that are missing.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from concurrent.futures import CancelledError
+from contextlib import closing
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
@@ -155,6 +156,49 @@ def _rows_of_chunk(blocks: Iterable[Block]) -> int:
     return min(BLOCK_FRAMES, 1 << (fitting.bit_length() - 1))
 
 
+def completed(
+    client: distributed.Client, function: Callable[..., Any], tasks: Iterable[tuple[Any, ...]]
+) -> Generator[tuple[tuple[Any, ...], Any], None, None]:
+    """Yield each task with its result as it is done; close it, and the tasks that are left end.
+
+    Parameters
+    ----------
+    client
+        Of the cluster.
+    function
+        Of a module that every worker has, or else it is sent there.
+    tasks
+        Arguments of one call each.
+
+    Raises
+    ------
+    ClusterError
+        If the scheduler is lost, or a task ended several workers.
+    Exception
+        Whatever a task raises.
+    """
+    assert client.scheduler is not None  # noqa: S101 - it is connected
+    address = str(client.scheduler.address)
+    futures, of = [], {}
+    done = 0
+    try:
+        for task in tasks:
+            future = client.submit(function, *task, pure=False)
+            of[future.key] = task
+            futures.append(future)
+        if not futures:
+            return
+        for future in distributed.as_completed(futures, loop=client.loop):
+            result = future.result()
+            done += 1
+            yield of[future.key], result
+    except (distributed.KilledWorker, CommClosedError, CancelledError) as error:
+        raise ClusterError(address, str(error) or type(error).__name__) from error
+    finally:
+        if done < len(futures) and client.status == "running":
+            client.cancel(futures)
+
+
 def _compute(
     client: distributed.Client,
     job: Job,
@@ -163,24 +207,10 @@ def _compute(
     progress: Callable[[int], None],
 ) -> None:
     """Have the blocks computed; whatever ends this before ends the tasks that are left."""
-    assert client.scheduler is not None  # noqa: S101 - it is connected
-    address = str(client.scheduler.address)
-    progress(0)
-    if not blocks:
-        return
-    lengths, futures = {}, []
     done = 0
-    try:
-        for first, last in blocks:
-            future = client.submit(write_block, job, output, first, last, pure=False)
-            lengths[future.key] = last - first
-            futures.append(future)
-        for future in distributed.as_completed(futures, loop=client.loop):
-            future.result()
-            done += lengths[future.key]
+    progress(done)
+    tasks = ((job, output, first, last) for first, last in blocks)
+    with closing(completed(client, write_block, tasks)) as results:
+        for (_, _, first, last), _ in results:
+            done += last - first
             progress(done)
-    except (distributed.KilledWorker, CommClosedError, CancelledError) as error:
-        raise ClusterError(address, str(error) or type(error).__name__) from error
-    finally:
-        if done < sum(lengths.values()) and client.status == "running":
-            client.cancel(futures)
