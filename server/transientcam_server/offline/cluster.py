@@ -17,7 +17,14 @@ import numpy as np
 
 import transientcam_moments as tm
 from transientcam_server.errors.exceptions import ClusterError, MissingExtra
-from transientcam_server.offline.formats import Block, Content, create_zarr, finish_zarr, library
+from transientcam_server.offline.formats import (
+    Block,
+    Content,
+    create_zarr,
+    finish_zarr,
+    library,
+    naming_address,
+)
 from transientcam_server.offline.job import BLOCK_FRAMES, Job, computed, opened, spans
 from transientcam_server.offline.opening import recording_at
 from transientcam_server.offline.recording import (
@@ -77,32 +84,40 @@ def reconstruct_on(
         If the scheduler is lost, or a task ended several workers.
     DamagedFrame
         If a frame is not what was recorded.
+    StorageError
+        If what is behind the output's address refuses, as where a bucket is missing.
     ServerError, TransientcamError, OSError
         If the recording cannot be read, or the output not be written.
     """
     job = Job.of(place, options, token=token)
     with recording_at(place, token=token) as recording:
-        group = _begun(recording, output, options)
+        with naming_address(output):
+            group = _begun(recording, output, options)
+            there = np.asarray(group[COUNTING][:]) != MISSING
         frames = recording.frames
-    there = np.asarray(group[COUNTING][:]) != MISSING
     missing = [(first, last) for first, last in spans(frames) if not there[first:last].all()]
     left = sum(last - first for first, last in missing)
     _compute(client, job, output, missing, lambda done: progress(frames - left + done, frames))
-    finish_zarr(output)
+    with naming_address(output):
+        finish_zarr(output)
     return frames, frames - left
 
 
 def write_block(job: Job, output: str, first: int, last: int) -> None:
     """Compute some frames and write them: what a task is."""
     tm.kernels.use_one_thread()  # a worker has a process, or a thread, for every core
-    group = _group(job, output)
+    with naming_address(output):
+        group = _group(job, output)
     recording, _ = opened(job)
     rows = group[job.products[0]].chunks[0]
     for begin in range(first, last, rows):  # all frames of a task might not fit in memory
         end = min(begin + rows, last)
-        for name, values in computed(job, begin, end).items():
-            group[name][begin:end] = values
-    group[COUNTING][first:last] = recording.series(COUNTING)[first:last]
+        found = computed(job, begin, end)
+        with naming_address(output):
+            for name, values in found.items():
+                group[name][begin:end] = values
+    with naming_address(output):
+        group[COUNTING][first:last] = recording.series(COUNTING)[first:last]
 
 
 @lru_cache(maxsize=2)
