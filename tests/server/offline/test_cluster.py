@@ -3,8 +3,6 @@
 import os
 import shutil
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
@@ -14,7 +12,6 @@ from typing import Any
 import dask
 import distributed
 import numpy as np
-import psutil  # type: ignore[import-untyped]  # of distributed
 import pytest
 import xarray
 import zarr
@@ -284,52 +281,6 @@ def test_a_store_that_goes_in_the_middle_is_named_by_a_worker(
     s3.mkdir("lost")
     with pytest.raises(StorageError, match=r"^s3://lost/a\.zarr "):
         reconstruct_on(client, str(source), "s3://lost/a.zarr", OPTIONS, progress=lose)
-
-
-BLOCKING = """\
-import threading
-from transientcam_server.offline import cluster, job
-
-real = cluster.computed
-
-def computed(of, first, last):
-    if first >= job.BLOCK_FRAMES:
-        threading.Event().wait()
-    return real(of, first, last)
-
-cluster.computed = computed
-"""
-"""What workers load: only the first block is ever computed."""
-
-
-def test_ctrl_c_ends_the_workers_and_the_next_run_goes_on(
-    client: distributed.Client, source: Path, serial: dict[str, Any], tmp_path: Path
-) -> None:
-    blocking, output = tmp_path / "blocking.py", tmp_path / "a.zarr"
-    blocking.write_text(BLOCKING)
-    products = [f"--product={name}" for name in OPTIONS.products]
-    command = ["reconstruct", str(source), "-o", str(output), "--workers", "2", *products]
-    running = subprocess.Popen(
-        [sys.executable, "-c", "from transientcam.cli import main; main()", *command],
-        env=os.environ
-        | {"TRANSIENTCAM_KERNELS": "off", "DASK_DISTRIBUTED__WORKER__PRELOAD": f"['{blocking}']"},
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,  # as a terminal does, the signal goes to all of it
-    )
-    with running:
-        while not (output / "frame" / "c" / "0").exists():
-            assert running.poll() is None, running.stderr and running.stderr.read()
-        workers = psutil.Process(running.pid).children(recursive=True)
-        assert len(workers) >= 2
-        os.killpg(running.pid, signal.SIGINT)
-        _, said = running.communicate()
-        psutil.wait_procs(workers)
-
-    assert running.returncode == 130
-    assert "Traceback" not in said
-    assert reconstruct_on(client, str(source), str(output), OPTIONS) == (FRAMES, BLOCK_FRAMES)
-    assert_same(str(output), serial)
 
 
 def test_the_command_takes_the_address_of_a_scheduler_and_a_directory(
