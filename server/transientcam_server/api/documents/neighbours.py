@@ -30,4 +30,4 @@ class NeighboursDocument(Document):
 
     cameras: list[NeighbourDocument] = Field(max_length=256)
     left_out: int = Field(ge=0, description="how many more were announced")
-    reason: str | None = Field(description="why the network could not be searched")
+    reason: str | None = Field(default=None, description="why the network could not be searched")
