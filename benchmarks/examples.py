@@ -23,6 +23,7 @@ _KEPT: Final = 2
 _DIGITS: Final = 6
 _POLL_S: Final = 0.2
 _STATE: Final = "/var/lib/transientcam"
+_URL: Final = "http://192.168.1.20:8000"
 _RECORDING: Final = {
     "name": "corner at 3 m",
     "frames": 4,
@@ -46,6 +47,7 @@ _FIXED: Final[dict[str, Any]] = {
     "frames": 1204,
     "frame_age_s": 0.031,
     "age_s": 3600.0,
+    "seen_s": 0.4,
     "expires_in_s": 21.4,
     "free_bytes": 214748364800,
     "lease_id": "u3Zk1yTq0v8wWlXeGd5J2A",
@@ -73,6 +75,7 @@ def examples() -> dict[str, Any]:
     with TemporaryDirectory() as directory:
         environment = {
             "TRANSIENTCAM_KERNELS": "off",  # which are ready would depend on the moment
+            "TRANSIENTCAM_ANNOUNCE": "on",
             "TRANSIENTCAM_RECORDINGS__DIRECTORY": f"{directory}/recordings",
             "TRANSIENTCAM_CALIBRATIONS__DIRECTORY": f"{directory}/calibrations",
         }
@@ -81,7 +84,7 @@ def examples() -> dict[str, Any]:
             httpx.Client(base_url=process.url, timeout=600.0) as http,
         ):
             captured = dict(_answers(http))
-        text = json.dumps(captured).replace(directory, _STATE)
+        text = json.dumps(captured).replace(directory, _STATE).replace(process.url, _URL)
     for identifier, fixed in (
         (captured["RecordingDocument"]["id"], "20261120T081500Z-3f9c2a"),
         (captured["JobDocument"]["id"], "5a0c1f6be2d4"),
@@ -127,6 +130,7 @@ def _answers(http: httpx.Client) -> Iterator[tuple[str, Any]]:
         ("TradeoffDocument", "tradeoff"),
     ):
         yield name, get(f"{api}/{path}")
+    yield "NeighboursDocument", _announced(http)
     yield "PlanDocument", post(f"{api}/plan", {"target": {"range_error_m": 0.005}})
     parameters = get(f"{api}/parameters")
     yield "ParametersDocument", parameters
@@ -162,6 +166,17 @@ def _computed(http: httpx.Client) -> Any:
         "/api/v1/frames/latest/range.npy", params={"wait_s": 10.0, "after": latest}
     ).raise_for_status()
     return json.loads(answer.headers["Transientcam-Meta"])
+
+
+def _announced(http: httpx.Client) -> Any:
+    """Return what this daemon finds on the network, of which only itself is the same everywhere."""
+    while True:
+        document = http.get("/api/v1/cameras").raise_for_status().json()
+        own = [
+            each for each in document["cameras"] if each["url"] == str(http.base_url).rstrip("/")
+        ]
+        if own:
+            return document | {"cameras": own, "left_out": 0}
 
 
 def _fixed(value: Any, fields: Any) -> Any:

@@ -6,24 +6,36 @@
         print(found.name, found.url)
 
 A camera announces itself as ``_transientcam._tcp``, and for browsers as ``_http._tcp``, with a TXT
-record of five keys: ``path`` (where its page is), ``api`` (the versions of the interface), ``sn``
-and ``fw`` (serial number and firmware of the camera), ``tls`` (1 where it is https).
+record of seven keys: ``path`` (where its page is), ``api`` (the versions of the interface),
+``model``, ``sn`` and ``fw`` (model, serial number and firmware of the camera), ``state`` (what it
+does, one of `STATES`), ``tls`` (1 where it is https).
 """
 
+import asyncio
 import ipaddress
+import re
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from concurrent.futures import Future
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, cast
+from urllib.parse import quote
 
 from transientcam.errors import ParameterError
 from transientcam.transport import translated
 
 if TYPE_CHECKING:
     from zeroconf import ServiceInfo, ServiceListener, Zeroconf
+    from zeroconf.asyncio import AsyncServiceInfo
 
 SERVICE_TYPE: Final = "_transientcam._tcp.local."
 WEB_TYPE: Final = "_http._tcp.local."
+STATES: Final = ("starting", "streaming", "stopped", "calibrating", "lost", "held")
+"""What a camera can be said to do; the states of ``GET /camera``."""
+MAX_CAMERAS: Final = 256
+"""Names that one search asks for: any host may announce as many as it likes."""
+_TEXT_CHARACTERS: Final = 64
+_HOST_NAME: Final = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*", re.ASCII)
 _PLACE: Final = "the local network"
 
 
@@ -37,12 +49,15 @@ class FoundCamera:
         Its name, unique on this network.
     url
         Its address; what `Camera` takes.
-    serial, firmware
+    serial, firmware, model
         Of the camera; empty where they are not announced.
     api
         Versions of the interface, such as ``v1``.
     tls
         Whether it is https.
+    state
+        What it does, one of `STATES`; empty where that is not announced. A camera in another state
+        is the same camera.
     """
 
     name: str
@@ -51,12 +66,30 @@ class FoundCamera:
     firmware: str
     api: str
     tls: bool
+    model: str = ""
+    state: str = field(default="", compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """What a search has found.
+
+    Attributes
+    ----------
+    cameras
+        Those that answered, by name; at most `MAX_CAMERAS`.
+    left_out
+        How many more names were announced, which were not asked.
+    """
+
+    cameras: tuple[FoundCamera, ...]
+    left_out: int
 
 
 def discover(
     *, timeout_s: float = 2.0, interfaces: Sequence[str] | None = None
 ) -> tuple[FoundCamera, ...]:
-    """Return the cameras that answer within ``timeout_s``, by name.
+    """Return the cameras that answer within ``timeout_s``, by name; at most `MAX_CAMERAS`.
 
     Parameters
     ----------
@@ -72,26 +105,40 @@ def discover(
     ModuleNotFoundError
         If zeroconf is not installed: ``pip install 'transientcam[discovery]'``.
     """
-    from zeroconf import InterfaceChoice, ServiceBrowser, Zeroconf
+    return search(timeout_s=timeout_s, interfaces=interfaces).cameras
+
+
+def search(*, timeout_s: float, interfaces: Sequence[str] | None = None) -> Search:
+    """Return the cameras that answer within ``timeout_s``, and how many names were not asked.
+
+    Parameters and errors are those of `discover`.
+    """
+    from zeroconf import DNSQuestionType, InterfaceChoice, ServiceBrowser, Zeroconf
 
     if not timeout_s > 0.0:
         raise ParameterError("timeout_s", timeout_s, "above 0")
     for each in interfaces or ():
         _require_address(each)
-    found: dict[str, FoundCamera] = {}
     ends_s = time.monotonic() + timeout_s
     with translated(_PLACE):
         searched = list(interfaces) if interfaces else InterfaceChoice.All
         network = Zeroconf(interfaces=searched)
+        names = _Names(network, ends_s)
         try:
-            # its base class is empty, and only there where zeroconf is installed
-            names = cast("ServiceListener", _Names(network, ends_s, found))
-            browser = ServiceBrowser(network, SERVICE_TYPE, listener=names)
+            browser = ServiceBrowser(
+                network,
+                SERVICE_TYPE,
+                # its base class is empty, and only there where zeroconf is installed
+                listener=cast("ServiceListener", names),
+                # answers to all: one to this port may reach another program that has it open
+                question_type=DNSQuestionType.QM,
+            )
             time.sleep(timeout_s)
             browser.cancel()
+            found = names.answered()
         finally:
             network.close()
-    return tuple(found[name] for name in sorted(found))
+    return Search(tuple(found[name] for name in sorted(found)), names.left_out)
 
 
 def _require_address(text: str) -> None:
@@ -103,24 +150,50 @@ def _require_address(text: str) -> None:
 
 
 class _Names:
-    """Listens for names, and resolves each to an address."""
+    """Listens for names, and asks all of them at once where they are: many may never answer."""
 
-    def __init__(self, network: "Zeroconf", ends_s: float, found: dict[str, FoundCamera]) -> None:
+    def __init__(self, network: "Zeroconf", ends_s: float) -> None:
         self._network = network
         self._ends_s = ends_s
-        self._found = found
+        self._asked: dict[str, tuple[AsyncServiceInfo, Future[bool]]] = {}
+        self.left_out = 0
 
     def add_service(self, zc: "Zeroconf", type_: str, name: str) -> None:
-        left_ms = round((self._ends_s - time.monotonic()) * 1e3)
-        info = self._network.get_service_info(type_, name, timeout=max(1, left_ms))
-        camera = None if info is None else read_announcement(info)
-        if camera is not None:
-            self._found[name] = camera
+        if len(self._asked) < MAX_CAMERAS:
+            self._ask(type_, name)
+        else:
+            self.left_out += 1
 
-    update_service = add_service
+    def update_service(self, zc: "Zeroconf", type_: str, name: str) -> None:
+        if name in self._asked:
+            self._asked[name][1].cancel()
+            self._ask(type_, name)
 
     def remove_service(self, zc: "Zeroconf", type_: str, name: str) -> None:
-        self._found.pop(name, None)
+        if name in self._asked:
+            self._asked.pop(name)[1].cancel()
+
+    def answered(self) -> dict[str, FoundCamera]:
+        """Return the cameras that have answered, by name, and wait for no other."""
+        found = {}
+        for name, (info, answer) in self._asked.items():
+            complete = answer.done() and answer.exception() is None and answer.result()
+            answer.cancel()
+            camera = read_announcement(info) if complete else None
+            if camera is not None:
+                found[name] = camera
+        return found
+
+    def _ask(self, type_: str, name: str) -> None:
+        from zeroconf import DNSQuestionType
+        from zeroconf.asyncio import AsyncServiceInfo
+
+        loop = self._network.loop
+        assert loop is not None  # noqa: S101 - a network that is open has one
+        left_ms = max(1, round((self._ends_s - time.monotonic()) * 1e3))
+        info = AsyncServiceInfo(type_, name)
+        request = info.async_request(self._network, left_ms, DNSQuestionType.QM)
+        self._asked[name] = info, asyncio.run_coroutine_threadsafe(request, loop)
 
 
 def read_announcement(info: "ServiceInfo") -> FoundCamera | None:
@@ -133,17 +206,22 @@ def read_announcement(info: "ServiceInfo") -> FoundCamera | None:
         return None
     text = {key: _printable(value) for key, value in info.decoded_properties.items()}
     tls = text.get("tls") == "1"
-    if tls and info.server:
-        host = info.server.rstrip(".")  # what its certificate names
+    server = (info.server or "").rstrip(".")
+    if tls and _HOST_NAME.fullmatch(server):
+        host = server  # what its certificate names
     path = text.get("path", "/")
     scheme = "https" if tls else "http"
+    place = quote(path, safe="/%-._~") if path.startswith("/") else ""
+    state = text.get("state", "")
     return FoundCamera(
         name=_printable(info.get_name()),
-        url=f"{scheme}://{host}:{info.port}{path if path.startswith('/') else ''}".rstrip("/"),
+        url=f"{scheme}://{host}:{info.port}{place}".rstrip("/"),
         serial=text.get("sn", ""),
         firmware=text.get("fw", ""),
         api=text.get("api", ""),
         tls=tls,
+        model=text.get("model", ""),
+        state=state if state in STATES else "",
     )
 
 
@@ -158,4 +236,4 @@ def _host_of(info: "ServiceInfo") -> str | None:
 
 
 def _printable(text: str | None) -> str:
-    return "".join(each for each in text or "" if each.isprintable())
+    return "".join(each for each in text or "" if each.isprintable())[:_TEXT_CHARACTERS]

@@ -10,12 +10,13 @@ from transientcam.errors import ProtocolError
 from transientcam.requests import problem
 from transientcam.transport import answer_of, http_options, translated
 
-_BLOCK_BYTES: Final = 256 * 1024
-_BLOCKS: Final = 128
+_BLOCK_BYTES: Final = 16 * 1024
+"""What reads less than that gets a whole block; what reads more gets no byte beside."""
+_BLOCKS: Final = 2048
 
 
 class RemoteFile(io.RawIOBase):
-    """A file on a server that answers with ranges; it keeps the blocks that were read last.
+    """A file on a server that answers with ranges; it keeps what was read last, up to 32 MiB.
 
     Parameters
     ----------
@@ -84,8 +85,7 @@ class RemoteFile(io.RawIOBase):
         view = memoryview(buffer).cast("B")
         done = 0
         while done < len(view) and self._place < self.size:
-            number, begin = divmod(self._place, _BLOCK_BYTES)
-            piece = self._block(number)[begin : begin + len(view) - done]
+            piece = self._piece(min(len(view) - done, self.size - self._place))
             view[done : done + len(piece)] = piece
             done += len(piece)
             self._place += len(piece)
@@ -97,17 +97,34 @@ class RemoteFile(io.RawIOBase):
             self._http.close()
         super().close()
 
+    def _piece(self, wanted: int) -> bytes:
+        """Return bytes from the present place on, ``wanted`` of them or fewer."""
+        number, begin = divmod(self._place, _BLOCK_BYTES)
+        if wanted <= _BLOCK_BYTES or number in self._blocks:
+            return self._block(number)[begin : begin + wanted]
+        piece = self._request(self._place, wanted)
+        for inside in range(
+            -(-self._place // _BLOCK_BYTES), (self._place + wanted) // _BLOCK_BYTES
+        ):
+            first = inside * _BLOCK_BYTES - self._place
+            self._keep(inside, piece[first : first + _BLOCK_BYTES])
+        return piece
+
     def _block(self, number: int) -> bytes:
         found = self._blocks.get(number)
         if found is None:
-            found = self._blocks[number] = self._request(number * _BLOCK_BYTES)
-            while len(self._blocks) > _BLOCKS:
-                self._blocks.popitem(last=False)
-        self._blocks.move_to_end(number)
+            found = self._request(number * _BLOCK_BYTES, _BLOCK_BYTES)
+        self._keep(number, found)
         return found
 
-    def _request(self, first: int) -> bytes:
-        headers = {"range": f"bytes={first}-{first + _BLOCK_BYTES - 1}"}
+    def _keep(self, number: int, block: bytes) -> None:
+        self._blocks[number] = block
+        self._blocks.move_to_end(number)
+        while len(self._blocks) > _BLOCKS:
+            self._blocks.popitem(last=False)
+
+    def _request(self, first: int, size: int) -> bytes:
+        headers = {"range": f"bytes={first}-{first + size - 1}"}
         if self._tag is not None:
             headers["if-range"] = self._tag
         with translated(self.url), self._http.stream("GET", self.url, headers=headers) as response:
@@ -121,6 +138,6 @@ class RemoteFile(io.RawIOBase):
         if not total.isdecimal():
             raise ProtocolError("content-range", total, "bytes first-last/size")
         self.size, self._tag = int(total), response.headers.get("etag")
-        if len(response.content) != min(_BLOCK_BYTES, self.size - first):
+        if len(response.content) != min(size, self.size - first):
             raise ProtocolError("answer", f"{len(response.content)} bytes", "those requested")
         return response.content

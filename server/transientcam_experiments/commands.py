@@ -4,7 +4,8 @@ What is heavy is imported when a verb runs, so that ``transientcam --help`` stay
 """
 
 import json
-import time
+from collections.abc import Generator, Mapping
+from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,10 +14,11 @@ import typer
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
+from transientcam_server.cli.cluster import DaskOption, WorkersOption, cluster_client
 from transientcam_server.cli.progress import progress_bars
 
 if TYPE_CHECKING:
-    from transientcam_experiments.paper.page import Page
+    from transientcam_experiments.tradeoff import Grid, Point, Records
 
 
 def paper(
@@ -40,14 +42,17 @@ def paper(
             "period, opposite rows in pairs."
         ),
     ] = None,
+    workers: WorkersOption = None,
+    dask: DaskOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print all numbers as JSON.")] = False,
 ) -> None:
     """Make the paper's figures with this software, and check what the paper says about each.
 
     Everything is captured from the simulated camera over its emulated USB, calibration included.
+    `--workers` and `--dask` make figures on a cluster, each worker another one.
     """
     _require_matplotlib()
-    from transientcam_experiments.paper import FIGURES, Bench
+    from transientcam_experiments.paper import FIGURES, Bench, making
     from transientcam_experiments.paper.page import Page
 
     chosen = list(dict.fromkeys(figures or FIGURES))
@@ -55,36 +60,46 @@ def paper(
         if number not in FIGURES:
             known = ", ".join(map(str, FIGURES))
             raise typer.BadParameter(f"{number} is none of {known}", param_hint="FIGURES")
-    bench = Bench(seed=seed, quick=quick, waveform=waveform)
     page = Page(output)
     console = Console(stderr=True)
-    documents = []
-    with progress_bars(console=console, counted=True) as progress:
+    documents = {}
+    with ExitStack() as stack:
+        if workers is not None or dask is not None:
+            client = stack.enter_context(cluster_client(workers, dask, console))
+            figures_made = _made_on(client, chosen, seed, quick, waveform)
+        else:
+            bench = Bench(seed=seed, quick=quick, waveform=waveform)
+            figures_made = ((number, making.made(number, bench)) for number in chosen)
+        results = stack.enter_context(closing(figures_made))
+        progress = stack.enter_context(progress_bars(console=console, counted=True))
         task = progress.add_task("figures", total=len(chosen))
-        for number in chosen:
-            progress.update(task, description=f"figure {number}")
-            documents.append(_made(number, bench, page))
+        for number, (document, picture) in results:
+            page.add(document, picture)
+            documents[number] = document
             progress.advance(task)
+    ordered = [documents[number] for number in chosen]
     if as_json:
-        typer.echo(json.dumps(documents, ensure_ascii=False))
+        typer.echo(json.dumps(ordered, ensure_ascii=False))
     else:
-        for document in documents:
+        for document in ordered:
             _print_statements(console, document)
         console.print(f"See {page.path}", soft_wrap=True)
 
 
-def _made(number: int, bench: Any, page: "Page") -> dict[str, Any]:
-    from transientcam_experiments.paper import FIGURES, style
-    from transientcam_experiments.paper.page import document_of
+def _made_on(
+    client: Any, chosen: list[int], seed: int, quick: bool, waveform: Path | None
+) -> Generator[tuple[int, tuple[dict[str, Any], bytes]], None, None]:
+    """Yield the number, the document and the picture of each figure as a cluster has made it."""
+    from transientcam_experiments.paper.making import made_by_worker
+    from transientcam_server.offline.cluster import completed
+    from transientcam_server.offline.job import installed
 
-    figure = FIGURES[number]
-    begin_s = time.process_time()  # independent of other load on the machine
-    made = figure.make(bench)
-    picture = style.png(made.picture)
-    seconds = time.process_time() - begin_s
-    document = document_of(figure, made, seconds=seconds, quick=bench.quick, seed=bench.seed)
-    page.add(document, picture)
-    return document
+    # workers may run in another directory
+    place = None if waveform is None else waveform.resolve()
+    tasks = [(number, seed, quick, place, installed()) for number in chosen]
+    with closing(completed(client, made_by_worker, tasks)) as results:
+        for task, result in results:
+            yield task[0], result
 
 
 def _print_statements(console: Console, document: dict[str, Any]) -> None:
@@ -123,16 +138,19 @@ def tradeoff(
     ] = "paper",
     repetitions: Annotated[int, typer.Option(min=1, help="Captures a point.")] = 5,
     seed: Annotated[int, typer.Option(min=0, help="Of all chance.")] = 1,
+    workers: WorkersOption = None,
+    dask: DaskOption = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print what was written as JSON.")
     ] = False,
 ) -> None:
     """Measure what accuracy costs in time on scenes whose truth is known.
 
+    `--workers` and `--dask` capture on a cluster; what is timed is measured here afterwards, alone.
+
     An interrupted run loses nothing: tables, plots and page show what was measured so far, and
     the same command goes on where it stopped.
     """
-    import transientcam_moments as tm
     from transientcam_experiments import tradeoff as experiment
     from transientcam_experiments.tradeoff import plots
 
@@ -146,6 +164,62 @@ def tradeoff(
     records = experiment.Records(output)
     console = Console(stderr=True)
     interrupted = False
+    try:
+        if workers is not None or dask is not None:
+            kept = {"repetitions": repetitions, "seed": seed}
+            _capture_on(workers, dask, console, grid, scenes, records, **kept)
+        _measure_here(console, points, records, seed=seed)
+    except KeyboardInterrupt:
+        interrupted = True
+    written = experiment.report(output, records) if len(records) else []
+    if as_json:
+        document = {"points": len(records), "written": [str(path) for path in written]}
+        typer.echo(json.dumps(document))
+    else:
+        console.print(f"{len(records)} points; see {output / 'index.html'}")
+    if interrupted:
+        console.print("Interrupted. The same command goes on where it stopped.")
+        raise typer.Exit(130)
+
+
+def _capture_on(
+    workers: int | None,
+    dask: str | None,
+    console: Console,
+    grid: "Grid",
+    scenes: list[str],
+    records: "Records",
+    *,
+    repetitions: int,
+    seed: int,
+) -> None:
+    """Capture on a cluster what is left of all scenes."""
+    from transientcam_experiments.tradeoff.clustered import measure_on
+
+    with (
+        cluster_client(workers, dask, console) as client,
+        progress_bars(console=console, counted=True) as progress,
+    ):
+        for name in scenes:
+            task = progress.add_task(f"{name}, captures", total=None)
+            measure_on(
+                client,
+                grid,
+                records,
+                scene=name,
+                repetitions=repetitions,
+                seed=seed,
+                progress=partial(_advance, progress, task),
+            )
+
+
+def _measure_here(
+    console: Console, points: Mapping[str, "list[Point]"], records: "Records", *, seed: int
+) -> None:
+    """Measure in this process what is left of all scenes."""
+    import transientcam_moments as tm
+    from transientcam_experiments import tradeoff as experiment
+
     with progress_bars(console=console, counted=True) as progress:
         left = (point for each in points.values() for point in each if point.key not in records)
         if any(point.kind == "computing" for point in left):  # only times need compiled kernels
@@ -156,27 +230,10 @@ def tradeoff(
                 )
             )
             progress.remove_task(compiling)
-        try:
-            for name, each in points.items():
-                task = progress.add_task(name, total=len(each))
-                experiment.measure(
-                    each,
-                    records,
-                    scene=name,
-                    seed=seed,
-                    progress=partial(_advance, progress, task),
-                )
-        except KeyboardInterrupt:
-            interrupted = True
-        written = experiment.report(output, records) if len(records) else []
-    if as_json:
-        document = {"points": len(records), "written": [str(path) for path in written]}
-        typer.echo(json.dumps(document))
-    else:
-        console.print(f"{len(records)} points; see {output / 'index.html'}")
-    if interrupted:
-        console.print("Interrupted. The same command goes on where it stopped.")
-        raise typer.Exit(130)
+        for name, each in points.items():
+            task = progress.add_task(name, total=len(each))
+            advance = partial(_advance, progress, task)
+            experiment.measure(each, records, scene=name, seed=seed, progress=advance)
 
 
 def _advance(progress: Progress, task: TaskID, kind: str) -> None:

@@ -241,7 +241,7 @@ class Settings(_Group):
     """TCP port to listen on; 0 takes any free one."""
     announce: Literal["auto", "on", "off"] = "auto"
     """Announce the service on the local network (mDNS); ``auto``: if other machines reach it, and
-    not from a container."""
+    not from a container; ``off``: nor look there for other cameras."""
     insecure: bool = False
     """Serve other machines although any client that reaches the port controls the camera."""
     allowed_hosts: tuple[str, ...] = ()

@@ -1,14 +1,17 @@
 """Announcements of others are read with suspicion."""
 
 import sys
+from contextlib import closing
 from typing import Any
 
 import pytest
 import zeroconf
-from zeroconf import ServiceInfo
+from zeroconf import ServiceInfo, Zeroconf
 
-from transientcam import ParameterError, ServerUnreachable, discover
-from transientcam.discovery import SERVICE_TYPE, read_announcement
+from transientcam import ParameterError, ServerUnreachable, discover, discovery
+from transientcam.discovery import SERVICE_TYPE, read_announcement, search
+
+LOOPBACK = ["127.0.0.1"]
 
 
 def announced(
@@ -106,3 +109,47 @@ def test_without_zeroconf_the_error_names_it(monkeypatch: pytest.MonkeyPatch) ->
 
     with pytest.raises(ModuleNotFoundError, match="zeroconf"):
         discover(timeout_s=0.1)
+
+
+def test_what_is_announced_is_bounded_and_cannot_change_the_address() -> None:
+    found = read_announcement(
+        announced(
+            "192.168.7.5",
+            server="evil.example/?.",
+            tls="1",
+            path='/a b"><script>',
+            sn="x" * 240,
+            state="on fire",
+        )
+    )
+
+    assert found is not None
+    assert found.url == "https://192.168.7.5:8000/a%20b%22%3E%3Cscript%3E"
+    assert len(found.serial) == 64
+    assert found.state == ""
+
+
+def test_names_that_never_answer_do_not_hide_those_that_do() -> None:
+    silent = [announced(name=f"silent {each}", server=f"none-{each}.local.") for each in range(8)]
+    with closing(Zeroconf(interfaces=LOOPBACK)) as network:
+        for each in (*silent, announced("192.168.7.5", name="talking", state="streaming")):
+            network.registry.async_add(each)  # as registering does, after it has asked around
+        while True:  # a laden machine answers late
+            found = {each.name: each for each in discover(timeout_s=0.5, interfaces=LOOPBACK)}
+            if "talking" in found:
+                break
+
+    assert found["talking"].state == "streaming"
+    assert not [name for name in found if name.startswith("silent")]
+
+
+def test_names_beyond_the_limit_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(discovery, "MAX_CAMERAS", 3)
+    several = [announced("192.168.7.6", name=f"camera {each}") for each in range(5)]
+    with closing(Zeroconf(interfaces=LOOPBACK)) as network:
+        for each in several:
+            network.registry.async_add(each)  # as registering does, after it has asked around
+        while (found := search(timeout_s=0.5, interfaces=LOOPBACK)).left_out < 2:
+            pass  # a laden machine answers late
+
+    assert len(found.cameras) <= 3

@@ -18,7 +18,7 @@ class Server:
     """Answers with ranges, as the daemon does, and counts the requests."""
 
     def __init__(self) -> None:
-        self.content, self.tag, self.requests = CONTENT, '"1"', 0
+        self.content, self.tag, self.requests, self.sent_bytes = CONTENT, '"1"', 0, 0
 
     def __call__(self, request: httpx.Request) -> httpx.Response:
         self.requests += 1
@@ -27,6 +27,7 @@ class Server:
             return httpx.Response(200, content=self.content)
         first, last = map(int, request.headers["range"].removeprefix("bytes=").split("-"))
         part = self.content[first : last + 1]
+        self.sent_bytes += len(part)
         where = f"bytes {first}-{first + len(part) - 1}/{len(self.content)}"
         headers = {"content-range": where, "etag": self.tag}
         return httpx.Response(206, content=part, headers=headers)
@@ -65,6 +66,20 @@ def test_what_was_read_is_not_requested_again(file: RemoteFile, server: Server) 
         file.read(1000)
 
     assert server.requests == 2  # the beginning, and one block
+
+
+def test_of_a_long_piece_no_byte_beside_travels_and_what_did_is_kept(
+    file: RemoteFile, server: Server
+) -> None:
+    before, requests = server.sent_bytes, server.requests
+
+    file.seek(300_001)
+    assert file.read(400_000) == CONTENT[300_001:700_001]
+    assert (server.sent_bytes - before, server.requests - requests) == (400_000, 1)
+
+    file.seek(400_000)  # within it
+    assert file.read(10) == CONTENT[400_000:400_010]
+    assert server.requests - requests == 1
 
 
 def test_a_file_that_changed_meanwhile_is_not_read_on(file: RemoteFile, server: Server) -> None:

@@ -165,8 +165,8 @@ def _camera_table(cameras: list[dict[str, Any]]) -> Table:
 
 
 def _network_table(cameras: list[dict[str, Any]]) -> Table:
-    table = Table("address", "serial number", "firmware", "name", box=None)
+    table = Table("address", "serial number", "firmware", "state", "name", box=None)
     for camera in cameras:
-        fields = (camera["url"], camera["serial"] or "?", camera["firmware"] or "?", camera["name"])
+        fields = (camera[name] or "?" for name in ("url", "serial", "firmware", "state", "name"))
         table.add_row(*map(escape, fields))
     return table

@@ -34,19 +34,26 @@ class Point:
     scene: str
     point: Mapping[str, Any]
     conditions: Mapping[str, Any]
-    run: Callable[["_Bench"], _Summary]
+    run: Callable[["Bench"], _Summary]
 
     @property
     def key(self) -> str:
         """The key of its record."""
         return key_of(self.kind, self.scene, self.point, self.conditions)
 
+    def measured(self, bench: "Bench", *, clock: Callable[[], float] = time.perf_counter) -> Record:
+        """Measure it; ``clock`` is that of the machine, for how long it takes."""
+        begin_s = clock()
+        values, spread = self.run(bench)
+        took_s = clock() - begin_s
+        return Record(self.kind, self.scene, self.point, self.conditions, values, spread, took_s)
+
 
 def points_of(grid: Grid, *, scene: str, repetitions: int, seed: int) -> list[Point]:
     """Return every point of a grid on a scene."""
     conditions = {"repetitions": repetitions, "seed": seed}
 
-    def point(kind: str, settings: Mapping[str, Any], run: Callable[["_Bench"], _Summary]) -> Point:
+    def point(kind: str, settings: Mapping[str, Any], run: Callable[["Bench"], _Summary]) -> Point:
         return Point(kind, scene, settings, conditions, run)
 
     def capture_point(sequence: Sequence) -> Point:
@@ -131,14 +138,9 @@ def measure(
             progress(point.kind)
     if not left:
         return
-    bench = _Bench(spec_of(scene, seed=seed), seed=seed)
+    bench = Bench.of(scene, seed=seed)
     for point in left:
-        begin_s = clock()
-        values, spread = point.run(bench)
-        took_s = clock() - begin_s
-        records.append(
-            Record(point.kind, scene, point.point, point.conditions, values, spread, took_s)
-        )
+        records.append(point.measured(bench, clock=clock))
         progress(point.kind)
 
 
@@ -148,7 +150,7 @@ def spec_of(scene: str, *, seed: int) -> str:
     return f"{spec}{'&' if '?' in spec else '?'}seed={seed}"
 
 
-class _Bench:
+class Bench:
     """Cameras before a scene, and what several points share.
 
     Every point gets a camera that was just switched on, at the same time of the scene: what is
@@ -162,7 +164,13 @@ class _Bench:
         self._scenes: dict[int, estimating.Scene] = {}
         self._sampled: tuple[Truth, Sample] | None = None
 
+    @classmethod
+    def of(cls, scene: str, *, seed: int) -> "Bench":
+        """Return the bench with a scene by its name, and its chance."""
+        return cls(spec_of(scene, seed=seed), seed=seed)
+
     def capture(self, sequence: Sequence, repetitions: int) -> _Summary:
+        """Return how accurately a sequence shows the scene: means and deviations."""
         with self._camera() as camera:
             applied = camera.configure(sequence)
             return capture.accuracy(

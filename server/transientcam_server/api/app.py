@@ -15,6 +15,7 @@ from transientcam_server.api.metrics import Metrics
 from transientcam_server.api.middleware.answers import AnswerLimit
 from transientcam_server.api.middleware.requests import RequestLog
 from transientcam_server.api.middleware.security import BodyLimit, OriginCheck, SecurityHeaders
+from transientcam_server.api.neighbours import NeighbourSearch
 from transientcam_server.api.routes import (
     acquisition,
     calibrations,
@@ -24,6 +25,7 @@ from transientcam_server.api.routes import (
     info,
     jobs,
     lease,
+    neighbours,
     parameters,
     plan,
     preview,
@@ -45,6 +47,7 @@ from transientcam_server.settings import Settings
 API: Final = "/api/v1"
 _RESOURCES = (
     info,
+    neighbours,
     camera,
     lease,
     sequence,
@@ -94,6 +97,7 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     app.state.service = service
     app.state.metrics = metrics
     app.state.guard = guard
+    app.state.neighbours = NeighbourSearch.of(settings)
     api = APIRouter()
     admitted = [Depends(permissions.admit), Depends(query.require_known)]
     for resource in _RESOURCES:

@@ -11,9 +11,7 @@ from transientcam_server.errors.exceptions import ClusterError, MissingExtra
 
 WorkersOption = Annotated[
     int | None,
-    typer.Option(
-        min=1, help="Compute with so many processes of this machine; the output is a .zarr."
-    ),
+    typer.Option(min=1, help="Compute with so many processes of this machine."),
 ]
 DaskOption = Annotated[
     str | None,

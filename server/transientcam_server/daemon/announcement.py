@@ -9,7 +9,7 @@ import ipaddress
 import logging
 import os
 import socket
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -24,6 +24,10 @@ from transientcam_server.settings import Settings
 
 _log = logging.getLogger(__name__)
 _LABEL_BYTES: Final = 63  # RFC 1035, 2.3.4
+_TEXT_BYTES: Final = 200
+"""Of a value in the TXT record, whose strings have at most 255 bytes (RFC 6763, 6.1)."""
+STATE_EVERY_S: Final = 2.0
+"""How often the state is looked at: each change of it is a packet for the whole network."""
 _EVERYWHERE: Final = ("0.0.0.0", "::")  # noqa: S104 - compared with, not bound to
 _MARKS_OF_CONTAINERS: Final = (".dockerenv", "run/.containerenv")
 _VARIABLES_OF_CONTAINERS: Final = ("container", "KUBERNETES_SERVICE_HOST")
@@ -49,14 +53,17 @@ def inside_container(
 
 @contextlib.asynccontextmanager
 async def announced(
-    settings: Settings, capabilities: Capabilities, *, port: int
+    settings: Settings, capabilities: Capabilities, *, port: int, state: Callable[[], str]
 ) -> AsyncIterator[None]:
-    """Announce the service within the block, if settings say so; failures are logged."""
+    """Announce the service within the block, if settings say so; failures are logged.
+
+    ``state`` is what the camera does, one of `transientcam.discovery.STATES`.
+    """
     if not enabled(settings, in_container=inside_container()):
         yield
         return
     # checking that the names are free takes more than a second, so the service does not wait for it
-    announcing = asyncio.create_task(_announce(settings, capabilities, port))
+    announcing = asyncio.create_task(_announce(settings, capabilities, port, state))
     try:
         yield
     finally:
@@ -64,18 +71,27 @@ async def announced(
         await asyncio.gather(announcing, return_exceptions=True)
 
 
-async def _announce(settings: Settings, capabilities: Capabilities, port: int) -> None:
+async def _announce(
+    settings: Settings, capabilities: Capabilities, port: int, state: Callable[[], str]
+) -> None:
     try:
         network = AsyncZeroconf(interfaces=_interfaces(settings.host))
     except OSError as error:
         _log.warning("the service is not announced: %s", error.strerror or error)
         return
     try:
-        for service in _services(settings, capabilities, port):
+        now = state()
+        services = _services(settings, capabilities, port, now)
+        for service in services:
             broadcast = await network.async_register_service(service, allow_name_change=True)
             await broadcast
             _log.info("announced as %s", service.name)
-        await asyncio.Event().wait()
+        while True:
+            await asyncio.sleep(STATE_EVERY_S)
+            if now != (now := state()):
+                services = [_in_state(service, now) for service in services]
+                for service in services:
+                    await network.async_update_service(service)
     except (Error, OSError) as error:
         _log.warning("the service is not announced: %s", error)
     finally:
@@ -83,13 +99,17 @@ async def _announce(settings: Settings, capabilities: Capabilities, port: int) -
         await network.async_close()
 
 
-def _services(settings: Settings, capabilities: Capabilities, port: int) -> list[ServiceInfo]:
+def _services(
+    settings: Settings, capabilities: Capabilities, port: int, state: str
+) -> list[ServiceInfo]:
     instance = _instance(f"{capabilities.model} {capabilities.serial}")
     properties = {
         "path": "/",
         "api": "v1",
-        "sn": capabilities.serial,
+        "model": _cut(capabilities.model, _TEXT_BYTES),
+        "sn": _cut(capabilities.serial, _TEXT_BYTES),
         "fw": str(capabilities.firmware),
+        "state": state,
         "tls": "0" if settings.tls_certificate is None else "1",
     }
     return [
@@ -105,10 +125,25 @@ def _services(settings: Settings, capabilities: Capabilities, port: int) -> list
     ]
 
 
+def _in_state(service: ServiceInfo, state: str) -> ServiceInfo:
+    """Return a service under the name that it was given, in another state."""
+    return ServiceInfo(
+        service.type,
+        service.name,
+        port=service.port,
+        addresses=service.addresses,
+        properties=service.decoded_properties | {"state": state},
+        server=service.server,
+    )
+
+
+def _cut(text: str, size_bytes: int) -> str:
+    return text.encode()[:size_bytes].decode(errors="ignore")
+
+
 def _instance(name: str) -> str:
     """Return ``name`` as one label of a domain name."""
-    label = name.replace(".", "-").encode()[:_LABEL_BYTES]
-    return label.decode(errors="ignore")
+    return _cut(name.replace(".", "-"), _LABEL_BYTES)
 
 
 def _interfaces(host: str) -> list[str] | InterfaceChoice:

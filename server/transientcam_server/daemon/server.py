@@ -138,7 +138,10 @@ class Server(uvicorn.Server):
             self._acceptor.open()
             port = sockets[0].getsockname()[1]
             capabilities = self._service.camera.capabilities
-            announcement = announced(self._settings, capabilities, port=port)
+            status = self._service.acquisition.status
+            announcement = announced(
+                self._settings, capabilities, port=port, state=lambda: status().state
+            )
             await self._around.enter_async_context(announcement)
             manager = ServiceManager.of(os.environ)
             await self._around.enter_async_context(supervised(self._service.acquisition, manager))

@@ -158,6 +158,15 @@ class ClusterError(ServerError):
 
 
 @dataclass(eq=False, repr=False)
+class StorageError(ServerError):
+    """What is behind an address cannot be read or written; ``address`` has bucket and key."""
+
+    address: str
+    reason: str
+    _sentence = "{address} cannot be read or written: {reason}"
+
+
+@dataclass(eq=False, repr=False)
 class MixedVersions(ServerError):  # noqa: N818 - says what is wrong
     """A worker would compute otherwise: ``found`` of ``package`` instead of ``wanted``."""
 

@@ -6,8 +6,9 @@ itself says, so that a second run goes on with those that are missing.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from concurrent.futures import CancelledError
+from contextlib import closing
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +17,14 @@ import numpy as np
 
 import transientcam_moments as tm
 from transientcam_server.errors.exceptions import ClusterError, MissingExtra
-from transientcam_server.offline.formats import Block, Content, create_zarr, finish_zarr, library
+from transientcam_server.offline.formats import (
+    Block,
+    Content,
+    create_zarr,
+    finish_zarr,
+    library,
+    naming_address,
+)
 from transientcam_server.offline.job import BLOCK_FRAMES, Job, computed, opened, spans
 from transientcam_server.offline.opening import recording_at
 from transientcam_server.offline.recording import (
@@ -76,32 +84,40 @@ def reconstruct_on(
         If the scheduler is lost, or a task ended several workers.
     DamagedFrame
         If a frame is not what was recorded.
+    StorageError
+        If what is behind the output's address refuses, as where a bucket is missing.
     ServerError, TransientcamError, OSError
         If the recording cannot be read, or the output not be written.
     """
     job = Job.of(place, options, token=token)
     with recording_at(place, token=token) as recording:
-        group = _begun(recording, output, options)
+        with naming_address(output):
+            group = _begun(recording, output, options)
+            there = np.asarray(group[COUNTING][:]) != MISSING
         frames = recording.frames
-    there = np.asarray(group[COUNTING][:]) != MISSING
     missing = [(first, last) for first, last in spans(frames) if not there[first:last].all()]
     left = sum(last - first for first, last in missing)
     _compute(client, job, output, missing, lambda done: progress(frames - left + done, frames))
-    finish_zarr(output)
+    with naming_address(output):
+        finish_zarr(output)
     return frames, frames - left
 
 
 def write_block(job: Job, output: str, first: int, last: int) -> None:
     """Compute some frames and write them: what a task is."""
     tm.kernels.use_one_thread()  # a worker has a process, or a thread, for every core
-    group = _group(job, output)
+    with naming_address(output):
+        group = _group(job, output)
     recording, _ = opened(job)
     rows = group[job.products[0]].chunks[0]
     for begin in range(first, last, rows):  # all frames of a task might not fit in memory
         end = min(begin + rows, last)
-        for name, values in computed(job, begin, end).items():
-            group[name][begin:end] = values
-    group[COUNTING][first:last] = recording.series(COUNTING)[first:last]
+        found = computed(job, begin, end)
+        with naming_address(output):
+            for name, values in found.items():
+                group[name][begin:end] = values
+    with naming_address(output):
+        group[COUNTING][first:last] = recording.series(COUNTING)[first:last]
 
 
 @lru_cache(maxsize=2)
@@ -155,6 +171,49 @@ def _rows_of_chunk(blocks: Iterable[Block]) -> int:
     return min(BLOCK_FRAMES, 1 << (fitting.bit_length() - 1))
 
 
+def completed(
+    client: distributed.Client, function: Callable[..., Any], tasks: Iterable[tuple[Any, ...]]
+) -> Generator[tuple[tuple[Any, ...], Any], None, None]:
+    """Yield each task with its result as it is done; close it, and the tasks that are left end.
+
+    Parameters
+    ----------
+    client
+        Of the cluster.
+    function
+        Of a module that every worker has, or else it is sent there.
+    tasks
+        Arguments of one call each.
+
+    Raises
+    ------
+    ClusterError
+        If the scheduler is lost, or a task ended several workers.
+    Exception
+        Whatever a task raises.
+    """
+    assert client.scheduler is not None  # noqa: S101 - it is connected
+    address = str(client.scheduler.address)
+    futures, of = [], {}
+    done = 0
+    try:
+        for task in tasks:
+            future = client.submit(function, *task, pure=False)
+            of[future.key] = task
+            futures.append(future)
+        if not futures:
+            return
+        for future in distributed.as_completed(futures, loop=client.loop):
+            result = future.result()
+            done += 1
+            yield of[future.key], result
+    except (distributed.KilledWorker, CommClosedError, CancelledError) as error:
+        raise ClusterError(address, str(error) or type(error).__name__) from error
+    finally:
+        if done < len(futures) and client.status == "running":
+            client.cancel(futures)
+
+
 def _compute(
     client: distributed.Client,
     job: Job,
@@ -163,24 +222,10 @@ def _compute(
     progress: Callable[[int], None],
 ) -> None:
     """Have the blocks computed; whatever ends this before ends the tasks that are left."""
-    assert client.scheduler is not None  # noqa: S101 - it is connected
-    address = str(client.scheduler.address)
-    progress(0)
-    if not blocks:
-        return
-    lengths, futures = {}, []
     done = 0
-    try:
-        for first, last in blocks:
-            future = client.submit(write_block, job, output, first, last, pure=False)
-            lengths[future.key] = last - first
-            futures.append(future)
-        for future in distributed.as_completed(futures, loop=client.loop):
-            future.result()
-            done += lengths[future.key]
+    progress(done)
+    tasks = ((job, output, first, last) for first, last in blocks)
+    with closing(completed(client, write_block, tasks)) as results:
+        for (_, _, first, last), _ in results:
+            done += last - first
             progress(done)
-    except (distributed.KilledWorker, CommClosedError, CancelledError) as error:
-        raise ClusterError(address, str(error) or type(error).__name__) from error
-    finally:
-        if done < sum(lengths.values()) and client.status == "running":
-            client.cancel(futures)

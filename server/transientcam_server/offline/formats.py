@@ -17,7 +17,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_server.errors.exceptions import MissingExtra, NotConvertible
+from transientcam.errors import TransientcamError
+from transientcam_server.errors.exceptions import (
+    MissingExtra,
+    NotConvertible,
+    ServerError,
+    StorageError,
+)
 from transientcam_server.imaging.labelling import Column, in_words
 from transientcam_server.recording.columns import as_json
 
@@ -232,6 +238,25 @@ def finish_zarr(place: str) -> None:
         # xarray look for; without, each array costs a request to a remote store
         warnings.filterwarnings("ignore", message="Consolidated metadata")
         zarr.consolidate_metadata(place)
+
+
+@contextmanager
+def naming_address(place: str) -> Iterator[None]:
+    """Say in errors of a store which address it has: each backend of fsspec raises its own.
+
+    Raises
+    ------
+    StorageError
+        In place of any other error of the block, where ``place`` is an address.
+    """
+    try:
+        yield
+    except (FileExistsError, ServerError, TransientcamError):
+        raise
+    except Exception as error:
+        if "://" not in place:
+            raise
+        raise StorageError(place, str(error) or type(error).__name__) from error
 
 
 def _sizes(content: Content) -> dict[str, int]:

@@ -31,6 +31,19 @@ def installed() -> tuple[tuple[str, str], ...]:
     return tuple((name, version(name)) for name in _PACKAGES)
 
 
+def require_versions(wanted: tuple[tuple[str, str], ...]) -> None:
+    """Refuse to compute here for a process that has other versions.
+
+    Raises
+    ------
+    MixedVersions
+        Naming this worker and the package.
+    """
+    for (name, here), (_, there) in zip(installed(), wanted, strict=True):
+        if here != there:
+            raise MixedVersions(_worker(), name, here, there)
+
+
 @dataclass(frozen=True, slots=True)
 class Job:
     """A recording and what is computed of it; small, hashable, and of use in any process.
@@ -106,9 +119,7 @@ def opened(job: Job) -> tuple[Recording, BatchReconstructor]:
 
 @lru_cache(maxsize=2)
 def _opened(job: Job) -> tuple[Recording, BatchReconstructor]:
-    for (name, here), (_, wanted) in zip(installed(), job.versions, strict=True):
-        if here != wanted:
-            raise MixedVersions(_worker(), name, here, wanted)
+    require_versions(job.versions)
     recording = recording_at(job.place, token=job.token)
     try:
         reconstructor = BatchReconstructor(recording, job.options)

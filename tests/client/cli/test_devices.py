@@ -17,7 +17,16 @@ from transientcam_driver.tofcam660.wire import Answer, AnswerType
 
 FREE = Camera("usb:A-17", "A-17", "AMCW lidar", "/dev/bus/usb/001/004")
 FORBIDDEN = Camera("usb", node="/dev/bus/usb/001/005", problem="no permission to open it")
-ANNOUNCED = FoundCamera("lidar B-3", "http://192.168.7.5:8000", "B-3", "1.2", "v1", tls=False)
+ANNOUNCED = FoundCamera(
+    name="lidar B-3",
+    url="http://192.168.7.5:8000",
+    serial="B-3",
+    firmware="1.2",
+    api="v1",
+    tls=False,
+    model="AMCW lidar",
+    state="streaming",
+)
 
 
 @pytest.fixture(autouse=True)
@@ -64,7 +73,7 @@ def test_cameras_are_listed_by_the_name_that_opens_them(
 
     assert "usb:A-17 A-17 AMCW lidar /dev/bus/usb/001/004" in words
     assert "/dev/bus/usb/001/005: no permission to open it" in words
-    assert "http://192.168.7.5:8000 B-3 1.2 lidar B-3" in words
+    assert "http://192.168.7.5:8000 B-3 1.2 streaming lidar B-3" in words
     assert "Products that one cannot give: transientcam doctor --camera CAMERA" in words
     assert "sim:mirrors" in words
 
@@ -87,6 +96,8 @@ def test_cameras_are_printed_as_json(
             "firmware": "1.2",
             "api": "v1",
             "tls": False,
+            "model": "AMCW lidar",
+            "state": "streaming",
         }
     ]
     assert (document["problems"], document["network_problem"]) == ({}, None)

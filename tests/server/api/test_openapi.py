@@ -31,6 +31,7 @@ def test_every_resource_of_the_interface_is_described(document: dict[str, Any]) 
         "GET /api/versions",
         "GET /api/v1/info",
         "GET /api/v1/camera",
+        "GET /api/v1/cameras",
         "GET /api/v1/sequence",
         "PUT /api/v1/sequence",
         "POST /api/v1/sequence/validate",

@@ -21,7 +21,12 @@ import transientcam
 import transientcam_moments as tm
 from tests.server.recording.made import record
 from transientcam.cli import run
-from transientcam_server.errors.exceptions import ClusterError, InputError, MixedVersions
+from transientcam_server.errors.exceptions import (
+    ClusterError,
+    InputError,
+    MixedVersions,
+    StorageError,
+)
 from transientcam_server.offline import BatchOptions, cluster, job, reconstruct_recording
 from transientcam_server.offline.cluster import reconstruct_on
 from transientcam_server.offline.job import BLOCK_FRAMES, Job, spans
@@ -231,28 +236,51 @@ def test_a_worker_with_other_versions_refuses(
         client.submit(job.computed, older, 0, 1).result()
 
 
-def test_the_output_may_be_an_address_as_of_s3(
-    client: distributed.Client,
-    source: Path,
-    serial: dict[str, Any],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+@pytest.fixture(scope="module")
+def s3(zarr_clients: None) -> Iterator[Any]:
+    """The file system of a server as that of S3, with the bucket `bucket`."""
     import s3fs
 
     server = ThreadedMotoServer("127.0.0.1", 0, verbose=False)
     server.start()
-    try:
-        host, port = server.get_host_and_port()
-        monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://{host}:{port}")
+    host, port = server.get_host_and_port()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("AWS_ENDPOINT_URL", f"http://{host}:{port}")
         for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
-            monkeypatch.setenv(name, "testing")
-        s3fs.S3FileSystem().mkdir("bucket")
-
-        reconstruct_on(client, str(source), "s3://bucket/a.zarr", OPTIONS)
-
-        assert_same("s3://bucket/a.zarr", serial)
-    finally:
+            patch.setenv(name, "testing")
+        files = s3fs.S3FileSystem()
+        files.mkdir("bucket")
+        yield files
         server.stop()
+
+
+def test_the_output_may_be_an_address_as_of_s3(
+    client: distributed.Client, source: Path, serial: dict[str, Any], s3: Any
+) -> None:
+    reconstruct_on(client, str(source), "s3://bucket/a.zarr", OPTIONS)
+
+    assert_same("s3://bucket/a.zarr", serial)
+
+
+def test_a_store_that_refuses_is_named_with_its_bucket(
+    client: distributed.Client, source: Path, s3: Any
+) -> None:
+    with pytest.raises(StorageError, match=r"^s3://none/a\.zarr .*bucket does not exist"):
+        reconstruct_on(client, str(source), "s3://none/a.zarr", OPTIONS)
+    with pytest.raises(StorageError, match=r"^ftps3://none/a\.zarr .*ftps3"):
+        reconstruct_on(client, str(source), "ftps3://none/a.zarr", OPTIONS)
+
+
+def test_a_store_that_goes_in_the_middle_is_named_by_a_worker(
+    client: distributed.Client, source: Path, s3: Any
+) -> None:
+    def lose(done: int, total: int) -> None:
+        if s3.exists("lost"):
+            s3.rm("lost", recursive=True)
+
+    s3.mkdir("lost")
+    with pytest.raises(StorageError, match=r"^s3://lost/a\.zarr "):
+        reconstruct_on(client, str(source), "s3://lost/a.zarr", OPTIONS, progress=lose)
 
 
 def test_the_command_takes_the_address_of_a_scheduler_and_a_directory(

@@ -62,6 +62,24 @@ window.addEventListener("load", () => SwaggerUIBundle({
 """
 
 
+_OWN: Final = Path(__file__).parent / "files"
+_OWN_FILES: Final = {"cameras.js": "text/javascript", "pages.css": "text/css"}
+
+
+@router.get("/cameras")
+async def cameras() -> FileResponse:
+    """Show the cameras on the local network; its script asks for them with the tab's token."""
+    return FileResponse(_OWN / "cameras.html", media_type="text/html")
+
+
+@router.get("/cameras/{file}")
+async def cameras_file(file: Annotated[str, PathParameter()]) -> FileResponse:
+    """Serve one of the files of that page."""
+    if file not in _OWN_FILES:
+        raise Problem(kinds.NOT_FOUND, f"There is no {file[:64]!r}.")
+    return FileResponse(_OWN / file, media_type=_OWN_FILES[file])
+
+
 @router.get("/docs")
 async def interface() -> HTMLResponse:
     """Show the interface, with everything it needs from here and no other host."""

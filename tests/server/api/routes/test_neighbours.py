@@ -1,0 +1,39 @@
+"""The list of cameras on the network, over HTTP."""
+
+import httpx
+
+from tests.server.contract import hold_to_contract
+from tests.serving import serving
+
+
+def test_a_service_lists_one_that_announces_itself_and_what_its_camera_does() -> None:
+    with (
+        serving("sim:wall?noise=off", announce="on") as other,
+        serving("sim:wall?noise=off", announce="auto") as asked,
+        httpx.Client(base_url=asked.url, timeout=60.0) as http,
+    ):
+        hold_to_contract(http, asked.app)
+        capabilities = other.camera.capabilities
+
+        def listed(state: str) -> dict[str, object]:
+            """Ask until the announced camera is in this state; the test's time limit ends it."""
+            while True:
+                document = http.get("/api/v1/cameras").raise_for_status().json()
+                assert (document["left_out"], document["reason"]) == (0, None)
+                for each in document["cameras"]:
+                    if (each["url"], each["state"]) == (other.url, state):
+                        return dict(each)
+
+        found = listed("streaming")
+        assert (found["model"], found["serial"]) == (capabilities.model, capabilities.serial)
+
+        httpx.put(f"{other.url}/api/v1/acquisition", json={"running": False}).raise_for_status()
+        assert listed("stopped")["name"] == found["name"]
+
+
+def test_without_mdns_the_list_is_empty_and_says_why() -> None:
+    with serving("sim:wall", announce="off") as served:
+        document = httpx.get(f"{served.url}/api/v1/cameras").raise_for_status().json()
+
+    assert document["cameras"] == []
+    assert "`announce` is `off`" in document["reason"]
