@@ -7,6 +7,7 @@ more memory than the file has bytes.
 """
 
 import itertools
+import math
 from typing import Any, Final
 
 import h5py
@@ -19,6 +20,8 @@ SMALL_BYTES: Final = 16 * 1024**2
 """May be read of any file: one that was repacked can hold little data in still less space."""
 MAX_CHUNK_BYTES: Final = 256 * 1024**2
 """Also the largest size of a frame; 10 of them a second are five times what USB 3 takes."""
+MAX_CHUNKS: Final = 4096
+"""Read at once: HDF5 takes some 10 KiB for each, also for those that were never written."""
 _HARD: Final = h5py.h5l.TYPE_HARD  # pyright: ignore[reportAttributeAccessIssue]
 _DEFLATE: Final = h5py.h5z.FILTER_DEFLATE
 _PIPELINES: Final = ((), (_DEFLATE,), (h5py.h5z.FILTER_SHUFFLE, _DEFLATE))
@@ -110,8 +113,9 @@ def read_rows(dataset: swmr.Dataset, first: int = 0, last: int | None = None) ->
     Raises
     ------
     ValueError
-        If a chunk is damaged.
+        If a chunk is damaged, or there are more than `MAX_CHUNKS`.
     """
+    _require_few_chunks(dataset, first, last)
     filters = _filters(dataset)
     if not filters:
         whole: NDArray[Any] = np.asarray(dataset[()] if not dataset.ndim else dataset[first:last])
@@ -180,6 +184,16 @@ def _require_inside(dataset: swmr.Dataset, name: str) -> None:
         and np.prod(dataset.chunks, dtype=float) * dataset.dtype.itemsize > MAX_CHUNK_BYTES
     ):
         raise ValueError(f"{name} has chunks of more than {MAX_CHUNK_BYTES} bytes")
+
+
+def _require_few_chunks(dataset: swmr.Dataset, first: int, last: int | None) -> None:
+    chunks = dataset.chunks
+    if chunks is None:
+        return
+    sizes = (len(dataset) if last is None else last) - first, *dataset.shape[1:]
+    count = math.prod(-(-size // step) for size, step in zip(sizes, chunks, strict=True))
+    if count > MAX_CHUNKS:
+        raise ValueError(f"{dataset.name} is stored in {count} chunks, more than {MAX_CHUNKS}")
 
 
 def _filters(dataset: swmr.Dataset) -> tuple[int, ...]:

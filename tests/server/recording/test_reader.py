@@ -206,6 +206,13 @@ def longer(file: Any, rows: int) -> None:
         file[name].resize(rows, 0)
 
 
+def stored_in(file: Any, name: str, *, chunks: tuple[int, ...]) -> None:
+    """State a million values, of which none is written, in so large chunks."""
+    dtype = file[name].dtype
+    del file[name]
+    file.create_dataset(name, (10**6,), dtype, chunks=chunks)
+
+
 CRAFTED: dict[str, tuple[Callable[[Any], object], str]] = {
     "no annotations": (lambda file: file.__delitem__("annotations"), "it has no annotations"),
     "annotations in a group": (
@@ -242,6 +249,10 @@ CRAFTED: dict[str, tuple[Callable[[Any], object], str]] = {
         "raw is packed with filters",
     ),
     "a series of 10^12 values": (lambda file: longer(file, 10**12), "states a size of"),
+    "a series in 62500 chunks that were never written": (
+        lambda file: stored_in(file, "host_time_s", chunks=(16,)),
+        "in 62500 chunks",
+    ),
     "a time that is no number": (
         lambda file: file["host_time_s"].__setitem__(1, np.nan),
         "host_time_s is nan",
