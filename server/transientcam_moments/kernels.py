@@ -21,15 +21,16 @@ from collections.abc import Callable, Sequence
 from typing import TypedDict
 
 from transientcam_moments._arrays import MAX_HARMONICS, chosen
-from transientcam_moments._kernels.automatic import (
+from transientcam_moments._lanes.automatic import (
     MOST_ROOTS,
     THREAD,
     compile_one,
     is_offered,
     want,
 )
-from transientcam_moments._kernels.parallel import Spread, at_once, over, use_one_thread
-from transientcam_moments._kernels.registry import PRECISION_NAMES, REGISTRY, Key
+from transientcam_moments._lanes.helper import Helper, program
+from transientcam_moments._lanes.parallel import Spread, at_once, over, use_one_thread
+from transientcam_moments._lanes.registry import PRECISION_NAMES, REGISTRY, Key, Lane
 from transientcam_moments.errors import ParameterError
 
 __all__ = [
@@ -182,8 +183,13 @@ def compile_in_background(
         or (key.name == "likelihood" and key.harmonics == harmonics[0])
     ]
     main = threading.main_thread()
+
+    def work() -> None:
+        with Helper(program()) as helper:
+            _compile(keys, None, main.is_alive, helper)
+
     # not a daemon: those are frozen at exit wherever they are, which a compiler doesn't survive
-    thread = threading.Thread(target=_compile, args=(keys, None, main.is_alive), name=THREAD)
+    thread = threading.Thread(target=work, name=THREAD)
     thread.start()
     return thread
 
@@ -208,7 +214,12 @@ def _keys(harmonics: Sequence[int], precisions: Sequence[str]) -> list[Key]:
     return [key for key in keys if is_offered(key)]
 
 
-def _compile(keys: list[Key], progress: Progress | None, go_on: Callable[[], bool]) -> None:
+def _compile(
+    keys: list[Key],
+    progress: Progress | None,
+    go_on: Callable[[], bool],
+    helper: Helper | None = None,
+) -> None:
     if not REGISTRY.enabled:
         return
     for done, key in enumerate(keys):
@@ -216,6 +227,22 @@ def _compile(keys: list[Key], progress: Progress | None, go_on: Callable[[], boo
             return
         if progress is not None:
             progress(done, len(keys), str(key))
-        compile_one(key)
+        compile_one(key, helper)
     if progress is not None:
         progress(len(keys), len(keys), "")
+
+
+def _make(key: Key, helper: Helper | None) -> Lane | None:
+    """Return a lane from the cache, else compiled; None where the program ends meanwhile."""
+    from transientcam_moments._kernels import compiler  # numba, on the thread that compiles
+
+    if helper is not None and compiler.is_kept():
+        lane = compiler.load_lane(key)
+        if lane is not None:
+            return lane
+        if not helper.compile(*key):
+            return None
+    return compiler.compile_lane(key)
+
+
+REGISTRY.make = _make

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import CACHE, lanes, without_lanes
-from transientcam_moments._kernels import automatic
-from transientcam_moments._kernels.parallel import _cores, on_threads
-from transientcam_moments._kernels.registry import HEAVY_PIXELS, REGISTRY, Key
+from transientcam_moments._lanes import automatic
+from transientcam_moments._lanes.parallel import _cores, on_threads
+from transientcam_moments._lanes.registry import HEAVY_PIXELS, REGISTRY, Key
 
 
 def moments(m: int, pixels: int = HEAVY_PIXELS) -> NDArray[np.complex64]:

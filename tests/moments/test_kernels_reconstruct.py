@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import lanes, without_lanes
-from transientcam_moments._kernels.registry import REGISTRY
+from transientcam_moments._lanes.registry import REGISTRY
 from transientcam_moments.four_bucket import harmonics_of
 from transientcam_moments.passed import PassedReconstruction
 

@@ -18,7 +18,7 @@ import transientcam_moments as tm
 from transientcam_server.errors.exceptions import ClusterError, MissingExtra
 from transientcam_server.offline.formats import Block, Content, create_zarr, finish_zarr, library
 from transientcam_server.offline.job import BLOCK_FRAMES, Job, computed, opened, spans
-from transientcam_server.offline.opening import recording_at
+from transientcam_server.offline.place import recording_at
 from transientcam_server.offline.recording import (
     BatchOptions,
     BatchReconstructor,
