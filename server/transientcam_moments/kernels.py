@@ -2,14 +2,16 @@
 
 Nothing has to be called. Every algorithm runs on NumPy and gives the same results; from the first
 call with 4096 pixels or more on, the lane that would have served it is loaded from the cache (half
-a second), or compiled (seconds, once on a machine), on a thread that no call waits for, and later
-calls change over to it. `compile` makes lanes ready beforehand, and waits for them.
+a second) on a thread that no call waits for, and later calls change over to it. What is not in the
+cache is compiled into it first (seconds, once on a machine), by a process of low priority, or by
+that thread where there can be none. `compile` makes lanes ready beforehand, and waits for them.
 
-A process that ends meanwhile waits at most for the one lane that is being compiled. The environment
-variable ``TRANSIENTCAM_KERNELS=off`` leaves everything to NumPy, ``TRANSIENTCAM_KERNELS=manual``
-compiles only what `compile` and `compile_in_background` are called for. Compiled code is kept for
-the next process in ``NUMBA_CACHE_DIR``, else in ``transientcam/kernels`` below ``XDG_CACHE_HOME``
-or ``~/.cache``, else (nothing there can be written to) not at all.
+A process that ends meanwhile waits for no lane, or at most for the one that is being compiled by
+its thread. The environment variable ``TRANSIENTCAM_KERNELS=off`` leaves everything to NumPy,
+``TRANSIENTCAM_KERNELS=manual`` compiles only what `compile` and `compile_in_background` are called
+for. Compiled code is kept for the next process in ``NUMBA_CACHE_DIR``, else in
+``transientcam/kernels`` below ``XDG_CACHE_HOME`` or ``~/.cache``, else (nothing there can be
+written to) not at all.
 
 `density`, `levinson`, `pisarenko` and `reconstruct` use all cores, or as many threads as their
 ``threads`` says. A program that makes such calls on threads of its own calls `use_one_thread` on
@@ -29,7 +31,13 @@ from transientcam_moments._lanes.automatic import (
     want,
 )
 from transientcam_moments._lanes.helper import Helper, program
-from transientcam_moments._lanes.parallel import Spread, at_once, over, use_one_thread
+from transientcam_moments._lanes.parallel import (
+    Spread,
+    at_once,
+    over,
+    over_all_cores,
+    use_one_thread,
+)
 from transientcam_moments._lanes.registry import PRECISION_NAMES, REGISTRY, Key, Lane
 from transientcam_moments.errors import ParameterError
 
@@ -45,6 +53,7 @@ __all__ = [
     "compile",
     "compile_in_background",
     "over",
+    "over_all_cores",
     "ready",
     "state",
     "use_one_thread",
@@ -173,8 +182,7 @@ def compile_in_background(
     to compile, but for that of the first order: they are prepared by themselves when they are first
     needed.
 
-    The thread is named "transientcam-compile", and can be joined. A process that ends in the
-    meantime waits at most for the lane that is being compiled.
+    The thread is named "transientcam-compile", and can be joined.
     """
     keys = [
         key

@@ -177,6 +177,8 @@ class OnePass:
         if self._estimated:
             smoothed[0] = 0
         planes = self._new_planes(smoothed)
+        found = Found(None, planes.phase_rad, planes.weight, planes.count, scratch.residual)
+        redone: list[int] = []
 
         def analyse(start: int, stop: int) -> None:
             for left, right in blocks(start, stop):
@@ -193,8 +195,8 @@ class OnePass:
                     planes.phase_rad, planes.weight, planes.count, scratch.residual, _EPS,
                     left, right,
                 )  # fmt: skip
-
-        def separate(start: int, stop: int) -> None:
+            room = scratch.wide(start)
+            redone.append(s.wide(smoothed, planes.brightness, found, room, start, stop))
             s.separate(
                 s.order, planes.phase_rad, planes.weight, planes.flags, planes.direct,
                 planes.indirect, planes.range_m, settings.threshold, constants.range_per_rad_m,
@@ -202,15 +204,12 @@ class OnePass:
             )  # fmt: skip
 
         spread(analyse, self._pixels)
-        found = Found(None, planes.phase_rad, planes.weight, planes.count, scratch.residual)
-        redone = s.wide(smoothed, planes.brightness, found, scratch.wide, 0, self._pixels)
-        spread(separate, self._pixels)
         if constants.bad is not None:
             planes.flags[constants.bad] |= _REPLACED
         if self._estimated:
             smoothed[0] = planes.brightness
         shaped = (a.reshape((*a.shape[:-1], *self._shape)) for a in planes[:-1])
-        return Planes(*shaped)._replace(redone=redone)
+        return Planes(*shaped)._replace(redone=sum(redone))
 
     def _new_planes(self, smoothed: Any) -> Planes:
         """Return room for a result: an array a plane, none of which keeps another from the pool."""
@@ -268,7 +267,8 @@ class _Scratch:
         self.saturated = np.empty(pixels, np.uint8)
         self.eigenvalue = np.empty(pixels, np.float32)
         self.residual = np.empty(pixels, np.float32)
-        self.wide = stages.wide.room(_ROOM)
+        self._stages = stages
+        self._wide: dict[int, Any] = {}
         if taps is not None:
             self.calibrated = np.empty((m + 1, pixels), np.complex64)
             self._row_length = row_length(shape[1], taps.size)
@@ -280,6 +280,13 @@ class _Scratch:
         if row is None:
             row = self._rows[start] = np.zeros(self._row_length, np.float32)
         return row
+
+    def wide(self, start: int) -> Any:
+        """Room for pixels that are redone in double precision, for each part of the image."""
+        room = self._wide.get(start)
+        if room is None:
+            room = self._wide[start] = self._stages.wide.room(_ROOM)
+        return room
 
     def mark_saturated(self, saturated: Any, shape: tuple[int, ...]) -> None:
         """Take the flags of saturated pixels from a boolean array, or from one for all."""

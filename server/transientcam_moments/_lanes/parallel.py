@@ -97,6 +97,14 @@ def on_threads(threads: int | None) -> Spread:
     return at_once if threads == 1 else over(_SHARED.get(), threads)
 
 
+def over_all_cores() -> Spread:
+    """Return a way to do an image on all cores, of which this thread has one.
+
+    Also on a thread that `use_one_thread` was called on.
+    """
+    return on_threads(_cores())
+
+
 def start_threads() -> None:
     """Start the threads that all calls share, so that no call waits until they run."""
     on_threads(None)(lambda start, stop: None, 1024 * _cores())
