@@ -394,7 +394,7 @@ def test_light_is_complete() -> None:
 @pytest.mark.parametrize("parts", [2, 3])
 def test_threads_within_a_frame_change_nothing(parts: int) -> None:
     settings = settings_of()
-    images = raw_images(settings, shape=(120, 163))
+    images = raw_images(settings, shape=(256, 320))
     reconstructor = tm.Reconstructor(settings, calibration=np.ones(M + 1))
     alone = reconstructor(images)
 

@@ -11,7 +11,7 @@ import numpy as np
 from transientcam_moments._kernels.padding import normalisation, row_length
 from transientcam_moments._kernels.pool import empty
 from transientcam_moments._kernels.refine import Found
-from transientcam_moments._lanes.parallel import Spread, blocks
+from transientcam_moments._lanes.parallel import BLOCK, Spread, blocks
 from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 if TYPE_CHECKING:  # it brings along the compiler
@@ -181,6 +181,7 @@ class OnePass:
         redone: list[int] = []
 
         def analyse(start: int, stop: int) -> None:
+            room = scratch.wide(start)
             for left, right in blocks(start, stop):
                 s.eigenvalue(
                     s.order, smoothed, int(self._estimated), scratch.eigenvalue, left, right
@@ -195,15 +196,15 @@ class OnePass:
                     planes.phase_rad, planes.weight, planes.count, scratch.residual, _EPS,
                     left, right,
                 )  # fmt: skip
-            room = scratch.wide(start)
-            redone.append(s.wide(smoothed, planes.brightness, found, room, start, stop))
+                # by blocks, so that the same pixels are redone together for any number of parts
+                redone.append(s.wide(smoothed, planes.brightness, found, room, left, right))
             s.separate(
                 s.order, planes.phase_rad, planes.weight, planes.flags, planes.direct,
                 planes.indirect, planes.range_m, settings.threshold, constants.range_per_rad_m,
                 start, stop,
             )  # fmt: skip
 
-        spread(analyse, self._pixels)
+        spread(analyse, self._pixels, BLOCK)
         if constants.bad is not None:
             planes.flags[constants.bad] |= _REPLACED
         if self._estimated:
