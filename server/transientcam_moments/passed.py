@@ -9,7 +9,7 @@ from transientcam_moments._arrays import (
 from transientcam_moments._kernels.one_pass import Planes
 from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments.flags import Flags
-from transientcam_moments.levinson import Coefficients
+from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.pisarenko import (
     Returns,
 )
@@ -77,7 +77,7 @@ class PassedReconstruction(Reconstruction):
     @cached_property
     def coefficients(self) -> Coefficients:
         """Coefficients of the maximum entropy density; no biased moments are made for them."""
-        return self._solved(self.smoothed, self.brightness)
+        return levinson(self.smoothed, brightness=self.brightness)
 
     @property
     def _shape(self) -> tuple[int, tuple[int, ...]]:

@@ -10,7 +10,7 @@ from transientcam_moments._arrays import (
     in_turn,
     namespace,
 )
-from transientcam_moments._lanes.parallel import Spread, at_once, on_threads
+from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments._shown import map_html
 from transientcam_moments.biasing import bias, estimate_zeroth, smallest_eigenvalue
 from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
@@ -18,7 +18,7 @@ from transientcam_moments.cumulative import cumulative
 from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.flags import INVALID, Flags, flags
 from transientcam_moments.harmonics import HarmonicCorrection
-from transientcam_moments.levinson import Coefficients, solved
+from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.likelihood import MODEL_ERROR, Likelihood
 from transientcam_moments.likelihood.choice import MOST_RETURNS
 from transientcam_moments.likelihood.estimate import assumed_noise, fitted
@@ -70,8 +70,7 @@ class Reconstruction:
     correction : HarmonicCorrection, optional
         What is taken out of the moments once they are smoothed.
     spread : callable, optional
-        How coefficients and the likelihood use several threads, as `kernels.over` returns it;
-        when left out, coefficients as `levinson` does, and the likelihood one.
+        How the likelihood uses several threads, as `kernels.over` returns it.
 
     Raises
     ------
@@ -240,11 +239,7 @@ class Reconstruction:
     @cached_property
     def coefficients(self) -> Coefficients:
         """Coefficients of the maximum entropy density."""
-        return self._solved(self.moments)
-
-    def _solved(self, moments: Array, brightness: Array | None = None) -> Coefficients:
-        spread = on_threads(None) if self._spread is at_once else self._spread
-        return solved(moments, brightness, spread)
+        return levinson(self.moments)
 
     @cached_property
     def returns(self) -> Returns:

@@ -97,8 +97,8 @@ class Reconstructor:
         previous : array, optional
             Images of the frame before, like `data`, for ``spoilt_images="fill"``.
         spread : callable
-            How the compiled pass, the likelihood and coefficients use several threads, as
-            `kernels.over` returns it.
+            How the compiled pass, and the likelihood, use several threads, as `kernels.over`
+            returns it.
 
         Returns
         -------

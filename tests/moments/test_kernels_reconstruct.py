@@ -404,22 +404,6 @@ def test_threads_within_a_frame_change_nothing(parts: int) -> None:
     assert_equal(alone, together)
 
 
-def test_coefficients_are_computed_on_the_threads_of_their_frame() -> None:
-    settings, totals = settings_of(), []
-
-    def spread(part: Callable[[int, int], None], total: int, /, unit: int = 1024) -> None:
-        totals.append(total)
-        part(0, total)
-
-    with lanes(M, precisions=("float32",), names=("reconstruct", "levinson")):
-        reconstructor = tm.Reconstructor(settings, calibration=np.ones(M + 1))
-        found = reconstructor(raw_images(settings, shape=(120, 163)), spread=spread)
-        of_the_pass = len(totals)
-        assert found.coefficients.error.shape == (120, 163)
-
-    assert totals[of_the_pass:] == [120 * 163]
-
-
 def assert_equal(one: tm.Reconstruction, other: tm.Reconstruction) -> None:
     """Both are the same to the last bit."""
     for name, read in PROPERTIES.items():
