@@ -40,7 +40,7 @@ class _NotKept(Exception):  # noqa: N818 - says what the cache lacks
     """A kernel would have to be compiled."""
 
 
-class _Refusal(event.Listener):  # type: ignore[misc]  # numba is only partly annotated
+class _Refusal(event.Listener):
     """Keeps the thread that makes it from compiling; numba asks it where the cache has nothing."""
 
     def __init__(self) -> None:
