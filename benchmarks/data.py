@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_moments._kernels import find, lookup
 from transientcam_moments._kernels.one_pass import Constants, OnePass
-from transientcam_moments._kernels.registry import REGISTRY
+from transientcam_moments._lanes import find, lookup
+from transientcam_moments._lanes.registry import REGISTRY
 from transientcam_moments.smoothing import gaussian_taps
 
 Array = NDArray[Any]

@@ -31,8 +31,8 @@ from transientcam_moments._arrays import (
     namespace,
     squared,
 )
-from transientcam_moments._kernels import accelerated
-from transientcam_moments._kernels.parallel import Spread, at_once
+from transientcam_moments._lanes import accelerated
+from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments.biasing import bias, estimate_zeroth
 from transientcam_moments.calibration import inverse_gains
 from transientcam_moments.errors import ParameterError, ShapeError

@@ -2,14 +2,16 @@
 
 Nothing has to be called. Every algorithm runs on NumPy and gives the same results; from the first
 call with 4096 pixels or more on, the lane that would have served it is loaded from the cache (half
-a second), or compiled (seconds, once on a machine), on a thread that no call waits for, and later
-calls change over to it. `compile` makes lanes ready beforehand, and waits for them.
+a second) on a thread that no call waits for, and later calls change over to it. What is not in the
+cache is compiled into it first (seconds, once on a machine), by a process of low priority, or by
+that thread where there can be none. `compile` makes lanes ready beforehand, and waits for them.
 
-A process that ends meanwhile waits at most for the one lane that is being compiled. The environment
-variable ``TRANSIENTCAM_KERNELS=off`` leaves everything to NumPy, ``TRANSIENTCAM_KERNELS=manual``
-compiles only what `compile` and `compile_in_background` are called for. Compiled code is kept for
-the next process in ``NUMBA_CACHE_DIR``, else in ``transientcam/kernels`` below ``XDG_CACHE_HOME``
-or ``~/.cache``, else (nothing there can be written to) not at all.
+A process that ends meanwhile waits for no lane, or at most for the one that is being compiled by
+its thread. The environment variable ``TRANSIENTCAM_KERNELS=off`` leaves everything to NumPy,
+``TRANSIENTCAM_KERNELS=manual`` compiles only what `compile` and `compile_in_background` are called
+for. Compiled code is kept for the next process in ``NUMBA_CACHE_DIR``, else in
+``transientcam/kernels`` below ``XDG_CACHE_HOME`` or ``~/.cache``, else (nothing there can be
+written to) not at all.
 
 `density`, `levinson`, `pisarenko` and `reconstruct` use all cores, or as many threads as their
 ``threads`` says. A program that makes such calls on threads of its own calls `use_one_thread` on
@@ -21,15 +23,22 @@ from collections.abc import Callable, Sequence
 from typing import TypedDict
 
 from transientcam_moments._arrays import MAX_HARMONICS, chosen
-from transientcam_moments._kernels.automatic import (
+from transientcam_moments._lanes.automatic import (
     MOST_ROOTS,
     THREAD,
     compile_one,
     is_offered,
     want,
 )
-from transientcam_moments._kernels.parallel import Spread, at_once, over, use_one_thread
-from transientcam_moments._kernels.registry import PRECISION_NAMES, REGISTRY, Key
+from transientcam_moments._lanes.helper import Helper, program
+from transientcam_moments._lanes.parallel import (
+    Spread,
+    at_once,
+    over,
+    over_all_cores,
+    use_one_thread,
+)
+from transientcam_moments._lanes.registry import PRECISION_NAMES, REGISTRY, Key, Lane
 from transientcam_moments.errors import ParameterError
 
 __all__ = [
@@ -44,6 +53,7 @@ __all__ = [
     "compile",
     "compile_in_background",
     "over",
+    "over_all_cores",
     "ready",
     "state",
     "use_one_thread",
@@ -172,8 +182,7 @@ def compile_in_background(
     to compile, but for that of the first order: they are prepared by themselves when they are first
     needed.
 
-    The thread is named "transientcam-compile", and can be joined. A process that ends in the
-    meantime waits at most for the lane that is being compiled.
+    The thread is named "transientcam-compile", and can be joined.
     """
     keys = [
         key
@@ -182,8 +191,13 @@ def compile_in_background(
         or (key.name == "likelihood" and key.harmonics == harmonics[0])
     ]
     main = threading.main_thread()
+
+    def work() -> None:
+        with Helper(program()) as helper:
+            _compile(keys, None, main.is_alive, helper)
+
     # not a daemon: those are frozen at exit wherever they are, which a compiler doesn't survive
-    thread = threading.Thread(target=_compile, args=(keys, None, main.is_alive), name=THREAD)
+    thread = threading.Thread(target=work, name=THREAD)
     thread.start()
     return thread
 
@@ -208,7 +222,12 @@ def _keys(harmonics: Sequence[int], precisions: Sequence[str]) -> list[Key]:
     return [key for key in keys if is_offered(key)]
 
 
-def _compile(keys: list[Key], progress: Progress | None, go_on: Callable[[], bool]) -> None:
+def _compile(
+    keys: list[Key],
+    progress: Progress | None,
+    go_on: Callable[[], bool],
+    helper: Helper | None = None,
+) -> None:
     if not REGISTRY.enabled:
         return
     for done, key in enumerate(keys):
@@ -216,6 +235,22 @@ def _compile(keys: list[Key], progress: Progress | None, go_on: Callable[[], boo
             return
         if progress is not None:
             progress(done, len(keys), str(key))
-        compile_one(key)
+        compile_one(key, helper)
     if progress is not None:
         progress(len(keys), len(keys), "")
+
+
+def _make(key: Key, helper: Helper | None) -> Lane | None:
+    """Return a lane from the cache, else compiled; None where the program ends meanwhile."""
+    from transientcam_moments._kernels import compiler  # numba, on the thread that compiles
+
+    if helper is not None and compiler.is_kept():
+        lane = compiler.load_lane(key)
+        if lane is not None:
+            return lane
+        if not helper.compile(*key):
+            return None
+    return compiler.compile_lane(key)
+
+
+REGISTRY.make = _make

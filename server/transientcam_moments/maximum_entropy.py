@@ -13,8 +13,8 @@ from transientcam_moments._arrays import (
     phases,
     real_type,
 )
-from transientcam_moments._kernels import accelerated
-from transientcam_moments._kernels.parallel import on_threads
+from transientcam_moments._lanes import accelerated
+from transientcam_moments._lanes.parallel import on_threads
 from transientcam_moments.levinson import Coefficients
 
 _BLOCK_VALUES = 1 << 18

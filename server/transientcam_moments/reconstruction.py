@@ -10,7 +10,7 @@ from transientcam_moments._arrays import (
     in_turn,
     namespace,
 )
-from transientcam_moments._kernels.parallel import Spread, at_once
+from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments._shown import map_html
 from transientcam_moments.biasing import bias, estimate_zeroth, smallest_eigenvalue
 from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order

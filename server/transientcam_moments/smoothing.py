@@ -3,7 +3,7 @@
 import numpy as np
 
 from transientcam_moments._arrays import Array, as_array, in_range, namespace, real_type
-from transientcam_moments._kernels import accelerated
+from transientcam_moments._lanes import accelerated
 from transientcam_moments.errors import ShapeError
 
 SIGMA_PX = 0.6

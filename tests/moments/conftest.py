@@ -2,7 +2,7 @@
 
 import pytest
 
-from transientcam_moments._kernels.registry import REGISTRY
+from transientcam_moments._lanes.registry import REGISTRY
 
 
 @pytest.fixture(autouse=True)

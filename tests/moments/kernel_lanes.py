@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import transientcam_moments as tm
-from transientcam_moments._kernels.registry import REGISTRY
+from transientcam_moments._lanes.registry import REGISTRY
 
 CACHE = Path(__file__).resolve().parents[2] / ".pytest_cache" / "kernels"
 FEW = tuple(

@@ -12,10 +12,10 @@ import pytest
 import transientcam_moments as tm
 from tests.moments import kernel_lanes
 from tests.moments.kernel_lanes import lanes, without_lanes
-from transientcam_moments import _kernels
-from transientcam_moments._kernels import registry
+from transientcam_moments import _lanes
 from transientcam_moments._kernels.cache import cache_directory
-from transientcam_moments._kernels.registry import REGISTRY, Key, Registry
+from transientcam_moments._lanes import registry
+from transientcam_moments._lanes.registry import REGISTRY, Key, Registry
 
 
 @pytest.fixture(autouse=True)
@@ -79,7 +79,7 @@ def test_a_lane_is_compiled_where_nothing_can_be_written() -> None:
     code = (
         "import transientcam_moments as tm\n"
         "from transientcam_moments._kernels.compiler import compile_lane\n"
-        "from transientcam_moments._kernels.registry import Key\n"
+        "from transientcam_moments._lanes.registry import Key\n"
         "import numpy as np\n"
         "lane = compile_lane(Key('smallest_eigenvalue', 1, 'f'))\n"
         "print(lane(np.full((2, 64), 3 + 0j, np.complex64))[0])"
@@ -93,7 +93,7 @@ def test_the_second_process_loads_what_the_first_compiled(tmp_path: Path) -> Non
     code = (
         "from transientcam_moments._kernels.eigenvalue import _smallest_eigenvalue as kernel\n"
         "from transientcam_moments._kernels.compiler import compile_lane\n"
-        "from transientcam_moments._kernels.registry import Key\n"
+        "from transientcam_moments._lanes.registry import Key\n"
         "compile_lane(Key('smallest_eigenvalue', 1, 'f'))\n"
         "print(sum(kernel.stats.cache_hits.values()), sum(kernel.stats.cache_misses.values()))"
     )
@@ -137,7 +137,7 @@ def test_what_compiled_code_is_kept_for_changes_with_every_source_file() -> None
         "before = cache.digest_of_sources()\n"
         "with tempfile.TemporaryDirectory() as copy:\n"
         "    root = pathlib.Path(cache.__file__).parents[1]\n"
-        "    for part in ('_kernels', 'likelihood'):\n"
+        "    for part in ('_kernels', '_lanes', 'likelihood'):\n"
         "        shutil.copytree(root / part, pathlib.Path(copy) / part)\n"
         "    cache.__file__ = copy + '/_kernels/cache.py'\n"
         "    digests = [before, cache.digest_of_sources()]\n"
@@ -171,7 +171,7 @@ def test_compiling_in_the_background_ends_with_the_lanes_in_use() -> None:
         assert thread.name == "transientcam-compile"
         thread.join()
 
-        assert _kernels.find("levinson", np.ones((4, 64), np.complex64)) is not None
+        assert _lanes.find("levinson", np.ones((4, 64), np.complex64)) is not None
         state = tm.kernels.state()
         assert (state["compiling"], state["failed"]) == (None, [])
 
@@ -257,11 +257,11 @@ def test_every_public_lane_has_its_compiler() -> None:
 def test_lanes_are_found_by_name_order_and_precision() -> None:
     REGISTRY.compiled[Key("levinson", 3, "f")] = found = lambda b: b
 
-    assert _kernels.find("levinson", np.ones((4, 64), np.complex64)) is found
-    assert _kernels.find("levinson", np.ones((4, 8, 8), np.complex64)) is found
-    assert _kernels.find("levinson", np.ones((4, 64), np.complex128)) is None
-    assert _kernels.find("levinson", np.ones((5, 64), np.complex64)) is None
-    assert _kernels.find("density", np.ones((4, 64), np.complex64)) is None
+    assert _lanes.find("levinson", np.ones((4, 64), np.complex64)) is found
+    assert _lanes.find("levinson", np.ones((4, 8, 8), np.complex64)) is found
+    assert _lanes.find("levinson", np.ones((4, 64), np.complex128)) is None
+    assert _lanes.find("levinson", np.ones((5, 64), np.complex64)) is None
+    assert _lanes.find("density", np.ones((4, 64), np.complex64)) is None
 
 
 @pytest.mark.parametrize(
@@ -278,7 +278,7 @@ def test_lanes_are_found_by_name_order_and_precision() -> None:
 def test_what_no_lane_takes_finds_none(planes: object) -> None:
     REGISTRY.compiled[Key("levinson", 3, "f")] = lambda b: b
 
-    assert _kernels.find("levinson", planes) is None
+    assert _lanes.find("levinson", planes) is None
 
 
 def test_a_lane_is_ready_once_it_is_compiled() -> None:

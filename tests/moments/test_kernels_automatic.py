@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import CACHE, lanes, without_lanes
-from transientcam_moments._kernels import automatic
-from transientcam_moments._kernels.parallel import _cores, on_threads
-from transientcam_moments._kernels.registry import HEAVY_PIXELS, REGISTRY, Key
+from transientcam_moments._lanes import automatic
+from transientcam_moments._lanes.helper import Helper
+from transientcam_moments._lanes.parallel import _cores, on_threads
+from transientcam_moments._lanes.registry import HEAVY_PIXELS, REGISTRY, Key
 
 
 def moments(m: int, pixels: int = HEAVY_PIXELS) -> NDArray[np.complex64]:
@@ -35,7 +36,7 @@ class Compiler:
         self.go_on = threading.Event()
         self.keys: list[Key] = []
 
-    def __call__(self, key: Key) -> None:
+    def __call__(self, key: Key, helper: Helper | None = None) -> None:
         assert self.go_on.wait(10)
         self.keys.append(key)
 
@@ -139,7 +140,7 @@ def test_where_it_is_not_wanted_nothing_is_compiled(setting: str) -> None:
 
 def test_orders_and_precisions_are_given_by_position(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Key] = []
-    monkeypatch.setattr(tm.kernels, "compile_one", asked.append)
+    monkeypatch.setattr(tm.kernels, "compile_one", lambda key, helper: asked.append(key))
 
     tm.kernels.compile([3, 4], ["float32"])
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from tests.moments import oracles
 from tests.moments.kernel_lanes import FEW, lanes, without_lanes
-from transientcam_moments import _kernels
+from transientcam_moments import _lanes
 from transientcam_moments._kernels import density as density_module
-from transientcam_moments._kernels.parallel import blocks
+from transientcam_moments._lanes.parallel import blocks
 from transientcam_moments.levinson import _levinson
 from transientcam_moments.polishing import residual, size
 
@@ -31,7 +31,7 @@ def compiled() -> Iterator[None]:
 
 
 def lane(name: str, planes: Array) -> Any:
-    found = _kernels.find(name, planes)
+    found = _lanes.find(name, planes)
     assert found is not None
     return found
 

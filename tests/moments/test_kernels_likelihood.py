@@ -9,7 +9,7 @@ import pytest
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import lanes, without_lanes
 from tests.moments.oracles import moments_of_returns
-from transientcam_moments._kernels import find
+from transientcam_moments._lanes import find
 
 M = 3
 

@@ -8,7 +8,7 @@ import pytest
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import lanes, without_lanes
 from tests.moments.oracles import around
-from transientcam_moments._kernels import find
+from transientcam_moments._lanes import find
 
 MULTIPLES = (1, 3, 4)
 STD = 0.01

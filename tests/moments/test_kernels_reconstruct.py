@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import lanes, without_lanes
-from transientcam_moments._kernels.registry import REGISTRY
+from transientcam_moments._lanes.registry import REGISTRY
 from transientcam_moments.four_bucket import harmonics_of
 from transientcam_moments.passed import PassedReconstruction
 
@@ -394,7 +394,7 @@ def test_light_is_complete() -> None:
 @pytest.mark.parametrize("parts", [2, 3])
 def test_threads_within_a_frame_change_nothing(parts: int) -> None:
     settings = settings_of()
-    images = raw_images(settings, shape=(120, 163))
+    images = raw_images(settings, shape=(256, 320))
     reconstructor = tm.Reconstructor(settings, calibration=np.ones(M + 1))
     alone = reconstructor(images)
 

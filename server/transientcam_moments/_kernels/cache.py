@@ -33,8 +33,9 @@ def cache_directory(environ: Mapping[str, str], digest: str) -> Path | None:
 def digest_of_sources() -> str:
     """Return a short digest of every source file of the kernels, and of what they compile."""
     digest = hashlib.sha256()
-    here = Path(__file__).parent
-    for file in sorted([*here.glob("*.py"), *here.parent.glob("likelihood/*.py")]):
+    package = Path(__file__).parents[1]
+    parts = ("_kernels", "_lanes", "likelihood")
+    for file in sorted(file for part in parts for file in (package / part).glob("*.py")):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -18,8 +18,8 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._kernels.parallel import Spread, at_once
-from transientcam_moments._kernels.registry import LEAST_PIXELS
+from transientcam_moments._lanes.parallel import Spread, at_once
+from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 _BANK = 240  # pairs of registers of coefficients, which stay in the first cache for all phases
 _PAST_CACHES_BYTES = 1 << 24

@@ -17,9 +17,9 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.padding import LEAST_WIDTH, normalisation, row_length
-from transientcam_moments._kernels.parallel import Spread, at_once
 from transientcam_moments._kernels.pool import empty
-from transientcam_moments._kernels.registry import LEAST_PIXELS
+from transientcam_moments._lanes.parallel import Spread, at_once
+from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}
 _REAL, _COMPLEX = real_arrays("f"), complex_arrays("f")

@@ -15,7 +15,7 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._kernels.parallel import Spread, at_once
+from transientcam_moments._lanes.parallel import Spread, at_once
 
 MOST_ODD = 31
 """The highest harmonic there is room for: b_0 .. b_31m in (m + 12)^2 registers."""

@@ -16,9 +16,9 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._kernels.parallel import Spread, at_once
 from transientcam_moments._kernels.pool import empty
 from transientcam_moments._kernels.returns import phase_of
+from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments.likelihood import choice, sharp, tail
 from transientcam_moments.likelihood.arithmetic import logarithm
 from transientcam_moments.likelihood.choice import (

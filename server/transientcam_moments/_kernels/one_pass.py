@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from transientcam_moments._kernels.padding import normalisation, row_length
-from transientcam_moments._kernels.parallel import Spread, blocks
 from transientcam_moments._kernels.pool import empty
 from transientcam_moments._kernels.refine import Found
-from transientcam_moments._kernels.registry import LEAST_PIXELS
+from transientcam_moments._lanes.parallel import BLOCK, Spread, blocks
+from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 if TYPE_CHECKING:  # it brings along the compiler
     from transientcam_moments._kernels.wide import WideReturns
@@ -177,8 +177,11 @@ class OnePass:
         if self._estimated:
             smoothed[0] = 0
         planes = self._new_planes(smoothed)
+        found = Found(None, planes.phase_rad, planes.weight, planes.count, scratch.residual)
+        redone: list[int] = []
 
         def analyse(start: int, stop: int) -> None:
+            room = scratch.wide(start)
             for left, right in blocks(start, stop):
                 s.eigenvalue(
                     s.order, smoothed, int(self._estimated), scratch.eigenvalue, left, right
@@ -193,24 +196,21 @@ class OnePass:
                     planes.phase_rad, planes.weight, planes.count, scratch.residual, _EPS,
                     left, right,
                 )  # fmt: skip
-
-        def separate(start: int, stop: int) -> None:
+                # by blocks, so that the same pixels are redone together for any number of parts
+                redone.append(s.wide(smoothed, planes.brightness, found, room, left, right))
             s.separate(
                 s.order, planes.phase_rad, planes.weight, planes.flags, planes.direct,
                 planes.indirect, planes.range_m, settings.threshold, constants.range_per_rad_m,
                 start, stop,
             )  # fmt: skip
 
-        spread(analyse, self._pixels)
-        found = Found(None, planes.phase_rad, planes.weight, planes.count, scratch.residual)
-        redone = s.wide(smoothed, planes.brightness, found, scratch.wide, 0, self._pixels)
-        spread(separate, self._pixels)
+        spread(analyse, self._pixels, BLOCK)
         if constants.bad is not None:
             planes.flags[constants.bad] |= _REPLACED
         if self._estimated:
             smoothed[0] = planes.brightness
         shaped = (a.reshape((*a.shape[:-1], *self._shape)) for a in planes[:-1])
-        return Planes(*shaped)._replace(redone=redone)
+        return Planes(*shaped)._replace(redone=sum(redone))
 
     def _new_planes(self, smoothed: Any) -> Planes:
         """Return room for a result: an array a plane, none of which keeps another from the pool."""
@@ -268,7 +268,8 @@ class _Scratch:
         self.saturated = np.empty(pixels, np.uint8)
         self.eigenvalue = np.empty(pixels, np.float32)
         self.residual = np.empty(pixels, np.float32)
-        self.wide = stages.wide.room(_ROOM)
+        self._stages = stages
+        self._wide: dict[int, Any] = {}
         if taps is not None:
             self.calibrated = np.empty((m + 1, pixels), np.complex64)
             self._row_length = row_length(shape[1], taps.size)
@@ -280,6 +281,13 @@ class _Scratch:
         if row is None:
             row = self._rows[start] = np.zeros(self._row_length, np.float32)
         return row
+
+    def wide(self, start: int) -> Any:
+        """Room for pixels that are redone in double precision, for each part of the image."""
+        room = self._wide.get(start)
+        if room is None:
+            room = self._wide[start] = self._stages.wide.room(_ROOM)
+        return room
 
     def mark_saturated(self, saturated: Any, shape: tuple[int, ...]) -> None:
         """Take the flags of saturated pixels from a boolean array, or from one for all."""

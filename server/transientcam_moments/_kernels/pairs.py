@@ -19,7 +19,7 @@ from transientcam_moments._kernels.compiled_entry import (
     sizes_type,
 )
 from transientcam_moments._kernels.likelihood import fit_one, portable, write
-from transientcam_moments._kernels.parallel import Spread, at_once
+from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments.likelihood import choice, pair_fit, sharp
 from transientcam_moments.likelihood.choice import COUNT, SCORE
 from transientcam_moments.likelihood.pairs import (

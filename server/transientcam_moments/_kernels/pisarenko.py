@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
-from transientcam_moments._kernels.parallel import Spread, at_once, blocks
 from transientcam_moments._kernels.pool import empty
 from transientcam_moments._kernels.refine import Found, redo
 from transientcam_moments._kernels.returns import half_turns, returns_entry
 from transientcam_moments._kernels.wide import WideReturns
+from transientcam_moments._lanes.parallel import Spread, at_once, blocks
 
 _ROOM = 256  # pixels that are redone in double precision at a time
 

@@ -17,8 +17,8 @@ from transientcam_moments._kernels.compiled_entry import (
 )
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.refine import Found, redo
-from transientcam_moments._kernels.registry import LEAST_PIXELS
 from transientcam_moments._kernels.returns import half_turns, returns_entry
+from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 _EPS = float(np.finfo(np.float32).eps)
 

@@ -15,8 +15,8 @@ from transientcam_moments._arrays import (
     moment_planes,
     namespace,
 )
-from transientcam_moments._kernels import accelerated
-from transientcam_moments._kernels.parallel import Spread, on_threads
+from transientcam_moments._lanes import accelerated
+from transientcam_moments._lanes.parallel import Spread, on_threads
 from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.likelihood import choice

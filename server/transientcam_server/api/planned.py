@@ -9,7 +9,7 @@ from fastapi import Request, Response
 
 from transientcam_server.api.documents.document import Document
 from transientcam_server.api.documents.job import JobDocument
-from transientcam_server.api.routes import jobs
+from transientcam_server.api.job_answers import accepted
 from transientcam_server.camera.jobs import Job
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.planning import Progress
@@ -61,7 +61,7 @@ def as_job(service: Service, kind: str, work: Work[_Answer], response: Response)
         made = await _ended(work(Progress(job.report, show=job.show)), ask)
         return made.model_dump(mode="json")
 
-    return jobs.accepted(service.jobs.start(kind, run, in_turn=False), response)
+    return accepted(service.jobs.start(kind, run, in_turn=False), response)
 
 
 def address_of(http: Request) -> str:

@@ -58,7 +58,7 @@ def reconstruct_recording(
 ) -> None:
     """Reconstruct every frame of a recording, continuing an interrupted run."""
     from transientcam_server import offline
-    from transientcam_server.offline.opening import recording_at
+    from transientcam_server.offline.place import recording_at
 
     with recording_at(place, token=token) as opened:
         options = wanted.options(opened.header)
@@ -82,7 +82,7 @@ def reconstruct_on_cluster(
     outputs = _outputs(place, output)
     with cluster_client(workers, dask, console) as client:
         from transientcam_server.offline.cluster import reconstruct_on
-        from transientcam_server.offline.opening import recording_at
+        from transientcam_server.offline.place import recording_at
 
         for each, into in outputs.items():
             with recording_at(each, token=token) as opened:

@@ -30,7 +30,7 @@ from transientcam_server.imaging.encodings.encoding import Encoding
 from transientcam_server.imaging.meta import frame_meta
 from transientcam_server.imaging.products import PRODUCTS, Product
 from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.imaging.stages import STAGES, Computed, compute
+from transientcam_server.imaging.stages import STAGES, Computed, compute, spread_of
 from transientcam_server.imaging.view import EVERYTHING, View
 from transientcam_server.imaging.workers import Workers
 
@@ -81,6 +81,7 @@ class Frame:
         self.past = past
         self._workers = workers
         self._run = workers.run_long if past else workers.run
+        self._spread = tm.kernels.at_once if past else spread_of(raw)
         self._truth = truth
         self._computed = Computed()
         self._accuracy: RangeAccuracy | None = None
@@ -170,7 +171,13 @@ class Frame:
             while self._requested:
                 requested, self._requested = self._requested, set()
                 self._computed, elapsed_s = await self._run(
-                    compute, self._computed, self.recipe, self.raw, self.previous, requested
+                    compute,
+                    self._computed,
+                    self.recipe,
+                    self.raw,
+                    self.previous,
+                    requested,
+                    self._spread,
                 )
                 self._reconstruct_s = (self._reconstruct_s or 0.0) + elapsed_s
                 for stage in requested:

@@ -227,13 +227,20 @@ class Recipe:
         dark, lit = np.asarray(noise.variance).T
         return dark, lit - dark
 
-    def reconstruct(self, raw: RawFrame, previous: RawFrame | None = None) -> tm.Reconstruction:
+    def reconstruct(
+        self,
+        raw: RawFrame,
+        previous: RawFrame | None = None,
+        *,
+        spread: tm.kernels.Spread = tm.kernels.at_once,
+    ) -> tm.Reconstruction:
         """Return the reconstruction of a capture; it computes what is read of it.
 
-        ``previous``, where it has the same sequence, is what spoilt images are filled in from.
+        ``previous``, where it has the same sequence, is what spoilt images are filled in from;
+        ``spread`` is how compiled lanes use several threads.
         """
         before = None if previous is None or previous.epoch != raw.epoch else _in_turn(previous)
-        return self._reconstructor(_in_turn(raw), previous=before)
+        return self._reconstructor(_in_turn(raw), previous=before, spread=spread)
 
     @cached_property
     def _reconstructor(self) -> tm.Reconstructor:

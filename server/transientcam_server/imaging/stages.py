@@ -1,6 +1,7 @@
 """Stages of a reconstruction: what a frame computes of it in one go, and what follows from that."""
 
 import logging
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final
@@ -23,6 +24,8 @@ STAGES: Final[dict[str, tuple[str, ...]]] = {
 }
 """Properties of `tm.Reconstruction` that each stage computes, in the order they build on."""
 _BITS: Final = {str(flag.name).lower(): np.uint8(flag) for flag in tm.Flags if flag}
+LEAST_SPREAD_PIXELS: Final = 1 << 16
+"""Of a frame that one core computes for much longer than its parts take to begin and to end."""
 FIRST: Final = "light"
 """The stage that all others build on."""
 
@@ -55,13 +58,17 @@ def compute(
     raw: RawFrame,
     previous: RawFrame | None,
     stages: Iterable[str],
+    spread: tm.kernels.Spread = tm.kernels.at_once,
 ) -> Computed:
-    """Compute stages of a frame; one that fails leaves the others as they are. Never raises."""
+    """Compute stages of a frame; one that fails leaves the others as they are. Never raises.
+
+    ``spread`` is how compiled lanes use several threads.
+    """
     requested = set(stages)
     computed = Computed(before.reconstruction, {}, before.pixels, before.range_noise)
     try:
         if computed.reconstruction is None:
-            computed.reconstruction = found = recipe.reconstruct(raw, previous)
+            computed.reconstruction = found = recipe.reconstruct(raw, previous, spread=spread)
             _read(found, FIRST)
             _flag_contradictions(recipe, found)
             computed.pixels = pixel_counts(found)
@@ -79,6 +86,12 @@ def compute(
     if recipe.sensor is not None and "returns" in requested and "returns" not in computed.failures:
         computed.range_noise = _range_noise(recipe, found, raw.number)
     return computed
+
+
+def spread_of(raw: RawFrame) -> tm.kernels.Spread:
+    """Return how lanes compute a new frame: on all cores where it is large, else on one."""
+    large = math.prod(raw.images.shape[-2:]) >= LEAST_SPREAD_PIXELS
+    return tm.kernels.over_all_cores() if large else tm.kernels.at_once
 
 
 def _flag_contradictions(recipe: Recipe, found: tm.Reconstruction) -> None:

@@ -26,7 +26,7 @@ from transientcam_server.offline.formats import (
     naming_address,
 )
 from transientcam_server.offline.job import BLOCK_FRAMES, Job, computed, opened, spans
-from transientcam_server.offline.opening import recording_at
+from transientcam_server.offline.place import recording_at
 from transientcam_server.offline.recording import (
     BatchOptions,
     BatchReconstructor,

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from transientcam_server.recording.reader import Recording
+
 
 class ByFrame:
     """An array whose first axis are frames; NumPy's basic indexing reads them one by one.
@@ -54,3 +56,8 @@ class ByFrame:
 
     def __repr__(self) -> str:
         return f"<ByFrame {' x '.join(map(str, self.shape))} {self.dtype}>"
+
+
+def raw_images(recording: Recording) -> ByFrame:
+    """Return all images of a recording (frames, N, H, W), uint16 in DN."""
+    return ByFrame(recording.shape, "<u2", lambda index: recording.frame(index).images)

@@ -1,15 +1,16 @@
 """A recording as an xarray.Dataset that reads and computes what is indexed; needs xarray."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from transientcam_server.errors.exceptions import MissingExtra
 from transientcam_server.imaging.products import Product
+from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.imaging.view import evenly
-from transientcam_server.offline.computing import known_product
-from transientcam_server.offline.images import ByFrame
+from transientcam_server.offline.computing import ComputedFrame, known_product
+from transientcam_server.offline.images import ByFrame, raw_images
 from transientcam_server.recording.columns import attributes_of, columns_of
 from transientcam_server.recording.reader import Recording
 
@@ -19,9 +20,6 @@ try:
     from xarray.core import indexing
 except ModuleNotFoundError as error:
     raise MissingExtra("to_xarray", "xarray", "convert") from error
-
-if TYPE_CHECKING:
-    from transientcam_server.offline.opening import OpenedRecording
 
 
 class _Indexed(BackendArray):
@@ -38,7 +36,7 @@ class _Indexed(BackendArray):
 
 
 def dataset(
-    opened: "OpenedRecording", recording: Recording, products: Sequence[str]
+    recording: Recording, frames: Sequence[ComputedFrame], recipe: Recipe, products: Sequence[str]
 ) -> xarray.Dataset:
     """Return images, labels, series and products of a recording."""
     variables: dict[str, Any] = {
@@ -46,25 +44,27 @@ def dataset(
         for name, column in columns_of(recording).items()
     }
     axes = ("frame", "image", "y", "x")
-    variables["raw"] = _variable(axes, opened.raw, "DN", "raw images")
+    variables["raw"] = _variable(axes, raw_images(recording), "DN", "raw images")
     chosen = [known_product(name) for name in products]
     if any(product.over_time for product in chosen):
-        times = evenly(opened.recipe.base_frequency_hz)
+        times = evenly(recipe.base_frequency_hz)
         variables["time"] = (("time",), np.asarray(times), {"units": "s"})
     for product in chosen:
-        variables[product.name] = _computed(opened, recording, product)
+        variables[product.name] = _computed(recording, frames, recipe, product)
     return xarray.Dataset(variables, attrs=attributes_of(recording))
 
 
-def _computed(opened: "OpenedRecording", recording: Recording, product: Product) -> xarray.Variable:
-    times = len(evenly(opened.recipe.base_frequency_hz)) if product.over_time else 0
-    frames, _, height, width = recording.shape
-    shape = product.shape(opened.recipe.applied, height, width, times=times)
+def _computed(
+    recording: Recording, frames: Sequence[ComputedFrame], recipe: Recipe, product: Product
+) -> xarray.Variable:
+    times = len(evenly(recipe.base_frequency_hz)) if product.over_time else 0
+    count, _, height, width = recording.shape
+    shape = product.shape(recipe.applied, height, width, times=times)
     description = product.description
     array = ByFrame(
-        (frames, *shape),
+        (count, *shape),
         description.dtype,
-        lambda index: opened[index].product(product.name).array,
+        lambda index: frames[index].product(product.name).array,
     )
     return _variable(("frame", *description.axes), array, description.unit, description.summary)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_server.errors.exceptions import MixedVersions
 from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.offline.opening import recording_at
+from transientcam_server.offline.place import recording_at
 from transientcam_server.offline.recording import BatchOptions, BatchReconstructor
 from transientcam_server.recording.reader import Recording
 from transientcam_server.settings import ReconstructionSettings

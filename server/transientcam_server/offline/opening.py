@@ -5,21 +5,20 @@ The arithmetic is the daemon's: the same recipe, stages and products. `transient
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, cast, overload
+from typing import TYPE_CHECKING, Any, overload
 
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from transientcam.notebook import table_html
-from transientcam.opening import remote_recording
 from transientcam_driver import RawFrame
 from transientcam_server.errors.exceptions import InputError
 from transientcam_server.imaging.calibration import nominal_gains
 from transientcam_server.imaging.labelling import image_columns, in_words
 from transientcam_server.imaging.recipe import Recipe, SettingsVersion
 from transientcam_server.offline.computing import ComputedFrame
-from transientcam_server.offline.images import ByFrame
+from transientcam_server.offline.images import ByFrame, raw_images
+from transientcam_server.offline.place import recording_at
 from transientcam_server.recording.reader import Recording
 from transientcam_server.recording.recipe import recorded_recipe
 from transientcam_server.settings import ReconstructionSettings
@@ -70,14 +69,6 @@ def open_recording(
         raise
 
 
-def recording_at(place: str, *, token: str | None = None, timeout_s: float = 10.0) -> Recording:
-    """Open the file at a path, or that of a daemon's recording; parameters as `open_recording`."""
-    if "://" not in place:
-        return Recording(Path(place))
-    source = remote_recording(place, token=token, timeout_s=timeout_s)
-    return Recording(Path(source.url), source=cast("IO[bytes]", source))
-
-
 class OpenedRecording(Sequence[ComputedFrame]):
     """A recording as a sequence of its frames; see `transientcam.Recording`."""
 
@@ -126,7 +117,7 @@ class OpenedRecording(Sequence[ComputedFrame]):
     @property
     def raw(self) -> ByFrame:
         """All images (frames, N, H, W), uint16 in DN; what is indexed is read and checked."""
-        return ByFrame(self._recording.shape, "<u2", lambda index: self._read(index).images)
+        return raw_images(self._recording)
 
     @property
     def annotations(self) -> dict[str, Any]:
@@ -157,7 +148,7 @@ class OpenedRecording(Sequence[ComputedFrame]):
         """
         from transientcam_server.offline.in_xarray import dataset
 
-        return dataset(self, self._recording, products)
+        return dataset(self._recording, self, self.recipe, products)
 
     def reconstruct(self, *products: str, bins: int = 256) -> "xarray.Dataset":
         """Return an xarray.Dataset of these products as Dask arrays, in blocks of 64 frames.

@@ -15,7 +15,7 @@ import transientcam_moments as tm
 from tests.moments.kernel_lanes import without_lanes
 from transientcam import wire
 from transientcam_driver import AppliedSequence, Camera, RawFrame, Sampling, Sequence, open_camera
-from transientcam_moments._kernels.registry import REGISTRY, Key
+from transientcam_moments._lanes.registry import REGISTRY, Key
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging import frame as module
 from transientcam_server.imaging import stages

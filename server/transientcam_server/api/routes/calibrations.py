@@ -26,8 +26,8 @@ from transientcam_server.api.documents.calibration import (
     VerdictDocument,
 )
 from transientcam_server.api.documents.job import JobDocument
+from transientcam_server.api.job_answers import ACCEPTED, accepted
 from transientcam_server.api.problems import documented
-from transientcam_server.api.routes import jobs
 from transientcam_server.camera.calibration_store import StoredCalibration
 from transientcam_server.camera.calibrator import CalibrationOptions, Drift
 from transientcam_server.errors import Problem, kinds
@@ -78,7 +78,7 @@ async def read_calibrations(service: ServiceOf) -> CalibrationsDocument:
     "/calibrations",
     status_code=status.HTTP_202_ACCEPTED,
     summary="Measure a calibration",
-    responses=jobs.ACCEPTED
+    responses=ACCEPTED
     | documented(
         kinds.BAD_REQUEST,
         kinds.INVALID_REQUEST,
@@ -105,7 +105,7 @@ async def measure_calibration(
         raise Problem(kinds.RECORDING_RUNS, detail, recording=running)
     order = CalibrationOptions(**wanted.model_dump())
     job = service.calibrations.measure(order, lambda: service.applied)
-    return jobs.accepted(job, response)
+    return accepted(job, response)
 
 
 @router.get("/calibrations/active", summary="The active calibration")

@@ -1,31 +1,19 @@
 """Jobs: long work that other requests started, and its progress."""
 
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import APIRouter, Path, Query, Request
 
 from transientcam_server.api.auth import Role
 from transientcam_server.api.auth.permissions import TO_CHANGE, needs, require
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.job import JobDocument, JobsDocument
+from transientcam_server.api.job_answers import job_document
 from transientcam_server.api.problems import documented
-from transientcam_server.camera.jobs import Job
 from transientcam_server.errors import kinds
 
 router = APIRouter(tags=["jobs"])
 MAX_WAIT_S: Final = 30.0
-ACCEPTED: Final[dict[int | str, dict[str, Any]]] = {
-    202: {
-        "description": "It has begun, or waits for its turn",
-        "headers": {
-            "Location": {
-                "description": "where its progress is reported",
-                "schema": {"type": "string"},
-            }
-        },
-    }
-}
-"""What the OpenAPI document says of a route that starts a job."""
 _Job = Annotated[
     str,
     Path(description="its id, as the list has it", max_length=200, examples=["5a0c1f6be2d4"]),
@@ -35,7 +23,7 @@ _Job = Annotated[
 @router.get("/jobs", summary="All jobs")
 async def read_jobs(service: ServiceOf) -> JobsDocument:
     """List what runs, what waits and the last ones that have ended, the newest first."""
-    return JobsDocument(jobs=[document(job) for job in service.jobs.all])
+    return JobsDocument(jobs=[job_document(job) for job in service.jobs.all])
 
 
 @router.get(
@@ -53,7 +41,7 @@ async def read_job(
     """Return how far a job is; with `wait_s` not before it has ended, or that long has passed."""
     found = service.jobs.get(job)
     await service.jobs.end_of(found, wait_s=wait_s)
-    return document(found)
+    return job_document(found)
 
 
 @router.post(
@@ -72,15 +60,4 @@ async def cancel_job(service: ServiceOf, job: _Job, request: Request) -> JobDocu
     """
     if service.jobs.get(job).in_turn:
         require(request, service, TO_CHANGE)
-    return document(service.jobs.cancel(job))
-
-
-def document(job: Job) -> JobDocument:
-    """Return where a job stands."""
-    return JobDocument(**job.to_document())
-
-
-def accepted(job: Job, response: Response) -> JobDocument:
-    """Return the answer to a request that started a job."""
-    response.headers["Location"] = f"/api/v1/jobs/{job.id}"
-    return document(job)
+    return job_document(service.jobs.cancel(job))

@@ -12,8 +12,8 @@ from transientcam_server.api.auth.permissions import needs
 from transientcam_server.api.dependencies import ServiceOf
 from transientcam_server.api.documents.job import JobDocument
 from transientcam_server.api.documents.plan import PlanDocument, PlanRequest
+from transientcam_server.api.job_answers import ACCEPTED
 from transientcam_server.api.problems import documented
-from transientcam_server.api.routes import jobs
 from transientcam_server.errors import kinds
 from transientcam_server.planning import Goal, Progress, SceneStatistics, uniform_scene
 from transientcam_server.service import Service
@@ -55,7 +55,7 @@ async def make_plan(service: ServiceOf, request: PlanRequest, http: Request) -> 
     "/plan/jobs",
     status_code=status.HTTP_202_ACCEPTED,
     summary="Make a plan as a job, with progress",
-    responses=jobs.ACCEPTED | documented(*_REFUSALS, kinds.TOO_MANY_JOBS),
+    responses=ACCEPTED | documented(*_REFUSALS, kinds.TOO_MANY_JOBS),
 )
 @needs(Role.VIEWER, lease=False)
 async def start_plan(

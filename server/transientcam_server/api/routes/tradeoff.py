@@ -15,8 +15,8 @@ from transientcam_server.api.documents.plan import (
     TradeoffDocument,
     TradeoffRequest,
 )
+from transientcam_server.api.job_answers import ACCEPTED
 from transientcam_server.api.problems import documented
-from transientcam_server.api.routes import jobs
 from transientcam_server.errors import kinds
 from transientcam_server.planning import Progress
 from transientcam_server.service import Service
@@ -57,7 +57,7 @@ async def read_tradeoff(
     "/tradeoff/jobs",
     status_code=status.HTTP_202_ACCEPTED,
     summary="Compute what accuracy costs as a job, with progress",
-    responses=jobs.ACCEPTED | documented(*_REFUSALS, kinds.BAD_REQUEST, kinds.TOO_MANY_JOBS),
+    responses=ACCEPTED | documented(*_REFUSALS, kinds.BAD_REQUEST, kinds.TOO_MANY_JOBS),
 )
 @needs(Role.VIEWER, lease=False)
 async def start_tradeoff(

@@ -9,7 +9,8 @@ from typing import Protocol
 
 from transientcam_moments.errors import ParameterError
 
-_BLOCK = 1 << 14
+BLOCK = 1 << 14
+"""Pixels that stay in the second cache from one kernel to the next."""
 
 Part = Callable[[int, int], None]
 """Works on the pixels (or rows) from its first argument up to its second."""
@@ -97,6 +98,14 @@ def on_threads(threads: int | None) -> Spread:
     return at_once if threads == 1 else over(_SHARED.get(), threads)
 
 
+def over_all_cores() -> Spread:
+    """Return a way to do an image on all cores, of which this thread has one.
+
+    Also on a thread that `use_one_thread` was called on.
+    """
+    return on_threads(_cores())
+
+
 def start_threads() -> None:
     """Start the threads that all calls share, so that no call waits until they run."""
     on_threads(None)(lambda start, stop: None, 1024 * _cores())
@@ -109,6 +118,6 @@ def _cores() -> int:
 
 
 def blocks(start: int, stop: int) -> Iterator[tuple[int, int]]:
-    """Cut pixels into blocks that stay in the second cache from one kernel to the next."""
-    cuts = [*range(start, max(start + 1, stop - _BLOCK // 2), _BLOCK), stop]
+    """Cut pixels into blocks of `BLOCK`, or half as many more at the end."""
+    cuts = [*range(start, max(start + 1, stop - BLOCK // 2), BLOCK), stop]
     return itertools.pairwise(cuts)

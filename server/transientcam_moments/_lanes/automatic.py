@@ -4,8 +4,9 @@ import logging
 import threading
 from typing import Final
 
-from transientcam_moments._kernels.parallel import start_threads
-from transientcam_moments._kernels.registry import REGISTRY, Key
+from transientcam_moments._lanes.helper import Helper, program
+from transientcam_moments._lanes.parallel import start_threads
+from transientcam_moments._lanes.registry import REGISTRY, Key
 
 THREAD: Final = "transientcam-compile"
 """Name of every thread that compiles."""
@@ -90,26 +91,30 @@ def _work() -> None:
     """Compile what is wanted until nothing is, or the process ends."""
     main = threading.main_thread()
     start_threads()
-    while True:
-        with _WANTED.lock:
-            if not _WANTED.waiting or not main.is_alive():
-                _WANTED.thread = None
-                return
-            _WANTED.waiting.sort(key=_is_long)  # stable: what is ready soon goes first
-            key = _WANTED.waiting.pop(0)
-        compile_one(key)
+    with Helper(program()) as helper:
+        while True:
+            with _WANTED.lock:
+                if not _WANTED.waiting or not main.is_alive():
+                    _WANTED.thread = None
+                    return
+                _WANTED.waiting.sort(key=_is_long)  # stable: what is ready soon goes first
+                key = _WANTED.waiting.pop(0)
+            compile_one(key, helper)
 
 
-def compile_one(key: Key) -> None:
-    """Compile a lane or load it from the cache, unless that was done or failed before."""
+def compile_one(key: Key, helper: Helper | None = None) -> None:
+    """Load a lane from the cache or compile it, unless that was done or failed before.
+
+    It is compiled by ``helper``, where that is given, and by this thread else.
+    """
     with REGISTRY.lock:
         if key in REGISTRY.compiled or key in REGISTRY.failed:
             return
         REGISTRY.compiling = key
         try:
-            from transientcam_moments._kernels.compiler import compile_lane
-
-            REGISTRY.compiled[key] = compile_lane(key)
+            lane = REGISTRY.make(key, helper)
+            if lane is not None:
+                REGISTRY.compiled[key] = lane
         except Exception as error:
             # whatever stops a compiler (a missing one, a full disk, an unknown processor) must
             # stop nothing else: the planar statement goes on serving

@@ -1,9 +1,14 @@
-"""Which lanes this process has: read by every call, written by the thread that compiles."""
+"""Which lanes this process has: read by every call, written by the thread that compiles.
+
+What compiles is set from above: lanes are compiled of functions of modules that look lanes up.
+"""
 
 import os
 import threading
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
+
+from transientcam_moments._lanes.helper import Helper
 
 PRECISIONS = {"f": "f", "F": "f", "d": "d", "D": "d"}  # of an array's type, by its character
 LEAST_PIXELS = 64  # what the widest lane takes at a time
@@ -24,10 +29,19 @@ class Key(NamedTuple):
         return f"{self.name} m={self.harmonics} {precision}"
 
 
+Lane = Callable[..., Any]
+
+
 class Registry:
     """The compiled lanes of a process and how far compiling has come.
 
     Written under ``lock`` by one compiling thread at a time; ``compiled`` is read without it.
+
+    Attributes
+    ----------
+    make
+        Returns the lane of a key: loaded from the cache or compiled, by another process where one
+        is given. None where the program ends meanwhile.
     """
 
     def __init__(self, environ: Mapping[str, str]) -> None:
@@ -39,9 +53,10 @@ class Registry:
         self.enabled = setting not in ("off", "0", "no", "false")
         self.automatic = self.enabled and setting != "manual"
         self.lock = threading.Lock()
-        self.compiled: dict[Key, Callable[..., Any]] = {}
+        self.compiled: dict[Key, Lane] = {}
         self.compiling: Key | None = None
         self.failed: dict[Key, str] = {}
+        self.make: Callable[[Key, Helper | None], Lane | None]
 
 
 # The one place that reads the environment; a process has one set of machine code.
