@@ -30,6 +30,7 @@ import { Replay } from "./replay";
 import { Simulation } from "./simulation";
 import { Status } from "./status";
 import { Details } from "./details";
+import { Trends } from "./trends";
 import { Viewport } from "./viewport";
 import { Theme } from "../ui/theme";
 
@@ -52,6 +53,8 @@ export class Store {
   readonly replay: Replay;
   /** How far the range is off. */
   readonly rangeErrors: RangeErrors;
+  /** How the flow of frames went. */
+  readonly trends: Trends;
   /** What happened. */
   readonly events = new Events();
   readonly shelf: Shelf | null;
@@ -126,6 +129,7 @@ export class Store {
     this.accuracy = new Accuracy(api);
     this.replay = new Replay(api, this.frames, this.status);
     this.rangeErrors = new RangeErrors(this.frames, this.status, this.replay.active);
+    this.trends = new Trends(this.status, this.rangeErrors);
     api.onRefusal = (problem) => {
       this.lease.refused(kindOf(problem));
       if (problem.status === 401) this.asksForToken.value = true;

@@ -39,7 +39,13 @@ export function Help() {
           <dt>
             <kbd>Shift</kbd> + drag, <kbd>R</kbd>
           </dt>
-          <dd>in a picture: measure a region; Escape removes it and the pins</dd>
+          <dd>in a picture: measure a rectangle; Escape removes it and the pins</dd>
+        </div>
+        <div>
+          <dt>
+            <kbd>Ctrl</kbd> + click, <kbd>C</kbd>
+          </dt>
+          <dd>in a picture: set or remove a corner of a polygon, and measure it</dd>
         </div>
         <div>
           <dt>arrows, + −</dt>
