@@ -22,6 +22,7 @@ export function PageMenu() {
           ],
         },
         { title: "Colours", actions: THEMES.map((theme) => ({ text: THEME_NAMES[theme] + (theme === choice.value ? " ✓" : ""), run: () => (choice.value = theme) })) },
+        { title: "Link", actions: [{ text: `Ask for less where it is too thin${store.adapts.value ? " ✓" : ""}`, run: () => (store.adapts.value = !store.adapts.peek()) }] },
         {
           title: "Help",
           actions: [
