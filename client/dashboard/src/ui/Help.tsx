@@ -1,15 +1,19 @@
 import { useStore } from "../store/store";
-import { Dialog } from "./Dialog";
+import { SwitchedDialog } from "./Dialog";
 import { SHORTCUTS } from "./shortcuts";
 
 /** The keys of the page, over the page. */
 export function Help() {
-  const { help } = useStore();
-  const close = (): void => {
-    help.value = false;
-  };
   return (
-    <Dialog open={help.value} title="Keys" onClose={close}>
+    <SwitchedDialog open={useStore().help} title="Keys">
+      {(close) => <KeyList onDone={close} />}
+    </SwitchedDialog>
+  );
+}
+
+function KeyList({ onDone }: { onDone: () => void }) {
+  return (
+    <>
       <dl class="keys">
         {SHORTCUTS.map(({ shown, words }) => (
           <div key={shown}>
@@ -53,10 +57,10 @@ export function Help() {
         </div>
       </dl>
       <div class="dialog-actions">
-        <button type="button" onClick={close}>
+        <button type="button" onClick={onDone}>
           Close
         </button>
       </div>
-    </Dialog>
+    </>
   );
 }
