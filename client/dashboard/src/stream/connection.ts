@@ -184,7 +184,7 @@ export class StreamConnection {
   /** What a message says of the link. */
   #weigh(message: ServerMessage, bytes: number): void {
     if (!this.#adapts) return;
-    if (message.type === "notice" && message.kind === "dropped") this.#judge.dropped(message.channel, message.count);
+    if (message.type === "notice" && message.kind === "dropped") this.#judge.dropped(message.channel, message.unacknowledged ?? message.count);
     if (message.type === "notice" && message.kind === "sequence-changed") this.#askForAll();
     if (message.type !== "frame") return;
     const { product, axes, array, meta } = message;

@@ -1,7 +1,7 @@
 /**
  * How much the page asks for: everything, or less over a link that does not carry it.
  *
- * The service counts the frames that it leaves out for a page that is slower than the camera. Where it leaves out many
+ * The service counts the frames that it leaves out as the page has not acknowledged earlier ones. Where these are many
  * although the page draws what comes at once, the way between is too slow: the page then asks for fewer frames a second,
  * and where that would be too few, for smaller ones. Where none is left out it asks for more again, step by step.
  */
@@ -90,7 +90,7 @@ export class LinkJudge {
     this.#waits_s = null;
   }
 
-  /** The service left out frames of a channel. */
+  /** The service left out frames of a channel, for want of acknowledgements. */
   dropped(channel: number, count: number): void {
     this.#dropped.set(channel, (this.#dropped.get(channel) ?? 0) + count);
   }

@@ -184,6 +184,8 @@ export type Notice =
       readonly channel: number;
       readonly count: number;
       readonly total: number;
+      /** How many of `count` were left out because earlier ones were not acknowledged; a service of before does not say. */
+      readonly unacknowledged?: number;
     }
   | { readonly type: "notice"; readonly kind: "lost-images"; readonly count: number }
   | { readonly type: "notice"; readonly kind: "camera-lost"; readonly reason?: string }

@@ -9,6 +9,6 @@ export function demandWords({ demand: { maxRate_hz, coded, part }, carried_bytes
   const codes = coded ? ["16 bits"] : [];
   return {
     short: ["Thin link: " + rate, ...codes, ...cut].join(", "),
-    long: `The link, or the service, carried ${fixed(carried_bytes_s / 1e6, 2, "MB/s")}, which is less than all frames take. So this page asks for ${[`at most ${rate}`, ...codes.map((each) => `numbers in ${each}`), ...cut.map((each) => `${each} only`)].join(", ")}, and for more again where that arrives in time. The page's menu turns this off.`,
+    long: `The link to the service carried ${fixed(carried_bytes_s / 1e6, 2, "MB/s")}, which is less than all frames take. So this page asks for ${[`at most ${rate}`, ...codes.map((each) => `numbers in ${each}`), ...cut.map((each) => `${each} only`)].join(", ")}, and for more again where that arrives in time. The page's menu turns this off.`,
   };
 }
