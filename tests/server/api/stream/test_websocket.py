@@ -129,7 +129,7 @@ def test_with_credits_the_server_waits_for_the_client_and_then_sends_the_newest(
     skipped = second.meta["frame"] - first.meta["frame"] - 1
     counts = dict(dropped.details)
     # after the acknowledgement one more may be left out before the next is on its way
-    assert 3 <= counts.pop("unacknowledged") <= skipped
+    assert 1 <= counts.pop("unacknowledged") <= skipped
     assert counts == {"channel": first.channel, "count": skipped, "total": skipped}
 
 
