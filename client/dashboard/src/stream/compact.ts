@@ -71,7 +71,7 @@ export interface Cut {
 export function whole(data: Numbers, shape: readonly number[], { region: [x0, y0, columns, rows], decimation }: Cut, width: number, height: number): Numbers {
   const [cutRows, cutColumns] = shape.slice(-2);
   const planes = data.length / (cutRows * cutColumns);
-  const made = data.slice(0, 0).constructor as new (length: number) => Numbers;
+  const made = data.constructor as new (length: number) => Numbers;
   const all = new made(planes * width * height);
   if (all instanceof Float32Array || all instanceof Float64Array) all.fill(NaN);
   for (let plane = 0; plane < planes; plane++) {
