@@ -4,7 +4,7 @@
  * Knows no worker and no page. The socket, the clock, chance and the probe are arguments.
  */
 import { codesFor } from "./compact";
-import { type Decision, EVERYTHING, LinkJudge } from "./demand";
+import { type Decision, EVERYTHING, DemandControl } from "./demand";
 import {
   type CameraDocument,
   decodeMessage,
@@ -71,7 +71,7 @@ export class StreamConnection {
   #attempts = 0;
   #timer: number | null = null;
   #inFlight = new Set<number>();
-  readonly #judge = new LinkJudge();
+  readonly #control = new DemandControl();
   #adapts = true;
   /** The part of the picture in sight: column and row of its first pixel, width and height; null for all of it. */
   #sight: readonly number[] | null = null;
@@ -101,7 +101,7 @@ export class StreamConnection {
   /** Sets which part of the picture is in sight. */
   look(sight: readonly number[] | null): void {
     this.#sight = sight;
-    if (this.#open && this.#judge.demand.part) this.#subscribe();
+    if (this.#open && this.#control.demand.part) this.#subscribe();
   }
 
   /** Shows this token from now on; a service that refused the one before is asked anew. */
@@ -117,7 +117,7 @@ export class StreamConnection {
   /** Frame `frame` and all before it were drawn: the service may send on. */
   acknowledge(frame: number): void {
     for (const number of this.#inFlight) if (number <= frame) this.#inFlight.delete(number);
-    if (this.#inFlight.size === 0) this.#judge.drewAll(this.#around.now_s());
+    if (this.#inFlight.size === 0) this.#control.drewAll(this.#around.now_s());
     if (this.#open) this.#socket?.send(encodeAck(frame));
   }
 
@@ -162,20 +162,20 @@ export class StreamConnection {
   #subscribe(): void {
     const products = this.#products.length === 0 ? LEAST_PRODUCTS : this.#products;
     this.#inFlight.clear(); // the service forgets them too
-    this.#judge.restart();
+    this.#control.restart();
     this.#socket?.send(encodeSubscribe(products.map((product) => this.#subscriptionOf(product)), CREDITS, this.#token));
   }
 
   #subscriptionOf(product: string): Subscription {
-    const { maxRate_hz, coded, part } = this.#judge.demand;
+    const { maxRate_hz, coded, part } = this.#control.demand;
     const encoding = coded ? this.#codes.get(product) : null;
     const cut = !part ? {} : this.#sight === null ? { decimation: 2 } : { region: this.#sight };
     return { product, max_rate_hz: maxRate_hz, ...(encoding == null ? {} : { encoding }), ...cut };
   }
 
   #askForAll(): void {
-    const asked = this.#judge.demand;
-    this.#judge.reset();
+    const asked = this.#control.demand;
+    this.#control.reset();
     if (asked === EVERYTHING) return;
     this.#emit({ type: "demand", demand: EVERYTHING, carried_bytes_s: 0 });
     if (this.#open) this.#subscribe();
@@ -184,12 +184,12 @@ export class StreamConnection {
   /** What a message says of the link. */
   #weigh(message: ServerMessage, bytes: number): void {
     if (!this.#adapts) return;
-    if (message.type === "notice" && message.kind === "dropped") this.#judge.dropped(message.channel, message.unacknowledged ?? message.count);
+    if (message.type === "notice" && message.kind === "dropped") this.#control.dropped(message.channel, message.unacknowledged ?? message.count);
     if (message.type === "notice" && message.kind === "sequence-changed") this.#askForAll();
     if (message.type !== "frame") return;
     const { product, axes, array, meta } = message;
     this.#codes.set(product, codesFor(axes, array.dtype));
-    const decision = this.#judge.arrived(this.#around.now_s(), meta.frame, bytes);
+    const decision = this.#control.arrived(this.#around.now_s(), meta.frame, bytes);
     if (decision === null) return;
     this.#emit({ type: "demand", ...decision });
     this.#subscribe();

@@ -48,8 +48,8 @@ const BETTER = 1.1;
 /** Most windows without loss before more is asked for than the link carried then; twice as many after each time that it was too much. */
 const MOST_PATIENCE = 16;
 
-/** Judges the link by what arrives; times are of any one clock. */
-export class LinkJudge {
+/** Decides what to ask for by what arrives; times are of any one clock. */
+export class DemandControl {
   #demand = EVERYTHING;
   /** Frames that the camera takes a second, measured while all were asked for. */
   #camera_hz = 0;
@@ -115,7 +115,7 @@ export class LinkJudge {
     const span_s = now_s - this.#began_s;
     if (span_s < WINDOW_S) return null;
     const carried_bytes_s = this.#bytes / span_s;
-    const changed = this.#judge(span_s, carried_bytes_s);
+    const changed = this.#decide(span_s, carried_bytes_s);
     this.#begin(now_s);
     return changed ? { demand: this.#demand, carried_bytes_s } : null;
   }
@@ -129,7 +129,7 @@ export class LinkJudge {
   }
 
   /** Whether what is asked for changed. */
-  #judge(span_s: number, carried_bytes_s: number): boolean {
+  #decide(span_s: number, carried_bytes_s: number): boolean {
     const lost = Math.max(0, ...this.#dropped.values());
     const all = this.#demand.maxRate_hz === null;
     if (all) this.#camera_hz = (this.#frames + lost) / span_s;

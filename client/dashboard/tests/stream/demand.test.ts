@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import { type Demand, EVERYTHING, LinkJudge } from "../../src/stream/demand";
+import { type Demand, EVERYTHING, DemandControl } from "../../src/stream/demand";
 
 interface Way {
   readonly camera_hz: number;
@@ -16,7 +16,7 @@ interface Way {
  * draws what arrives. Times pass as the frames say.
  */
 class Stream {
-  readonly judge = new LinkJudge();
+  readonly control = new DemandControl();
   now_s = 0;
   #free_s = 0;
   #due_s = 0;
@@ -35,22 +35,22 @@ class Stream {
       }
       if (!waits || this.now_s < this.#free_s) continue;
       waits = false;
-      const { coded, part } = this.judge.demand;
+      const { coded, part } = this.control.demand;
       const bytes = (frame_bytes * (coded ? 0.58 : 1)) / (part ? 4 : 1);
       const arrives_s = this.now_s + bytes / link_bytes_s;
       this.#free_s = Math.max(arrives_s, this.now_s + draw_s);
-      if (lost > 0) this.judge.dropped(0, lost);
+      if (lost > 0) this.control.dropped(0, lost);
       lost = 0;
-      const decision = this.judge.arrived(arrives_s, this.#frame, bytes);
-      this.judge.drewAll(arrives_s + draw_s);
-      if (decision !== null) this.judge.restart();
+      const decision = this.control.arrived(arrives_s, this.#frame, bytes);
+      this.control.drewAll(arrives_s + draw_s);
+      if (decision !== null) this.control.restart();
     }
-    return this.judge.demand;
+    return this.control.demand;
   }
 
   /** As the service limits rates: by schedule, a little early too, anew after a pause. */
   #isDue(camera_hz: number): boolean {
-    const { maxRate_hz } = this.judge.demand;
+    const { maxRate_hz } = this.control.demand;
     if (maxRate_hz === null) return true;
     const period_s = 1 / maxRate_hz;
     if (this.now_s < this.#due_s - 0.1 / camera_hz) return false;
@@ -87,7 +87,7 @@ describe("what is asked for", () => {
 
   test("is tried to be more ever more seldom over a link that stays thin", () => {
     const stream = new Stream();
-    let [changes, before] = [[] as number[], stream.judge.demand];
+    let [changes, before] = [[] as number[], stream.control.demand];
     while (stream.now_s < 400) {
       const now = stream.runs(1, { ...CAMERA, link_bytes_s: 7e6 });
       if (now !== before) changes = [...changes, stream.now_s];
@@ -105,7 +105,7 @@ describe("what is asked for", () => {
   test("is everything of another sequence", () => {
     const stream = new Stream();
     stream.runs(40, { ...CAMERA, link_bytes_s: 1e6 });
-    stream.judge.reset();
-    expect(stream.judge.demand).toEqual(EVERYTHING);
+    stream.control.reset();
+    expect(stream.control.demand).toEqual(EVERYTHING);
   });
 });
