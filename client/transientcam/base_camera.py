@@ -251,15 +251,17 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         self,
         scene: str | None = None,
         *,
+        definition: str | None = None,
         effects: Mapping[str, str] | None = None,
         diffusor: bool | None = None,
     ) -> _Document:
-        """Put a simulated camera before a built-in scene; capturing goes on meanwhile.
+        """Put a simulated camera before another scene; capturing goes on meanwhile.
 
+        ``scene`` names a built-in scene; ``definition`` is in its place the text of a scene file.
         ``effects`` replaces all earlier choices: "auto", "on" or "off" by name. ``diffusor`` puts
         filter and diffusor before the lens, to measure a calibration, or takes them away.
         """
-        return self._ask(changes.set_simulation(scene, effects, diffusor))
+        return self._ask(changes.set_simulation(scene, definition, effects, diffusor))
 
     def cause(self, fault: str) -> _Document:
         """Inject a fault into the simulation: unplug, replug, corrupt-image or drop-image."""

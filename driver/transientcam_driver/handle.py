@@ -138,6 +138,11 @@ class Simulation(Protocol):
         ...
 
     @property
+    def definition(self) -> str | None:
+        """Text of the scene's file where `change` was given it; None for one with a name."""
+        ...
+
+    @property
     def field_of_view_deg(self) -> float | None:
         """Horizontal, of the scene's camera; None where the scene has no camera."""
         ...
@@ -156,6 +161,7 @@ class Simulation(Protocol):
         self,
         *,
         scene: str | None = None,
+        definition: str | None = None,
         effects: Mapping[str, str] | None = None,
         diffusor: bool | None = None,
     ) -> None:
@@ -170,6 +176,9 @@ class Simulation(Protocol):
         scene
             Name of a built-in scene, a path to a scene's .toml, or the scene it was built with;
             the present one by default.
+        definition
+            In its place the text of a scene file, which may name no other file and cost no more
+            than `transientcam_driver.simulation.scene.limits` states.
         effects
             "auto", "on" or "off" by an effect's name, in place of all earlier choices; by default
             these stay.

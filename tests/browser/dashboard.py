@@ -114,6 +114,20 @@ def point_at(page: Page, picture: str, x: int, y: int, *, click: bool = False) -
         page.mouse.click(*at)
 
 
+def drop(page: Page, name: str, content: str | bytes) -> None:
+    """Hold a file over the page and drop it there."""
+    body = content.encode() if isinstance(content, str) else content
+    carried = page.evaluate_handle(
+        """([name, text]) => { const carried = new DataTransfer();
+             carried.items.add(new File([Uint8Array.from(atob(text), (each) =>
+               each.charCodeAt(0))], name)); return carried; }""",
+        [name, base64.b64encode(body).decode()],
+    )
+    page.dispatch_event("body", "dragover", {"dataTransfer": carried})
+    page.locator(".file-drop").wait_for()
+    page.dispatch_event("body", "drop", {"dataTransfer": carried})
+
+
 def text(page: Page, panel: str, name: str) -> str:
     """A figure of a view, without the thin spaces before its unit and between thousands."""
     shown = page.locator(f"{panel} [data-field={name}]").first.text_content()

@@ -171,11 +171,8 @@ def test_pins_and_regions_measure_what_the_daemon_serves(page: Page, served: Ser
     assert text(page, ".panel-map", "region-mean") == f"{np.nanmean(inside):.3f} m"
     assert text(page, ".panel-map", "region-std") == f"{np.nanstd(inside, ddof=1):.3f} m"
     assert text(page, ".panel-map", "region-filled") == f"{100 * np.isfinite(inside).mean():.0f} %"
-    residual_m, tilt_deg = plane_of(ranges, lens, (50, 40), (69, 54))
-    figure, unit = text(page, ".panel-map", "plane-residual").split()
-    shown_m = float(figure) * {"m": 1, "mm": 1e-3, "µm": 1e-6}[unit]
-    assert shown_m == pytest.approx(residual_m, rel=0.06)  # two digits
-    assert text(page, ".panel-map", "plane-tilt") == f"{tilt_deg:.1f} °"
+    y, x = np.mgrid[: ranges.shape[0], : ranges.shape[1]]
+    plane_is_shown(page, ranges, lens, (x >= 50) & (x <= 69) & (y >= 40) & (y <= 54))
     # the map along the line between the pins, and all of them in one frame of the last seconds
     choose(page, "sequence", "Values")
     series = page.locator(".plots-place")
@@ -192,23 +189,42 @@ def test_pins_and_regions_measure_what_the_daemon_serves(page: Page, served: Ser
     along = ranges[np.floor(40 + 30 * steps + 0.5).astype(int), 30 + np.arange(91)]
     np.testing.assert_allclose(line[:, 0], steps * np.hypot(90, 30), rtol=1e-6)
     np.testing.assert_allclose(line[:, 1], along, rtol=1e-6)
+    # clicks with Ctrl set corners of a polygon: a triangle, y >= 20, x - y >= 10, x + y <= 110
+    for corner in ((30, 20), (90, 20), (60, 50)):
+        page.keyboard.down("Control")
+        point_at(page, "transient", *corner, click=True)
+        page.keyboard.up("Control")
+    triangle = (y >= 20) & (x - y >= 10) & (x + y <= 110)
+    values = ranges[triangle]
+    expect(page.locator("[data-field=region-count]")).to_have_text(str(np.isfinite(values).sum()))
+    assert text(page, ".panel-map", "region-mean") == f"{np.nanmean(values):.3f} m"
+    assert text(page, ".panel-map", "region-std") == f"{np.nanstd(values, ddof=1):.3f} m"
+    plane_is_shown(page, ranges, lens, triangle)
+    expect(page.locator(".panel-map .mark-corner")).to_have_count(3)
     page.get_by_role("button", name="Remove region").click()
     page.get_by_role("button", name="Remove pins").click()
-    expect(page.locator(".mark-region, .mark-pin")).to_have_count(0)
+    expect(page.locator(".mark-region, .mark-polygon, .mark-pin")).to_have_count(0)
+
+
+def plane_is_shown(
+    page: Page, ranges: NDArray[np.float64], lens: dict[str, float], inside: NDArray[np.bool_]
+) -> None:
+    """Compare the plane that is shown with that of the pixels inside."""
+    residual_m, tilt_deg = plane_of(ranges, lens, inside)
+    figure, unit = text(page, ".panel-map", "plane-residual").split()
+    shown_m = float(figure) * {"m": 1, "mm": 1e-3, "µm": 1e-6}[unit]
+    assert shown_m == pytest.approx(residual_m, rel=0.06)  # two digits
+    assert text(page, ".panel-map", "plane-tilt") == f"{tilt_deg:.1f} °"
 
 
 def plane_of(
-    ranges: NDArray[np.float64],
-    lens: dict[str, float],
-    first: tuple[int, int],
-    last: tuple[int, int],
+    ranges: NDArray[np.float64], lens: dict[str, float], inside: NDArray[np.bool_]
 ) -> tuple[float, float]:
     """Deviation from the nearest plane in m and its tilt in degrees, by singular values."""
-    y, x = np.mgrid[first[1] : last[1] + 1, first[0] : last[0] + 1]
+    y, x = np.nonzero(inside & np.isfinite(ranges))
     across, down = (x - lens["cx"]) / lens["fx"], (y - lens["cy"]) / lens["fy"]
     rays = np.stack([across, down, np.ones(x.shape)], axis=-1)
-    points = ranges[y, x][..., None] * rays / np.linalg.norm(rays, axis=-1, keepdims=True)
-    found = points[np.isfinite(ranges[y, x])]
+    found = ranges[y, x, None] * rays / np.linalg.norm(rays, axis=-1, keepdims=True)
     _, singular, axes = np.linalg.svd(found - found.mean(axis=0), full_matrices=False)
     tilt = np.degrees(np.arccos(abs(axes[2, 2])))
     return float(singular[2] / np.sqrt(len(found) - 3)), float(tilt)

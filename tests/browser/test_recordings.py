@@ -14,6 +14,7 @@ from tests.browser.dashboard import (
     LIVE,
     choose,
     choose_from,
+    drop,
     map_canvas,
     map_colours,
     map_pixels,
@@ -116,6 +117,11 @@ def test_a_recording_is_annotated_downloaded_and_deleted(
         row.get_by_role("button", name="Download corner").click()
     assert download.value.suggested_filename == f"{recording}.h5"
     assert Path(download.value.path()).read_bytes() == httpx.get(f"{url}/file").content
+    # the file that was downloaded, dropped on the page, is found among the recordings
+    drop(page, f"{recording} (1).h5", b"")
+    expect(page.locator("[data-field=state]")).to_have_text("Replay")
+    drop(page, "other.h5", b"")
+    expect(page.locator(".toast", has_text="no recording like other.h5")).to_be_visible()
     choose_from(row, "More of corner", "Delete…")
     confirm = page.get_by_role("dialog", name="Delete this recording?")
     confirm.get_by_role("button", name="Keep").click()

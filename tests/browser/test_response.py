@@ -48,10 +48,10 @@ def curves(page: Page, aspect: str) -> dict[str, NDArray[np.float64]]:
     return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
 
 
-def moments_of(served: Served) -> NDArray[np.complex64]:
+def moments_of(served: Served, pixel: tuple[int, int] = PIXEL) -> NDArray[np.complex64]:
     answer = httpx.get(f"{served.url}/api/v1/frames/latest/moments.npy").raise_for_status()
     moments: NDArray[np.complex64] = np.load(io.BytesIO(answer.content))
-    return moments[:, PIXEL[1], PIXEL[0], np.newaxis]
+    return moments[:, pixel[1], pixel[0], np.newaxis]
 
 
 def test_the_curves_are_those_of_the_moments_package(page: Page, served: Served) -> None:
@@ -76,6 +76,44 @@ def test_the_curves_are_those_of_the_moments_package(page: Page, served: Served)
         expected = moments[j] / moments[0].real
         assert float(str(point.get_attribute("cx"))) == pytest.approx(expected.real, abs=1e-3)
         assert -float(str(point.get_attribute("cy"))) == pytest.approx(expected.imag, abs=1e-3)
+
+
+def test_pinned_pixels_are_drawn_beside_the_selected_one(page: Page, served: Served) -> None:
+    select(page, served)
+    page.get_by_role("tab", name="Cumulative").click()
+    page.locator(".response-plot[data-aspect=cumulative] canvas").wait_for()
+    pins = {"A": (30, 40), "B": (135, 60)}
+    colours = {"A": (0xE6, 0x9F, 0x00), "B": (0x56, 0xB4, 0xE9)}
+    assert not any(drawn_in(page, colour) for colour in colours.values())
+    for x, y in pins.values():
+        page.keyboard.down("Shift")
+        point_at(page, "map", x, y, click=True)
+        page.keyboard.up("Shift")
+    expect(page.locator(".key .key-pin")).to_have_text(["A", "B"])
+    drawn = curves(page, "Cumulative")
+    phase_rad = 2 * np.pi * F_HZ * drawn["time_ns"] * 1e-9
+    for name, pixel in pins.items():
+        moments = moments_of(served, pixel)
+        expected = np.asarray(tm.cumulative(tm.levinson(moments), phase_rad))[:, 0]
+        shown = drawn[f"pin_{name.lower()}_cumulative_dn"]
+        np.testing.assert_allclose(shown, expected, atol=2e-3 * float(moments[0, 0].real))
+        assert drawn_in(page, colours[name])
+
+
+def drawn_in(page: Page, colour: tuple[int, int, int]) -> bool:
+    """Whether the plot has ink of a colour, once it is drawn."""
+    found: bool = page.locator(".response-plot canvas").evaluate(
+        """(canvas, [red, green, blue]) => new Promise((done) => requestAnimationFrame(() => {
+             const { data } = canvas.getContext('2d')
+               .getImageData(0, 0, canvas.width, canvas.height);
+             const like = (at) => data[at] === red && data[at + 1] === green
+               && data[at + 2] === blue && data[at + 3] === 255;
+             let count = 0;
+             for (let at = 0; at < data.length; at += 4) count += like(at);
+             done(count > 0); }))""",
+        list(colour),
+    )
+    return found
 
 
 def bounds_are_drawn(page: Page, served: Served) -> None:

@@ -1,5 +1,6 @@
 """The simulated scene, its effects and its faults, from the page."""
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -8,8 +9,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, Route, expect
 
-from tests.browser.conftest import put
-from tests.browser.dashboard import LIVE, choose, map_pixels, open_page
+from tests.browser.conftest import Watch, put
+from tests.browser.dashboard import LIVE, choose, drop, map_pixels, open_page, point_at
 from tests.serving import Served
 
 PATIENCE_MS = 60_000
@@ -98,3 +99,33 @@ def test_the_cable_is_pulled_and_an_image_lost(page: Page, served: Served) -> No
     page.wait_for_function(
         "(before) => transientcam.store.status.lostImages.peek() > before", arg=before
     )
+
+
+# a wall of half the albedo and another distance than the built-in ones
+OWN = """
+name = "a wall of my own"
+[light]
+position_m = [0, 0, 0]
+aim_at_m = [0, 1, 0]
+electrons_per_s = 1e8
+[[surface]]
+kind = "diffuse"
+centre_m = [0, 1.25, 0]
+normal = [0, -1, 0]
+size_m = [4, 4]
+albedo = 0.5
+"""
+
+
+def test_a_scene_is_opened_by_dropping_its_file(page: Page, served: Served, watch: Watch) -> None:
+    watch.refusals_expected = True
+    open_page(page)
+    drop(page, "own.toml", OWN.replace("0.5", "5"))
+    expect(page.locator(".toast", has_text="surface[0].albedo = 5")).to_be_visible()
+    assert simulated(served)["scene"] == "wall"
+    drop(page, "own.toml", OWN)
+    expect(page.locator("[data-field=subject]")).to_have_text("simulated a wall of my own")
+    expect(page.locator(".file-drop")).to_have_count(0)
+    point_at(page, "map", 81, 60)
+    expect(page.locator(".panel-map [data-field=value]")).to_have_text(re.compile(r"^1\.2\d"))
+    assert simulated(served)["scene"] == "a wall of my own"

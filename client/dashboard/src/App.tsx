@@ -6,6 +6,7 @@ import { Help } from "./ui/Help";
 import { Palette } from "./views/palette/Palette";
 import { shortcuts } from "./ui/shortcuts";
 import { ReplayBar } from "./views/replay/ReplayBar";
+import { FileDrop } from "./views/files/FileDrop";
 import { Banner } from "./views/status/Banner";
 import { ControlDialog } from "./views/status/ControlDialog";
 import { LayoutDialog } from "./views/status/LayoutDialog";
@@ -35,6 +36,7 @@ export function App({ onRetry }: { onRetry: () => void }) {
       <LayoutDialog />
       <ControlDialog />
       <TokenDialog />
+      <FileDrop />
     </>
   );
 }

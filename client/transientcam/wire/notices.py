@@ -33,7 +33,13 @@ NOTICES: Final[dict[str, NoticeKind]] = {
         NoticeKind(
             "dropped",
             "this client was too slow for frames of a channel",
-            {"channel": "integer", "count": "integer", "total": "integer"},
+            {
+                "channel": "integer",
+                "count": "integer",
+                "total": "integer",
+                "unacknowledged": "integer",
+            },
+            optional=("unacknowledged",),
         ),
         NoticeKind(
             "gap",

@@ -173,8 +173,13 @@ def world_before(
         choices = found.effects | quiet | checked_effects(effects)
         return replace(found, sensor=scene.sensor, device=scene.device, effects=choices)
 
-    def prepare(name: str, effects: Mapping[str, str], diffusor: bool) -> tuple[Scene, World]:
-        found = seen(scene if name == scene.name else find_scene(name), effects)
+    def named(name: str) -> Scene:
+        return scene if name == scene.name else find_scene(name)
+
+    def prepare(
+        wanted: Scene | str, effects: Mapping[str, str], diffusor: bool
+    ) -> tuple[Scene, World]:
+        found = seen(named(wanted) if isinstance(wanted, str) else wanted, effects)
         behind = seen(find_scene(CALIBRATION), effects) if diffusor else found
         return found, world_of_scene(behind)
 

@@ -9,13 +9,13 @@ from transientcam_driver.handle import Explanation, Truth
 from transientcam_driver.sensor import Sensor
 from transientcam_driver.sequence import Sequence
 from transientcam_driver.simulation.device import Fault
-from transientcam_driver.simulation.scene import Scene
+from transientcam_driver.simulation.scene import Scene, parse_scene
 from transientcam_driver.simulation.switchable_world import SwitchableWorld
 from transientcam_driver.simulation.world import World
 
-PrepareScene = Callable[[str, Mapping[str, str], bool], tuple[Scene, World]]
-"""Prepares a scene by its name, with choices of effects, and with or without a diffusor before the
-lens."""
+PrepareScene = Callable[[Scene | str, Mapping[str, str], bool], tuple[Scene, World]]
+"""Prepares a scene, given or by its name, with choices of effects, and with or without a diffusor
+before the lens."""
 
 
 class FaultyDevice(Protocol):
@@ -63,6 +63,8 @@ class SimulationHandle:
         prepare: PrepareScene,
         set_interlock: Callable[[bool], None] | None = None,
     ) -> None:
+        self._chosen: Scene | str = scene  # without choices of effects
+        self._definition: str | None = None
         self._scene = scene
         self._world = world
         self._device = device
@@ -76,6 +78,11 @@ class SimulationHandle:
     def scene(self) -> str:
         """Name of the scene."""
         return self._scene.name
+
+    @property
+    def definition(self) -> str | None:
+        """Text of the scene's file, where `change` was given it."""
+        return self._definition
 
     @property
     def field_of_view_deg(self) -> float | None:
@@ -96,18 +103,25 @@ class SimulationHandle:
         self,
         *,
         scene: str | None = None,
+        definition: str | None = None,
         effects: Mapping[str, str] | None = None,
         diffusor: bool | None = None,
     ) -> None:
         """Prepare another scene, other effects or the diffusor, and switch to it."""
         with self._changing:
+            wanted: Scene | str = self._chosen
+            if definition is not None:
+                wanted = parse_scene(definition)
+            elif scene is not None and scene != self.scene:
+                wanted = scene
+            else:
+                definition = self._definition
             chosen = self.effects if effects is None else dict(effects)
             before_lens = self._diffusor if diffusor is None else diffusor
-            found, world = self._prepare(
-                self.scene if scene is None else scene, chosen, before_lens
-            )
+            found, world = self._prepare(wanted, chosen, before_lens)
             self._world.change(world)
-            self._scene, self._effects, self._diffusor = found, chosen, before_lens
+            self._chosen, self._definition, self._scene = wanted, definition, found
+            self._effects, self._diffusor = chosen, before_lens
 
     def truth(self, *, device_time_s: float | None = None) -> Truth:
         """Ground truth of the last image, or at a time."""

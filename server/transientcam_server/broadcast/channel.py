@@ -31,6 +31,7 @@ class Channel:
     crop: Crop = WHOLE
     next_due_s: float = float("-inf")
     dropped: int = 0
+    dropped_unacknowledged: int = 0
     dropped_total: int = 0
 
     def describe(self, capabilities: Capabilities, applied: AppliedSequence) -> wire.Channel:

@@ -120,6 +120,7 @@ class Outbox:
             self._waiting.remove(oldest)
             for channel in oldest.channels:
                 channel.dropped += 1
+                channel.dropped_unacknowledged += not self._has_credit
         self._waiting.append(Delivery(frame, due))
         self._changed.set()
         return len(dropped)
@@ -139,8 +140,12 @@ class Outbox:
             await self._changed.wait()
         return item
 
+    @property
+    def _has_credit(self) -> bool:
+        return self._credits is None or len(self._unacknowledged) < self._credits
+
     def _take(self) -> Item | None:
-        may_send = self._credits is None or len(self._unacknowledged) < self._credits
+        may_send = self._has_credit
         for item in self._waiting:
             if not isinstance(item, Delivery):
                 self._waiting.remove(item)

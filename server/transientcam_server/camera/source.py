@@ -55,13 +55,14 @@ class Twin:
         What the first one was opened with.
     age_s
         Device time of the first one.
-    scene, effects, diffusor
+    scene, definition, effects, diffusor
         What it simulates at present.
     """
 
     spec: str
     age_s: float
     scene: str
+    definition: str | None
     effects: dict[str, str]
     diffusor: bool
 
@@ -78,12 +79,18 @@ class Twin:
         clock.sleep(self.age_s)
         there = camera.simulation
         assert there is not None  # noqa: S101 - of the same spec
-        if (there.scene, there.effects, there.diffusor) != (
+        if (there.scene, there.definition, there.effects, there.diffusor) != (
             self.scene,
+            self.definition,
             self.effects,
             self.diffusor,
         ):
-            there.change(scene=self.scene, effects=self.effects, diffusor=self.diffusor)
+            there.change(
+                scene=self.scene,
+                definition=self.definition,
+                effects=self.effects,
+                diffusor=self.diffusor,
+            )
         return camera
 
 
@@ -94,4 +101,4 @@ def twin_of(camera: Camera, spec: str) -> Twin:
     age_s = 0.0
     with contextlib.suppress(CameraError):  # an unplugged one is as new as the twin
         age_s = camera.status().device_time_s
-    return Twin(spec, age_s, own.scene, own.effects, own.diffusor)
+    return Twin(spec, age_s, own.scene, own.definition, own.effects, own.diffusor)

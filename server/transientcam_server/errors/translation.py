@@ -13,6 +13,7 @@ from transientcam_driver import (
     CameraNotFound,
     DriverError,
     EffectError,
+    SceneError,
     SequenceError,
 )
 from transientcam_moments import ParameterError
@@ -21,6 +22,7 @@ from transientcam_server.errors.exceptions import OriginRefused, Problem
 
 _SHOWN_CHARACTERS = 200
 _SHOWN_LEVELS = 8
+_SHOWN_BITS = 128
 _OF_ANY_PROBLEM = frozenset(("type", "title", "status", "detail", "instance", "request_id"))
 
 
@@ -92,6 +94,16 @@ def problem_of(error: Exception) -> Problem:
                 value=error.value,
                 limit=error.limit,
             )
+        case SceneError():
+            return Problem(
+                kinds.INVALID_REQUEST,
+                # its value may be as long as the file
+                f"{error.file}: {error.key} = {shortened(repr(plain(error.value)))}: "
+                f"must be {error.allowed}",
+                field=error.key,
+                value=error.value,
+                limit=error.allowed,
+            )
         case CameraError() | DriverError():
             return Problem(kinds.CAMERA_FAILED, str(error))
         case ProtocolError():
@@ -116,8 +128,11 @@ def _of_origin(error: OriginRefused) -> Problem:
 def plain(value: object, *, levels: int = _SHOWN_LEVELS) -> object:
     """Return a value as JSON can carry it: no NaN, nothing long or deep, no foreign type."""
     match value:
-        case None | bool() | int():
+        case None | bool():
             return value
+        case int():
+            bits = value.bit_length()  # of very many no text is made
+            return value if bits <= _SHOWN_BITS else f"an integer of {bits} bits"
         case float():
             return value if math.isfinite(value) else str(value)
         case str():

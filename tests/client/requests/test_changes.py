@@ -22,6 +22,9 @@ def test_an_unknown_field_of_a_sequence_is_left_to_the_server_to_refuse() -> Non
 
 
 def test_parts_of_the_simulation_that_are_none_are_left_out() -> None:
-    assert changes.set_simulation("corner", None).body == b'{"scene": "corner"}'
-    assert changes.set_simulation(None, None, False).body == b'{"diffusor": false}'
-    assert changes.set_simulation(None, {"blur": "on"}).body == b'{"effects": {"blur": "on"}}'
+    assert changes.set_simulation("corner", None, None, None).body == b'{"scene": "corner"}'
+    assert changes.set_simulation(None, None, None, False).body == b'{"diffusor": false}'
+    assert (
+        changes.set_simulation(None, None, {"blur": "on"}, None).body
+        == b'{"effects": {"blur": "on"}}'
+    )

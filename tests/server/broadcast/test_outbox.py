@@ -26,6 +26,7 @@ def test_the_newest_frames_wait_and_the_dropped_ones_are_counted() -> None:
 
         assert numbers(waiting(outbox)) == [4, 5]
         assert outbox.channels[0].dropped == 3
+        assert outbox.channels[0].dropped_unacknowledged == 0
 
     run(test)
 
@@ -56,6 +57,19 @@ def test_with_credits_only_so_many_frames_are_under_way_and_then_the_newest_foll
 
         assert numbers(waiting(outbox)) == [5]
         assert outbox.channels[0].dropped == 2
+        assert outbox.channels[0].dropped_unacknowledged == 2
+
+    run(test)
+
+
+def test_what_is_dropped_while_there_is_credit_is_not_for_want_of_acknowledgements() -> None:
+    def test() -> None:
+        outbox = subscribed(credit=2)
+        for number in (1, 2, 3):  # nothing is sent meanwhile, as while a frame is encoded
+            outbox.put_frame(fake_frame(number))
+
+        assert outbox.channels[0].dropped == 2
+        assert outbox.channels[0].dropped_unacknowledged == 0
 
     run(test)
 

@@ -62,20 +62,32 @@ export function peaks(c: Coefficients, pixel: number): Peak[] {
 /** Samples around a peak stand a quarter of its half width from it at first, then ever further by this factor. */
 const SPREAD = 1.5;
 
-/** Samples the density at `count` even times and more closely around `around`, its peaks. */
-export function impulseResponse(c: Coefficients, pixel: number, count: number, around: readonly Peak[]): ImpulseResponse {
+/** A pixel and the peaks of it that are sampled more closely. */
+export interface Peaked {
+  readonly pixel: number;
+  readonly peaks: readonly Peak[];
+}
+
+/** `count` even phases over one turn, rising, and more around each pixel's peaks. */
+export function phasesAround(c: Coefficients, count: number, around: readonly Peaked[]): Float64Array {
   const phases = Array.from({ length: count }, (_, n) => (TURN * n) / (count - 1));
-  for (const peak of around) {
-    phases.push(peak.phase_rad);
-    // A tail falls with the square of the distance: it takes steps in proportion until the even ones are as fine.
-    for (let distance = 0.25 * halfWidth(c, pixel, peak); distance < TURN / count; distance *= SPREAD) {
-      phases.push(peak.phase_rad - distance, peak.phase_rad + distance);
+  for (const { pixel, peaks: found } of around) {
+    for (const peak of found) {
+      phases.push(peak.phase_rad);
+      // A tail falls with the square of the distance: it takes steps in proportion until the even ones are as fine.
+      for (let distance = 0.25 * halfWidth(c, pixel, peak); distance < TURN / count; distance *= SPREAD) {
+        phases.push(peak.phase_rad - distance, peak.phase_rad + distance);
+      }
     }
   }
-  const sorted = Float64Array.from(phases.filter((phase_rad) => phase_rad >= 0 && phase_rad <= TURN)).sort();
+  return Float64Array.from(phases.filter((phase_rad) => phase_rad >= 0 && phase_rad <= TURN)).sort();
+}
+
+/** Samples the density at some phases. */
+export function impulseResponse(c: Coefficients, pixel: number, phases_rad: Float64Array): ImpulseResponse {
   return {
-    time_s: sorted.map((phase_rad) => phase_rad / TURN / c.baseFrequency_hz),
-    density: sorted.map((phase_rad) => densityAt(c, pixel, phase_rad)),
+    time_s: phases_rad.map((phase_rad) => phase_rad / TURN / c.baseFrequency_hz),
+    density: phases_rad.map((phase_rad) => densityAt(c, pixel, phase_rad)),
   };
 }
 

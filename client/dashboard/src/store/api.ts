@@ -250,7 +250,7 @@ export class Api {
   }
 
   /** Answered once the scene is prepared. */
-  setSimulation(wanted: { scene?: string; diffusor?: boolean; effects?: Readonly<Record<string, EffectChoice>> }): Promise<SimulationDocument> {
+  setSimulation(wanted: { scene?: string; definition?: string; diffusor?: boolean; effects?: Readonly<Record<string, EffectChoice>> }): Promise<SimulationDocument> {
     return this.#json("PUT", "/simulation", { body: wanted }) as Promise<SimulationDocument>;
   }
 

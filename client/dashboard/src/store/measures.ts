@@ -19,6 +19,8 @@ export interface Region {
   readonly y0: number;
   readonly x1: number;
   readonly y1: number;
+  /** Corners of a polygon in the rectangle, in their order: only the pixels within it belong to the region, and those on its edges. */
+  readonly corners?: readonly Pixel[];
 }
 
 /** Half the width of a region that is made around a pixel by a key. */
@@ -40,6 +42,13 @@ export class Measures {
     this.pins.value = [...pins.filter((pin) => pin.name !== name), { name, x, y }].sort((a, b) => a.name.localeCompare(b.name));
   }
 
+  /** Adds a corner to the polygon, or takes it away where it is one already; a rectangle gives way to a new polygon. */
+  corner({ x, y }: Pixel): void {
+    const corners = this.region.peek()?.corners ?? [];
+    const others = corners.filter((corner) => corner.x !== x || corner.y !== y);
+    this.region.value = polygonOf(others.length < corners.length ? others : [...corners, { x, y }]);
+  }
+
   /** The region around a pixel of a picture; none where there is one. */
   toggleRegion({ x, y }: Pixel, width: number, height: number): void {
     if (this.region.peek() !== null) this.region.value = null;
@@ -50,6 +59,31 @@ export class Measures {
 /** The region between two corners, in whatever order. */
 export function regionOf(a: Pixel, b: Pixel): Region {
   return { x0: Math.min(a.x, b.x), y0: Math.min(a.y, b.y), x1: Math.max(a.x, b.x), y1: Math.max(a.y, b.y) };
+}
+
+/** The region within a polygon; null without corners. */
+export function polygonOf(corners: readonly Pixel[]): Region | null {
+  if (corners.length === 0) return null;
+  const [xs, ys] = [corners.map(({ x }) => x), corners.map(({ y }) => y)];
+  return { x0: Math.min(...xs), y0: Math.min(...ys), x1: Math.max(...xs), y1: Math.max(...ys), corners };
+}
+
+/** Whether a pixel of the rectangle belongs to the region: the polygon's edges cross the row to its right an odd number of times, or run through its centre. */
+export function holds({ corners }: Region, x: number, y: number): boolean {
+  if (corners === undefined) return true;
+  let odd = false;
+  for (let n = 0; n < corners.length; n++) {
+    const [a, b] = [corners[n], corners[(n + 1) % corners.length]];
+    // Of whole numbers, and exact.
+    const side = (b.x - a.x) * (y - a.y) - (b.y - a.y) * (x - a.x);
+    if (side === 0 && between(x, a.x, b.x) && between(y, a.y, b.y)) return true;
+    if ((a.y > y) !== (b.y > y) && (side > 0) === (b.y > a.y)) odd = !odd;
+  }
+  return odd;
+}
+
+function between(value: number, one: number, other: number): boolean {
+  return Math.min(one, other) <= value && value <= Math.max(one, other);
 }
 
 /** Figures of the values within a region. */
@@ -68,7 +102,9 @@ export function figuresOf(map: ArrayLike<number>, width: number, height: number,
   const values: number[] = [];
   let pixels = 0;
   for (let y = region.y0; y <= Math.min(region.y1, height - 1); y++) {
-    for (let x = region.x0; x <= Math.min(region.x1, width - 1); x++, pixels++) {
+    for (let x = region.x0; x <= Math.min(region.x1, width - 1); x++) {
+      if (!holds(region, x, y)) continue;
+      pixels += 1;
       const value = map[y * width + x];
       if (Number.isFinite(value)) values.push(value);
     }

@@ -44,6 +44,12 @@ export class Simulation {
     await this.refresh();
   }
 
+  /** Puts the camera before a scene of one's own: the text of its file. */
+  async stageOwn(definition: string): Promise<void> {
+    await this.#api.setSimulation({ definition });
+    await this.refresh();
+  }
+
   /** Puts filter and diffusor before the lens, or takes them away. */
   async putDiffusor(diffusor: boolean): Promise<void> {
     await this.#api.setSimulation({ diffusor });

@@ -1,5 +1,6 @@
 import { computed, signal } from "@preact/signals";
 
+import type { Decision } from "../stream/demand";
 import type { CameraState, FrameMeta } from "../stream/protocol";
 
 /** How this page stands with the service. */
@@ -63,8 +64,12 @@ export class Status {
   readonly lostImages = signal(0);
   readonly unreadable = signal<string | null>(null);
   readonly #drops = signal<ReadonlyMap<number, number>>(new Map());
+  /** Those of subscriptions before the present one. */
+  readonly #droppedBefore = signal(0);
   /** Frames the service left out for this page, which was slower than the camera. */
-  readonly dropped = computed(() => Math.max(0, ...this.#drops.value.values()));
+  readonly dropped = computed(() => this.#droppedBefore.value + Math.max(0, ...this.#drops.value.values()));
+  /** Where less than everything is asked for, as the link carries no more: what, and how much the link carried. */
+  readonly demanded = signal<Decision | null>(null);
   /** What is on screen is not what the camera sees now. */
   readonly stale = computed(() => this.connection.value.kind !== "open" || this.cameraLoss.value !== null);
   /** How frames come, as far as it is known. */
@@ -75,9 +80,16 @@ export class Status {
   /** A new session with the service: it counts anew. */
   sessionOpened(cameraState: CameraState, now_s: number): void {
     this.#drops.value = new Map();
+    this.#droppedBefore.value = 0;
     this.lostImages.value = 0;
     this.unreadable.value = null;
     this.cameraIs(cameraState, now_s);
+  }
+
+  /** Something else is asked for in the same session: the service counts what it leaves out anew. */
+  subscribedAnew(): void {
+    this.#droppedBefore.value = this.dropped.peek();
+    this.#drops.value = new Map();
   }
 
   cameraIs(state: CameraState, now_s: number, reason: string | null = null): void {

@@ -19,7 +19,7 @@ import type { Pixel } from "./pixel";
 import { Player } from "./player";
 import { RangeErrors } from "./rangeErrors";
 import { Sequencing } from "./sequencing";
-import { aNumber, browserShelf, oneOf, remembered, sessionShelf, type Shelf } from "./settings";
+import { aBoolean, aNumber, browserShelf, oneOf, remembered, sessionShelf, type Shelf } from "./settings";
 import { isLayout, OVERVIEW, type Layout } from "../views/layout";
 import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
@@ -30,7 +30,8 @@ import { Replay } from "./replay";
 import { Simulation } from "./simulation";
 import { Status } from "./status";
 import { Details } from "./details";
-import { Viewport } from "./viewport";
+import { Trends } from "./trends";
+import { pixelsOf, Viewport, type View, WHOLE } from "./viewport";
 import { Theme } from "../ui/theme";
 
 /** All that the page knows. Views read and set it; what fills it is no concern of theirs. */
@@ -52,6 +53,8 @@ export class Store {
   readonly replay: Replay;
   /** How far the range is off. */
   readonly rangeErrors: RangeErrors;
+  /** How the flow of frames went. */
+  readonly trends: Trends;
   /** What happened. */
   readonly events = new Events();
   readonly shelf: Shelf | null;
@@ -69,6 +72,10 @@ export class Store {
   readonly selected = signal<Pixel | null>(null);
   /** Which part of the picture is shown. */
   readonly viewport = new Viewport();
+  /** That part in pixels: column and row of the first, width and height; null for the whole. */
+  readonly sight = computed(() => sightOf(this.viewport.view.value, this.camera.value));
+  /** Less is asked for over a link that is too thin for all. */
+  readonly adapts: Signal<boolean>;
   /** Pixels that are kept, and a region. */
   readonly measures = new Measures();
   /** The pixel under the pointer, in whichever view. */
@@ -126,6 +133,7 @@ export class Store {
     this.accuracy = new Accuracy(api);
     this.replay = new Replay(api, this.frames, this.status);
     this.rangeErrors = new RangeErrors(this.frames, this.status, this.replay.active);
+    this.trends = new Trends(this.status, this.rangeErrors);
     api.onRefusal = (problem) => {
       this.lease.refused(kindOf(problem));
       if (problem.status === 401) this.asksForToken.value = true;
@@ -139,6 +147,7 @@ export class Store {
     this.looks = new Looks(this.frames, this.noises, shelf);
     this.layout = remembered<Layout>(shelf, "layout", OVERVIEW, (value): value is Layout => isLayout(value, VIEW_NAMES));
     this.layouts = new Layouts(shelf, this.layout);
+    this.adapts = remembered(shelf, "link.adapts", true, aBoolean);
     this.theme = new Theme(shelf, systemScheme());
   }
 
@@ -152,6 +161,11 @@ export class Store {
 /** Whether a value is a field of view that a camera may have, in degrees. */
 export function isField(value: unknown): value is number {
   return aNumber(value) && value >= 5 && value <= 150;
+}
+
+function sightOf(view: View, camera: CameraDocument | null): readonly number[] | null {
+  const { width, height } = camera?.capabilities ?? {};
+  return view === WHOLE || !aNumber(width) || !aNumber(height) ? null : pixelsOf(view, width, height);
 }
 
 /** Whether the system is dark, by the browser; null outside of one. */

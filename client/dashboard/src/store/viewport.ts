@@ -55,3 +55,10 @@ export function seenAt({ zoom, left, top }: View, { x, y }: Point): Point {
 export function placeIn({ zoom, left, top }: View, { x, y }: Point): Point {
   return { x: left + x / zoom, y: top + y / zoom };
 }
+
+/** The pixels of a picture that are seen, in part too: column and row of the first, width and height. */
+export function pixelsOf({ zoom, left, top }: View, width: number, height: number): readonly number[] {
+  const [x, y] = [Math.floor(left * width), Math.floor(top * height)];
+  const [right, bottom] = [Math.min(width, Math.ceil((left + 1 / zoom) * width)), Math.min(height, Math.ceil((top + 1 / zoom) * height))];
+  return [x, y, right - x, bottom - y];
+}

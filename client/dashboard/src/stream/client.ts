@@ -32,6 +32,8 @@ export class StreamClient {
   #tickets = 0;
   #filling: ReturnType<typeof setTimeout> | undefined;
   #asking = false;
+  #looking: ReturnType<typeof setTimeout> | undefined;
+  #session = "";
 
   constructor(store: Store, worker: WorkerPort, loop: AnimationLoop, now_s: Clock = () => Date.now() / 1000) {
     this.#store = store;
@@ -65,6 +67,16 @@ export class StreamClient {
       if (wanted === known) return;
       known = wanted;
       this.#send({ type: "want", products: wanted });
+    });
+    effect(() => {
+      this.#send({ type: "adapt", adapts: this.#store.adapts.value });
+    });
+    effect(() => {
+      const sight = this.#store.sight.value;
+      clearTimeout(this.#looking);
+      this.#looking = setTimeout(() => {
+        this.#send({ type: "look", sight });
+      }, 1000 * SETTLED_S);
     });
     effect(() => {
       if (!this.#store.held.value) this.#loop.wake();
@@ -106,6 +118,9 @@ export class StreamClient {
       case "camera":
         this.#takeCamera(report.document);
         break;
+      case "demand":
+        status.demanded.value = report.demand.maxRate_hz === null ? null : report;
+        break;
       case "unreadable":
         status.unreadable.value = report.reason;
         break;
@@ -125,12 +140,19 @@ export class StreamClient {
   }
 
   #greet(hello: Hello): void {
-    this.#store.status.sessionOpened(hello.camera.state, this.#now_s());
+    const { status } = this.#store;
     this.#takeSequence(hello.sequence);
-    void this.#readCamera();
-    void this.#store.caller.look();
-    void this.#store.lease.look();
-    void this.#store.recordings.refresh();
+    if (hello.session === this.#session) {
+      status.subscribedAnew();
+      status.cameraIs(hello.camera.state, this.#now_s());
+    } else {
+      this.#session = hello.session;
+      status.sessionOpened(hello.camera.state, this.#now_s());
+      void this.#readCamera();
+      void this.#store.caller.look();
+      void this.#store.lease.look();
+      void this.#store.recordings.refresh();
+    }
     clearTimeout(this.#filling);
     const soon = hello.camera.state === "streaming" && (hello.sequence?.capture_s ?? 0) < SOON_S;
     this.#filling = setTimeout(() => void this.#fillIn(), soon ? 1000 * SOON_S : 0);
@@ -286,6 +308,9 @@ interface Errand {
   readonly resolve: (reports: readonly FrameReport[]) => void;
   readonly reject: (error: Error) => void;
 }
+
+/** How long the picture stays where it is before only the part in sight is asked for. */
+const SETTLED_S = 0.3;
 
 /** How long the stream's next frame is waited for before the newest there is will do. */
 const SOON_S = 0.4;

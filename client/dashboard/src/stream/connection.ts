@@ -3,13 +3,17 @@
  *
  * Knows no worker and no page. The socket, the clock, chance and the probe are arguments.
  */
+import { codesFor } from "./compact";
+import { type Decision, EVERYTHING, DemandControl } from "./demand";
 import {
   type CameraDocument,
   decodeMessage,
   encodeAck,
   encodeSubscribe,
+  LEAST_PRODUCTS,
   ProtocolError,
   type ServerMessage,
+  type Subscription,
   SUBPROTOCOL,
 } from "./protocol";
 
@@ -27,6 +31,8 @@ export interface Surroundings {
   openSocket(url: string, protocol: string): Socket;
   setTimer(action: () => void, delay_s: number): number;
   clearTimer(timer: number): void;
+  /** Time of any clock that never goes back. */
+  now_s(): number;
   /** A number in [0, 1). */
   random(): number;
   /** Asks the service whether it is there; resolves to what it says of the camera, rejects if it is not. */
@@ -40,6 +46,7 @@ export type ConnectionEvent =
   | { readonly type: "refused" }
   | { readonly type: "message"; readonly message: ServerMessage }
   | { readonly type: "camera"; readonly document: CameraDocument }
+  | ({ readonly type: "demand" } & Decision)
   | { readonly type: "unreadable"; readonly reason: string };
 
 /** Frames the service may send ahead of what was drawn. */
@@ -64,6 +71,12 @@ export class StreamConnection {
   #attempts = 0;
   #timer: number | null = null;
   #inFlight = new Set<number>();
+  readonly #control = new DemandControl();
+  #adapts = true;
+  /** The part of the picture in sight: column and row of its first pixel, width and height; null for all of it. */
+  #sight: readonly number[] | null = null;
+  /** In which codes each product can be sent that came once. */
+  readonly #codes = new Map<string, string | null>();
 
   constructor(url: string, around: Surroundings, emit: (event: ConnectionEvent) => void) {
     this.#url = url;
@@ -76,6 +89,19 @@ export class StreamConnection {
     this.#products = products;
     if (this.#open) this.#subscribe();
     else if (this.#socket === null && this.#timer === null && !this.#refused) this.#connect();
+  }
+
+  /** Sets whether less is asked for over a link that is too thin for all. */
+  adapt(adapts: boolean): void {
+    if (adapts === this.#adapts) return;
+    this.#adapts = adapts;
+    this.#askForAll();
+  }
+
+  /** Sets which part of the picture is in sight. */
+  look(sight: readonly number[] | null): void {
+    this.#sight = sight;
+    if (this.#open && this.#control.demand.part) this.#subscribe();
   }
 
   /** Shows this token from now on; a service that refused the one before is asked anew. */
@@ -91,6 +117,7 @@ export class StreamConnection {
   /** Frame `frame` and all before it were drawn: the service may send on. */
   acknowledge(frame: number): void {
     for (const number of this.#inFlight) if (number <= frame) this.#inFlight.delete(number);
+    if (this.#inFlight.size === 0) this.#control.drewAll(this.#around.now_s());
     if (this.#open) this.#socket?.send(encodeAck(frame));
   }
 
@@ -133,7 +160,39 @@ export class StreamConnection {
   }
 
   #subscribe(): void {
-    this.#socket?.send(encodeSubscribe(this.#products, CREDITS, this.#token));
+    const products = this.#products.length === 0 ? LEAST_PRODUCTS : this.#products;
+    this.#inFlight.clear(); // the service forgets them too
+    this.#control.restart();
+    this.#socket?.send(encodeSubscribe(products.map((product) => this.#subscriptionOf(product)), CREDITS, this.#token));
+  }
+
+  #subscriptionOf(product: string): Subscription {
+    const { maxRate_hz, coded, part } = this.#control.demand;
+    const encoding = coded ? this.#codes.get(product) : null;
+    const cut = !part ? {} : this.#sight === null ? { decimation: 2 } : { region: this.#sight };
+    return { product, max_rate_hz: maxRate_hz, ...(encoding == null ? {} : { encoding }), ...cut };
+  }
+
+  #askForAll(): void {
+    const asked = this.#control.demand;
+    this.#control.reset();
+    if (asked === EVERYTHING) return;
+    this.#emit({ type: "demand", demand: EVERYTHING, carried_bytes_s: 0 });
+    if (this.#open) this.#subscribe();
+  }
+
+  /** What a message says of the link. */
+  #weigh(message: ServerMessage, bytes: number): void {
+    if (!this.#adapts) return;
+    if (message.type === "notice" && message.kind === "dropped") this.#control.dropped(message.channel, message.unacknowledged ?? message.count);
+    if (message.type === "notice" && message.kind === "sequence-changed") this.#askForAll();
+    if (message.type !== "frame") return;
+    const { product, axes, array, meta } = message;
+    this.#codes.set(product, codesFor(axes, array.dtype));
+    const decision = this.#control.arrived(this.#around.now_s(), meta.frame, bytes);
+    if (decision === null) return;
+    this.#emit({ type: "demand", ...decision });
+    this.#subscribe();
   }
 
   #receive(data: ArrayBuffer): void {
@@ -144,6 +203,7 @@ export class StreamConnection {
       if (message === null) return;
       if (message.type === "frame") this.#inFlight.add(message.meta.frame);
       this.#emit({ type: "message", message });
+      this.#weigh(message, data.byteLength);
     } catch (error) {
       if (!(error instanceof ProtocolError)) throw error;
       this.#emit({ type: "unreadable", reason: error.message });

@@ -5,6 +5,8 @@
  */
 import { decode, encode } from "@msgpack/msgpack";
 
+import { decodeReflection16, decodeU16, whole } from "./compact";
+
 export const SUBPROTOCOL = "transientcam.v1.msgpack";
 
 export type Dtype = "<f4" | "<f8" | "<c8" | "<u2" | "|u1";
@@ -36,6 +38,9 @@ export interface FrameMeta {
   readonly height: number;
   readonly temperature_c: number;
   readonly lost_images: number;
+  /** Which pixels of the frame were sent, and every how many of them. */
+  readonly region?: readonly [x: number, y: number, width: number, height: number];
+  readonly decimation?: number;
   readonly pixels: Readonly<Record<string, number>> | null;
   /** Standard deviation that the sensor's noise gives the range, in m; null until the range was computed. */
   readonly predicted_range_std_m?: { readonly median: number; readonly p90: number } | null;
@@ -179,6 +184,8 @@ export type Notice =
       readonly channel: number;
       readonly count: number;
       readonly total: number;
+      /** How many of `count` were left out because earlier ones were not acknowledged; a service of before does not say. */
+      readonly unacknowledged?: number;
     }
   | { readonly type: "notice"; readonly kind: "lost-images"; readonly count: number }
   | { readonly type: "notice"; readonly kind: "camera-lost"; readonly reason?: string }
@@ -244,7 +251,7 @@ export function decodeMessage(buffer: ArrayBuffer): ServerMessage | null {
   }
   switch (message["type"]) {
     case "frame":
-      return { ...message, array: ndArray(message["array"]) } as unknown as FrameMessage;
+      return frameOf(message);
     case "hello":
     case "notice":
     case "error":
@@ -254,20 +261,50 @@ export function decodeMessage(buffer: ArrayBuffer): ServerMessage | null {
   }
 }
 
+/** A frame whose array has every pixel, whichever way it was sent. */
+function frameOf(message: Record<string, unknown>): FrameMessage {
+  const axes = Array.isArray(message["axes"]) ? message["axes"] : [];
+  const frame = { ...message, axes, array: decoded(message, ndArray(message["array"])) } as unknown as FrameMessage;
+  const { meta, array } = frame;
+  const { region, decimation, width, height }: Partial<FrameMeta> = isMap(meta) ? meta : {};
+  if (region === undefined || decimation === undefined || width === undefined || height === undefined) return frame;
+  if (array.shape.length < 2 || (region[2] === width && region[3] === height && decimation === 1)) return frame;
+  const shape = [...array.shape.slice(0, -2), height, width];
+  return { ...frame, array: { ...array, shape, data: whole(array.data, array.shape, { region, decimation }, width, height) } };
+}
+
+/** The array that codes stand for; the array itself where it has none. */
+function decoded(message: Record<string, unknown>, array: NdArray): NdArray {
+  const { encoding, scale, offset, brightness } = message;
+  if (encoding === undefined) return array;
+  const { data, shape } = array;
+  if (encoding === "u16" && data instanceof Uint16Array && typeof scale === "number" && typeof offset === "number") {
+    return { dtype: "<f4", shape, data: decodeU16(data, scale, offset) };
+  }
+  if (encoding === "reflection16" && data instanceof Uint16Array && shape.length === 3) {
+    const light = ndArray(brightness);
+    if (light.data instanceof Float32Array && light.shape.join() === shape.slice(1).join()) {
+      return { dtype: "<f4", shape: [shape[0] + 1, ...shape.slice(1)], data: decodeReflection16(data, light.data) };
+    }
+  }
+  throw new ProtocolError(`This page cannot read a frame encoded as ${String(encoding)}.`);
+}
+
 /** What is asked for where nothing is looked at, so that frames and their figures come all the same: the smallest. */
 export const LEAST_PRODUCTS: readonly string[] = ["flags"];
 
+/** One product, as it is asked for; what is left out has its default. */
+export interface Subscription {
+  readonly product: string;
+  readonly max_rate_hz: number | null;
+  readonly encoding?: string;
+  readonly region?: readonly number[];
+  readonly decimation?: number;
+}
+
 /** The first message of a client, and every later change of its subscription: frames from the next one on. */
-export function encodeSubscribe(products: readonly string[], credits: number, token: string | null = null): Uint8Array<ArrayBuffer> {
-  const wanted = products.length === 0 ? LEAST_PRODUCTS : products;
-  return encode({
-    type: "subscribe",
-    v: 1,
-    token,
-    subscriptions: wanted.map((product) => ({ product, max_rate_hz: null })),
-    credits,
-    start: null,
-  }) as Uint8Array<ArrayBuffer>;
+export function encodeSubscribe(subscriptions: readonly Subscription[], credits: number, token: string | null = null): Uint8Array<ArrayBuffer> {
+  return encode({ type: "subscribe", v: 1, token, subscriptions, credits, start: null }) as Uint8Array<ArrayBuffer>;
 }
 
 /** Says that frame `frame` and all before it were taken. */

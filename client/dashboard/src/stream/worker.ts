@@ -9,6 +9,8 @@ export type Command =
   | { readonly type: "open"; readonly url: string; readonly products: readonly string[]; readonly token: string | null }
   | { readonly type: "authenticate"; readonly token: string | null }
   | { readonly type: "want"; readonly products: readonly string[] }
+  | { readonly type: "adapt"; readonly adapts: boolean }
+  | { readonly type: "look"; readonly sight: readonly number[] | null }
   | { readonly type: "acknowledge"; readonly frame: number }
   | { readonly type: "retry" }
   | { readonly type: "bring"; readonly ticket: number; readonly path: string; readonly products: readonly string[] };
@@ -87,6 +89,7 @@ scope.onmessage = ({ data: command }) => {
           clearTimer: (timer) => {
             clearTimeout(timer);
           },
+          now_s: () => performance.now() / 1000,
           random: Math.random,
           probe: askForCamera,
         },
@@ -101,6 +104,12 @@ scope.onmessage = ({ data: command }) => {
       break;
     case "want":
       connection?.want(command.products);
+      break;
+    case "adapt":
+      connection?.adapt(command.adapts);
+      break;
+    case "look":
+      connection?.look(command.sight);
       break;
     case "acknowledge":
       connection?.acknowledge(command.frame);

@@ -1,5 +1,6 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
+import type { Signal } from "@preact/signals";
 
 interface DialogProps {
   readonly open: boolean;
@@ -42,5 +43,24 @@ export function Dialog({ open, title, onClose, children }: DialogProps) {
         </div>
       )}
     </dialog>
+  );
+}
+
+interface SwitchedDialogProps {
+  readonly open: Signal<boolean>;
+  readonly title: string;
+  /** What is inside, with what closes it. */
+  readonly children: (close: () => void) => ComponentChildren;
+}
+
+/** A dialog that is open while a signal says so. */
+export function SwitchedDialog({ open, title, children }: SwitchedDialogProps) {
+  const close = (): void => {
+    open.value = false;
+  };
+  return (
+    <Dialog open={open.value} title={title} onClose={close}>
+      {children(close)}
+    </Dialog>
   );
 }

@@ -1,15 +1,19 @@
 import { useStore } from "../store/store";
-import { Dialog } from "./Dialog";
+import { SwitchedDialog } from "./Dialog";
 import { SHORTCUTS } from "./shortcuts";
 
 /** The keys of the page, over the page. */
 export function Help() {
-  const { help } = useStore();
-  const close = (): void => {
-    help.value = false;
-  };
   return (
-    <Dialog open={help.value} title="Keys" onClose={close}>
+    <SwitchedDialog open={useStore().help} title="Keys">
+      {(close) => <KeyList onDone={close} />}
+    </SwitchedDialog>
+  );
+}
+
+function KeyList({ onDone }: { onDone: () => void }) {
+  return (
+    <>
       <dl class="keys">
         {SHORTCUTS.map(({ shown, words }) => (
           <div key={shown}>
@@ -39,7 +43,13 @@ export function Help() {
           <dt>
             <kbd>Shift</kbd> + drag, <kbd>R</kbd>
           </dt>
-          <dd>in a picture: measure a region; Escape removes it and the pins</dd>
+          <dd>in a picture: measure a rectangle; Escape removes it and the pins</dd>
+        </div>
+        <div>
+          <dt>
+            <kbd>Ctrl</kbd> + click, <kbd>C</kbd>
+          </dt>
+          <dd>in a picture: set or remove a corner of a polygon, and measure it</dd>
         </div>
         <div>
           <dt>arrows, + −</dt>
@@ -47,10 +57,10 @@ export function Help() {
         </div>
       </dl>
       <div class="dialog-actions">
-        <button type="button" onClick={close}>
+        <button type="button" onClick={onDone}>
           Close
         </button>
       </div>
-    </Dialog>
+    </>
   );
 }

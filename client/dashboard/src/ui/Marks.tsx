@@ -4,7 +4,7 @@ import { useMemo } from "preact/hooks";
 import { PIN_COLOURS } from "../store/measures";
 import type { Pixel } from "../store/pixel";
 import { useStore } from "../store/store";
-import { seenAt } from "../store/viewport";
+import { seenAt, type Point } from "../store/viewport";
 
 /** What is marked in a picture of the sensor of this size: over the picture, as large at any zoom. */
 export function Marks({ width, height }: { width: number; height: number }) {
@@ -53,13 +53,26 @@ function RegionMark({ width, height }: SizeProps) {
   const { measures, viewport } = useStore();
   const region = measures.region.value;
   if (region === null) return null;
-  const [from, to] = [
-    seenAt(viewport.view.value, { x: region.x0 / width, y: region.y0 / height }),
-    seenAt(viewport.view.value, { x: (region.x1 + 1) / width, y: (region.y1 + 1) / height }),
-  ];
+  const view = viewport.view.value;
+  if (region.corners !== undefined) return <PolygonMark corners={region.corners.map((corner) => seenAt(view, centreOf(corner, width, height)))} />;
+  const [from, to] = [seenAt(view, { x: region.x0 / width, y: region.y0 / height }), seenAt(view, { x: (region.x1 + 1) / width, y: (region.y1 + 1) / height })];
   return (
     <div class="mark" aria-hidden="true">
       <i class="mark-region" style={{ left: percent(from.x), top: percent(from.y), width: percent(to.x - from.x), height: percent(to.y - from.y) }} />
+    </div>
+  );
+}
+
+/** A polygon, its corners in shares of the picture; each corner is marked, so that the first ones are seen too. */
+function PolygonMark({ corners }: { corners: readonly Point[] }) {
+  return (
+    <div class="mark" aria-hidden="true">
+      <svg class="mark-polygon" viewBox="0 0 1 1" preserveAspectRatio="none">
+        <polygon points={corners.map(({ x, y }) => `${x},${y}`).join(" ")} />
+      </svg>
+      {corners.map(({ x, y }, n) => (
+        <i key={n} class="mark-corner" style={{ left: percent(x), top: percent(y) }} />
+      ))}
     </div>
   );
 }

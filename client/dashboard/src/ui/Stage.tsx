@@ -24,7 +24,7 @@ const ZOOM_PER_UNIT = 1.002;
 const KEY_ZOOM = 1.25;
 
 interface Drag {
-  readonly kind: "pan" | "region";
+  readonly kind: "pan" | "region" | "corner";
   readonly from: Pixel;
   last: PointerEvent;
   moved: boolean;
@@ -35,8 +35,9 @@ interface Drag {
  *
  * Pointing at it sets the pointed pixel, a click or tap selects one, for all views alike; the wheel zooms, dragging
  * moves what is zoomed, a double click shows it whole again. With Shift a click pins a pixel and dragging marks a
- * region. With the stage focused, Shift and the arrow keys move the selected pixel, + and − zoom, Enter pins it, R
- * marks a region around it and Escape takes regions and pins away.
+ * region; with Ctrl or Cmd a click sets a corner of a region. With the stage focused, Shift and the arrow keys move the
+ * selected pixel, + and − zoom, Enter pins it, R marks a region around it, C sets a corner there and Escape takes
+ * regions and pins away.
  */
 export function Stage({ width, height, label, children }: StageProps) {
   const store = useStore();
@@ -69,7 +70,7 @@ export function Stage({ width, height, label, children }: StageProps) {
 
   const onPointerDown = (event: PointerEvent): void => {
     if (event.button !== 0) return;
-    drag.current = { kind: event.shiftKey ? "region" : "pan", from: pixelAt(event), last: event, moved: false };
+    drag.current = { kind: event.shiftKey ? "region" : event.ctrlKey || event.metaKey ? "corner" : "pan", from: pixelAt(event), last: event, moved: false };
     picture.current?.setPointerCapture(event.pointerId);
   };
   const onPointerMove = (event: PointerEvent): void => {
@@ -83,7 +84,7 @@ export function Stage({ width, height, label, children }: StageProps) {
     if (!now.moved) return;
     if (now.kind === "region") {
       measures.region.value = regionOf(now.from, pixelAt(event));
-    } else {
+    } else if (now.kind === "pan") {
       const [before, after] = [shareAt(now.last), shareAt(event)];
       viewport.pan({ x: after.x - before.x, y: after.y - before.y });
       now.last = event;
@@ -94,6 +95,7 @@ export function Stage({ width, height, label, children }: StageProps) {
     drag.current = null;
     if (ended === null || ended.moved) return;
     if (ended.kind === "region") measures.pin(pixelAt(event));
+    else if (ended.kind === "corner") measures.corner(pixelAt(event));
     else store.selected.value = pixelAt(event);
   };
 
@@ -105,6 +107,7 @@ export function Stage({ width, height, label, children }: StageProps) {
     else if (event.key === "+") viewport.zoomAt(centre, KEY_ZOOM);
     else if (event.key === "-") viewport.zoomAt(centre, 1 / KEY_ZOOM);
     else if (event.key === "Enter") measures.pin(from);
+    else if (event.key === "c" && !event.ctrlKey && !event.metaKey) measures.corner(from);
     else if (event.key === "r") measures.toggleRegion(from, width, height);
     else if (event.key === "Escape") [measures.region.value, measures.pins.value] = [null, []];
     else return;

@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import { impulseResponse, peaks } from "../../src/physics/impulseResponse";
+import { impulseResponse, peaks, phasesAround } from "../../src/physics/impulseResponse";
 import { densityAt } from "../../src/physics/maximumEntropy";
 import { momentsOf, picture } from "../oracle";
 
@@ -54,7 +54,7 @@ describe("a sampled impulse response", () => {
   test.each([200, 2, 0.02])("reaches the top of every peak and holds all its light, over %d of even light", (uniform) => {
     const c = picture([momentsOf(TWO_RETURNS, uniform, 8)]);
     const found = peaks(c, 0);
-    const { time_s, density } = impulseResponse(c, 0, 257, found);
+    const { time_s, density } = impulseResponse(c, 0, phasesAround(c, 257, [{ pixel: 0, peaks: found }]));
     for (const peak of found.slice(0, 2)) {
       const nearest = density[time_s.findIndex((t) => Math.abs(t - peak.time_s) < 1e-15)];
       expect(nearest / peak.density).toBeCloseTo(1, 6);
@@ -66,7 +66,7 @@ describe("a sampled impulse response", () => {
 
   test("rises in time over one period, and is Eq. (2) at each", () => {
     const c = picture([momentsOf(TWO_RETURNS, 60, 4)]);
-    const { time_s, density } = impulseResponse(c, 0, 129, peaks(c, 0));
+    const { time_s, density } = impulseResponse(c, 0, phasesAround(c, 129, [{ pixel: 0, peaks: peaks(c, 0) }]));
     expect(time_s[0]).toBe(0);
     expect(time_s[time_s.length - 1]).toBeCloseTo(1 / F_HZ, 15);
     time_s.slice(1).forEach((t, n) => {

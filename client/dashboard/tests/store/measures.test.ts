@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import { figuresOf, Measures, regionOf } from "../../src/store/measures";
+import { figuresOf, holds, Measures, polygonOf, regionOf } from "../../src/store/measures";
 
 describe("pins", () => {
   test("take the first free name, and are let go by pinning them again", () => {
@@ -29,6 +29,32 @@ describe("a region", () => {
     const { mean, std, count, pixels, values } = figuresOf(map, 4, 3, { x0: 1, y0: 1, x1: 2, y1: 2 });
     expect([mean, std, count, pixels]).toEqual([4, 2, 3, 4]);
     expect([...values]).toEqual([2, 4, 6]);
+  });
+
+  test("within a polygon holds what is drawn: a notch is outside, edges are inside, whichever way round", () => {
+    // each # is a pixel whose centre lies within or on an edge of the arrow head
+    const drawn = ["#.......#", "##.....##", "###...###", "####.####", ".#######.", "..#####..", "...###...", "....#...."];
+    const corners = [{ x: 0, y: 0 }, { x: 4, y: 4 }, { x: 8, y: 0 }, { x: 8, y: 3 }, { x: 4, y: 7 }, { x: 0, y: 3 }]; // prettier-ignore
+    for (const way of [corners, [...corners].reverse(), [...corners.slice(2), ...corners.slice(0, 2)]]) {
+      const region = polygonOf(way);
+      if (region === null) throw new Error("there are corners");
+      expect(region).toMatchObject({ x0: 0, y0: 0, x1: 8, y1: 7 });
+      expect(drawn.map((row, y) => [...row].map((_, x) => (holds(region, x, y) ? "#" : ".")).join(""))).toEqual(drawn);
+      expect(figuresOf(new Float32Array(9 * 8).fill(5), 9, 8, region)).toMatchObject({ mean: 5, std: 0, count: drawn.join("").split("#").length - 1 });
+    }
+  });
+
+  test("grows by corners, each taken away by setting it again, and takes the place of a rectangle", () => {
+    const measures = new Measures();
+    measures.region.value = regionOf({ x: 0, y: 0 }, { x: 9, y: 9 });
+    const [a, b, c] = [{ x: 1, y: 1 }, { x: 5, y: 1 }, { x: 1, y: 4 }];
+    for (const corner of [a, b, c]) measures.corner(corner);
+    expect(measures.region.value).toEqual({ x0: 1, y0: 1, x1: 5, y1: 4, corners: [a, b, c] });
+    measures.corner(b);
+    expect(measures.region.value).toEqual({ x0: 1, y0: 1, x1: 1, y1: 4, corners: [a, c] });
+    expect(figuresOf(new Float32Array(60), 10, 6, measures.region.value as never).count).toBe(4); // the line between the two
+    for (const corner of [a, c]) measures.corner(corner);
+    expect(measures.region.value).toBeNull();
   });
 
   test("keeps millimetres on metres, and ends at the edge of a smaller picture", () => {

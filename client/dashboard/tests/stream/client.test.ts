@@ -62,6 +62,7 @@ describe("between worker and store", () => {
     page.store.frames.claim(["coefficients"]);
     expect(page.sent).toEqual([
       { type: "open", url: "ws://camera/", products: ["brightness", "range"], token: null },
+      { type: "adapt", adapts: true },
       { type: "want", products: ["brightness", "coefficients", "range"] },
     ]);
   });

@@ -59,6 +59,7 @@ class World {
       clearTimer: (timer) => {
         this.#timers.delete(timer);
       },
+      now_s: () => this.#now_s,
       random: () => 0.5,
       probe: () => {
         this.probes += 1;
@@ -103,6 +104,49 @@ let world: World;
 beforeEach(() => {
   world = new World();
   world.connection.want(["range"]);
+});
+
+describe("over a thin link", () => {
+  const picture = (number: number): unknown => ({
+    type: "frame",
+    product: "range",
+    axes: ["y", "x"],
+    meta: { frame: number },
+    array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) },
+  });
+  const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.["subscriptions"];
+  /** A frame every 2 s of a camera that takes ten a second, drawn at once. */
+  const starves = async (): Promise<void> => {
+    for (let frame = 1; frame <= 4; frame++) {
+      world.socket.receives({ type: "notice", kind: "dropped", channel: 0, count: 19, total: 19 });
+      world.socket.receives(picture(20 * frame));
+      world.connection.acknowledge(20 * frame);
+      await world.passes(2);
+    }
+  };
+
+  test("asks for fewer and smaller frames and says so, and for all when the user says", async () => {
+    world.socket.opens();
+    await starves();
+    expect(asked()).toMatchObject([{ product: "range", encoding: "u16", decimation: 2 }]);
+    expect(world.events.filter(({ type }) => type === "demand")).toMatchObject([{ demand: { coded: true, part: false } }, { demand: { coded: true, part: true } }]);
+    world.connection.look([3, 4, 50, 60]);
+    expect(asked()).toMatchObject([{ encoding: "u16", region: [3, 4, 50, 60] }]);
+    world.connection.adapt(false);
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+    expect(world.events.at(-1)).toMatchObject({ type: "demand", demand: { maxRate_hz: null } });
+    await starves();
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+  });
+
+  test("asks for all of another sequence, and for what is in sight only while it asks for parts", async () => {
+    world.socket.opens();
+    world.connection.look([3, 4, 50, 60]);
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+    await starves();
+    world.socket.receives({ type: "notice", kind: "sequence-changed", sequence: {} });
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+  });
 });
 
 describe("a stream", () => {

@@ -1,6 +1,12 @@
 """What is in front of the simulated camera: surfaces, light, motions, and the files of scenes."""
 
-from transientcam_driver.simulation.scene.file import BUILT_IN, SceneInfo, list_scenes, load_scene
+from transientcam_driver.simulation.scene.file import (
+    BUILT_IN,
+    SceneInfo,
+    list_scenes,
+    load_scene,
+    parse_scene,
+)
 from transientcam_driver.simulation.scene.scene import Background, Scene, Surface, TimeZero
 
 __all__ = [
@@ -12,4 +18,5 @@ __all__ = [
     "TimeZero",
     "list_scenes",
     "load_scene",
+    "parse_scene",
 ]

@@ -24,6 +24,7 @@ from transientcam_driver.simulation.imperfections import (
 )
 from transientcam_driver.simulation.responses import Scatter
 from transientcam_driver.simulation.scene.geometry import Ellipsoid, Rectangle, Shape
+from transientcam_driver.simulation.scene.limits import require_modest
 from transientcam_driver.simulation.scene.motion import Motion, Repeat
 from transientcam_driver.simulation.scene.scene import (
     Background,
@@ -70,9 +71,34 @@ def load_scene(path: Path) -> Scene:
     SceneError
         Naming the file, the key, its value and what is allowed.
     """
-    top = _open(path)
-    name, description = top.text("name", path.stem), top.text("description", "")
-    responses = tuple(_response(table, path.parent) for table in top.tables("response"))
+    return _scene(_open(path), name=path.stem, file=path)
+
+
+def parse_scene(text: str) -> Scene:
+    """Read the text of a scene file that comes from elsewhere; it may name no other file.
+
+    Raises
+    ------
+    SceneError
+        As `load_scene`; and if it would take much memory or time to prepare.
+    """
+    try:
+        content = tomllib.loads(text)
+        scene = _scene(Table("the scene", "", content), name="own scene", file=None)
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError; a number of too many digits
+        raise SceneError("the scene", "the text", str(error), "valid TOML") from error
+    built_in = [each.name for each in list_scenes()]
+    if scene.name in built_in:
+        allowed = f"another name than those of built-in scenes: {', '.join(built_in)}"
+        raise SceneError("the scene", "name", scene.name, allowed)
+    require_modest(scene)
+    return scene
+
+
+def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
+    folder = None if file is None else file.parent
+    name, description = top.text("name", name), top.text("description", "")
+    responses = tuple(_response(table, folder) for table in top.tables("response"))
     motions = _motions(top.tables("motion"))
     surfaces = tuple(_surface(table, motions) for table in top.tables("surface"))
     diffusor = _diffusor(top.table("diffusor")) if "diffusor" in top else None
@@ -82,10 +108,10 @@ def load_scene(path: Path) -> Scene:
     scene = Scene(
         name=name,
         description=description,
-        file=path,
+        file=file,
         light=_light(top.table("light"), somewhere=bool(surfaces)),
         sensor=_sensor(top.table("sensor")),
-        device=_device(top.table("device"), path.parent),
+        device=_device(top.table("device"), folder),
         camera=_viewpoint(top.table("camera")) if surfaces else None,
         surfaces=surfaces,
         transport=_transport(top.table("transport")),
@@ -167,11 +193,11 @@ def _sensor(table: Table) -> Sensor:
     return sensor
 
 
-def _device(table: Table, folder: Path) -> DeviceProfile:
+def _device(table: Table, folder: Path | None) -> DeviceProfile:
     profile = PROFILES[table.choice("profile", tuple(PROFILES), "ideal")]
     profile = replace(profile, seed=table.integer("seed", 0, least=0, most=2**63 - 1))
     if "waveform_file" in table:
-        profile = replace(profile, waveform=Waveform(file=folder / table.text("waveform_file")))
+        profile = replace(profile, waveform=Waveform(file=_file(table, "waveform_file", folder)))
     if "pattern" in table:
         profile = replace(profile, pattern=_pattern(table.table("pattern"), folder))
     if "drift" in table:
@@ -188,17 +214,25 @@ def _device(table: Table, folder: Path) -> DeviceProfile:
     return profile
 
 
-def _pattern(table: Table, folder: Path) -> Pattern:
+def _pattern(table: Table, folder: Path | None) -> Pattern:
     pattern = Pattern(
         delay_s=table.number("delay_s", 0.0, least=0),
         gain=table.number("gain", 0.0, least=0, most=0.3),
-        file=folder / table.text("file") if "file" in table else None,
+        file=_file(table, "file", folder) if "file" in table else None,
         file_frequency_hz=table.number("file_frequency_hz", 23e6, above=0),
     )
     if pattern.file is not None and pattern.delay_s:
         raise table.error("delay_s", pattern.delay_s, "absent beside file, which has the delays")
     table.done()
     return pattern
+
+
+def _file(table: Table, key: str, folder: Path | None) -> Path:
+    """Read the name of a file beside the scene's own."""
+    name = table.text(key)
+    if folder is None:
+        raise table.error(key, name, "absent: a scene that is sent cannot name files")
+    return folder / name
 
 
 def _drift(table: Table) -> Drift:
@@ -352,13 +386,14 @@ def _mask(table: Table) -> NDArray[np.bool_]:
     return np.array([[cell == "#" for cell in row] for row in rows])
 
 
-def _response(table: Table, folder: Path) -> ResponseFile:
+def _response(table: Table, folder: Path | None) -> ResponseFile:
     time_zero_s = table.number("time_zero_s") if "time_zero_s" in table else None
-    zero_file = folder / table.text("time_zero_file") if "time_zero_file" in table else None
+    has_zero_file = "time_zero_file" in table
+    zero_file = _file(table, "time_zero_file", folder) if has_zero_file else None
     if time_zero_s is not None and zero_file is not None:
         raise table.error("time_zero_s", time_zero_s, "absent beside time_zero_file")
     response = ResponseFile(
-        path=folder / table.text("file"),
+        path=_file(table, "file", folder),
         weight=table.number("weight", 1.0, above=0),
         delay_s=table.number("delay_s", 0.0),
         normalise=table.switch("normalise", True),

@@ -64,8 +64,7 @@ class Table:
     ) -> float:
         """Read a finite number within limits."""
         value = self._take(key, default)
-        fits = isinstance(value, int | float) and not isinstance(value, bool)
-        if not (fits and math.isfinite(value) and least <= value <= most and value > above):
+        if not (_is_finite(value) and least <= value <= most and value > above):
             raise self.error(key, value, "a number" + _limits(least, most, above))
         return float(value)
 
@@ -144,14 +143,16 @@ class Table:
 
 
 def _are_numbers(value: object, count: int) -> bool:
-    return (
-        isinstance(value, list | tuple)
-        and len(value) == count
-        and all(
-            isinstance(item, int | float) and not isinstance(item, bool) and math.isfinite(item)
-            for item in value
-        )
-    )
+    return isinstance(value, list | tuple) and len(value) == count and all(map(_is_finite, value))
+
+
+def _is_finite(value: object) -> bool:
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer that no float can hold
+        return False
 
 
 def _limits(least: float, most: float, above: float) -> str:

@@ -1,11 +1,13 @@
 """JSON documents about the simulated world."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import ConfigDict, Field
 
 from transientcam_server.api.documents.document import Document
 
+MAX_DEFINITION: Final = 65_536
+"""Characters of a scene that a client sends."""
 Choice = Literal["auto", "on", "off"]
 
 
@@ -41,6 +43,8 @@ class SimulationRequest(Document):
     )
 
     scene: Annotated[str, Field(max_length=64)] | None = None
+    definition: Annotated[str, Field(max_length=MAX_DEFINITION)] | None = None
+    """In its place the text of a scene's file (TOML); it may name no other file."""
     effects: Annotated[dict[str, Choice], Field(max_length=64)] | None = None
     """By name, in place of all earlier choices; of the others the scene decides."""
     diffusor: bool | None = None

@@ -42,16 +42,24 @@ async def read_simulation(service: ServiceOf) -> SimulationDocument:
 async def change_simulation(service: ServiceOf, wanted: SimulationRequest) -> SimulationDocument:
     """Change the scene, force effects on or off, or put the diffusor before the lens.
 
+    `definition` is a scene of one's own; a name it has must not be that of a built-in scene. One
+    that would take much memory or time to prepare is refused.
+
     Capturing goes on meanwhile. Answered once the scene is prepared, which may take seconds. The
     frame that is captured at that moment may hold images of both. Streams are sent a
     `simulation-changed` notice.
     """
     simulation = _simulation(service)
+    if wanted.scene is not None and wanted.definition is not None:
+        limit = "absent beside definition"
+        detail = f"scene = {wanted.scene!r}: must be {limit}"
+        raise Problem(kinds.INVALID_REQUEST, detail, field="scene", value=wanted.scene, limit=limit)
     if wanted.scene is not None:
         _require_known(wanted.scene, simulation)
     await asyncio.to_thread(
         simulation.change,
         scene=wanted.scene,
+        definition=wanted.definition,
         effects=wanted.effects,
         diffusor=wanted.diffusor,
     )

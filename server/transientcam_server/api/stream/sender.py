@@ -77,8 +77,14 @@ class Sender:
 
     async def _report_dropped(self, channel: Channel) -> None:
         count, channel.dropped = channel.dropped, 0
+        unacknowledged, channel.dropped_unacknowledged = channel.dropped_unacknowledged, 0
         channel.dropped_total += count
-        details = {"channel": channel.number, "count": count, "total": channel.dropped_total}
+        details = {
+            "channel": channel.number,
+            "count": count,
+            "total": channel.dropped_total,
+            "unacknowledged": unacknowledged,
+        }
         await self._websocket.send_bytes(wire.encode(wire.Notice("dropped", details)))
 
     async def _report_failed(self, channel: Channel, problem: Problem) -> None:

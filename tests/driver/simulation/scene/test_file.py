@@ -5,7 +5,7 @@ import pytest
 
 from transientcam_driver import SceneError, list_scenes
 from transientcam_driver.simulation.build import find_scene
-from transientcam_driver.simulation.scene.file import load_scene
+from transientcam_driver.simulation.scene.file import load_scene, parse_scene
 
 SCENE = """
 [light]
@@ -154,3 +154,58 @@ def test_the_directions_of_a_rectangle_are_those_of_a_viewer_in_front() -> None:
 
     assert np.allclose(wall.right, [1, 0, 0])
     assert np.allclose(wall.up, [0, 0, 1])
+
+
+def test_a_scene_that_is_sent_is_that_of_the_same_text_in_a_file(tmp_path: Path) -> None:
+    sent, read = parse_scene(SCENE), load_scene(write(tmp_path, SCENE))
+
+    assert (sent.name, sent.file) == ("own scene", None)
+    assert [each.name for each in sent.surfaces] == [each.name for each in read.surfaces]
+    assert sent.light.electrons_per_s == read.light.electrons_per_s
+
+
+MIRROR = """
+[[surface]]
+kind = "mirror"
+centre_m = [1, 1, 0]
+normal = [-1, 0, 0]
+size_m = [1, 1]
+reflectivity = 0.9
+"""
+WALL = SCENE[SCENE.index("[[surface]]") :]
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ("scene = [", "the text"),
+        ("a = " + "[" * 5000, "the text"),
+        ("seed = " + "9" * 5000, "the text"),
+        (SCENE.replace("1e7", "0x" + "f" * 5000), "light.electrons_per_s"),
+        (SCENE.replace("1e7", "9" * 400), "light.electrons_per_s"),
+        (SCENE.replace("[3, 2]", f"[3, {'9' * 400}]"), "surface[0].size_m"),
+        ('name = "mirrors"\n' + SCENE, "name"),
+        (
+            '[light]\nelectrons_per_s = 1e7\n[[response]]\nfile = "/etc/passwd"',
+            "response[0].file",
+        ),
+        (SCENE + '[device]\nwaveform_file = "/dev/zero"', "device.waveform_file"),
+        (SCENE + '[device.pattern]\nfile = "/dev/zero"', "device.pattern.file"),
+        (SCENE + 32 * WALL, "surface"),
+        (SCENE + 9 * MIRROR, "transport.mirror_bounces"),
+        (SCENE + 2 * MIRROR + "[transport]\nmirror_bounces = 8", None),
+        (SCENE + 7 * WALL, "transport.patches"),
+        (SCENE + 7 * WALL + "[transport]\ndiffuse_bounces = 0", None),
+        (SCENE + 7 * WALL + "[transport]\npatches = 22", None),
+    ],
+)
+def test_a_scene_that_is_sent_names_no_files_and_costs_no_more_than_it_may(
+    text: str, key: str | None
+) -> None:
+    if key is None:
+        parse_scene(text)
+        return
+    with pytest.raises(SceneError) as refused:
+        parse_scene(text)
+
+    assert refused.value.key == key

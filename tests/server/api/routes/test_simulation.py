@@ -6,6 +6,7 @@ import transientcam
 from tests.serving import Served
 from transientcam import wire
 from transientcam_driver import open_camera
+from transientcam_server.camera.source import twin_of
 
 
 def test_the_simulated_scene_is_reported(http: httpx.Client) -> None:
@@ -76,6 +77,66 @@ def test_the_camera_is_put_before_another_scene_while_it_captures(
             assert (explained["scene"], effects["ambient"]["choice"]) == ("wall", "on")
         finally:
             assert camera.simulate("mirrors", effects={})["effects"] == {}
+
+
+OWN = """
+name = "a wall of my own"
+[light]
+position_m = [0, 0, 0]
+aim_at_m = [0, 1, 0]
+electrons_per_s = 1e8
+[[surface]]
+kind = "diffuse"
+centre_m = [0, 1.5, 0]
+normal = [0, -1, 0]
+size_m = [4, 4]
+albedo = 0.5
+"""
+
+
+def test_the_camera_is_put_before_a_scene_that_the_client_sends(
+    served: Served, http: httpx.Client
+) -> None:
+    with transientcam.Camera(served.url) as camera:
+        sent = http.put("/api/v1/simulation", json={"definition": OWN}).raise_for_status()
+        try:
+            assert sent.json()["scene"] == "a wall of my own"
+            # it stays while something else is chosen of it
+            http.put("/api/v1/simulation", json={"effects": {"ambient": "on"}}).raise_for_status()
+            again = http.put("/api/v1/simulation", json={"scene": "a wall of my own"})
+            assert again.raise_for_status().json()["effects"] == {"ambient": "on"}
+            truth_m = camera.frame("truth", after=camera.frame("truth").frame, wait_s=10).array
+            assert truth_m[60, 81] == pytest.approx(1.5, abs=1e-3)
+            assert twin_of(served.camera, "sim:mirrors?noise=off").definition == OWN
+        finally:
+            back = http.put("/api/v1/simulation", json={"scene": "mirrors", "effects": {}})
+            assert back.raise_for_status().json()["scene"] == "mirrors"
+    assert twin_of(served.camera, "sim:mirrors?noise=off").definition is None
+
+
+@pytest.mark.parametrize(
+    ("body", "field"),
+    [
+        ({"definition": "seed ="}, "the text"),
+        ({"definition": OWN.replace("0.5", "2")}, "surface[0].albedo"),
+        ({"definition": OWN.replace("0.5", "0x" + "f" * 5000)}, "surface[0].albedo"),
+        ({"definition": OWN.replace("0.5", "2020-02-02")}, "surface[0].albedo"),
+        ({"definition": OWN.replace("a wall of my own", "wall")}, "name"),
+        ({"definition": OWN + "[device]\nwaveform_file = '/dev/zero'"}, "device.waveform_file"),
+        ({"definition": OWN, "scene": "wall"}, "scene"),
+        ({"definition": "#" * 65_537}, "definition"),
+    ],
+)
+def test_a_scene_that_is_not_valid_is_refused_and_the_scene_stays(
+    http: httpx.Client, body: object, field: str
+) -> None:
+    refused = http.put("/api/v1/simulation", json=body)
+
+    problem = refused.json()
+    assert (refused.status_code, problem["type"]) == (422, "/problems/invalid-request")
+    assert problem["field"].removeprefix("body.") == field
+    assert problem["limit"]
+    assert http.get("/api/v1/simulation").json()["scene"] == "mirrors"
 
 
 @pytest.mark.parametrize(

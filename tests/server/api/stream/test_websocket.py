@@ -127,11 +127,10 @@ def test_with_credits_the_server_waits_for_the_client_and_then_sends_the_newest(
 
     assert second.meta["frame"] >= waited_for.number
     skipped = second.meta["frame"] - first.meta["frame"] - 1
-    assert dropped.details == {
-        "channel": first.channel,
-        "count": skipped,
-        "total": skipped,
-    }
+    counts = dict(dropped.details)
+    # after the acknowledgement one more may be left out before the next is on its way
+    assert 1 <= counts.pop("unacknowledged") <= skipped
+    assert counts == {"channel": first.channel, "count": skipped, "total": skipped}
 
 
 def test_a_start_in_the_past_sends_every_frame_from_there_and_goes_on_with_the_newest(

@@ -1,6 +1,6 @@
 /** The plane that a region of the range map is nearest to. */
 import { planeThrough, type Plane } from "../../physics/plane";
-import type { Region } from "../../store/measures";
+import { holds, type Region } from "../../store/measures";
 import { fillCloud, makeCloud, type Pinhole } from "../points/cloud";
 
 /** The plane through what the pixels of a region see, in m; null where too few have a range. */
@@ -8,7 +8,10 @@ export function planeOf(range_m: ArrayLike<number>, width: number, height: numbe
   const columns = Math.min(region.x1, width - 1) - region.x0 + 1;
   const rows = Math.min(region.y1, height - 1) - region.y0 + 1;
   if (columns < 1 || rows < 1) return null;
-  const inside = Float32Array.from({ length: columns * rows }, (_, at) => range_m[(region.y0 + Math.floor(at / columns)) * width + region.x0 + (at % columns)]);
+  const inside = Float32Array.from({ length: columns * rows }, (_, at) => {
+    const [x, y] = [region.x0 + (at % columns), region.y0 + Math.floor(at / columns)];
+    return holds(region, x, y) ? range_m[y * width + x] : NaN;
+  });
   const cloud = makeCloud(inside.length);
   const count = fillCloud(cloud, inside, columns, { ...lens, cx: lens.cx - region.x0, cy: lens.cy - region.y0 });
   return planeThrough(cloud.positions.subarray(0, 3 * count));

@@ -2,19 +2,15 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useId, useRef } from "preact/hooks";
 
 import { useStore } from "../../store/store";
-import { Dialog } from "../../ui/Dialog";
+import { SwitchedDialog } from "../../ui/Dialog";
 import { commandsOf, matching } from "./commands";
 
 /** All commands of the page, by the keyboard: type, choose by arrow keys, Enter. After the WAI-ARIA pattern "combobox" with a list. */
 export function Palette() {
-  const { palette } = useStore();
-  const close = (): void => {
-    palette.value = false;
-  };
   return (
-    <Dialog open={palette.value} title="All commands" onClose={close}>
-      <Search onDone={close} />
-    </Dialog>
+    <SwitchedDialog open={useStore().palette} title="All commands">
+      {(close) => <Search onDone={close} />}
+    </SwitchedDialog>
   );
 }
 

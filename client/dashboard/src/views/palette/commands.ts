@@ -4,6 +4,7 @@ import { copyLink } from "../../store/permalink";
 import type { Store } from "../../store/store";
 import { SHORTCUTS } from "../../ui/shortcuts";
 import { THEMES } from "../../ui/theme";
+import { chooseFile } from "../files/openFile";
 import { LAYOUTS } from "../layout";
 import { MAP_PRODUCTS } from "../map/catalogue";
 import { VIEWS } from "../registry";
@@ -30,6 +31,7 @@ export function commandsOf(store: Store): Command[] {
     ...(steering && applied !== null ? PRESETS.map(({ name, sequence }) => ({ words: `Sequence: ${name}`, key: "", run: () => void told(store, () => store.sequencing.set({ ...applied, ...sequence })) })) : []),
     ...scenes.map(({ name }) => ({ words: `Scene: ${name}`, key: "", run: () => void told(store, () => store.simulation.stage(name)) })),
     ...THEMES.map((theme) => ({ words: `Colours: ${theme === "auto" ? "as the system" : theme}`, key: "", run: () => void (store.theme.choice.value = theme) })),
+    { words: "Open a file: scene, recording or calibration…", key: "", run: () => { chooseFile(store); } },
     { words: "Copy a link to what is shown", key: "", run: () => void copyLink(window, store) },
     ...SHORTCUTS.filter(({ shown }) => shown.length === 1 && shown !== "K").map(({ keys, shown, words, run }) => ({
       words: `Page: ${words}`,

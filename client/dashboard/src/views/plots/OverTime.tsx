@@ -58,6 +58,6 @@ function placesOf({ selected, measures }: Store): Place[] {
   return [
     ...(pixel === null ? [] : [{ key: `pixel ${pixel.x},${pixel.y}`, name: `${pixel.x}, ${pixel.y}`, colour: "--curve", valueIn: (frame: Frame) => valueAtPixel(frame, pixel) }]),
     ...measures.pins.value.map((pin) => ({ key: `${pin.name} ${pin.x},${pin.y}`, name: pin.name, colour: PIN_COLOURS[pin.name], valueIn: (frame: Frame) => valueAtPixel(frame, pin) })),
-    ...(region === null ? [] : [{ key: `region ${Object.values(region).join()}`, name: "region", colour: "--light", valueIn: ({ values, shape }: Frame) => figuresOf(values, shape[1], shape[0], region).mean }]),
+    ...(region === null ? [] : [{ key: `region ${JSON.stringify(region)}`, name: "region", colour: "--light", valueIn: ({ values, shape }: Frame) => figuresOf(values, shape[1], shape[0], region).mean }]),
   ];
 }

@@ -3,10 +3,10 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 import "uplot/dist/uPlot.min.css";
 
 import { rangeOfTime_m } from "../../physics/constants";
-import { peaks } from "../../physics/impulseResponse";
 import { pixelOf } from "../../physics/reflection";
 import { aBoolean, oneOf, remembered } from "../../store/settings";
 import type { Frame } from "../../store/frames";
+import { PIN_COLOURS } from "../../store/measures";
 import type { Pixel } from "../../store/pixel";
 import { type Store, useStore } from "../../store/store";
 import { Tabs, Toggle } from "../../ui/controls";
@@ -15,7 +15,7 @@ import { save } from "../../ui/download";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { autoLimits, type Span } from "../../ui/scale";
-import { csvOf, curvesOf, type Aspect } from "./curves";
+import { csvOf, drawnOf, type Aspect, type Subject } from "./curves";
 import { AMPLITUDE } from "../map/catalogue";
 import { PixelFigures } from "./Figures";
 import { FlagHistory } from "./flagShares";
@@ -27,8 +27,6 @@ import { ReturnHistory } from "./returns";
 
 /** Share of the height that the axis was made for which is left after a frame without such a peak. */
 const SHRINK = 0.96;
-/** Least share of the light that makes a peak worth finer samples around it. */
-const LEAST_SHARE = 0.02;
 
 type Side = Aspect | "moments";
 const ASPECTS: readonly { readonly value: Aspect; readonly text: string; readonly hint: string }[] = [
@@ -59,8 +57,7 @@ export function ResponseView() {
         if (!coefficients || pixel === null) return null;
         if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return null;
         const index = pixel.y * coefficients.width + pixel.x;
-        const found = peaks(coefficients, index).filter(({ share }) => share >= LEAST_SHARE);
-        return { pixel, coefficients, index, found };
+        return { pixel, coefficients, index };
       }),
     [frame, store],
   );
@@ -73,7 +70,7 @@ export function ResponseView() {
     if (now === null) return;
     const truth = store.details.document.peek()?.truth ?? null;
     const name = `pixel-${now.pixel.x}-${now.pixel.y}-${aspect}-${frame.peek()?.meta.frame ?? 0}.csv`;
-    save(name, new Blob([csvOf(curvesOf(aspect, now.coefficients, now.index, now.found, truth))], { type: "text/csv" }));
+    save(name, new Blob([csvOf(drawnOf(aspect, now, store.measures.pins.peek(), truth))], { type: "text/csv" }));
   };
   return (
     <Panel
@@ -126,11 +123,8 @@ function selectFirst(store: Store, frame: ReadonlySignal<Frame | null>): () => v
   return end;
 }
 
-interface Shown {
+interface Shown extends Subject {
   readonly pixel: Pixel;
-  readonly coefficients: Parameters<typeof curvesOf>[1];
-  readonly index: number;
-  readonly found: Parameters<typeof curvesOf>[3];
 }
 
 interface PlotProps {
@@ -144,6 +138,7 @@ interface PlotProps {
 /** The curves of one aspect over time of flight. */
 function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
   const store = useStore();
+  const { measures } = store;
   const box = useRef<HTMLDivElement>(null);
   const size = useMemo(() => signal({ width: 0, height: 0 }), []);
   useSize(box, size);
@@ -182,17 +177,17 @@ function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
     const truth = store.details.document.value?.truth ?? null;
     if (plot.value === null || size.value.width === 0) return;
     if (now === null) {
-      plot.value.show(null, null);
+      plot.value.show(null, null, new Map());
       return;
     }
-    const curves = curvesOf(aspect, now.coefficients, now.index, now.found, truth);
+    const { curves, ofPins } = drawnOf(aspect, now, measures.pins.value, truth);
     let highest = 0; // NaN never counts
-    for (const line of curves.lines) for (const value of line) if (value > highest) highest = value;
+    for (const line of [...curves.lines, ...ofPins.values()]) for (const value of line) if (value > highest) highest = value;
     // A peak's height is its noisiest figure: the axis grows with it at once and shrinks slowly.
     held.current = now.pixel === heldFor.current ? Math.max(highest, SHRINK * held.current) : highest;
     heldFor.current = now.pixel;
     top.current = autoLimits(top.current, { low: 0, high: held.current });
-    plot.value.show(curves, truth);
+    plot.value.show(curves, truth, ofPins);
   }, [plot, shown, aspect]);
 
   useDrawing(() => {
@@ -207,6 +202,11 @@ function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
         <p class="key">
           {aspect === "bounds" && <span class="key-band">any light with these moments</span>}
           <span>estimate</span>
+          {measures.pins.value.map(({ name }) => (
+            <span key={name} class="key-pin" style={{ "--pin": PIN_COLOURS[name] }}>
+              {name}
+            </span>
+          ))}
           {simulated && aspect !== "density" && <span class="key-truth">truth</span>}
           {simulated && <span class="key-stem" title="As high as their share of the light">true returns</span>}
           {aspect === "bounds" && <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">smoothed</em>}

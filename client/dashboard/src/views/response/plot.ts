@@ -1,15 +1,16 @@
 import uPlot from "uplot";
 
 import { rangeOfTime_m } from "../../physics/constants";
+import { PIN_COLOURS, PIN_NAMES } from "../../store/measures";
 import { grouped, significant } from "../../ui/format";
-import type { Aspect, Curves, Truth } from "./curves";
+import { ESTIMATES, type Aspect, type Curves, type PinLines, type Truth } from "./curves";
 
 /** The plot, and the line that marks the player's time in it. */
 export interface ResponsePlot {
   readonly plot: uPlot;
   readonly head: HTMLElement;
-  /** Shows curves of the aspect that the plot was made for, and the times of true returns. */
-  show(curves: Curves | null, truth: Truth | null): void;
+  /** Shows curves of the aspect that the plot was made for, the times of true returns, and the estimates of pins at the same times. */
+  show(curves: Curves | null, truth: Truth | null, pins: PinLines): void;
 }
 
 export interface PlotOptions {
@@ -44,8 +45,10 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, perio
     bounds: [edge, edge, solid, true_],
     cumulative: [{ ...solid, fill: wash }, true_],
   };
+  const ofPins = PIN_NAMES.map((name): uPlot.Series => ({ ...solid, stroke: PIN_COLOURS[name], width: 1.25 }));
   // What the hover line reads: the estimate itself.
-  const main = aspect === "bounds" ? 3 : 1;
+  const main = ESTIMATES[aspect] + 1;
+  const empty = (): uPlot.AlignedData => [[], ...[...series[aspect], ...ofPins].map(() => [])];
   const plot = new uPlot(
     {
       width: Math.max(1, box.clientWidth),
@@ -89,10 +92,10 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, perio
           values: (_plot, splits) => splits.map((time_ns) => `${Number((time_ns * METRES_PER_NS).toFixed(2))}\u202fm`),
         },
       ],
-      series: [{}, ...series[aspect]],
+      series: [{}, ...series[aspect], ...ofPins],
       bands: aspect === "bounds" ? [{ series: [2, 1], fill: wash }] : [],
     },
-    [[], ...series[aspect].map(() => [])],
+    empty(),
     box,
   );
   plot.over.addEventListener("click", () => {
@@ -105,11 +108,12 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, perio
   return {
     plot,
     head,
-    show: (curves, truthNow) => {
+    show: (curves, truthNow, pins) => {
       truth = truthNow;
       // Where the axis bends; it follows the axis, and uPlot takes it from here.
       Object.assign(plot.scales["y"], { asinh: top() / ASINH_SHARES[aspect] });
-      plot.setData(curves === null ? [[], ...series[aspect].map(() => [])] : [curves.time_ns, ...curves.lines]);
+      if (curves === null) plot.setData(empty());
+      else plot.setData([curves.time_ns, ...curves.lines, ...PIN_NAMES.map((name) => pins.get(name) ?? curves.time_ns.map(() => NaN))]);
     },
   };
 }

@@ -21,7 +21,7 @@ export function SimulationView() {
       <div class="panel-body">
         {simulation.trouble.value !== null && <p class="quiet">{simulation.trouble.value}</p>}
         <Obstacle />
-        {world !== null && <p class="quiet scene-words">{world.scenes.find(({ name }) => name === world.scene)?.description}</p>}
+        {world !== null && <p class="quiet scene-words">{world.scenes.find(({ name }) => name === world.scene)?.description ?? "A scene from a file."} A scene file that is dropped on the page takes its place.</p>}
         {world !== null && (
           <fieldset class="faults">
             <legend>Let something go wrong</legend>

@@ -2,7 +2,7 @@ import { useMemo } from "preact/hooks";
 
 import { remembered } from "../../store/settings";
 import { useStore } from "../../store/store";
-import { Dialog } from "../../ui/Dialog";
+import { SwitchedDialog } from "../../ui/Dialog";
 import { useNow } from "../../ui/hooks";
 import { TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
@@ -12,15 +12,10 @@ const LONGEST_NAME = 80;
 
 /** Who controls the camera, and the way to take control or give it back. */
 export function ControlDialog() {
-  const store = useStore();
-  const { asksForControl } = store;
-  const close = (): void => {
-    asksForControl.value = false;
-  };
   return (
-    <Dialog open={asksForControl.value} title="Control" onClose={close}>
-      <Control onDone={close} />
-    </Dialog>
+    <SwitchedDialog open={useStore().asksForControl} title="Control">
+      {(close) => <Control onDone={close} />}
+    </SwitchedDialog>
   );
 }
 

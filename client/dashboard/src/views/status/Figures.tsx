@@ -2,13 +2,15 @@ import { useComputed } from "@preact/signals";
 
 import { CREDIBLE_LATENCY_S } from "../../store/status";
 import { useStore } from "../../store/store";
-import { engineering, fixed, grouped, NOTHING } from "../../ui/format";
+import { KEPT_S, linesOf, type Trend } from "../../store/trends";
+import { deviation, engineering, fixed, grouped, NOTHING } from "../../ui/format";
 import { PulseIcon } from "../../ui/icons";
 import { PopoverButton } from "../../ui/PopoverButton";
+import { Sparkline } from "../../ui/Sparkline";
 
 /** All figures of the flow of frames, behind a button. */
 export function Figures() {
-  const { status } = useStore();
+  const { status, rangeErrors } = useStore();
   const latency = useComputed(() => {
     const latency_s = status.latency_s.value;
     if (latency_s === null) return NOTHING;
@@ -17,10 +19,21 @@ export function Figures() {
   });
   return (
     <PopoverButton face={<PulseIcon />} label="All figures" title="All figures of the flow of frames" kind="figures">
-      <dl class="flow">
-        <Figure name="Latency" field="latency" title="From the last image's arrival at the service to this screen">
+      <dl class="flow flow-trends">
+        <Figure name="Rate" field="flow-rate" title="Frames drawn a second" trend="rate_hz">
+          {useComputed(() => fixed(status.rate_hz.value, 1, "Hz"))}
+        </Figure>
+        <Figure name="Error of the range" field="flow-error" title="In the median pixel" trend="error_m">
+          {useComputed(() => deviation(rangeErrors.now.value?.error_m, "m"))}
+        </Figure>
+        <Figure name="Latency" field="latency" title="From the last image's arrival at the service to this screen" trend="latency_s">
           {latency}
         </Figure>
+        <Figure name="Dropped" field="dropped" title="Frames left out for this page, which was slower than the camera" trend="dropped">
+          {useComputed(() => grouped(status.dropped.value))}
+        </Figure>
+      </dl>
+      <dl class="flow">
         <Figure name="Capture" field="capture" title="From the first exposure of a frame to the last">
           {useComputed(() => fixed(1000 * (status.newest.value?.capture_s ?? NaN), 1, "ms"))}
         </Figure>
@@ -29,9 +42,6 @@ export function Figures() {
         </Figure>
         <Figure name="Encode" field="encode" title="Bringing the products of a frame into the form they are sent in">
           {useComputed(() => engineering(status.encode_s.value, "s", 2))}
-        </Figure>
-        <Figure name="Dropped" field="dropped" title="Frames left out for this page, which was slower than the camera">
-          {useComputed(() => grouped(status.dropped.value))}
         </Figure>
         <Figure name="Lost images" field="lost" title="Images that did not arrive from the camera intact since this page connected">
           {useComputed(() => grouped(status.lostImages.value))}
@@ -51,14 +61,33 @@ interface FigureProps {
   readonly name: string;
   readonly field: string;
   readonly title: string;
+  /** What is drawn over the last minute beside it. */
+  readonly trend?: Trend;
   readonly children: { readonly value: string };
 }
 
-function Figure({ name, field, title, children }: FigureProps) {
+function Figure({ name, field, title, trend, children }: FigureProps) {
   return (
     <div class="figure" title={title}>
       <dt>{name}</dt>
-      <dd data-field={field}>{children}</dd>
+      <dd>
+        <span data-field={field}>{children}</span>
+        {trend !== undefined && <Course name={name} trend={trend} />}
+      </dd>
     </div>
   );
 }
+
+/** A figure over the last minute, from zero to its largest value. */
+function Course({ name, trend }: { name: string; trend: Trend }) {
+  const { samples } = useStore().trends;
+  const { most, lines } = linesOf(samples.value, trend);
+  return <Sparkline lines={lines} label={`${name} over the last ${KEPT_S} s, from 0 to ${MOST_WORDS[trend](most)}`} />;
+}
+
+const MOST_WORDS: Readonly<Record<Trend, (most: number) => string>> = {
+  rate_hz: (most) => fixed(most, 1, "Hz"),
+  error_m: (most) => engineering(most, "m", 2),
+  latency_s: (most) => fixed(1000 * most, 0, "ms"),
+  dropped: (most) => `${grouped(most)} in half a second`,
+};

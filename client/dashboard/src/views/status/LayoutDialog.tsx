@@ -2,19 +2,15 @@ import { useSignal } from "@preact/signals";
 
 import { LONGEST_NAME } from "../../store/layouts";
 import { useStore } from "../../store/store";
-import { Dialog } from "../../ui/Dialog";
+import { SwitchedDialog } from "../../ui/Dialog";
 import { LAYOUTS } from "../layout";
 
 /** Saves the present layout under a name, and removes saved ones. */
 export function LayoutDialog() {
-  const { asksForLayout } = useStore();
-  const close = (): void => {
-    asksForLayout.value = false;
-  };
   return (
-    <Dialog open={asksForLayout.value} title="Layouts" onClose={close}>
-      <Saved onDone={close} />
-    </Dialog>
+    <SwitchedDialog open={useStore().asksForLayout} title="Layouts">
+      {(close) => <Saved onDone={close} />}
+    </SwitchedDialog>
   );
 }
 

@@ -2,6 +2,7 @@ import { copyLink } from "../../store/permalink";
 import { useStore } from "../../store/store";
 import { ActionMenu } from "../../ui/ActionMenu";
 import { THEMES, type ThemeChoice } from "../../ui/theme";
+import { chooseFile } from "../files/openFile";
 import { LAYOUTS } from "../layout";
 
 /** What concerns the page and not the camera. */
@@ -22,6 +23,8 @@ export function PageMenu() {
           ],
         },
         { title: "Colours", actions: THEMES.map((theme) => ({ text: THEME_NAMES[theme] + (theme === choice.value ? " ✓" : ""), run: () => (choice.value = theme) })) },
+        { title: "Files", actions: [{ text: "Open a scene, recording or calibration…", run: () => { chooseFile(store); } }] },
+        { title: "Link", actions: [{ text: `Ask for less where it is too thin${store.adapts.value ? " ✓" : ""}`, run: () => (store.adapts.value = !store.adapts.peek()) }] },
         {
           title: "Help",
           actions: [

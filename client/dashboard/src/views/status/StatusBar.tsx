@@ -6,6 +6,7 @@ import { deviation, fixed } from "../../ui/format";
 import { errorWords } from "../sequence/words";
 import { useNow } from "../../ui/hooks";
 import { Figures } from "./Figures";
+import { demandWords } from "./words";
 import { Steering } from "./Steering";
 import { Toasts } from "./Toasts";
 
@@ -18,6 +19,7 @@ export function StatusBar() {
         <span class="brand-name">transientcam</span>
       </h1>
       <StateChip />
+      <ThinLink />
       <Performance />
       <Subject />
       <Figures />
@@ -62,6 +64,20 @@ function StateChip() {
 /** A live camera whose frames come too seldom or too late is not well. */
 function slowed(state: State, trouble: string | null): State {
   return state.word === "Live" && trouble !== null ? { tone: "waiting", word: "Live, slow", why: trouble } : state;
+}
+
+/** That less is asked for than there is, and what. */
+function ThinLink() {
+  const { status, sight } = useStore();
+  const decision = status.demanded.value;
+  if (decision === null) return null;
+  const { long, short } = demandWords(decision, sight.value !== null);
+  return (
+    <span class="chip chip-waiting thin-link" role="status" data-field="link" title={long}>
+      <i aria-hidden="true" />
+      {short}
+    </span>
+  );
 }
 
 /** Frames a second and how well they measure; leads to what accuracy costs. */

@@ -2,18 +2,14 @@ import { useSignal } from "@preact/signals";
 
 import { kindOf } from "../../store/api";
 import { useStore } from "../../store/store";
-import { Dialog } from "../../ui/Dialog";
+import { SwitchedDialog } from "../../ui/Dialog";
 
 /** Asks for the token that the service lets people in with. */
 export function TokenDialog() {
-  const { asksForToken } = useStore();
-  const close = (): void => {
-    asksForToken.value = false;
-  };
   return (
-    <Dialog open={asksForToken.value} title="Authentication required" onClose={close}>
-      <TokenForm onDone={close} />
-    </Dialog>
+    <SwitchedDialog open={useStore().asksForToken} title="Authentication required">
+      {(close) => <TokenForm onDone={close} />}
+    </SwitchedDialog>
   );
 }
 

@@ -1,0 +1,45 @@
+import { useSignal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+
+import { useStore } from "../../store/store";
+import { openFile } from "./openFile";
+
+const carriesFiles = (event: DragEvent): boolean => event.dataTransfer?.types.includes("Files") ?? false;
+
+/** Opens the files that are dropped anywhere on the page, and says so while they are held over it. */
+export function FileDrop() {
+  const store = useStore();
+  const over = useSignal(false);
+  useEffect(() => {
+    const onOver = (event: DragEvent): void => {
+      if (!carriesFiles(event)) return; // a panel that is moved
+      event.preventDefault();
+      over.value = true;
+    };
+    const onLeave = (event: DragEvent): void => {
+      if (event.relatedTarget === null) over.value = false;
+    };
+    const onDrop = (event: DragEvent): void => {
+      if (!carriesFiles(event)) return;
+      event.preventDefault(); // the browser would leave the page for the file
+      over.value = false;
+      for (const file of event.dataTransfer?.files ?? []) void openFile(store, file);
+    };
+    window.addEventListener("dragover", onOver);
+    window.addEventListener("dragleave", onLeave);
+    window.addEventListener("drop", onDrop);
+    return () => {
+      window.removeEventListener("dragover", onOver);
+      window.removeEventListener("dragleave", onLeave);
+      window.removeEventListener("drop", onDrop);
+    };
+  }, [store, over]);
+  if (!over.value) return null;
+  return (
+    <div class="file-drop" aria-hidden="true">
+      <p>
+        A scene (.toml) to put the camera before, a recording (.h5) of this service to show, a calibration (.npz) to take in
+      </p>
+    </div>
+  );
+}

@@ -1,0 +1,47 @@
+"""A page behind a link that does not carry all frames."""
+
+import re
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, expect
+
+from tests.browser.dashboard import open_page
+from tests.browser.test_map import product
+from tests.browser.thin_link import ThinLink
+from tests.serving import Served
+
+pytestmark = pytest.mark.shared_daemon(slower=3.0)
+
+
+def test_over_a_thin_link_less_is_asked_for_and_everything_again_once_it_is_wide(
+    browser: Browser, served: Served
+) -> None:
+    with ThinLink(served.url).running() as link:
+        context = browser.new_context(reduced_motion="reduce", base_url=link.url)
+        context.set_default_timeout(60_000)
+        page = context.new_page()
+        open_page(page)
+        exact = product(served, "range").astype(np.float64).ravel()
+        page.evaluate(
+            "() => { window.first = transientcam.store.frames.of('range').peek().values }"
+        )
+        sign = page.locator("[data-field=link]")
+        link.rate_bytes_s = 5e5  # 0.9 MB a frame, of which the camera takes three a second
+        expect(sign).to_contain_text("16 bits")
+        expect(sign).to_have_attribute("title", re.compile("carried [0-9.]+\u202fMB/s.* 16 bits"))
+        # frames are all alike, but for the steps of the codes
+        page.wait_for_function(
+            """() => transientcam.store.frames.of('range').peek().values
+                 .some((value, at) => Math.abs(value - first[at]) > 0)"""
+        )
+        values = page.evaluate(
+            """() => Array.from(transientcam.store.frames.of('range').peek().values,
+                 (value) => Number.isNaN(value) ? null : value)"""
+        )
+        shown = np.array([np.nan if each is None else each for each in values])
+        step_m = (np.nanmax(exact) - np.nanmin(exact)) / 65534
+        np.testing.assert_allclose(shown, exact, rtol=1e-6, atol=0.51 * step_m)
+        link.rate_bytes_s = None
+        expect(sign).to_have_count(0)
+        context.close()
