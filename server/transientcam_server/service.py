@@ -195,9 +195,10 @@ class Service:
             self.lease.close()
             self.hub.close()
             self.jobs.cancel_all()
-            await self._loop.run_in_executor(self._executor, self.acquisition.stop)
+            # not behind frames that are computed: the light goes off now
+            await asyncio.to_thread(self.acquisition.stop)
             await self.jobs.close()
-            await self._loop.run_in_executor(self._executor, self.recordings.close)
+            await asyncio.to_thread(self.recordings.close)
             ended = await self.workers.close(within_s=_WORKERS_END_S)
             if not ended:
                 _log.warning("a worker does not end; what it computes is dropped")

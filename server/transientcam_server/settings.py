@@ -69,8 +69,8 @@ class ReconstructionSettings(_Group):
     sensor is not known, and in the daemon until the kernel is compiled; each frame names its
     `estimator`. The paper's are `pisarenko` and
     `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase` serve any set of
-    frequencies; for those with gaps `automatic` is `two-returns`, or `likelihood` where there are
-    but two and until the kernel is compiled. The others are there for comparison."""
+    frequencies; for those with gaps `automatic` is `two-returns`, or `unwrapped-phase` where there
+    are but two and until the kernel is compiled. The others are there for comparison."""
     minimum_brightness_dn: _Finite = Field(default=0.0, ge=0.0)
     """Pixels with no more light than this have no range."""
     spoilt_images: SpoiltImages = "repair"

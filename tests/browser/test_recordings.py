@@ -94,7 +94,6 @@ def test_what_just_happened_is_saved(page: Page, served: Served) -> None:
     listed = httpx.get(f"{served.url}/api/v1/recordings/{saved['id']}/frames").json()
     began_s = listed["host_time_s"]
     assert began_s <= kept_s <= began_s + listed["duration_s"]
-    assert listed["duration_s"] <= 10.0
 
 
 def test_a_recording_is_annotated_downloaded_and_deleted(

@@ -1,11 +1,15 @@
+import asyncio
+import threading
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-from tests.server.streaming import streaming
+from tests.server.streaming import PATIENCE_S, streaming
 from tests.serving import Served, serving
 from transientcam_server.broadcast.channel import Channel
 from transientcam_server.camera import AcquisitionStatus
+from transientcam_server.imaging.workers import Workers
 
 HEALTHY: dict[str, Any] = {
     "state": "streaming",
@@ -74,3 +78,32 @@ def test_the_loop_is_left_to_requests_without_viewers() -> None:
             during = daemon.service.watched
 
     assert (before, during) == (False, True)
+
+
+def test_the_camera_is_stopped_at_the_end_whatever_is_computed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stopped = threading.Event()
+    waits: list[bool] = []
+
+    def compute() -> None:
+        waits.append(stopped.wait(PATIENCE_S))
+
+    with serving("sim:wall?noise=off", workers=2) as daemon:
+        service = daemon.service
+        stop = service.acquisition.stop
+
+        def stop_and_say_so() -> None:
+            stop()
+            stopped.set()
+
+        monkeypatch.setattr(service.acquisition, "stop", stop_and_say_so)
+        computing = threading.Thread(target=asyncio.run, args=(_each(service.workers, compute, 2),))
+        computing.start()
+    computing.join()
+
+    assert waits == [True, True]
+
+
+async def _each(workers: Workers, compute: Callable[[], None], count: int) -> None:
+    await asyncio.gather(*(workers.run(compute) for _ in range(count)))

@@ -21,8 +21,8 @@ from transientcam_server.settings import ReconstructionSettings
 _log = logging.getLogger(__name__)
 _UNTIL_COMPILED: Final = "pisarenko"
 """In NumPy as in compiled lanes fast enough for a camera of 163 x 120 pixels."""
-_GAPPED_UNTIL_COMPILED: Final = "likelihood"
-"""For frequencies with gaps; in NumPy the quickest there that knows more than one return."""
+_ONE_RETURN: Final = "unwrapped-phase"
+"""For frequencies with gaps: in NumPy the only one that keeps up with 512 x 424 pixels."""
 _LEAST_FOR_PAIRS: Final = 3
 """Frequencies of which two returns leave something to judge them by."""
 
@@ -46,15 +46,15 @@ class SettingsVersion:
         """Return these settings with an estimator that keeps up with a camera now.
 
         ``automatic`` stays where ``ready`` says that the kernel of its estimator is compiled for
-        this order. Until then it is Pisarenko's returns, and the likelihood for multiples that have
-        gaps.
+        this order. Until then it is Pisarenko's returns, and the unwrapped phase of one return for
+        multiples that have gaps.
         """
         if self.settings.estimator != "automatic":
             return self
         if sequence.sampling.consecutive:
             kernel, until = "likelihood", _UNTIL_COMPILED
         else:
-            kernel, until = "pairs", _GAPPED_UNTIL_COMPILED
+            kernel, until = "pairs", _ONE_RETURN
             if _for_gaps(sequence.sampling) == until:
                 return self
         if ready(kernel, sequence.multiples[-1]):
@@ -126,7 +126,7 @@ def _serves(settings: ReconstructionSettings, sampling: Sampling) -> bool:
 
 def _for_gaps(sampling: Sampling) -> str:
     """Return what `automatic` is for multiples that have gaps."""
-    return "two-returns" if len(sampling.multiples) >= _LEAST_FOR_PAIRS else "likelihood"
+    return "two-returns" if len(sampling.multiples) >= _LEAST_FOR_PAIRS else _ONE_RETURN
 
 
 def listed(multiples: tuple[int, ...]) -> str:

@@ -373,12 +373,12 @@ def test_an_estimator_that_is_named_is_used_compiled_or_not(named: str) -> None:
     assert settings.for_live_frames(Sequence(harmonics=4), ready=lambda name, m: False) == settings
 
 
-def test_two_frequencies_with_gaps_are_the_likelihoods_compiled_or_not() -> None:
+def test_two_frequencies_with_gaps_give_one_return_compiled_or_not() -> None:
     settings = SettingsVersion(1, ReconstructionSettings())
     gapped = Sequence(harmonics=2, sampling=Sampling((2, 3)))
 
     assert settings.for_live_frames(gapped, ready=lambda name, m: False) == settings
-    assert technique_of(gapped) == "likelihood"
+    assert technique_of(gapped) == "unwrapped-phase"
     assert suited(settings.settings, gapped.sampling) == settings.settings
 
 
@@ -394,7 +394,7 @@ def test_more_with_gaps_are_searched_for_pairs_once_that_is_compiled() -> None:
     before, behind = (settings.for_live_frames(gapped, ready=ready) for _ in range(2))
 
     assert asked == [("pairs", 15)] * 2
-    assert (before.settings.estimator, before.id) == ("likelihood", 1)
+    assert (before.settings.estimator, before.id) == ("unwrapped-phase", 1)
     assert behind == settings
     assert technique_of(gapped) == "two-returns"
 
