@@ -38,7 +38,9 @@ render(
 
 const address = new URL("/api/v1/stream", window.location.href);
 address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
-stream.open(address.href);
+void stream.learnAbsent().then(() => {
+  stream.open(address.href);
+});
 
 window.addEventListener("pagehide", () => {
   store.lease.abandon();

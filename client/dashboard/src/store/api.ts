@@ -89,6 +89,12 @@ export class Api {
     return ((await this.#json("GET", "/info")) as { caller: CallerDocument }).caller;
   }
 
+  /** Why frames do not have some products, by their names. */
+  async absentProducts(): Promise<Readonly<Record<string, string>>> {
+    const { absent_products: absent } = (await this.#json("GET", "/info")) as { absent_products: readonly { name: string; reason: string }[] };
+    return Object.fromEntries(absent.map(({ name, reason }) => [name, reason]));
+  }
+
   camera(): Promise<CameraDocument> {
     return this.#json("GET", "/camera") as Promise<CameraDocument>;
   }

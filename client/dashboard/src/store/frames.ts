@@ -1,4 +1,4 @@
-import { signal, type Signal } from "@preact/signals";
+import { computed, signal, type Signal } from "@preact/signals";
 
 import type { Coefficients } from "../physics/maximumEntropy";
 import type { FrameMeta, Numbers } from "../stream/protocol";
@@ -21,14 +21,19 @@ export interface Frame {
 }
 
 /**
- * The newest frame of each product, and which products are wanted.
+ * The newest frame of each product, which products are wanted, and which the camera does not have.
  *
  * Views ask for products and give them back; what any view asks for is streamed. At most one frame
  * of a product is kept, so memory does not grow with time.
  */
 export class Frames {
-  /** Products that a view shows, sorted. */
-  readonly wanted = signal<readonly string[]>([]);
+  /** Why frames of this camera do not have a product, by its name. */
+  readonly absent = signal<Readonly<Record<string, string | undefined>>>({});
+  /** Products that a view shows and that can be had, sorted. */
+  readonly wanted = computed(() => this.#claimed.value.filter((product) => this.absent.value[product] === undefined));
+  /** The product that says how much light a pixel has. */
+  readonly amplitude = computed(() => (this.absent.value["brightness"] === undefined ? "brightness" : "direct"));
+  readonly #claimed = signal<readonly string[]>([]);
   readonly #claims = new Map<string, number>();
   readonly #newest = new Map<string, Signal<Frame | null>>();
 
@@ -68,7 +73,7 @@ export class Frames {
 
   #publish(): void {
     const wanted = [...this.#claims.keys()].sort();
-    if (wanted.join() !== this.wanted.peek().join()) this.wanted.value = wanted;
+    if (wanted.join() !== this.#claimed.peek().join()) this.#claimed.value = wanted;
   }
 }
 

@@ -1,4 +1,4 @@
-import { computed, signal, type Signal } from "@preact/signals";
+import { computed, effect, signal, type Signal } from "@preact/signals";
 import { createContext } from "preact";
 import { useContext } from "preact/hooks";
 
@@ -20,7 +20,7 @@ import { Player } from "./player";
 import { RangeErrors } from "./rangeErrors";
 import { Sequencing } from "./sequencing";
 import { aBoolean, aNumber, browserShelf, oneOf, remembered, sessionShelf, type Shelf } from "./settings";
-import { isLayout, OVERVIEW, type Layout } from "../views/layout";
+import { isLayout, OVERVIEW, SPACE, type Layout } from "../views/layout";
 import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
 import { TransientLook } from "../views/transient/look";
@@ -146,6 +146,10 @@ export class Store {
     this.field_deg = remembered(shelf, "points.field_deg", 45, isField);
     this.looks = new Looks(this.frames, this.noises, shelf);
     this.layout = remembered<Layout>(shelf, "layout", OVERVIEW, (value): value is Layout => isLayout(value, VIEW_NAMES));
+    effect(() => {
+      const seesLight = this.frames.absent.value["coefficients"] === undefined;
+      if (!seesLight && JSON.stringify(this.layout.peek()) === JSON.stringify(OVERVIEW)) this.layout.value = SPACE;
+    });
     this.layouts = new Layouts(shelf, this.layout);
     this.adapts = remembered(shelf, "link.adapts", true, aBoolean);
     this.theme = new Theme(shelf, systemScheme());

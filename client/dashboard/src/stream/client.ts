@@ -149,6 +149,7 @@ export class StreamClient {
       this.#session = hello.session;
       status.sessionOpened(hello.camera.state, this.#now_s());
       void this.#readCamera();
+      void this.learnAbsent();
       void this.#store.caller.look();
       void this.#store.lease.look();
       void this.#store.recordings.refresh();
@@ -180,6 +181,7 @@ export class StreamClient {
   #complain({ problem }: ErrorMessage): void {
     // A refused user is asked for a token; an error beside that would say nothing more.
     if (TOKEN_PROBLEMS.includes(kindOf(problem))) this.#store.api.credentials.refused.value = problem;
+    else if (kindOf(problem) === UNKNOWN_PRODUCT) void this.learnAbsent();
     else this.#store.status.unreadable.value = problem.detail ?? problem.title ?? null;
   }
 
@@ -251,6 +253,17 @@ export class StreamClient {
     }
   }
 
+  /** Reads which products the camera does not have: before the first subscription, which asks for no other. */
+  async learnAbsent(): Promise<void> {
+    const { api, frames } = this.#store;
+    try {
+      const absent = await api.absentProducts();
+      if (JSON.stringify(absent) !== JSON.stringify(frames.absent.peek())) frames.absent.value = absent;
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error; // the stream says what is wrong
+    }
+  }
+
   #takeCamera(document: CameraDocument): void {
     this.#store.camera.value = document;
     if (document.simulated && this.#store.simulation.world.peek() === null) void this.#store.simulation.follow();
@@ -314,5 +327,7 @@ const SETTLED_S = 0.3;
 
 /** How long the stream's next frame is waited for before the newest there is will do. */
 const SOON_S = 0.4;
+
+const UNKNOWN_PRODUCT = "unknown-product";
 
 const TOKEN_PROBLEMS: readonly string[] = ["token-required", "token-refused"];

@@ -29,10 +29,18 @@ export function Choice<T extends string | number>({ label, value, options, onCha
   );
 }
 
+interface Tab<T extends string> {
+  readonly value: T;
+  readonly text: string;
+  readonly hint?: string;
+  /** Why it cannot be chosen. */
+  readonly obstacle?: string | undefined;
+}
+
 interface TabsProps<T extends string> {
   readonly label: string;
   readonly value: T;
-  readonly options: readonly { readonly value: T; readonly text: string; readonly hint?: string }[];
+  readonly options: readonly Tab<T>[];
   readonly onChange: (value: T) => void;
 }
 
@@ -43,8 +51,9 @@ export function Tabs<T extends string>({ label, value, options, onChange }: Tabs
     if (step === 0) return;
     event.preventDefault();
     event.stopPropagation();
-    const at = options.findIndex((option) => option.value === value);
-    const next = options[(at + step + options.length) % options.length];
+    const open = options.filter(({ obstacle }) => obstacle === undefined);
+    const at = open.findIndex((option) => option.value === value);
+    const next = open[(at + step + open.length) % open.length];
     onChange(next.value);
     const tabs = (event.currentTarget as HTMLElement).querySelectorAll<HTMLElement>("[role=tab]");
     tabs[options.indexOf(next)].focus();
@@ -58,9 +67,10 @@ export function Tabs<T extends string>({ label, value, options, onChange }: Tabs
           role="tab"
           aria-selected={option.value === value}
           tabIndex={option.value === value ? 0 : -1}
-          title={option.hint}
+          title={option.obstacle ?? option.hint}
+          aria-disabled={option.obstacle !== undefined}
           onClick={() => {
-            onChange(option.value);
+            if (option.obstacle === undefined) onChange(option.value);
           }}
         >
           {option.text}

@@ -2,7 +2,7 @@ import { Fragment } from "preact";
 import { useRef } from "preact/hooks";
 
 import { useStore } from "../store/store";
-import { DRAGGED, SlotContext } from "../ui/Panel";
+import { DRAGGED, Panel, SlotContext } from "../ui/Panel";
 import { below, beside, closed, replaced, split, viewsOf, type Layout, type Row } from "./layout";
 import { VIEWS } from "./registry";
 
@@ -59,6 +59,7 @@ function Place({ view, share }: { view: string; share: number }) {
   const shown = VIEWS.find(({ name }) => name === view);
   if (shown === undefined) return null;
   const View = shown.view;
+  const obstacle = shown.needs === undefined ? undefined : store.frames.absent.value[shown.needs];
   const layout = store.layout.value;
   const set = (made: Layout | null) => (): void => {
     if (made !== null) store.layout.value = made;
@@ -93,9 +94,20 @@ function Place({ view, share }: { view: string; share: number }) {
       }}
     >
       <SlotContext.Provider value={groups}>
-        <View />
+        {obstacle === undefined ? <View /> : <AbsentView name={view} title={shown.title} reason={obstacle} />}
       </SlotContext.Provider>
     </div>
+  );
+}
+
+/** In the place of a view that this camera's frames have nothing for. */
+function AbsentView({ name, title, reason }: { name: string; title: string; reason: string }) {
+  return (
+    <Panel name={name} title={<h2>{title}</h2>}>
+      <p class="absent" data-field="absent">
+        This camera cannot show it: {reason}.
+      </p>
+    </Panel>
   );
 }
 

@@ -34,9 +34,12 @@ export const LAYOUTS: Readonly<Record<string, Layout>> = {
   Simulation: [row(1, ["map", 1], ["transient", 1]), row(1, ["simulation", 3], ["sequence", 2])],
   Projector: [row(1, ["map", 1], ["transient", 1])],
   "One pixel": [row(1, ["transient", 1], ["streak", 1]), row(1, ["response", 1])],
+  Space: [row(2, ["map", 2], ["points", 3]), row(1, ["response", 2], ["sequence", 1])],
 };
 
 export const OVERVIEW = LAYOUTS["Overview"];
+/** The same for cameras that see no light in flight. */
+export const SPACE = LAYOUTS["Space"];
 
 /** Whether a remembered value is a layout of known views, each at most once. */
 export function isLayout(value: unknown, known: readonly string[]): value is Layout {

@@ -15,17 +15,25 @@ import { TransientView } from "./transient/TransientView";
 import { ValidityView } from "./validity/ValidityView";
 import type { ViewName } from "./names";
 
+interface View {
+  readonly name: ViewName;
+  readonly title: string;
+  readonly view: ComponentType;
+  /** The product without which it shows nothing. */
+  readonly needs?: string;
+}
+
 /**
  * The views on offer. A view is a component that takes no properties: it reads the store, and asks it for
  * the products that it shows. Panels choose among them by name; `layout.ts` says where they stand.
  */
-export const VIEWS: readonly { readonly name: ViewName; readonly title: string; readonly view: ComponentType }[] = [
+export const VIEWS: readonly View[] = [
   { name: "map", title: "Maps", view: MapView },
   { name: "second-map", title: "Second map", view: SecondMapView },
-  { name: "transient", title: "Light in flight", view: TransientView },
+  { name: "transient", title: "Light in flight", view: TransientView, needs: "coefficients" },
   { name: "response", title: "Impulse response", view: ResponseView },
   { name: "plots", title: "Values", view: PlotsView },
-  { name: "streak", title: "Streak", view: StreakView },
+  { name: "streak", title: "Streak", view: StreakView, needs: "coefficients" },
   { name: "points", title: "Points in space", view: PointsView },
   { name: "validity", title: "Validity", view: ValidityView },
   { name: "sequence", title: "Sequence and accuracy", view: SequenceView },

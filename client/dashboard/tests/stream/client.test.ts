@@ -1,4 +1,4 @@
-import { beforeEach, describe, expect, test } from "vitest";
+import { beforeEach, describe, expect, test, vi } from "vitest";
 
 import { Api } from "../../src/store/api";
 import type { RecordingDocument } from "../../src/store/documents";
@@ -23,12 +23,14 @@ const hello = (state: Hello["camera"]["state"]): Report => ({
 });
 
 class Page {
+  /** Products that the camera does not have, by the service. */
+  absent: readonly { readonly name: string; readonly reason: string }[] = [];
   readonly sent: Command[] = [];
   readonly worker: WorkerPort = { onmessage: null, postMessage: (command) => this.sent.push(command) };
   readonly #requested: ((now_ms: number) => void)[] = [];
   readonly store = new Store({
     shelf: null,
-    api: new Api(() => Promise.resolve(new Response(JSON.stringify(CAMERA)))),
+    api: new Api(() => Promise.resolve(new Response(JSON.stringify({ ...CAMERA, absent_products: this.absent })))),
   });
   readonly client = new StreamClient(
     this.store,
@@ -65,6 +67,21 @@ describe("between worker and store", () => {
       { type: "adapt", adapts: true },
       { type: "want", products: ["brightness", "coefficients", "range"] },
     ]);
+  });
+
+  test("it does not ask for what the camera does not have", async () => {
+    page.absent = [{ name: "brightness", reason: "it needs a zeroth moment" }];
+    await page.client.learnAbsent();
+    expect(page.store.frames.absent.value).toEqual({ brightness: "it needs a zeroth moment" });
+    expect(page.sent.at(-1)).toEqual({ type: "want", products: ["range"] });
+    expect(page.store.frames.amplitude.value).toBe("direct");
+  });
+
+  test("a product that is refused makes it look what the camera has", async () => {
+    page.absent = [{ name: "brightness", reason: "it needs a zeroth moment" }];
+    page.receives({ type: "message", message: { type: "error", problem: { type: "/problems/unknown-product" } } });
+    await vi.waitFor(() => expect(page.sent.at(-1)).toEqual({ type: "want", products: ["range"] }));
+    expect(page.store.status.unreadable.value).toBeNull();
   });
 
   test("frames reach the store at the next refresh, and are acknowledged then", () => {

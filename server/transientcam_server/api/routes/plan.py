@@ -16,6 +16,7 @@ from transientcam_server.api.job_answers import ACCEPTED
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.planning import Goal, Progress, SceneStatistics, uniform_scene
+from transientcam_server.planning.families import require_plannable
 from transientcam_server.service import Service
 
 router = APIRouter(tags=["accuracy"])
@@ -70,7 +71,8 @@ async def start_plan(
 
 
 def _work(service: Service, request: PlanRequest, http: Request) -> planned.Work[PlanDocument]:
-    """Return what makes the plan; a goal that cannot be meant is refused at once."""
+    """Return what makes the plan; a goal that cannot be meant or planned is refused at once."""
+    require_plannable(service.camera.capabilities)
     return partial(_made, service, request, _goal(service, request), planned.address_of(http))
 
 

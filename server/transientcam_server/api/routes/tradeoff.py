@@ -19,6 +19,7 @@ from transientcam_server.api.job_answers import ACCEPTED
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.planning import Progress
+from transientcam_server.planning.families import require_plannable
 from transientcam_server.service import Service
 
 router = APIRouter(tags=["accuracy"])
@@ -73,6 +74,7 @@ async def start_tradeoff(
 
 
 def _work(service: Service, by: str, http: Request) -> planned.Work[TradeoffDocument]:
+    require_plannable(service.camera.capabilities)
     return partial(_made, service, by, planned.address_of(http))
 
 

@@ -16,7 +16,7 @@ import { paint } from "../../ui/paint";
 import { Panel } from "../../ui/Panel";
 import { Stage } from "../../ui/Stage";
 import type { ViewName } from "../names";
-import { AMPLITUDE, MAP_PRODUCTS } from "./catalogue";
+import { MAP_PRODUCTS, type MapProduct } from "./catalogue";
 import { Measured } from "./Measured";
 import { Readout, valueAtPixel } from "./Readout";
 
@@ -37,7 +37,9 @@ interface MapPanelProps {
 /** A map of one number a pixel: range, one of the lights, or how sure these are. */
 function MapPanel({ name, choice }: MapPanelProps) {
   const store = useStore();
-  const shown = MAP_PRODUCTS.find(({ product }) => product === choice.value) ?? MAP_PRODUCTS[0];
+  const absent = store.frames.absent.value;
+  const obstacleOf = ({ product, scatterOf }: MapProduct): string | undefined => absent[scatterOf ?? product];
+  const shown = MAP_PRODUCTS.find((each) => each.product === choice.value && obstacleOf(each) === undefined) ?? MAP_PRODUCTS[0];
   const look = store.looks.of(shown.product);
   const canvas = useRef<HTMLCanvasElement>(null);
   const figure = (kind: "png" | "svg"): void => {
@@ -59,7 +61,7 @@ function MapPanel({ name, choice }: MapPanelProps) {
         <Tabs
           label={name === "map" ? "Map" : "Second map"}
           value={shown.product}
-          options={MAP_PRODUCTS.map(({ product, name, hint }) => ({ value: product, text: name, hint }))}
+          options={MAP_PRODUCTS.map((each) => ({ value: each.product, text: each.name, hint: each.hint, obstacle: obstacleOf(each) }))}
           onChange={(product) => (choice.value = product)}
         />
       }
@@ -78,7 +80,7 @@ interface MapProps {
 function Map({ look, canvas }: MapProps) {
   const store = useStore();
   const { product: shown, frame } = look;
-  useProducts([shown.scatterOf ?? shown.product, AMPLITUDE]);
+  useProducts([shown.scatterOf ?? shown.product, store.frames.amplitude.value]);
   const { size, waiting, marked } = useMemo(() => signalsOf(look, computed(() => store.pointed.value ?? store.selected.value)), [look, store]);
   const [width, height] = size.value.split("x").map(Number);
 

@@ -7,7 +7,6 @@ import { WINDOW } from "../../store/noise";
 import type { Pixel } from "../../store/pixel";
 import { useStore } from "../../store/store";
 import { deviation, fixed, NOTHING } from "../../ui/format";
-import { AMPLITUDE } from "./catalogue";
 
 /** Value of a frame at a pixel; NaN without a frame, a pixel or a value. */
 export function valueAtPixel(frame: Frame | null, pixel: Pixel | null): number {
@@ -19,8 +18,9 @@ export function valueAtPixel(frame: Frame | null, pixel: Pixel | null): number {
 /** The value under the pointer, how much it scatters, and how much light it rests on. */
 export function Readout({ look: { product: shown, frame } }: { look: Look }) {
   const store = useStore();
-  const amplitude = store.frames.of(AMPLITUDE);
-  const [noise, lightNoise] = useMemo(() => [store.noises.of(shown.product), store.noises.of(AMPLITUDE)], [store, shown]);
+  const ofLight = store.frames.amplitude.value;
+  const amplitude = store.frames.of(ofLight);
+  const [noise, lightNoise] = useMemo(() => [store.noises.of(shown.product), store.noises.of(ofLight)], [store, shown, ofLight]);
   const looked = useComputed(() => store.pointed.value ?? store.selected.value);
   const at = (width: number | undefined): number => (looked.value === null || width === undefined ? -1 : looked.value.y * width + looked.value.x);
   const place = useComputed(() => (looked.value === null ? "" : `${looked.value.x}, ${looked.value.y}`));
@@ -40,9 +40,9 @@ export function Readout({ look: { product: shown, frame } }: { look: Look }) {
           {scatter}
         </span>
       </span>
-      {shown.product !== AMPLITUDE && (
+      {shown.product !== ofLight && (
         <span>
-          <span class="quiet">brightness</span> <span data-field="amplitude">{light}</span>{" "}
+          <span class="quiet">{ofLight}</span> <span data-field="amplitude">{light}</span>{" "}
           <span class="quiet" data-field="amplitude-scatter">
             {lightScatter}
           </span>

@@ -16,7 +16,6 @@ import { download } from "../../ui/files";
 import { grouped } from "../../ui/format";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
-import { AMPLITUDE } from "../map/catalogue";
 import { LightBar } from "../transient/LightBar";
 import type { TransientLook } from "../transient/look";
 import { byFlags, byValue, colourCloud, fillCloud, type Painter } from "./cloud";
@@ -29,8 +28,8 @@ import { SceneStage } from "./SceneStage";
 const COLOURINGS = ["range", "light", "validity", "flight"] as const;
 type Colouring = (typeof COLOURINGS)[number];
 const NAMES: Record<Colouring, string> = { range: "range", light: "light", validity: "validity", flight: "light in flight" };
-/** What the colours are made of, besides the range. */
-const NEEDED: Record<Colouring, readonly string[]> = { range: [], light: [AMPLITUDE], validity: ["flags"], flight: ["coefficients", AMPLITUDE] };
+/** What the colours are made of, besides the range and the light. */
+const NEEDED: Record<Colouring, readonly string[]> = { range: [], light: [], validity: ["flags"], flight: ["coefficients"] };
 
 /** The range map as points in space. */
 export function PointsView() {
@@ -40,8 +39,10 @@ export function PointsView() {
   const shaded = useMemo(() => remembered(store.shelf, "points.shaded", true, aBoolean), [store]);
   const surrounded = useMemo(() => remembered(store.shelf, "points.surrounded", true, aBoolean), [store]);
   const { light } = store;
-  const [rangeLook, lightLook] = [store.looks.of("range"), store.looks.of(AMPLITUDE)];
-  useProducts(["range", ...NEEDED[colouring.value]]);
+  const ofLight = store.frames.amplitude.value;
+  const [rangeLook, lightLook] = [store.looks.of("range"), store.looks.of(ofLight)];
+  const isLit = colouring.value === "light" || colouring.value === "flight";
+  useProducts(["range", ...NEEDED[colouring.value], ...(isLit ? [ofLight] : [])]);
   const range = store.frames.of("range");
   const canvas = useRef<HTMLCanvasElement>(null);
   const box = useRef<HTMLDivElement>(null);
@@ -99,7 +100,7 @@ export function PointsView() {
       const other = store.frames.of(product).value;
       return other?.values.length === frame.values.length ? other : null;
     };
-    const amplitude = chosen === "light" || chosen === "flight" ? of(AMPLITUDE) : null;
+    const amplitude = chosen === "light" || chosen === "flight" ? of(ofLight) : null;
     const flags = chosen === "validity" ? of("flags") : null;
     const coefficients = chosen === "flight" ? (store.frames.of("coefficients").value?.coefficients ?? null) : null;
     if (flags !== null) return byFlags(flags.values);

@@ -16,7 +16,6 @@ import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { autoLimits, type Span } from "../../ui/scale";
 import { csvOf, drawnOf, type Aspect, type Subject } from "./curves";
-import { AMPLITUDE } from "../map/catalogue";
 import { PixelFigures } from "./Figures";
 import { FlagHistory } from "./flagShares";
 import { richestPixel } from "./interesting";
@@ -42,10 +41,12 @@ const SIDES: readonly { readonly value: Side; readonly text: string; readonly hi
 /** Everything about the selected pixel; its curves are computed here from the streamed coefficients. */
 export function ResponseView() {
   const store = useStore();
-  useProducts(["coefficients", "range", AMPLITUDE]);
+  const { absent, amplitude } = store.frames;
+  const obstacle = absent.value["coefficients"];
+  useProducts(["coefficients", "range", amplitude.value]);
   const flags = useMemo(() => new FlagHistory(), []);
   const returns = useMemo(() => new ReturnHistory(), []);
-  const frame = store.frames.of("coefficients");
+  const frame = store.frames.of(obstacle === undefined ? "coefficients" : "range");
   useEffect(() => store.details.follow(store.selected, frame), [store, frame]);
   useEffect(() => selectFirst(store, frame), [store, frame]);
   const side = useMemo(() => remembered<Side>(store.shelf, "response.side", "bounds", oneOf(SIDES.map(({ value }) => value))), [store]);
@@ -64,7 +65,8 @@ export function ResponseView() {
   const levinson = useComputed(() => (shown.value === null ? null : pixelOf(shown.value.coefficients, shown.value.index)));
   const logarithmic = useMemo(() => remembered(store.shelf, "response.logarithmic", false, aBoolean), [store]);
   const pointed = useSignal("");
-  const place = useComputed(() => (shown.value === null ? null : `${shown.value.pixel.x}, ${shown.value.pixel.y}`));
+  const pixel = useComputed(() => (absent.value["coefficients"] === undefined ? (shown.value?.pixel ?? null) : store.selected.value));
+  const place = useComputed(() => (pixel.value === null ? null : `${pixel.value.x}, ${pixel.value.y}`));
   const download = (aspect: Aspect) => (): void => {
     const now = shown.peek();
     if (now === null) return;
@@ -75,7 +77,7 @@ export function ResponseView() {
   return (
     <Panel
       name="response"
-      downloads={place.value === null ? [] : ASPECTS.map(({ value, text }) => ({ text: `${text} (CSV)`, run: download(value) }))}
+      downloads={shown.value === null ? [] : ASPECTS.map(({ value, text }) => ({ text: `${text} (CSV)`, run: download(value) }))}
       title={
         <h2>
           Impulse response <span class="quiet">{place.value === null ? "" : `of pixel ${place.value}`}</span>
@@ -95,7 +97,11 @@ export function ResponseView() {
     >
       <div class="response">
         {place.value === null && <p class="stage-empty">Click a pixel in one of the pictures.</p>}
-        {place.value === null ? null : side.value === "moments" ? (
+        {place.value === null ? null : obstacle !== undefined ? (
+          <p class="absent" data-field="absent">
+            This camera has no density of light over time: {obstacle}.
+          </p>
+        ) : side.value === "moments" ? (
           <MomentsPlane pixel={levinson} />
         ) : (
           <Plot key={side.value} aspect={side.value} logarithmic={side.value === "density" && logarithmic.value} shown={shown} pointed={pointed} />
@@ -103,7 +109,7 @@ export function ResponseView() {
         {place.value !== null && (
           <aside class="response-side" aria-label="What was found at the pixel" tabIndex={0}>
             <Found flags={flags} returns={returns} told={store.details.document.value} held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null} />
-            {shown.value !== null && <PixelFigures key={place.value} pixel={shown.value.pixel} />}
+            {pixel.value !== null && <PixelFigures key={place.value} pixel={pixel.value} />}
             <FlagWords flags={flags} looked={store.details.document.value !== null} />
           </aside>
         )}
@@ -115,9 +121,10 @@ export function ResponseView() {
 /** Selects a pixel worth looking at with the first frame, unless one was selected before; the answer ends it. */
 function selectFirst(store: Store, frame: ReadonlySignal<Frame | null>): () => void {
   const end = effect(() => {
-    const coefficients = frame.value?.coefficients;
-    if (store.selected.value !== null || !coefficients) return;
-    const pixel = richestPixel(coefficients);
+    const newest = frame.value;
+    if (store.selected.value !== null || newest === null) return;
+    const [height, width] = newest.shape;
+    const pixel = newest.coefficients ? richestPixel(newest.coefficients) : { x: width >> 1, y: height >> 1 };
     untracked(() => (store.selected.value = pixel));
   });
   return end;

@@ -9,15 +9,15 @@ import { fixed, grouped } from "../../ui/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { Stage } from "../../ui/Stage";
-import { AMPLITUDE } from "../map/catalogue";
 import { countFlags, paintFlags } from "./reasons";
 
 /** Which pixels something is wrong with, and what. */
 export function ValidityView() {
   const store = useStore();
-  useProducts(["flags", AMPLITUDE]);
+  const amplitude = store.frames.amplitude.value;
+  useProducts(["flags", amplitude]);
   const frame = store.frames.of("flags");
-  const scene = store.frames.of(AMPLITUDE);
+  const scene = store.frames.of(amplitude);
   const canvas = useRef<HTMLCanvasElement>(null);
   const size = useComputed(() => (frame.value?.shape ?? [120, 163]).join("x"));
   const [height, width] = size.value.split("x").map(Number);
