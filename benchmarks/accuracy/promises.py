@@ -128,28 +128,34 @@ def measured(
     Each range is held against the truth in the middle of its own capture: scenes may move.
     """
     with opened(scene, CAPTURE_SEED) as camera:
-        assert camera.simulation is not None
-        applied = camera.configure(sequence)
-        sensor = sensor_of(camera, SensorSettings())
-        recipe = Recipe(applied, SETTINGS, float(sensor.highest_dn), sensor=sensor)
-        camera.start()
-        pixels, errors_m, device_s, full = None, [], 0.0, 0.0
-        for _ in range(captures):
-            raw = camera.read_frame(timeout_s=1e3)
-            device_s = raw.capture_s
-            truth = camera.simulation.truth(device_time_s=raw.device_time_s + device_s / 2)
-            if pixels is None:
-                lit = np.flatnonzero(np.isfinite(truth.range_m) & (truth.brightness > 0))
-                random = np.random.default_rng(1)
-                pixels = np.sort(random.choice(lit, min(PIXELS, lit.size), replace=False))
-                full = float((raw.images.max(axis=0).ravel()[lit] >= sensor.highest_dn).mean())
-            b = tm.smooth(np.asarray(recipe.reconstruct(raw).measured), SETTINGS.smoothing_px)
-            part = b.reshape((len(b), -1))[:, pixels]
-            variance = _variance(part, recipe, sensor)
-            frequency_hz = recipe.base_frequency_hz
-            found_m = ranges_m(part, variance, estimator, frequency_hz, SETTINGS)
-            errors_m.append(found_m - truth.range_m.ravel()[pixels])
-        camera.stop()
+        return measured_by(camera, sequence, estimator, captures)
+
+
+def measured_by(
+    camera: Camera, sequence: Sequence, estimator: str, captures: int
+) -> tuple[dict[str, float], float, float]:
+    """Do the same with a simulated camera that is open."""
+    assert camera.simulation is not None
+    applied = camera.configure(sequence)
+    sensor = sensor_of(camera, SensorSettings())
+    recipe = Recipe(applied, SETTINGS, float(sensor.highest_dn), sensor=sensor)
+    camera.start()
+    pixels, errors_m, device_s, full = None, [], 0.0, 0.0
+    for _ in range(captures):
+        raw = camera.read_frame(timeout_s=1e3)
+        device_s = raw.capture_s
+        truth = camera.simulation.truth(device_time_s=raw.device_time_s + device_s / 2)
+        if pixels is None:
+            lit = np.flatnonzero(np.isfinite(truth.range_m) & (truth.brightness > 0))
+            random = np.random.default_rng(1)
+            pixels = np.sort(random.choice(lit, min(PIXELS, lit.size), replace=False))
+            full = float((raw.images.max(axis=0).ravel()[lit] >= sensor.highest_dn).mean())
+        b = tm.smooth(np.asarray(recipe.reconstruct(raw).measured), SETTINGS.smoothing_px)
+        part = b.reshape((len(b), -1))[:, pixels]
+        variance = _variance(part, recipe, sensor)
+        found_m = ranges_m(part, variance, estimator, recipe.base_frequency_hz, SETTINGS)
+        errors_m.append(found_m - truth.range_m.ravel()[pixels])
+    camera.stop()
     errors = pixel_errors(np.stack(errors_m), np.zeros_like(errors_m[0]))
     values = {
         "std": float(np.median(errors.std_m)),
