@@ -66,11 +66,14 @@ def test_noise_alone_is_no_uncertainty_of_the_direct_range() -> None:
 
 
 def test_what_the_estimators_differ_by_beyond_noise_is_uncertainty() -> None:
-    blurred = moments((WALL_M, 0.6), (WALL_M + 0.5, 0.4))
+    omega = 2 * np.pi * BASE_HZ * np.arange(HARMONICS + 1)[:, None]
+    tail = 0.7 + 0.3 / (1 - 1j * omega * 1e-9)  # 30 % of the light decays within 1 ns
+    blurred = (moments((WALL_M, 1.0)) * tail).astype(np.complex64)
 
-    _, found = looked(blurred, 1, noise=NOISE / 10)
+    _, found = looked(blurred, 1, noise=NOISE / 4)
 
-    assert np.median(found.uncertainty_m) > 0.01
+    assert np.median(found.uncertainty_m) > 0.003
+    assert np.median(found.direct_m) > WALL_M + 0.003
 
 
 @pytest.mark.parametrize("harmonics", [1, 3])
@@ -87,7 +90,7 @@ def test_the_noise_of_a_bias_is_that_of_looks_taken_again(harmonics: int) -> Non
     variance_m2 = found.repeats.variance_m2(np.asarray(tm.range_m(repeated, BASE_HZ)))
 
     again_m2 = np.var(np.array(apart_m), axis=0).mean()
-    assert variance_m2.mean() == pytest.approx(again_m2, rel=0.2)
+    assert variance_m2.mean() == pytest.approx(again_m2, rel=0.35)
 
 
 @pytest.mark.parametrize("estimator", ["single-frequency", "maximum-entropy", "likelihood"])
