@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_server.imaging.calibration import nominal_gains
 from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.planning.look_noise import Repeats, direct_range
+from transientcam_server.planning.estimation import direct_range
 from transientcam_server.planning.scene import PIXELS, SceneStatistics
 from transientcam_server.settings import ReconstructionSettings
 
@@ -19,6 +19,7 @@ LIT_DEVIATIONS: Final = 5.0
 MOVED_DEVIATIONS: Final = 5.0
 _EARLY: Final = 0.9
 """Share of a period by which a direct return may come before the mean of all light."""
+_SEED: Final = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,20 +111,16 @@ def describe(
     if not lit.any():
         return None
     there = np.flatnonzero(lit)
-    # evenly over all that are lit: by chance some part of a scene would count too much
-    pixels = there[((np.arange(PIXELS) + 0.5) * there.size / PIXELS).astype(int)]
+    random = np.random.default_rng(_SEED)
+    pixels = np.sort(random.choice(there, PIXELS, replace=there.size < PIXELS))
     b, mean_dn = seen.at(pixels)
     variance = seen.variance(mean_dn) / len(seen.moments)
     base_hz = seen.recipe.base_frequency_hz
-    found = direct_range(b, variance, base_hz, settings)
+    direct_m, uncertainty_m = direct_range(b, variance, base_hz, settings)
     # by how hard they are: every other pixel is then as good a sample of the scene as all of them
-    order = np.argsort(found.uncertainty_m, kind="stable")
-    pixels, b, mean_dn, variance, direct_m, uncertainty_m, repeated_b, repeated_m = (
-        each[..., order]
-        for each in (
-            *(pixels, b, mean_dn, variance, found.direct_m, found.uncertainty_m),
-            *(found.repeats.moments, found.repeats.direct_m),
-        )
+    order = np.argsort(uncertainty_m, kind="stable")
+    pixels, b, mean_dn, variance, direct_m, uncertainty_m = (
+        each[..., order] for each in (pixels, b, mean_dn, variance, direct_m, uncertainty_m)
     )
     light_dn = _brightness(b if coarse is None else coarse.at(pixels)[0], b)
     checked = coarse is not None
@@ -134,7 +131,8 @@ def describe(
         ambient = np.maximum(mean_dn - light_dn / 2, 0.0) / seen.exposure_s
     else:
         ambient = np.full(pixels.size, ambient_dn_per_s)
-    relative, repeated = (_relative(each, light_dn) for each in (b, repeated_b))
+    relative = (b / light_dn).astype(np.complex64)
+    relative[0] = 1.0
     returns = tm.pisarenko(relative)
     weight = np.asarray(returns.weight, dtype=float)
     phase = np.asarray(returns.phase_rad, dtype=float)
@@ -149,7 +147,6 @@ def describe(
         base_frequency_hz=base_hz,
         measured=relative,
         relative_noise=np.sqrt(variance[1]) / light_dn,
-        repeats=Repeats(repeated, repeated_m),
         lit_share=float(lit.mean()),
         moving_share=_moving_share(seen, lit),
         ambiguity_checked=checked,
@@ -177,13 +174,6 @@ def _brightness(low: _Array, b: _Array) -> _Array:
     """Return b_0 (P): the modulus at the lowest frequency, and no less than at any other."""
     size: _Array = np.maximum(np.abs(low[1]), np.abs(b[1:]).max(axis=0)).astype(float)
     return np.maximum(size, 1e-9)
-
-
-def _relative(b: _Array, light_dn: _Array) -> _Array:
-    """Return moments (m + 1, ..., P) over the brightness (P), that of order 0 being 1."""
-    relative = (b / light_dn).astype(np.complex64)
-    relative[0] = 1.0
-    return relative
 
 
 def _unwrapped(direct_m: _Array, b: _Array, coarse: Seen, pixels: _Array, base_hz: float) -> _Array:

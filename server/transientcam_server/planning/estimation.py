@@ -1,4 +1,4 @@
-"""The estimators that are planned with."""
+"""The estimators that are planned with, and the range of the direct return by several of them."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -19,16 +19,22 @@ MOST_HARMONICS: Final[Mapping[str, int]] = MappingProxyType({"single-frequency":
 """More harmonics than these do nothing for an estimator."""
 
 
-def smooth_and_sharp(
+def direct_range(
     b: _Array, variance: _Array, base_frequency_hz: float, settings: ReconstructionSettings
 ) -> tuple[_Array, _Array]:
-    """Return ranges (P) by maximum entropy, and by the likelihood of few returns.
+    """Return the range (P) of the direct return, and by how much it may be wrong.
 
-    Where only one of them gives a range, both are that.
+    Maximum entropy and likelihood err in opposite ways of resolving returns: the one has a density
+    as smooth as the moments allow, the other as few returns as they do. Light that neither resolves
+    comes later than the direct return, so that both are too long and the shorter one is nearer;
+    where they agree, nothing is left to resolve. Of eight such rules this one was closest to the
+    truth of simulated scenes (decision 0851).
     """
-    smooth_m, sharp_m = (
+    each = [
         ranges_m(b, variance, name, base_frequency_hz, settings)
         for name in ("maximum-entropy", "likelihood")
-    )
+    ]
+    smooth_m, sharp_m = each
     smooth_m = np.where(np.isfinite(smooth_m), smooth_m, sharp_m)
-    return smooth_m, np.where(np.isfinite(sharp_m), sharp_m, smooth_m)
+    sharp_m = np.where(np.isfinite(sharp_m), sharp_m, smooth_m)
+    return np.minimum(smooth_m, sharp_m), np.abs(smooth_m - sharp_m)

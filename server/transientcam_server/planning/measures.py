@@ -41,10 +41,7 @@ class PixelErrors:
 
 
 def pixel_errors(
-    range_m: _Array,
-    true_m: _Array,
-    uncertainty_m: _Array | float = 0.0,
-    variance_m2: _Array | float = 0.0,
+    range_m: _Array, true_m: _Array, uncertainty_m: _Array | float = 0.0
 ) -> PixelErrors:
     """Measure the errors of captured or drawn ranges.
 
@@ -57,17 +54,13 @@ def pixel_errors(
         (P) what they should be.
     uncertainty_m
         (P) by how much that may itself be wrong; counts as bias.
-    variance_m2
-        (P) of the noise that the centre of all ranges and ``true_m`` have apart from each other,
-        which is no bias.
     """
     count = np.isfinite(range_m).sum(axis=0)
     enough = count >= 2
     known = np.where(enough, range_m, 0.0)
     std_m = typical_deviation(known)
     centre_m = np.nanmedian(known, axis=0)
-    apart_m2 = np.maximum((centre_m - true_m) ** 2 - variance_m2, 0.0)
-    bias_m = np.sqrt(apart_m2 + np.square(uncertainty_m))
+    bias_m = np.hypot(centre_m - true_m, uncertainty_m)
     std_m = np.where(enough, std_m, np.inf)
     bias_m = np.where(enough, bias_m, np.inf)
     limit_m = OUTLIER_DEVIATIONS * max(float(np.median(np.hypot(std_m, bias_m))), _LEAST_ERROR_M)

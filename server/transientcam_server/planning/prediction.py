@@ -131,7 +131,6 @@ class Predictor:
         self._nominal = self.relative_noise(NOMINAL)
         self._column = lru_cache(maxsize=None)(self._drawn_column)
         self._exact = lru_cache(maxsize=None)(self._bias_without_noise)
-        self._of_look = lru_cache(maxsize=None)(self._variance_by_look)
         self.resolving = Resolving(scene, settings, seed=seed, go_on=go_on)
 
     def longest_exposure_s(self) -> float:
@@ -146,16 +145,17 @@ class Predictor:
     def quick(self, estimator: str, sequence: Sequence, scale: float) -> tuple[float, float, float]:
         """Return deviation, bias and error in m of the median pixel at a scale of noise.
 
-        Between the steps that were drawn each pixel's bias is interpolated, and the logarithm of
-        its deviation.
+        Between the steps that were drawn the logarithms of each pixel's errors are interpolated.
         """
         key = (estimator, self._harmonics(estimator, sequence), sequence.base_frequency_hz)
         place = math.log(scale) / math.log(STEP)
         below = math.floor(place)
         part = place - below
         low, high = (self._column(*key, below + k) for k in (0, 1))
-        std = np.exp((1 - part) * np.log(low[0]) + part * np.log(high[0]))
-        bias = (1 - part) * low[1] + part * high[1]
+        std, bias = (
+            np.exp((1 - part) * np.log(one) + part * np.log(other))
+            for one, other in ((low[0], high[0]), (low[1], high[1]))
+        )
         return _typical(std), float(np.median(bias)), float(np.median(np.hypot(std, bias)))
 
     def least_noise_m(self, estimator: str, sequence: Sequence, scale: float) -> float:
@@ -183,28 +183,9 @@ class Predictor:
         variance = np.broadcast_to((self._nominal[FEW] * STEP**-4) ** 2, b.shape).astype(np.float32)
         variance[0] = 0
         range_m = ranges_m(b, variance, estimator, base_frequency_hz, self.settings)
-        apart_m2 = (range_m - scene.direct_m[FEW]) ** 2
-        apart_m2 -= self._of_look(estimator, harmonics, base_frequency_hz)[FEW]
-        bias_m = np.hypot(np.sqrt(np.maximum(apart_m2, 0.0)), scene.uncertainty_m[FEW])
+        bias_m = np.hypot(range_m - scene.direct_m[FEW], scene.uncertainty_m[FEW])
+        # noise of the look itself is in this, and in the direct range
         return _HARDLY * float(np.median(np.nan_to_num(bias_m, nan=math.inf)))
-
-    def _variance_by_look(self, estimator: str, harmonics: int, base_frequency_hz: float) -> _Array:
-        """Variance in m^2 (P) of the range less the direct one that is the noise of the look."""
-        scene = self.scene
-        b = scene.repeated_moments(harmonics, base_frequency_hz)
-        if b is None or scene.repeats is None or scene.relative_noise is None:
-            return np.zeros(scene.direct_m.shape)
-        self._go_on()
-        variance = np.broadcast_to(scene.relative_noise**2, b.shape).astype(np.float32)
-        variance[0] = 0
-        range_m = ranges_m(
-            b.reshape((len(b), -1)),
-            variance.reshape((len(b), -1)),
-            estimator,
-            base_frequency_hz,
-            self.settings,
-        )
-        return scene.repeats.variance_m2(range_m.reshape(b.shape[1:]))
 
     def predict(self, estimator: str, sequence: Sequence) -> Prediction:
         """Predict the errors of a sequence and an estimator, with intervals."""
@@ -308,7 +289,6 @@ class Predictor:
             range_m.reshape((draws, -1)),
             self.scene.direct_m[pixels],
             self.scene.uncertainty_m[pixels],
-            self._of_look(estimator, harmonics, base_frequency_hz)[pixels],
         )
 
 

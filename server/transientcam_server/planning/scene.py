@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_moments.pisarenko import DIRECT_THRESHOLD
-from transientcam_server.planning.look_noise import Repeats
 
 _Array = NDArray[Any]
 PIXELS: Final = 128
@@ -36,7 +35,7 @@ class SceneStatistics:
     direct_m
         (P) range of the direct return.
     uncertainty_m
-        (P) by how much that may be wrong beyond noise: what the look at the scene did not resolve.
+        (P) by how much that may be wrong: what the look at the scene did not resolve.
     delay_s, share
         (K, P) returns: time of flight (NaN where unused) and share of the pixel's light (0 where
         unused). What the shares leave to 1 comes back evenly at all times.
@@ -45,8 +44,6 @@ class SceneStatistics:
         where the returns are given exactly.
     relative_noise
         (P) deviation of these moments over the brightness.
-    repeats
-        What other looks would have shown: how much of a bias is the noise of the look.
     lit_share
         Share of all pixels whose light stands clear of the noise.
     moving_share
@@ -65,7 +62,6 @@ class SceneStatistics:
     base_frequency_hz: float = 0.0
     measured: _Array | None = None
     relative_noise: _Array | None = None
-    repeats: Repeats | None = None
     lit_share: float = 1.0
     moving_share: float = 0.0
     ambiguity_checked: bool = True
@@ -91,18 +87,13 @@ class SceneStatistics:
     def relative_moments(self, harmonics: int, base_frequency_hz: float) -> _Array:
         """Return moments (m + 1, P) of pixels with a brightness of 1."""
         if self.measured is not None and self.covers(harmonics, base_frequency_hz):
-            return np.array(self.measured[self._orders(harmonics, base_frequency_hz)])
+            step = self._multiple(base_frequency_hz)
+            return np.array(self.measured[: step * harmonics + 1 : step])
         j = np.arange(harmonics + 1)[:, None, None]
         phase = 2 * np.pi * base_frequency_hz * np.nan_to_num(self.delay_s)
         moments = (self.share * np.exp(1j * j * phase)).sum(axis=1)
         moments[0] = 1.0
         return np.asarray(moments, np.complex64)
-
-    def repeated_moments(self, harmonics: int, base_frequency_hz: float) -> _Array | None:
-        """Return these moments (m + 1, R, P) of other looks; None where none are known."""
-        if self.repeats is None or not self.covers(harmonics, base_frequency_hz):
-            return None
-        return np.array(self.repeats.moments[self._orders(harmonics, base_frequency_hz)])
 
     def ambiguous(self, unambiguous_range_m: float) -> bool:
         """Whether ranges beyond this one are too frequent, of the direct or of later returns.
@@ -114,11 +105,6 @@ class SceneStatistics:
         late = (late_m >= unambiguous_range_m).any(axis=0)
         direct = self.direct_m >= unambiguous_range_m
         return bool(direct.mean() > AMBIGUOUS_SHARE or late.mean() > LATE_SHARE)
-
-    def _orders(self, harmonics: int, base_frequency_hz: float) -> slice:
-        """Return where moments of multiples of a frequency are among those of the look."""
-        step = self._multiple(base_frequency_hz)
-        return slice(0, step * harmonics + 1, step)
 
     def _multiple(self, base_frequency_hz: float) -> int:
         """Return which multiple of the base frequency of the look this is; 0 where it is none."""
