@@ -24,6 +24,17 @@ def daemon() -> Iterator[Served]:
 
 
 @pytest.fixture
+def kept(daemon: Served, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Keep looks and fronts for the whole test, however long the machine takes for it."""
+    service = daemon.service
+    service.fronts.forget()  # and looks with them
+    for keeper in (service.fronts, service.looks):
+        monkeypatch.setattr(keeper, "_clock", lambda: 0.0)
+    yield
+    service.fronts.forget()
+
+
+@pytest.fixture
 def few_families(daemon: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     """Search one family in this process, so that a front takes a second."""
     families = import_module("transientcam_server.planning.families")  # not the function
@@ -45,6 +56,7 @@ def jobs_of(daemon: Served) -> list[dict[str, Any]]:
         return jobs
 
 
+@pytest.mark.usefixtures("kept")
 def test_a_daemon_plans_for_the_scene_before_its_camera(
     daemon: Served, shown: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -65,7 +77,7 @@ def test_a_daemon_plans_for_the_scene_before_its_camera(
     assert plan["summary"] in words
 
 
-@pytest.mark.usefixtures("few_families")
+@pytest.mark.usefixtures("kept", "few_families")
 def test_the_front_of_a_daemon_is_a_table_and_a_sentence(
     daemon: Served, capsys: pytest.CaptureFixture[str]
 ) -> None:
