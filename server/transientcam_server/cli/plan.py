@@ -112,13 +112,15 @@ def plan(
     budget |= {"computing_share": computing_share}
     stays = _fields(fixed or [])
     if front:
+        goal_of_one = {"--fix": fixed or None, "--estimator": estimator}
         _refuse(
-            {"--fix": stays, "--estimator": estimator, **_options(target), **_options(budget)},
+            goal_of_one | _options(target) | _options(budget),
             "is for one sequence, and --front shows all that no other beats",
         )
     console = Console(stderr=True)
     if daemon is not None:
-        here = {"camera": camera, "real_time": real_time or None, "return": returns}
+        here: dict[str, Any] = {"camera": camera, "real_time": real_time or None}
+        here |= {"return": returns or None}
         here |= {"brightness_dn_per_s": brightness_dn_per_s, "ambient_dn_per_s": ambient_dn_per_s}
         _refuse(_options(here), "is the daemon's")
         parts: dict[str, Any] = {"target": _given(target), "budget": _given(budget)}
@@ -173,7 +175,8 @@ def _by_camera(
             typer.echo(json.dumps({"detail": problem.detail, **problem.extensions}))
         else:
             console.print(problem.detail, style="red", soft_wrap=True)
-            print_takes(problem.extensions.get("takes", []))
+            takes: Any = problem.extensions.get("takes", [])
+            print_takes(takes)
         raise typer.Exit(1) from problem
 
 
@@ -205,7 +208,7 @@ def _options(values: dict[str, Any]) -> dict[str, Any]:
 
 def _refuse(options: dict[str, Any], reason: str) -> None:
     for hint, value in options.items():
-        if value:
+        if value is not None:
             raise typer.BadParameter(reason, param_hint=hint)
 
 

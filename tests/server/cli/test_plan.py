@@ -160,7 +160,7 @@ def test_what_a_daemon_refuses_is_printed_with_what_limits(
     [
         (["--daemon", "http://127.0.0.1:1", "--camera", "sim:wall"], "--camera"),
         (["--daemon", "http://127.0.0.1:1", "--real-time"], "--real-time"),
-        (["--daemon", "http://127.0.0.1:1", "--ambient-dn-per-s", "3"], "--ambient-dn-per-s"),
+        (["--daemon", "http://127.0.0.1:1", "--ambient-dn-per-s", "0"], "--ambient-dn-per-s"),
         (["--front", "--range-error-m", "0.01"], "--range-error-m"),
         (["--front", "--fix", "harmonics=3"], "--fix"),
     ],
