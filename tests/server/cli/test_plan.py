@@ -25,7 +25,7 @@ def daemon() -> Iterator[Served]:
 
 @pytest.fixture
 def kept(daemon: Served, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Keep looks and fronts for the whole test, however long the machine takes for it."""
+    """Keep looks and fronts for the whole test, however long that takes, and not for the next."""
     service = daemon.service
     service.fronts.forget()  # and looks with them
     for keeper in (service.fronts, service.looks):
@@ -114,6 +114,7 @@ def test_the_front_of_a_given_scene_needs_no_daemon(
     assert errors_m == sorted(errors_m, reverse=True)
 
 
+@pytest.mark.usefixtures("kept")
 @pytest.mark.parametrize("what", ["plan", "tradeoff"])
 def test_an_interrupt_cancels_the_job_of_the_daemon(
     what: str, daemon: Served, monkeypatch: pytest.MonkeyPatch
@@ -122,7 +123,6 @@ def test_an_interrupt_cancels_the_job_of_the_daemon(
     monkeypatch.setattr(daemon.service.planning, "_process", Here())
     monkeypatch.setattr(daemon.service.planner, f"{what}_document", work)
     monkeypatch.setattr(daemon.service.planner, "look", lambda *_, **__: None)
-    daemon.service.fronts.forget()
 
     def interrupted(status: Status, text: str) -> None:
         if work.began.is_set():
