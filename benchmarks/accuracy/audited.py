@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from benchmarks.accuracy.promises import Kept, Refused
+from benchmarks.accuracy.kept import Kept, Refused
 
 
 @dataclass(frozen=True)

@@ -8,19 +8,21 @@ from benchmarks.machine import machine
 
 PAGE: Final = Path(__file__).parents[2] / "docs" / "plans.md"
 PARTS: Final = {
+    "expectations": "What to expect",
     "promises": "Do plans keep what they promise?",
     "audit": "The worst cases of an audit",
     "regret": "How much quicker could a plan have been?",
 }
 _HEAD: Final = """# Do plans keep what they promise?
 
-Every scene is looked at once; every goal is planned, and what is recommended is captured with other
-noise and held against the truth of the simulation. Errors are of the median lit pixel. Each part is
-measured by a command of its own, which it names.
+A plan looks at a scene once, and says which sequence reaches a target soonest and how large its
+error will be. Here many scenes are looked at, each plan is captured with other noise, and its error
+is held against the truth of the simulation.
+
+An error is noise and bias together, of the median lit pixel. Each part below is measured by a
+command of its own, which it names.
 
 `outlier_share` counts what noise throws off and what the frequencies of the look show to be biased.
-Light that none of them resolves moves a range without any sign of it, and is in no figure here but
-the measured ones.
 """
 
 

@@ -16,7 +16,7 @@ import os
 import time
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from benchmarks.accuracy.kept import Kept, Refused, expectations, page, table
 from transientcam_driver import Camera, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.camera.source import sensor_of
@@ -52,49 +53,6 @@ GOALS: Final = {
     "0.2 s": Goal(capture_s=0.2),
 }
 _Array = NDArray[Any]
-
-
-@dataclass(frozen=True)
-class Kept:
-    """A plan and what was measured of it; errors in m, None where a goal was refused."""
-
-    scene: str
-    goal: str
-    target_m: float | None
-    choice: str
-    capture_s: float
-    device_s: float
-    predicted: dict[str, float]
-    interval: tuple[float, float]
-    measured: dict[str, float]
-    saturated: float
-    planned_in_s: float
-
-    @property
-    def ratios(self) -> dict[str, float]:
-        """Measured over predicted noise, bias and error."""
-        return {
-            name: self.measured[name] / self.predicted[name] for name in ("std", "bias", "error")
-        }
-
-    @property
-    def covered(self) -> bool:
-        """Whether the interval of the error holds what was measured."""
-        return self.interval[0] <= self.measured["error"] <= self.interval[1]
-
-    @property
-    def met(self) -> bool | None:
-        """Whether the target was met; None without one."""
-        return None if self.target_m is None else self.measured["error"] <= self.target_m
-
-
-@dataclass(frozen=True)
-class Refused:
-    """A goal that is out of reach, and why."""
-
-    scene: str
-    goal: str
-    why: str
 
 
 def scenes() -> Iterator[str]:
@@ -128,28 +86,34 @@ def measured(
     Each range is held against the truth in the middle of its own capture: scenes may move.
     """
     with opened(scene, CAPTURE_SEED) as camera:
-        assert camera.simulation is not None
-        applied = camera.configure(sequence)
-        sensor = sensor_of(camera, SensorSettings())
-        recipe = Recipe(applied, SETTINGS, float(sensor.highest_dn), sensor=sensor)
-        camera.start()
-        pixels, errors_m, device_s, full = None, [], 0.0, 0.0
-        for _ in range(captures):
-            raw = camera.read_frame(timeout_s=1e3)
-            device_s = raw.capture_s
-            truth = camera.simulation.truth(device_time_s=raw.device_time_s + device_s / 2)
-            if pixels is None:
-                lit = np.flatnonzero(np.isfinite(truth.range_m) & (truth.brightness > 0))
-                random = np.random.default_rng(1)
-                pixels = np.sort(random.choice(lit, min(PIXELS, lit.size), replace=False))
-                full = float((raw.images.max(axis=0).ravel()[lit] >= sensor.highest_dn).mean())
-            b = tm.smooth(np.asarray(recipe.reconstruct(raw).measured), SETTINGS.smoothing_px)
-            part = b.reshape((len(b), -1))[:, pixels]
-            variance = _variance(part, recipe, sensor)
-            frequency_hz = recipe.base_frequency_hz
-            found_m = ranges_m(part, variance, estimator, frequency_hz, SETTINGS)
-            errors_m.append(found_m - truth.range_m.ravel()[pixels])
-        camera.stop()
+        return measured_by(camera, sequence, estimator, captures)
+
+
+def measured_by(
+    camera: Camera, sequence: Sequence, estimator: str, captures: int
+) -> tuple[dict[str, float], float, float]:
+    """Do the same with a simulated camera that is open."""
+    assert camera.simulation is not None
+    applied = camera.configure(sequence)
+    sensor = sensor_of(camera, SensorSettings())
+    recipe = Recipe(applied, SETTINGS, float(sensor.highest_dn), sensor=sensor)
+    camera.start()
+    pixels, errors_m, device_s, full = None, [], 0.0, 0.0
+    for _ in range(captures):
+        raw = camera.read_frame(timeout_s=1e3)
+        device_s = raw.capture_s
+        truth = camera.simulation.truth(device_time_s=raw.device_time_s + device_s / 2)
+        if pixels is None:
+            lit = np.flatnonzero(np.isfinite(truth.range_m) & (truth.brightness > 0))
+            random = np.random.default_rng(1)
+            pixels = np.sort(random.choice(lit, min(PIXELS, lit.size), replace=False))
+            full = float((raw.images.max(axis=0).ravel()[lit] >= sensor.highest_dn).mean())
+        b = tm.smooth(np.asarray(recipe.reconstruct(raw).measured), SETTINGS.smoothing_px)
+        part = b.reshape((len(b), -1))[:, pixels]
+        variance = _variance(part, recipe, sensor)
+        found_m = ranges_m(part, variance, estimator, recipe.base_frequency_hz, SETTINGS)
+        errors_m.append(found_m - truth.range_m.ravel()[pixels])
+    camera.stop()
     errors = pixel_errors(np.stack(errors_m), np.zeros_like(errors_m[0]))
     values = {
         "std": float(np.median(errors.std_m)),
@@ -217,49 +181,6 @@ def _predicted(choice: Choice) -> dict[str, float]:
     }
 
 
-def summary(rows: list[Kept]) -> str:
-    """State ratios, coverage and targets met."""
-    lines = []
-    for name in ("std", "bias", "error"):
-        ratios = np.array([row.ratios[name] for row in rows])
-        quantiles = ", ".join(f"{np.quantile(ratios, q):.2f}" for q in (0.0, 0.1, 0.5, 0.9, 1.0))
-        lines.append(f"{name}: measured / predicted least, 10 %, 50 %, 90 %, most: {quantiles}")
-    covered = np.mean([row.covered for row in rows])
-    lines.append(
-        f"90 % intervals hold the measured error in {covered:.0%} of {len(rows)} (bar: 85 to 95 %)"
-    )
-    targets = [row.met for row in rows if row.met is not None]
-    if targets:
-        share = np.mean(targets)
-        lines.append(f"targets met: {sum(targets)} of {len(targets)}, {share:.0%} (bar: 80 %)")
-    off = max(abs(row.device_s / row.capture_s - 1) for row in rows)
-    lines.append(f"times of the device differ from planned ones by at most {off:.2%}")
-    lines.append(f"saturated pixels: at most {max(row.saturated for row in rows):.2%}")
-    return "\n".join(lines)
-
-
-def table(rows: list[Kept]) -> str:
-    """Return all plans as a table."""
-    head = (
-        "| scene | goal | recommended | ms | noise | bias | error (90 %) mm | "
-        "measured noise, bias, error | ratio | outliers % | met |\n" + "|---" * 11 + "|"
-    )
-    lines = [head]
-    for row in rows:
-        p, q = row.predicted, row.measured
-        low, high = row.interval
-        met = {None: "–", True: "yes", False: "no"}[row.met]
-        lines.append(
-            f"| {row.scene} | {row.goal} | {row.choice} | {row.capture_s * 1e3:.0f} "
-            f"| {p['std'] * 1e3:.3g} | {p['bias'] * 1e3:.3g} "
-            f"| {p['error'] * 1e3:.3g} ({low * 1e3:.3g} to {high * 1e3:.3g}) "
-            f"| {q['std'] * 1e3:.3g}, {q['bias'] * 1e3:.3g}, {q['error'] * 1e3:.3g} "
-            f"| {row.ratios['error']:.2f} | {p['outliers'] * 100:.1f}, {q['outliers'] * 100:.1f} "
-            f"| {met} |"
-        )
-    return "\n".join(lines)
-
-
 def all_kept(
     names: Iterable[str], goals: dict[str, Goal], captures: int, *, processes: int
 ) -> tuple[list[Kept], list[Refused]]:
@@ -283,13 +204,6 @@ def _listed(scene: str, goals: dict[str, Goal], captures: int) -> list[Kept | Re
     return list(kept(scene, goals, captures))
 
 
-def page(rows: list[Kept], refused: list[Refused]) -> str:
-    """Return summary, table and refusals."""
-    lines = [f"- {line}" for line in summary(rows).splitlines()]
-    lines += [f"- refused: {each.scene}, {each.goal}: {each.why}" for each in refused]
-    return "\n".join([*lines, "", table(rows)])
-
-
 def main() -> None:
     """Measure all scenes, or those named; print the tables, or write them."""
     from benchmarks.accuracy import audited, evidence
@@ -311,7 +225,9 @@ def main() -> None:
     )
     print(page(rows, refused), audited.table(rows, refused), sep="\n\n")
     if arguments.write:
-        command = "python -m benchmarks.accuracy.promises --write"
+        quick = " --quick" if arguments.quick else ""
+        command = f"python -m benchmarks.accuracy.promises{quick} --write"
+        evidence.write("expectations", expectations(rows), command)
         evidence.write("promises", page(rows, refused), command)
         evidence.write("audit", audited.table(rows, refused), command)
     if arguments.json:

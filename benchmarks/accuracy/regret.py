@@ -17,26 +17,29 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.accuracy import evidence
-from benchmarks.accuracy.promises import GOALS, looked, measured
+from benchmarks.accuracy.promises import GOALS, LOOK_SEED, looked, measured, opened
 from transientcam_driver import Sequence
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.planning import Goal, Planner, SceneStatistics
 from transientcam_server.planning.choice import in_words
 from transientcam_server.planning.estimation import ESTIMATORS
 from transientcam_server.planning.families import Family
+from transientcam_server.planning.scene import AMBIGUOUS_SHARE
 
 SCENES = ("wall", "mirrors", "translucent", "corner")
 TARGETS = ("20 mm", "5 mm", "2 mm")
 CAPTURES = 10
 ORDER = 1
-LEAST_M = 1e-9
 AMBIGUOUS = (
-    "The search also runs sequences whose unambiguous range is shorter than the way of some light "
-    "that the look saw; a plan does not."
+    "The search knows the true ranges and judges by them. A sequence is no candidate where more "
+    f"than {AMBIGUOUS_SHARE:.0%} of the lit pixels are beyond its unambiguous range: that is the "
+    "rule of plans, too, which go by the ranges that the look found, and also by later returns."
 )
 
 
@@ -70,6 +73,7 @@ def _regrets(
     scene: str, targets: list[str], search_s: float, clock: Callable[[], float]
 ) -> Iterator[Regret]:
     planner, statistics = looked(scene)
+    true_m = true_ranges_m(scene)
 
     @cache
     def error_m(estimator: str, sequence: Sequence) -> float:
@@ -86,7 +90,7 @@ def _regrets(
             continue
         quickest_s, quickest = best.applied.capture_s, best.in_words()
         searched, until_s = 0, clock() + search_s
-        families = list(every_family(goal, planner, statistics))
+        families = list(every_family(goal, planner, statistics, true_m))
         random.Random(ORDER).shuffle(families)
         for family in families:
             if clock() > until_s:
@@ -118,11 +122,25 @@ def _regrets(
         )
 
 
-def every_family(goal: Goal, planner: Planner, scene: SceneStatistics) -> Iterator[Family]:
-    """Yield all that the camera can run without saturating, with any estimator, also ambiguous."""
-    near = replace(scene, direct_m=np.full_like(scene.direct_m, LEAST_M), share=0 * scene.share)
+def every_family(
+    goal: Goal, planner: Planner, scene: SceneStatistics, true_m: NDArray[Any]
+) -> Iterator[Family]:
+    """Yield all that the camera can run without saturating or ambiguity, with any estimator.
+
+    Ambiguity is judged by the true ranges (P) of lit pixels, and not by what the look found.
+    """
+    known = replace(scene, direct_m=true_m, share=0 * scene.share)
     for estimator in ESTIMATORS:
-        yield from planner.families(replace(goal, estimator=estimator), near)
+        yield from planner.families(replace(goal, estimator=estimator), known)
+
+
+def true_ranges_m(scene: str) -> NDArray[Any]:
+    """Return the range of every lit pixel of a scene."""
+    with opened(scene, LOOK_SEED) as camera:
+        assert camera.simulation is not None
+        truth = camera.simulation.truth()
+    lit = np.isfinite(truth.range_m) & (truth.brightness > 0)
+    return np.asarray(truth.range_m[lit], dtype=float)
 
 
 def table(found: list[Regret]) -> str:

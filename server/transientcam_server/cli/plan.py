@@ -4,25 +4,17 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 """
 
 import json
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.status import Status
 
-from transientcam.cli.options import JsonOption
+from transientcam.cli.options import JsonOption, TokenOption
+from transientcam_server.cli.plan_text import print_front, print_plan, print_takes
 
 if TYPE_CHECKING:
-    from transientcam_driver import Camera, Sequence
-    from transientcam_server.planning import Planner, SceneStatistics
-    from transientcam_server.planning.progress import Report
-    from transientcam_server.planning.takes import TakesPrediction
-
-MOVING: Final = 0.02
-"""Share of moving pixels from which on it is said."""
-LOOK_S: Final = 60.0
-"""How long a frame may take of a camera that is not planned for: an emulated one computes it."""
+    from transientcam_server.cli.plan_here import View
+    from transientcam_server.planning import Goal
 
 
 def plan(
@@ -65,8 +57,25 @@ def plan(
         ),
     ] = None,
     camera: Annotated[
-        str, typer.Option(help="The camera, and the scene before it; a few captures are taken.")
-    ] = "sim:mirrors",
+        str | None,
+        typer.Option(
+            help="The camera, and the scene before it; a few captures are taken.  "
+            "[default: sim:mirrors]"
+        ),
+    ] = None,
+    daemon: Annotated[
+        str | None,
+        typer.Option(
+            metavar="URL",
+            help="Let a daemon plan, for the scene before its camera, which goes on capturing.",
+        ),
+    ] = None,
+    front: Annotated[
+        bool,
+        typer.Option(
+            "--front", help="In the place of one sequence for a goal: all that no other beats."
+        ),
+    ] = False,
     real_time: Annotated[
         bool, typer.Option("--real-time", help="Let a simulated camera take its time, too.")
     ] = False,
@@ -89,103 +98,118 @@ def plan(
             help="Light that is not the camera's, in DN for each second.  [default: as measured]"
         ),
     ] = None,
+    token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Find the sequence and estimator for a target accuracy or a budget of time.
 
-    Where the target is out of reach what limits it is printed, and the exit code is 1.
+    Where the target is out of reach what limits it is printed, and the exit code is 1. Ctrl-C ends
+    the work, also that of a daemon.
     """
-    import transientcam_moments as tm
-    from transientcam_driver import Sequence, open_camera
-    from transientcam_driver.clock import RealClock, VirtualClock
-    from transientcam_server.camera.source import sensor_of
-    from transientcam_server.errors.exceptions import Problem
-    from transientcam_server.planning import Goal, Planner, Progress, uniform_scene
-    from transientcam_server.planning.estimation import ESTIMATORS
-    from transientcam_server.planning.families import require_plannable
-    from transientcam_server.planning.takes import predict_takes
-    from transientcam_server.settings import ReconstructionSettings, SensorSettings
+    target = {"range_error_m": range_error_m, "range_std_m": range_std_m}
+    target |= {"separation_m": separation_m, "bound_width": bound_width}
+    budget = {"capture_s": capture_s, "frame_rate_hz": frame_rate_hz}
+    budget |= {"computing_share": computing_share}
+    stays = _fields(fixed or [])
+    if front:
+        goal_of_one = {"--fix": fixed or None, "--estimator": estimator}
+        _refuse(
+            goal_of_one | _options(target) | _options(budget),
+            "is for one sequence, and --front shows all that no other beats",
+        )
+    console = Console(stderr=True)
+    if daemon is not None:
+        here: dict[str, Any] = {"camera": camera, "real_time": real_time or None}
+        here |= {"return": returns or None}
+        here |= {"brightness_dn_per_s": brightness_dn_per_s, "ambient_dn_per_s": ambient_dn_per_s}
+        _refuse(_options(here), "is the daemon's")
+        parts: dict[str, Any] = {"target": _given(target), "budget": _given(budget)}
+        parts["target"] |= {"separation_share": separation_share} if separation_m else {}
+        parts |= {"fixed": stays, "estimator": estimator}
+        document = _by_daemon(daemon, token, None if front else parts, console, as_json=as_json)
+    else:
+        from transientcam_server.cli.plan_here import View
 
+        view = View(
+            camera or "sim:mirrors",
+            real_time,
+            brightness_dn_per_s,
+            [_return(text) for text in returns or ["2"]],
+            ambient_dn_per_s,
+        )
+        asked = {**target, **budget, "separation_share": separation_share, "estimator": estimator}
+        document = _by_camera(
+            view, None if front else _goal(asked, stays), console, as_json=as_json
+        )
+    if as_json:
+        typer.echo(json.dumps(document))
+    elif front:
+        print_front(document)
+    else:
+        print_plan(document, computing=computing_share is not None)
+
+
+def _goal(asked: dict[str, Any], fixed: dict[str, Any]) -> "Goal":
+    from transientcam_driver import Sequence
+    from transientcam_server.planning import Goal
+    from transientcam_server.planning.estimation import ESTIMATORS
+
+    estimator = asked["estimator"]
     if estimator is not None and estimator not in ESTIMATORS:
         known = ", ".join(ESTIMATORS)
         raise typer.BadParameter(f"{estimator!r} is none of {known}", param_hint="--estimator")
-    document = _fields(fixed or [])
-    goal = Goal(
-        range_error_m=range_error_m,
-        range_std_m=range_std_m,
-        separation_m=separation_m,
-        separation_share=separation_share,
-        bound_width=bound_width,
-        capture_s=capture_s,
-        frame_rate_hz=frame_rate_hz,
-        computing_share=computing_share,
-        base=Sequence.from_document(document),
-        fixed=frozenset(document),
-        estimator=estimator,
-    )
-    console = Console(stderr=True)
-    virtual = camera.startswith("sim:") and not real_time
-    predicted: list[TakesPrediction] = []
+    return Goal(**asked, base=Sequence.from_document(fixed), fixed=frozenset(fixed))
+
+
+def _by_camera(
+    view: "View", goal: "Goal | None", console: Console, *, as_json: bool
+) -> dict[str, Any]:
+    """Plan here; where that is refused print what limits, and end with exit code 1."""
+    from transientcam_server.cli.plan_here import by_camera
+    from transientcam_server.errors.exceptions import Problem
+
     try:
-        goal.require_sensible()
-        with open_camera(camera, clock=VirtualClock() if virtual else RealClock()) as opened:
-            sensor = sensor_of(opened, SensorSettings())
-            try:
-                require_plannable(opened.capabilities)
-            except Problem:
-                with console.status("looking at the scene"):
-                    predicted = predict_takes(opened, sensor, read_s=LOOK_S)
-                raise
-            planner = Planner(opened.capabilities, sensor, ReconstructionSettings())
-            if computing_share is not None:
-                with console.status("compiling kernels"):
-                    tm.kernels.compile()  # the daemon's speed is timed
-            if brightness_dn_per_s is None:
-                scene = _looked(planner, opened, goal.base, ambient_dn_per_s, console)
-            else:
-                scene = uniform_scene(
-                    brightness_dn_per_s,
-                    [_return(text) for text in returns or ["2"]],
-                    ambient_dn_per_s=ambient_dn_per_s or 0.0,
-                )
-        with console.status("predicting") as status:
-            made = planner.plan(goal, scene, Progress(_shown(status)))
+        return by_camera(view, goal, console)
     except Problem as problem:
         if as_json:
-            takes = {"takes": [asdict(each) for each in predicted]} if predicted else {}
-            typer.echo(json.dumps({"detail": problem.detail, **problem.extensions, **takes}))
+            typer.echo(json.dumps({"detail": problem.detail, **problem.extensions}))
         else:
             console.print(problem.detail, style="red", soft_wrap=True)
-            _print_takes(predicted)
+            takes: Any = problem.extensions.get("takes", [])
+            print_takes(takes)
         raise typer.Exit(1) from problem
-    if as_json:
-        typer.echo(json.dumps(made.to_document()))
-    else:
-        _print_plan(made.to_document(), computing=computing_share is not None)
 
 
-def _looked(
-    planner: "Planner",
-    camera: "Camera",
-    base: "Sequence",
-    ambient_dn_per_s: float | None,
-    console: Console,
-) -> "SceneStatistics":
-    """Look at the scene, and show how far that has come."""
-    from transientcam_server.planning import Progress
+def _by_daemon(
+    url: str, token: str | None, parts: dict[str, Any] | None, console: Console, *, as_json: bool
+) -> dict[str, Any]:
+    """Let a daemon plan; where it refuses that do the same."""
+    from transientcam.errors import ProblemError
+    from transientcam_server.cli.plan_daemon import by_daemon
 
-    with console.status("looking at the scene") as status:
-        return planner.look(
-            camera,
-            base,
-            ambient_dn_per_s=ambient_dn_per_s,
-            progress=Progress(_shown(status)),
-        )
+    try:
+        return by_daemon(url, token, parts, console)
+    except ProblemError as problem:
+        if as_json:
+            typer.echo(json.dumps(problem.document))
+        else:
+            console.print(problem.detail, style="red", soft_wrap=True)
+        raise typer.Exit(1) from problem
 
 
-def _shown(status: Status) -> "Report":
-    """Return what shows how far a look or a plan has come."""
-    return lambda share, step: status.update(f"{share:.0%}: {step}")
+def _given(values: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _options(values: dict[str, Any]) -> dict[str, Any]:
+    """Return what is given by the name of its option."""
+    return {f"--{name.replace('_', '-')}": value for name, value in _given(values).items()}
+
+
+def _refuse(options: dict[str, Any], reason: str) -> None:
+    for hint, value in options.items():
+        if value is not None:
+            raise typer.BadParameter(reason, param_hint=hint)
 
 
 def _fields(texts: list[str]) -> dict[str, Any]:
@@ -211,57 +235,3 @@ def _return(text: str) -> tuple[float, float]:
     if not all(0 < part < float("inf") for part in parts):
         raise typer.BadParameter(f"{text!r} is not RANGE_M:WEIGHT", param_hint="--return")
     return parts
-
-
-def _print_takes(predicted: "list[TakesPrediction]") -> None:
-    for each in predicted:
-        cost = f"{each.capture_s * 1e3:.1f} ms ({each.frame_rate_hz:.1f} Hz)"
-        typer.echo(f"takes {each.takes:>2}: {cost}, range to {each.range_std_m * 1e3:.2f} mm")
-
-
-def _print_plan(document: dict[str, Any], *, computing: bool) -> None:
-    predicted = document["predicted"]
-    error, std = predicted["range_error_m"], predicted["range_std_m"]
-    typer.echo(json.dumps(document["sequence"]))
-    typer.echo(f"estimator {document['estimator']}")
-    time_ms, rate_hz = document["capture_s"] * 1e3, document["frame_rate_hz"]
-    typer.echo(f"captures in {time_ms:.1f} ms ({rate_hz:.1f} Hz back to back)")
-    if computing:
-        typer.echo(
-            f"reconstructs in {document['reconstruct_s'] * 1e3:.1f} ms, "
-            f"{document['computing_share']:.1%} of the time"
-        )
-    typer.echo(
-        f"range to {error['median'] * 1e3:.2f} mm ({error['low'] * 1e3:.2f} to "
-        f"{error['high'] * 1e3:.2f}): noise {std['median'] * 1e3:.2f} mm, "
-        f"bias {predicted['range_bias_m'] * 1e3:.2f} mm; "
-        f"{predicted['outlier_share']:.1%} of the ranges are outliers"
-    )
-    typer.echo(document["summary"])
-    scene = document["scene"]
-    typer.echo(
-        f"seen: {scene['lit_share']:.0%} of the pixels lit, at {scene['range_m']:.2f} m; "
-        f"{scene['ambient_dn_per_s']:.3g} DN/s of ambient light"
-    )
-    if scene["moving_share"] > MOVING:
-        typer.echo(f"{scene['moving_share']:.0%} of them move: what that costs is not predicted")
-    if not scene["ambiguity_checked"]:
-        typer.echo("whether ranges are short by a period was not checked")
-    if document["predicted"]["beyond_scene"]:
-        typer.echo("at best: this resolves more of the scene than the capture it is predicted from")
-    if document["predicted"]["separation_share"] is not None:
-        share = document["predicted"]["separation_share"]
-        typer.echo(f"finds both returns in {share:.0%} of captures")
-    if document["predicted"]["bound_width"] is not None:
-        width = document["predicted"]["bound_width"]
-        typer.echo(f"bounds {width:.3g} times the mean density apart")
-    for name, what in (("half_time", "half the time"), ("twice_accuracy", "twice the accuracy")):
-        other = document[name]
-        if other is None:
-            typer.echo(f"{what}: no sequence does")
-            continue
-        errors = (
-            "" if other["error_factor"] is None else f"{other['error_factor']:.2g} x the error, "
-        )
-        sequence = json.dumps(other["sequence"])
-        typer.echo(f"{what}: {errors}{other['time_factor']:.2g} x the time: {sequence}")

@@ -1,10 +1,12 @@
 """What tests let another process call; its modules are imported there."""
 
 import os
+import threading
 from collections.abc import Callable
 from typing import NoReturn, TypeVar
 
-from transientcam_server.errors import Problem, kinds
+from transientcam_server.errors import kinds
+from transientcam_server.errors.exceptions import JobCancelled, Problem
 from transientcam_server.planning import Progress
 
 _T = TypeVar("_T")
@@ -54,6 +56,27 @@ class Here:
 
     def close(self) -> None:
         """End nothing."""
+
+
+class Endless:
+    """Work in pure Python that reports where it is, and goes on until that raises."""
+
+    def __init__(self) -> None:
+        self.began, self.ended = threading.Event(), threading.Event()
+        self.raised: Exception | None = None
+
+    def __call__(self, goal: object, scene: object, progress: Progress) -> None:
+        progress.at(0.5, "searching")
+        progress.show({"summary": "One of many."})
+        self.began.set()
+        try:
+            while not self.ended.is_set():
+                sum(k * k for k in range(10_000))
+                progress()
+        except (Problem, JobCancelled) as error:
+            self.raised = error
+            self.ended.set()
+            raise
 
 
 def is_running(process: int) -> bool:

@@ -1,7 +1,6 @@
 """Planning over REST: recommendations, refusals, and the front of the scene that is seen."""
 
 import json
-import threading
 from collections.abc import Iterator
 from http.client import HTTPConnection
 from importlib import import_module
@@ -12,12 +11,11 @@ import httpx
 import pytest
 
 from tests.server.contract import hold_to_contract
-from tests.server.planning.calls import Here
+from tests.server.planning.calls import Endless, Here
 from tests.serving import Served, serving
 from transientcam import Camera
 from transientcam.wire import LEASE_HEADER
 from transientcam_server.errors.exceptions import JobCancelled, Problem
-from transientcam_server.planning import Progress
 
 FIXED = {"base_frequency_hz": 23e6, "harmonics": 3}
 SCENE = {"brightness_dn_per_s": 8e5, "returns": [{"range_m": 1.5}, {"range_m": 3.0, "weight": 0.5}]}
@@ -148,27 +146,6 @@ def test_the_front_falls_and_the_current_frame_says_where_it_stands(
     accuracy = current["meta"]["accuracy"]
     assert 0 < accuracy["range_bias_m"] <= accuracy["range_error_m"] < 0.2
     assert 0 <= accuracy["outlier_share"] < 0.5
-
-
-class Endless:
-    """Work in pure Python that reports where it is, and goes on until that raises."""
-
-    def __init__(self) -> None:
-        self.began, self.ended = threading.Event(), threading.Event()
-        self.raised: Exception | None = None
-
-    def __call__(self, goal: object, scene: object, progress: Progress) -> None:
-        progress.at(0.5, "searching")
-        progress.show({"summary": "One of many."})
-        self.began.set()
-        try:
-            while not self.ended.is_set():
-                sum(k * k for k in range(10_000))
-                progress()
-        except (Problem, JobCancelled) as error:
-            self.raised = error
-            self.ended.set()
-            raise
 
 
 @pytest.fixture(params=["plan", "tradeoff"])

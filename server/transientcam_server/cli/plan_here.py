@@ -1,0 +1,104 @@
+"""The verb ``plan`` in this process: a look through a camera, and the search."""
+
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+from rich.console import Console
+from rich.status import Status
+
+import transientcam_moments as tm
+from transientcam_driver import Camera, open_camera
+from transientcam_driver.clock import RealClock, VirtualClock
+from transientcam_server.camera.source import sensor_of
+from transientcam_server.errors.exceptions import Problem
+from transientcam_server.planning import Goal, Planner, Progress, SceneStatistics, uniform_scene
+from transientcam_server.planning.families import require_plannable
+from transientcam_server.planning.progress import Report
+from transientcam_server.planning.takes import predict_takes
+from transientcam_server.settings import ReconstructionSettings, SensorSettings
+
+LOOK_S: Final = 60.0
+"""How long a frame may take of a camera that is not planned for: an emulated one computes it."""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """The camera, and what is known of the scene before it.
+
+    Attributes
+    ----------
+    camera
+        As `open_camera` takes it.
+    real_time
+        Whether a simulated one takes its time, too.
+    brightness_dn_per_s
+        Zeroth moment of equal pixels in DN for each second of exposure; None looks at the scene.
+    returns
+        Range in m and weight of each return of such a scene.
+    ambient_dn_per_s
+        Light that is not the camera's; None measures it.
+    """
+
+    camera: str
+    real_time: bool
+    brightness_dn_per_s: float | None
+    returns: list[tuple[float, float]]
+    ambient_dn_per_s: float | None
+
+
+def by_camera(view: View, goal: Goal | None, console: Console) -> dict[str, Any]:
+    """Plan for a goal, or, without one, find all that no other beats; return it as JSON.
+
+    Raises
+    ------
+    Problem
+        Where the goal is out of reach, or the camera is not planned for; then with ``takes``, what
+        more of them give.
+    CameraError
+        As the camera does.
+    """
+    if goal is not None:
+        goal.require_sensible()
+    virtual = view.camera.startswith("sim:") and not view.real_time
+    with open_camera(view.camera, clock=VirtualClock() if virtual else RealClock()) as camera:
+        sensor = sensor_of(camera, SensorSettings())
+        try:
+            require_plannable(camera.capabilities)
+        except Problem as problem:
+            with console.status("looking at the scene"):
+                predicted = predict_takes(camera, sensor, read_s=LOOK_S)
+            problem.extensions["takes"] = [asdict(each) for each in predicted]
+            raise
+        planner = Planner(camera.capabilities, sensor, ReconstructionSettings())
+        if goal is not None and goal.computing_share is not None:
+            with console.status("compiling kernels"):
+                tm.kernels.compile()  # the daemon's speed is timed
+        scene = _scene(planner, camera, view, goal or Goal(), console)
+    with console.status("predicting") as status:
+        progress = Progress(_shown(status))
+        if goal is None:
+            return planner.tradeoff_document(Goal(), scene, progress)
+        return planner.plan_document(goal, scene, progress)
+
+
+def _scene(
+    planner: Planner, camera: Camera, view: View, goal: Goal, console: Console
+) -> SceneStatistics:
+    """Look at the scene, and show how far that has come; or take it as it is given."""
+    if view.brightness_dn_per_s is not None:
+        ambient_dn_per_s = view.ambient_dn_per_s or 0.0
+        return uniform_scene(
+            view.brightness_dn_per_s, view.returns, ambient_dn_per_s=ambient_dn_per_s
+        )
+    with console.status("looking at the scene") as status:
+        return planner.look(
+            camera,
+            goal.base,
+            ambient_dn_per_s=view.ambient_dn_per_s,
+            progress=Progress(_shown(status)),
+        )
+
+
+def _shown(status: Status) -> Report:
+    """Return what shows how far a look or a plan has come."""
+    return lambda share, step: status.update(f"{share:.0%}: {step}")
