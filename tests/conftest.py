@@ -42,6 +42,7 @@ _LIBRARY_THREADS = (
     "uvloop_",
     "zarr_io",
     "asyncio_",  # the executor of zarr's loop
+    "requests_",  # that of a daemon's
     "fsspecIO",
     "Dask-",
     "IO loop",

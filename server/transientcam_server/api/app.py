@@ -119,4 +119,16 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     app.add_middleware(OriginCheck, settings=settings)
     app.add_middleware(RequestLog, metrics=metrics)
     app.add_middleware(SecurityHeaders)
+    _analyse_routes(app)
     return app
+
+
+def _analyse_routes(app: FastAPI) -> None:
+    """Have FastAPI analyse all routes now, which it leaves to the first request.
+
+    The threads of two services in one process may not do so at the same time: pydantic then warns
+    of aliases that it takes from the other's parameters.
+    """
+    scope = {"type": "http", "method": "GET", "path": "/.", "root_path": "", "headers": []}
+    for route in app.routes:
+        route.matches(dict(scope))

@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 import transientcam_moments as tm
-from transientcam_server.errors.exceptions import ClusterError, MissingExtra
+from transientcam_server.errors.exceptions import ClusterError, MissingExtra, StorageError
 from transientcam_server.offline.formats import (
     Block,
     Content,
@@ -105,6 +105,15 @@ def reconstruct_on(
 
 def write_block(job: Job, output: str, first: int, last: int) -> None:
     """Compute some frames and write them: what a task is."""
+    try:
+        _write_block(job, output, first, last)
+    except StorageError as error:
+        # the errors of backends behind it are not all such that they can be sent to the client
+        error.__cause__ = error.__context__ = None
+        raise
+
+
+def _write_block(job: Job, output: str, first: int, last: int) -> None:
     tm.kernels.use_one_thread()  # a worker has a process, or a thread, for every core
     with naming_address(output):
         group = _group(job, output)

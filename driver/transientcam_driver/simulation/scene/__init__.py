@@ -7,14 +7,13 @@ from transientcam_driver.simulation.scene.file import (
     load_scene,
     parse_scene,
 )
-from transientcam_driver.simulation.scene.scene import Background, Scene, Surface, TimeZero
+from transientcam_driver.simulation.scene.scene import Background, Scene, TimeZero
 
 __all__ = [
     "BUILT_IN",
     "Background",
     "Scene",
     "SceneInfo",
-    "Surface",
     "TimeZero",
     "list_scenes",
     "load_scene",
