@@ -69,7 +69,7 @@ def expectations(rows: list[Kept]) -> str:
         f"- The interval that a plan states, 90 %, holds the measured error of {inside} of "
         f"{len(rows)}, {inside / len(rows):.0%} (bar: 85 to 95 %). {len(above)} errors lie above "
         f"it{_of(above)}, {len(below)} below it{_of(below)}.",
-        f"- Noise: 80 % of the measured deviations are {low:.2g} to {high:.2g} of the predicted.",
+        f"- Noise: 80 % of the measured deviations are {low:.2f} to {high:.2f} of the predicted.",
         WRONG,
     ]
     return "\n".join(lines)
