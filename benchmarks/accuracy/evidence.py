@@ -11,6 +11,7 @@ PARTS: Final = {
     "expectations": "What to expect",
     "promises": "Do plans keep what they promise?",
     "audit": "The worst cases of an audit",
+    "calibrating": "What the intervals are made of",
     "regret": "How much quicker could a plan have been?",
 }
 _HEAD: Final = """# Do plans keep what they promise?

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 WRONG = """\
-- A plan is wrong where light comes back late and no frequency of the look shows it: where it enters
-  the material, as in wax and soap, or where a part of the scene is lit by other walls alone. The
-  bias is larger than predicted then, and a longer capture does not help. The interval of the plan
-  does not hold such an error."""
+- The bias is predicted too small where light comes back late and no frequency of the look shows it:
+  where it enters the material, as in wax and soap, or where a part of the scene is lit by other
+  walls alone. A longer capture does not help there. The upper end of an interval is made for such
+  scenes."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,12 @@ from transientcam_driver import Sequence
 from transientcam_server.imaging.noise import MEDIAN_OF_NORMAL
 from transientcam_server.imaging.ranging import ranges_m
 from transientcam_server.planning.estimation import MOST_HARMONICS
+from transientcam_server.planning.intervals import (
+    RESAMPLED,
+    Figure,
+    figure,
+    with_unknown_bias,
+)
 from transientcam_server.planning.measures import PixelErrors, pixel_errors
 from transientcam_server.planning.resolving import Resolving
 from transientcam_server.planning.scene import SceneStatistics
@@ -37,45 +43,9 @@ STEP: Final = 4.0
 """Factor between steps of noise."""
 NOMINAL: Final = Sequence(exposure_s=1e-3, zeroth="estimated")
 """The steps are multiples of its noise."""
-COVERAGE: Final = 0.9
-"""Of the intervals."""
-MODEL_SPREAD: Final = 0.08
-"""Standard deviation of the logarithm of measured over predicted errors beyond what the sampling
-of pixels explains (docs/accuracy.md)."""
-_RESAMPLED: Final = 100
 _HARDLY: Final = 0.8
-LIKELY: Final = 0.8
-"""Share of the captures that are to meet a target."""
-_LEAST_M: Final = 1e-9
 _NORMAL: Final = np.array([NormalDist().inv_cdf(0.5 + (k + 0.5) / 64) for k in range(32)])
 """Absolute values of a standard normal variable, each as likely."""
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """A predicted error in m and its interval.
-
-    Attributes
-    ----------
-    median
-        Of the median lit pixel.
-    low, high
-        `COVERAGE` of the captures measure a value between them.
-    p90
-        90 % of the pixels are better.
-    with_margin
-        What 80 % of the captures measure less than: what a target is held against.
-    """
-
-    median: float
-    low: float
-    high: float
-    p90: float
-    with_margin: float
-
-    def to_document(self) -> dict[str, float]:
-        """Return it as JSON."""
-        return {"median": self.median, "low": self.low, "high": self.high, "p90": self.p90}
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,21 +164,14 @@ class Predictor:
         errors = self._errors(
             estimator, harmonics, sequence.base_frequency_hz, noise, FINE_DRAWS, sequence.zeroth
         )
-        picks = np.random.default_rng(self._seed).integers(0, noise.size, (_RESAMPLED, noise.size))
-
-        def figure(each: _Array, median: Callable[[_Array], float]) -> Figure:
-            value = max(median(each), _LEAST_M)
-            sampled = np.maximum([median(each[pick]) for pick in picks], _LEAST_M)
-            low, high, likely = (
-                _widened(value, float(np.quantile(sampled, part)), NormalDist().inv_cdf(part))
-                for part in (0.5 - COVERAGE / 2, 0.5 + COVERAGE / 2, LIKELY)
-            )
-            return Figure(value, low, high, float(np.quantile(each, 0.9)), likely)
-
+        picks = np.random.default_rng(self._seed).integers(0, noise.size, (RESAMPLED, noise.size))
+        std = figure(errors.std_m, _typical, picks)
+        bias = figure(errors.bias_m, _median, picks)
+        error = figure(errors.error_m, _median, picks)
         return Prediction(
-            figure(errors.std_m, _typical),
-            figure(errors.bias_m, _median),
-            figure(errors.error_m, _median),
+            std,
+            bias,
+            with_unknown_bias(error, std.median, bias.median),
             errors.outlier_share,
         )
 
@@ -290,18 +253,6 @@ class Predictor:
             self.scene.direct_m[pixels],
             self.scene.uncertainty_m[pixels],
         )
-
-
-def _widened(value: float, sampled: float, deviations: float) -> float:
-    """Add what the model may be wrong by to a quantile of the median of sampled pixels.
-
-    Both as logarithms, as independent: ``deviations`` is the quantile of a normal variable.
-    """
-    if not 0 < sampled < math.inf:
-        return sampled
-    by_sampling, by_model = math.log(sampled / value), deviations * MODEL_SPREAD
-    outwards = max(by_sampling, 0.0) if deviations > 0 else min(by_sampling, 0.0)
-    return value * math.exp(math.copysign(math.hypot(outwards, by_model), deviations))
 
 
 def _typical(deviations: _Array) -> float:

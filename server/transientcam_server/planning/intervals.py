@@ -1,0 +1,109 @@
+"""Intervals of predicted errors: between which values a capture is expected to measure them.
+
+The interval of the noise covers the sampling of pixels and what the model is wrong by. How far the
+bias lies from its prediction is another matter, and the larger one: light that comes back late may
+show in no frequency of the look, and where nothing comes back late the prediction states what the
+noise of the look could hide. By how much is measured on random scenes
+(``python -m benchmarks.accuracy.calibrating``), and the interval of the error is as wide.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from statistics import NormalDist
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Array = NDArray[Any]
+COVERAGE: Final = 0.9
+"""Of the intervals."""
+LIKELY: Final = 0.8
+"""Share of the captures that are to meet a target."""
+MODEL_SPREAD: Final = 0.08
+"""Standard deviation of the logarithm of measured over predicted errors beyond what the sampling
+of pixels explains (docs/accuracy.md)."""
+MOST_BIAS: Final = 2.0
+"""Measured over predicted bias, at most: on random scenes some 85 % of the errors are smaller than
+one with so much bias (docs/plans.md, decision 1030)."""
+RESAMPLED: Final = 100
+_LEAST_M: Final = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A predicted error in m and its interval.
+
+    Attributes
+    ----------
+    median
+        Of the median lit pixel.
+    low, high
+        `COVERAGE` of the captures measure a value between them.
+    p90
+        90 % of the pixels are better.
+    with_margin
+        What 80 % of the captures measure less than: what a target is held against.
+    """
+
+    median: float
+    low: float
+    high: float
+    p90: float
+    with_margin: float
+
+    def to_document(self) -> dict[str, float]:
+        """Return it as JSON."""
+        return {"median": self.median, "low": self.low, "high": self.high, "p90": self.p90}
+
+
+def figure(errors_m: _Array, median: Callable[[_Array], float], picks: _Array) -> Figure:
+    """Return the figure of the errors (P) of pixels.
+
+    Parameters
+    ----------
+    median
+        Of such errors.
+    picks
+        Indices (`RESAMPLED`, P) of pixels, drawn with replacement: samples of the same scene.
+    """
+    value = max(median(errors_m), _LEAST_M)
+    sampled = np.maximum([median(errors_m[pick]) for pick in picks], _LEAST_M)
+    low, high, likely = (
+        _widened(value, float(np.quantile(sampled, part)), NormalDist().inv_cdf(part))
+        for part in (0.5 - COVERAGE / 2, 0.5 + COVERAGE / 2, LIKELY)
+    )
+    return Figure(value, low, high, float(np.quantile(errors_m, 0.9)), likely)
+
+
+def with_unknown_bias(error: Figure, std_m: float, bias_m: float) -> Figure:
+    """Return the figure of an error whose interval holds other biases than the predicted one.
+
+    It begins with the error without bias: what is predicted is in part what the noise of the look
+    could hide. It ends with that of `MOST_BIAS`.
+
+    Parameters
+    ----------
+    error
+        Of noise and bias together.
+    std_m, bias_m
+        Predicted noise and bias of the median pixel.
+    """
+    predicted = math.hypot(std_m, bias_m)
+    if not 0 < predicted < math.inf:
+        return error
+    low, high = (math.hypot(std_m, factor * bias_m) / predicted for factor in (0.0, MOST_BIAS))
+    return replace(error, low=error.low * low, high=error.high * high)
+
+
+def _widened(value: float, sampled: float, deviations: float) -> float:
+    """Add what the model may be wrong by to a quantile of the median of sampled pixels.
+
+    Both as logarithms, as independent: ``deviations`` is the quantile of a normal variable.
+    """
+    if not 0 < sampled < math.inf:
+        return sampled
+    by_sampling, by_model = math.log(sampled / value), deviations * MODEL_SPREAD
+    outwards = max(by_sampling, 0.0) if deviations > 0 else min(by_sampling, 0.0)
+    return value * math.exp(math.copysign(math.hypot(outwards, by_model), deviations))
