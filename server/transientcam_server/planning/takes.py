@@ -84,21 +84,25 @@ def takes_of(
     settings = recipe.settings.model_copy(update={"smoothing_px": 0.0})
     found = replace(recipe, settings=settings).reconstruct(frame)
     assert found.noise is not None  # noqa: S101 - the sensor is known
-    moments = np.asarray(found.smoothed)
+    sequence, sampling = recipe.applied.sequence, recipe.applied.sequence.sampling
+    moments, multiples = np.asarray(found.smoothed), None
+    if not sampling.consecutive:
+        known = () if sequence.zeroth == "estimated" else (0,)
+        multiples = (*known, *sampling.multiples)
+        moments = moments[-len(multiples) :]
     flat = moments.reshape((len(moments), -1))
     step = max(1, flat.shape[1] // _PIXELS)
     b = flat[:, step // 2 :: step]
-    variance = np.broadcast_to(found.noise.variance, moments.shape).reshape(flat.shape)
-    sequence = recipe.applied.sequence
-    of_one = sequence.takes * variance[:, step // 2 :: step]
+    variance = np.broadcast_to(found.noise.variance[-len(moments) :], moments.shape)
+    of_one = sequence.takes * variance.reshape(flat.shape)[:, step // 2 :: step]
     images = recipe.applied.images // sequence.takes
     predicted = []
     for count in takes:
         if count <= min(capabilities.max_takes, capabilities.max_images // images):
             more = capabilities.apply(replace(sequence, takes=count))
             noise = tm.noise.MomentNoise(of_one / count)
-            fitted = tm.two_returns(b, noise, model_error=MODEL_ERROR)
-            std_m = tm.range_m(fitted.direct_phase_std_rad(), sequence.base_frequency_hz)
-            median_m = float(np.nanmedian(std_m))
+            fitted = tm.two_returns(b, noise, harmonics=multiples, model_error=MODEL_ERROR)
+            std_rad = fitted.direct_phase_std_rad(settings.return_threshold)
+            median_m = float(np.nanmedian(tm.range_m(std_rad, sequence.base_frequency_hz)))
             predicted.append(TakesPrediction(count, more.capture_s, more.frame_rate_hz, median_m))
     return predicted

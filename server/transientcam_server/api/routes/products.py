@@ -34,15 +34,13 @@ _PROBLEMS: Final = documented(
     kinds.UNKNOWN_PRODUCT_STORE,
     kinds.PRODUCT_STORE_UNFINISHED,
     kinds.INVALID_REQUEST,
-    kinds.RANGE_NOT_SATISFIABLE,
 )
 
 
 def _found(media_type: str, content: dict[str, Any]) -> dict[int | str, dict[str, Any]]:
     """Return what the OpenAPI document says of what stands at a key."""
     whole = {"description": "what stands at the key", "content": {media_type: content}}
-    part = {"description": "the requested bytes", "content": {media_type: {}}}
-    return {200: whole | etags.READING[200], 206: part, 304: etags.READING[304]} | _PROBLEMS
+    return {200: whole | etags.READING[200], 304: etags.READING[304]} | _PROBLEMS
 
 
 @router.get("", summary="All stores of products")
@@ -75,14 +73,13 @@ async def read_product_metadata(
             examples=[METADATA],
         ),
     ],
-    wanted: downloads.Range = None,
     if_none_match: etags.IfNoneMatch = None,
 ) -> Response:
     """Return the metadata of a Zarr store (version 3).
 
     `xarray.open_zarr(".../products/{id}/zarr")` opens it.
     """
-    return await _answer(service, store, document, wanted, if_none_match)
+    return await _answer(service, store, document, None, if_none_match)
 
 
 @router.get(
@@ -96,18 +93,19 @@ async def read_product_array(
     store: StoreName,
     array: ArrayName,
     document: Annotated[str, Path(description="`zarr.json`", max_length=64, examples=[METADATA])],
-    wanted: downloads.Range = None,
     if_none_match: etags.IfNoneMatch = None,
 ) -> Response:
     """Return the metadata of an array."""
-    return await _answer(service, store, f"{array}/{document}", wanted, if_none_match)
+    return await _answer(service, store, f"{array}/{document}", None, if_none_match)
 
 
 @router.get(
     "/{store}/zarr/{array}/c/{chunk:path}",
     summary="A chunk of products, for Zarr",
     response_class=Response,
-    responses=_found(_BYTES, {}),
+    responses=_found(_BYTES, {})
+    | {206: {"description": "the requested bytes of a chunk", "content": {_BYTES: {}}}}
+    | documented(kinds.RANGE_NOT_SATISFIABLE),
 )
 async def read_product_chunk(
     service: ServiceOf,
