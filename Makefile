@@ -58,6 +58,7 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 	$(BIN)/python -m benchmarks.throughput --write
 	$(BIN)/python -m benchmarks.dashboard --hours 0.1 --write
 	$(BIN)/python -m benchmarks.pictures
+	$(BIN)/python -m benchmarks.notebooks
 	$(BIN)/python -m benchmarks.mathematics
 	$(BIN)/transientcam paper -o docs
 

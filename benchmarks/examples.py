@@ -9,12 +9,14 @@ import argparse
 import json
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import httpx
 
 from benchmarks.daemon import daemon
+from transientcam.cli import run
 from transientcam_server.api.documents.document import EXAMPLES_FILE
 from transientcam_server.api.documents.sequence import SequenceDocument
 
@@ -56,6 +58,7 @@ _FIXED: Final[dict[str, Any]] = {
     "history": _HISTORY,
     "kernels": {"enabled": True},
     "recordings": _RECORDED | {"frames": 4},
+    "stores": {"frames": 4},
     "versions": {"transientcam": "0.2.0", "h5py": "3.16.0", "numpy": "2.4.6"},
     "calibrations": _CALIBRATED,
     "CalibrationDocument": _CALIBRATED,
@@ -154,6 +157,11 @@ def _answers(http: httpx.Client) -> Iterator[tuple[str, Any]]:
     yield "RecordingDocument", until(recording, ("complete",))
     yield "RecordingsDocument", get(f"{api}/recordings")
     yield "TimelineDocument", get(f"{recording}/frames")
+    found = get(f"{api}/recordings")
+    file = Path(found["directory"], found["recordings"][0]["id"] + ".h5")
+    reconstruct = ["reconstruct", str(file), "--product", "range", "--json"]
+    assert run([*reconstruct, "-o", str(file.with_suffix(".zarr"))]) == 0
+    yield "ProductStoresDocument", get(f"{api}/products")
 
     yield "GrantedLeaseDocument", post(f"{api}/lease", {"holder": "alignment on bench 2"})
     yield "LeaseDocument", get(f"{api}/lease")

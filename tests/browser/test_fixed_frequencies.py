@@ -40,4 +40,6 @@ def test_it_shows_points_and_returns_and_says_what_it_lacks(page: Page, watch: W
     expect(response.locator("[data-field=pixel-range]")).to_have_text(re.compile(r"^12\.50\d"))
 
     page.get_by_role("button", name="Predict").click()
-    expect(page.locator("[data-view=sequence]")).to_contain_text("Plans are made for")
+    finding = page.locator("[data-view=sequence]")
+    expect(finding).to_contain_text("Plans are made for")
+    expect(finding).to_contain_text(re.compile(r"2 takes: .{1,9}s, range to \d"))

@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 from typing import Any
 
 import pytest
@@ -28,6 +29,19 @@ def image_environment() -> dict[str, str]:
     text = (_DOCKER / "Dockerfile").read_text().replace("\\\n", " ")
     (line,) = [each for each in text.splitlines() if each.startswith("ENV ")]
     return dict(re.findall(r"(\w+)=(\S+)", line.removeprefix("ENV ")))
+
+
+def test_the_services_are_written_as_the_compose_specification_has_it() -> None:
+    """check-jsonschema carries the schema that compose itself checks files with."""
+    command = ["check_jsonschema", "--builtin-schema", "vendor.compose-spec"]
+    checked = subprocess.run(
+        [sys.executable, "-m", *command, _DOCKER / "compose.yaml"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+    assert checked.returncode == 0, checked.stdout
 
 
 @pytest.mark.parametrize("name", _OURS)

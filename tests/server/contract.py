@@ -63,8 +63,9 @@ def find_operation(document: dict[str, Any], path: str, method: str) -> dict[str
     """Return the operation that answers a path; fixed paths before those with parameters."""
     paths = sorted(document["paths"], key=lambda template: template.count("{"))
     for template in paths:
-        pattern = re.sub(r"\\{\w+\\}", "[^/]+", re.escape(template).replace(r"\{", "{"))
-        pattern = re.sub(r"\{\w+\\?\}", "[^/]+", pattern)
+        # the numbers of a chunk have slashes between them
+        pattern = re.escape(template).replace(r"\{chunk\}", ".+")
+        pattern = re.sub(r"\\\{\w+\\\}", "[^/]+", pattern)
         if re.fullmatch(pattern, path):
             operation: dict[str, Any] | None = document["paths"][template].get(method.lower())
             return operation

@@ -28,10 +28,24 @@ def documented_file(media_type: str) -> dict[int | str, dict[str, Any]]:
     }
 
 
-async def answer(path: Path, wanted: str | None, *, media_type: str, filename: str) -> FileResponse:
+async def answer(
+    path: Path,
+    wanted: str | None,
+    *,
+    media_type: str,
+    filename: str | None = None,
+    tag: str | None = None,
+) -> FileResponse:
     """Return a file, or the range of it that is wanted.
 
     A header that is no range is ignored, as RFC 9110 (Sec. 14.2) has it.
+
+    Parameters
+    ----------
+    filename
+        What to keep it as; None for what is no download.
+    tag
+        Its ETag; None for one made of its time and size.
 
     Raises
     ------
@@ -39,7 +53,8 @@ async def answer(path: Path, wanted: str | None, *, media_type: str, filename: s
         ``range-not-satisfiable``.
     """
     usable = _is_usable(wanted, (await asyncio.to_thread(path.stat)).st_size)
-    return _File(path, media_type=media_type, filename=filename, ranges=usable)
+    headers = None if tag is None else {"ETag": tag}
+    return _File(path, headers, media_type=media_type, filename=filename, ranges=usable)
 
 
 def part(data: bytes, wanted: str | None, *, media_type: str, tag: str) -> Response:
@@ -84,8 +99,16 @@ class _File(FileResponse):
 
     chunk_size = 1024 * 1024
 
-    def __init__(self, path: Path, *, media_type: str, filename: str, ranges: bool) -> None:
-        super().__init__(path, media_type=media_type, filename=filename)
+    def __init__(
+        self,
+        path: Path,
+        headers: dict[str, str] | None,
+        *,
+        media_type: str,
+        filename: str | None,
+        ranges: bool,
+    ) -> None:
+        super().__init__(path, headers=headers, media_type=media_type, filename=filename)
         self._ranges = ranges
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

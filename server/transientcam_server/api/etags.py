@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, Final
 
 from fastapi import Header
@@ -34,6 +35,18 @@ def etag(document: Mapping[str, Any]) -> str:
 def of_bytes(content: bytes) -> str:
     """Return what names some bytes."""
     return f'"{hashlib.sha256(content).hexdigest()[:16]}"'
+
+
+def of_file(path: Path) -> str:
+    """Return what names the content of a file, by when and how long it was written.
+
+    Raises
+    ------
+    OSError
+        If it is gone.
+    """
+    found = path.stat()
+    return of_bytes(f"{found.st_ino} {found.st_mtime_ns} {found.st_size}".encode())
 
 
 def names(header: str | None, tag: str) -> bool:

@@ -3,6 +3,7 @@
 import asyncio
 import threading
 from collections.abc import Awaitable, Callable, Coroutine
+from dataclasses import asdict
 from typing import Any, Final, TypeVar
 
 from fastapi import Request, Response
@@ -12,7 +13,8 @@ from transientcam_server.api.documents.job import JobDocument
 from transientcam_server.api.job_answers import accepted
 from transientcam_server.camera.jobs import Job
 from transientcam_server.errors import Problem, kinds
-from transientcam_server.planning import Progress
+from transientcam_server.planning import Progress, families
+from transientcam_server.planning.takes import takes_of
 from transientcam_server.service import Service
 
 FRAME_WITHIN_S: Final = 10.0
@@ -62,6 +64,33 @@ def as_job(service: Service, kind: str, work: Work[_Answer], response: Response)
         return made.model_dump(mode="json")
 
     return accepted(service.jobs.start(kind, run, in_turn=False), response)
+
+
+async def require_plannable(service: Service, address: str) -> None:
+    """Refuse a camera whose captures are not predicted.
+
+    Raises
+    ------
+    Problem
+        ``target-unreachable``, with ``takes``: what more of them give, by the newest frame.
+    """
+    try:
+        families.require_plannable(service.camera.capabilities)
+    except Problem as problem:
+        problem.extensions["takes"] = await _takes(service, address)
+        raise
+
+
+async def _takes(service: Service, address: str) -> list[dict[str, Any]]:
+    """Return what takes give; nothing where no frame or no noise is known."""
+    frame = service.hub.latest
+    if frame is None or frame.recipe.sensor is None:
+        return []
+    async with service.planning.place_of(address):
+        predicted, _ = await service.workers.run_long(
+            takes_of, frame.raw, frame.recipe, service.camera.capabilities
+        )
+    return [asdict(each) for each in predicted]
 
 
 def address_of(http: Request) -> str:

@@ -194,6 +194,8 @@ def _by_daemon(
             typer.echo(json.dumps(problem.document))
         else:
             console.print(problem.detail, style="red", soft_wrap=True)
+            takes: Any = problem.document.get("takes", [])
+            print_takes(takes)
         raise typer.Exit(1) from problem
 
 

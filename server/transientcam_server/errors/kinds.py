@@ -88,6 +88,13 @@ UNKNOWN_RECORDING: Final = ProblemKind(
     "Unknown recording",
     "No recording has this id; the list of recordings has those that exist.",
 )
+UNKNOWN_PRODUCT_STORE: Final = ProblemKind(
+    "unknown-product-store",
+    404,
+    "Unknown store of products",
+    "No store of products has this id; the list of stores has those that lie beside the "
+    "recordings.",
+)
 UNKNOWN_CALIBRATION: Final = ProblemKind(
     "unknown-calibration",
     404,
@@ -154,6 +161,13 @@ RECORDING_UNFINISHED: Final = ProblemKind(
     "Recording not finished",
     "It is still being written, or its writer died and it was not recovered yet; the service "
     "recovers such recordings when it starts.",
+)
+PRODUCT_STORE_UNFINISHED: Final = ProblemKind(
+    "product-store-unfinished",
+    409,
+    "Store of products not finished",
+    "Frames are still computed into it, or that was interrupted; the same `transientcam "
+    "reconstruct` goes on. Where frames are missing it would read as zeros.",
 )
 CALIBRATION_MISFIT: Final = ProblemKind(
     "calibration-misfit",

@@ -21,6 +21,7 @@ from transientcam_server.imaging.requirements import unmet
 from transientcam_server.offline.computing import KNOWN, ComputedFrame
 from transientcam_server.offline.formats import SINKS, Block, Content, Row, sink_of, write
 from transientcam_server.recording import swmr
+from transientcam_server.recording.product_stores import FORMAT
 from transientcam_server.recording.reader import Recording
 from transientcam_server.recording.recipe import recorded_recipe
 from transientcam_server.recording.salvage import salvage
@@ -166,7 +167,7 @@ def document_of(recording: Recording, options: BatchOptions) -> dict[str, str]:
     """Return the attributes that must agree for an unfinished file to be continued."""
     header = recording.header
     return {
-        "format": "transientcam products",
+        "format": FORMAT,
         "recording_id": header.recording_id,
         "title": header.name,
         "Conventions": "CF-1.11",

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
-from transientcam_driver import Camera
+from transientcam_driver import Camera, Capabilities, RawFrame
 from transientcam_moments.likelihood import MODEL_ERROR
 from transientcam_server.imaging.calibration import factory_gains
 from transientcam_server.imaging.recipe import Recipe
@@ -65,21 +65,44 @@ def predict_takes(
     finally:
         camera.stop()
     full_scale = float((1 << capabilities.bits) - 1)
-    gains = factory_gains(camera.factory)
-    found = Recipe(applied, settings, full_scale, gains, sensor=sensor).reconstruct(frame)
+    recipe = Recipe(applied, settings, full_scale, factory_gains(camera.factory), sensor=sensor)
+    return takes_of(frame, recipe, capabilities, takes=takes)
+
+
+def takes_of(
+    frame: RawFrame, recipe: Recipe, capabilities: Capabilities, *, takes: Several[int] = TAKES
+) -> list[TakesPrediction]:
+    """Predict what takes give by a frame, which may have any number of them itself.
+
+    Parameters
+    ----------
+    recipe
+        Of the frame; its sensor has to be known.
+    takes
+        Those that the camera cannot do are left out.
+    """
+    settings = recipe.settings.model_copy(update={"smoothing_px": 0.0})
+    found = replace(recipe, settings=settings).reconstruct(frame)
     assert found.noise is not None  # noqa: S101 - the sensor is known
-    moments = np.asarray(found.smoothed)
+    sequence, sampling = recipe.applied.sequence, recipe.applied.sequence.sampling
+    moments, multiples = np.asarray(found.smoothed), None
+    if not sampling.consecutive:
+        known = () if sequence.zeroth == "estimated" else (0,)
+        multiples = (*known, *sampling.multiples)
+        moments = moments[-len(multiples) :]
     flat = moments.reshape((len(moments), -1))
     step = max(1, flat.shape[1] // _PIXELS)
     b = flat[:, step // 2 :: step]
-    variance = np.broadcast_to(found.noise.variance, moments.shape).reshape(flat.shape)
-    noise = variance[:, step // 2 :: step]
+    variance = np.broadcast_to(found.noise.variance[-len(moments) :], moments.shape)
+    of_one = sequence.takes * variance.reshape(flat.shape)[:, step // 2 :: step]
+    images = recipe.applied.images // sequence.takes
     predicted = []
     for count in takes:
-        if count <= min(capabilities.max_takes, capabilities.max_images // applied.images):
-            more = capabilities.apply(replace(applied.sequence, takes=count))
-            fitted = tm.two_returns(b, tm.noise.MomentNoise(noise / count), model_error=MODEL_ERROR)
-            std_m = tm.range_m(fitted.direct_phase_std_rad(), applied.sequence.base_frequency_hz)
-            median_m = float(np.nanmedian(std_m))
+        if count <= min(capabilities.max_takes, capabilities.max_images // images):
+            more = capabilities.apply(replace(sequence, takes=count))
+            noise = tm.noise.MomentNoise(of_one / count)
+            fitted = tm.two_returns(b, noise, harmonics=multiples, model_error=MODEL_ERROR)
+            std_rad = fitted.direct_phase_std_rad(settings.return_threshold)
+            median_m = float(np.nanmedian(tm.range_m(std_rad, sequence.base_frequency_hz)))
             predicted.append(TakesPrediction(count, more.capture_s, more.frame_rate_hz, median_m))
     return predicted

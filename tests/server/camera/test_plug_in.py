@@ -199,10 +199,17 @@ def test_what_they_cannot_give_is_absent_with_the_reason(
     with Device(fixed.url, timeout_s=20.0) as device:
         refused = device.send("POST", "/api/v1/plan", json={"target": {"range_error_m": 0.01}})
         problem = device.refusal(refused, 409, "target-unreachable")
+        front = device.refusal(device.send("GET", "/api/v1/tradeoff"), 409, "target-unreachable")
         pixel = device.send("GET", "/api/v1/frames/latest/pixel", params={"x": 1, "y": 1})
     curves = pixel.json()
 
-    assert problem["field"] == "sampling"
+    assert problem["field"] == front["field"] == "sampling"
+    takes = [each["takes"] for each in problem["takes"]]
+    assert takes[:2] == [1, 2]
+    assert [each["takes"] for each in front["takes"]] == takes
+    one, two, *_ = problem["takes"]
+    assert two["capture_s"] == pytest.approx(2 * one["capture_s"], rel=0.01)
+    assert 0 < two["range_std_m"] <= one["range_std_m"] < 0.05
     assert curves["density_per_s"] == curves["cumulative"] == []
     assert len(curves["returns"]) > 0
     assert "the multiples 2, 10 and 15 at 3" in problem["detail"]

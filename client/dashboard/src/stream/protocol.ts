@@ -227,6 +227,8 @@ export interface Problem {
   readonly field?: string;
   readonly value?: unknown;
   readonly limit?: unknown;
+  /** Of a plan for a camera of fixed frequencies: what takes give. */
+  readonly takes?: readonly { readonly takes: number; readonly capture_s: number; readonly range_std_m: number }[];
 }
 
 export type ServerMessage = Hello | FrameMessage | Notice | ErrorMessage;

@@ -16,7 +16,6 @@ from transientcam_server.api.job_answers import ACCEPTED
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.planning import Goal, Progress, SceneStatistics, uniform_scene
-from transientcam_server.planning.families import require_plannable
 from transientcam_server.service import Service
 
 router = APIRouter(tags=["accuracy"])
@@ -45,11 +44,12 @@ async def make_plan(service: ServiceOf, request: PlanRequest, http: Request) -> 
     With targets it is the quickest one that reaches all of them with margin within the budgets;
     with budgets alone the most accurate one within them. Where no scene is given it is looked at:
     before a simulated camera by another one in virtual time, at all frequencies; before any other
-    by the current frame, and the plan cannot consider what that does not resolve. Nothing is
-    changed: `sequence` of the answer is the body for a `PUT /sequence`. A client that leaves ends
-    the work; `POST /plan/jobs` reports its progress.
+    by the current frame, and the plan cannot consider what that does not resolve. A camera of fixed
+    frequencies is refused; `takes` of the problem says what more of them give. Nothing is changed:
+    `sequence` of the answer is the body for a `PUT /sequence`. A client that leaves ends the work;
+    `POST /plan/jobs` reports its progress.
     """
-    return await planned.for_request(http, _work(service, request, http))
+    return await planned.for_request(http, await _work(service, request, http))
 
 
 @router.post(
@@ -67,12 +67,14 @@ async def start_plan(
     What that would be refused with is the `problem` of the job. It goes on when the client leaves;
     `POST /jobs/{job}/cancel` ends it.
     """
-    return planned.as_job(service, KIND, _work(service, request, http), response)
+    return planned.as_job(service, KIND, await _work(service, request, http), response)
 
 
-def _work(service: Service, request: PlanRequest, http: Request) -> planned.Work[PlanDocument]:
+async def _work(
+    service: Service, request: PlanRequest, http: Request
+) -> planned.Work[PlanDocument]:
     """Return what makes the plan; a goal that cannot be meant or planned is refused at once."""
-    require_plannable(service.camera.capabilities)
+    await planned.require_plannable(service, planned.address_of(http))
     return partial(_made, service, request, _goal(service, request), planned.address_of(http))
 
 

@@ -19,7 +19,6 @@ from transientcam_server.api.job_answers import ACCEPTED
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.planning import Progress
-from transientcam_server.planning.families import require_plannable
 from transientcam_server.service import Service
 
 router = APIRouter(tags=["accuracy"])
@@ -48,10 +47,11 @@ async def read_tradeoff(
 ) -> TradeoffDocument:
     """Return the Pareto front for the scene, its lines, and where the current frame stands.
 
-    It takes seconds where the scene was not looked at within the last ten. A client that leaves
+    It takes seconds where the scene was not looked at within the last ten. A camera of fixed
+    frequencies is refused; `takes` of the problem says what more of them give. A client that leaves
     ends the work; `POST /tradeoff/jobs` reports its progress.
     """
-    return await planned.for_request(http, _work(service, by, http))
+    return await planned.for_request(http, await _work(service, by, http))
 
 
 @router.post(
@@ -70,11 +70,11 @@ async def start_tradeoff(
     lines. What that would be refused with is the `problem` of the job. It goes on when the client
     leaves; `POST /jobs/{job}/cancel` ends it.
     """
-    return planned.as_job(service, KIND, _work(service, request.by, http), response)
+    return planned.as_job(service, KIND, await _work(service, request.by, http), response)
 
 
-def _work(service: Service, by: str, http: Request) -> planned.Work[TradeoffDocument]:
-    require_plannable(service.camera.capabilities)
+async def _work(service: Service, by: str, http: Request) -> planned.Work[TradeoffDocument]:
+    await planned.require_plannable(service, planned.address_of(http))
     return partial(_made, service, by, planned.address_of(http))
 
 

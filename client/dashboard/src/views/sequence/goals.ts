@@ -18,5 +18,10 @@ export function goalWords(problem: Problem): string {
     words = words.replace(figure, (_, joined: string, value: string) => `${name} ${joined === "=" ? "of" : "is"} ${write(Number(value))}`);
     words = words.replaceAll(field, name);
   }
-  return words;
+  return [words, ...takesWords(problem)].join(" ");
+}
+
+/** What takes give where the camera leaves nothing else to choose. */
+function takesWords({ takes = [] }: Problem): string[] {
+  return takes.map((each) => `${each.takes} ${each.takes === 1 ? "take" : "takes"}: ${engineering(each.capture_s, "s")}, range to ${engineering(each.range_std_m, "m")}.`);
 }
