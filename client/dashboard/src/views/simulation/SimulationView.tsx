@@ -56,6 +56,7 @@ function ScenePicker({ task }: { task: Task }) {
       <span class="quiet">Scene</span>
       <select
         name="scene"
+        aria-label="Scene"
         value={world.scene}
         disabled={task.busy.value !== null || obstacle.value !== null}
         onChange={(event) => {
