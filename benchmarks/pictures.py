@@ -69,6 +69,8 @@ def _page(sequence: dict[str, Any]) -> Iterator[Page]:
         browser = playwright.chromium.launch(executable_path=executable)
         page = browser.new_page(viewport=SIZES[0], color_scheme="dark", reduced_motion="reduce")
         page.set_default_timeout(_PATIENCE_MS)
+        # a laden machine is no thin link: pictures are of whole frames
+        page.add_init_script("localStorage['transientcam.link.adapts'] = 'false'")
         open_page(page, f"{served.url}/?debug")
         page.wait_for_function(_OF_THE_SEQUENCE, arg=sequence["harmonics"])
         yield page
@@ -152,7 +154,7 @@ def views(page: Page, to: Path) -> None:
 
 # every picture has its frame, and nothing waits for one
 _DRAWN = """
-() => [...document.querySelectorAll(".stage canvas, .streak canvas, .points canvas")]
+() => [...document.querySelectorAll(".stage canvas, .streak-picture canvas, .points canvas")]
     .every((each) => "frame" in each.dataset)
   && ![...document.querySelectorAll(".stage-empty")]
     .some((each) => /Waiting|Loading/.test(each.textContent))

@@ -150,6 +150,7 @@ def test_a_target_is_planned_for_refused_in_words_or_given_up(
     status = panel.locator("p.refusal[data-field=accuracy-status]")
     status.wait_for()
     assert "error of the range" in str(status.text_content())
+    expect(panel.locator("[data-field=choice_range_error_m]")).to_have_count(0)
 
     began, pause = threading.Event(), threading.Event()
 

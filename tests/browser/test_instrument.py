@@ -54,6 +54,7 @@ def test_keys_never_do_what_was_not_asked_for(page: Page) -> None:
     logarithmic.click()
     page.keyboard.press("Space")
     expect(logarithmic).to_have_attribute("aria-pressed", "true")
+    expect(page.locator(".panel-map .colour-bar-tick").nth(2)).to_be_visible()
     expect(page.get_by_role("button", name="Pause")).to_be_visible()
     page.keyboard.press("Tab")
     page.keyboard.press("Shift+Tab")
@@ -240,6 +241,12 @@ def test_a_copied_link_shows_the_same_page_to_another_user(
     page.get_by_label("High end of the scale in m").fill("3,5")
     page.get_by_label("High end of the scale in m").press("Enter")
     page.locator(".panel-map").get_by_label("Colours").select_option("cividis")
+    page.get_by_role("tab", name="Last 1 ns").click()
+    page.get_by_role("tab", name="Cumulative").click()
+    page.keyboard.down("Shift")
+    point_at(page, "map", 30, 40, click=True)
+    page.keyboard.up("Shift")
+    page.mouse.wheel(0, -500)
     choose_from(page, "Page: layout, colours, help", "Copy a link to what is shown")
     toast = page.locator(".toast", has_text="The link was copied")
     expect(toast).to_be_visible()
@@ -262,6 +269,17 @@ def test_a_copied_link_shows_the_same_page_to_another_user(
     assert json.loads(shown) == ["transient", "map", "response"]
     expect(map_canvas(other)).to_have_attribute("data-high", "3.5")
     expect(map_canvas(other)).to_have_attribute("data-colours", "cividis")
+    other.locator("canvas[data-play=gate]").wait_for()
+    expect(other.locator(".response-plot[data-aspect=cumulative]")).to_be_visible()
+    expect(other.locator("[data-pin=A]")).to_be_visible()
+    zooms = [
+        re.findall(r"-?[0-9.]+", str(each.locator(".panel-map .stage-zoom").get_attribute("style")))
+        for each in (page, other)
+    ]
+    assert float(zooms[0][0]) > 1
+    assert [float(each) for each in zooms[1]] == pytest.approx(
+        [float(each) for each in zooms[0]], rel=1e-3
+    )
     context.close()
 
 

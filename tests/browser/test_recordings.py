@@ -115,10 +115,10 @@ def test_a_recording_is_annotated_downloaded_and_deleted(
     assert httpx.get(url).json()["annotations"] == {"sample": "white paint", "distance_m": 3.5}
     with page.expect_download() as download:
         row.get_by_role("button", name="Download corner").click()
-    assert download.value.suggested_filename == f"{recording}.h5"
+    assert download.value.suggested_filename == f"corner-{recording}.h5"
     assert Path(download.value.path()).read_bytes() == httpx.get(f"{url}/file").content
     # the file that was downloaded, dropped on the page, is found among the recordings
-    drop(page, f"{recording} (1).h5", b"")
+    drop(page, f"corner-{recording} (1).h5", b"")
     expect(page.locator("[data-field=state]")).to_have_text("Replay")
     drop(page, "other.h5", b"")
     expect(page.locator(".toast", has_text="no recording like other.h5")).to_be_visible()

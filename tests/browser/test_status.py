@@ -42,6 +42,14 @@ def test_a_live_camera_says_so_with_its_figures(page: Page, served: Served) -> N
     while (period_s := frame_period_s(served)) > 1.02 * sequence["capture_s"]:
         pass  # a laden machine leaves out images now and then
     assert period_s > 0.98 * sequence["capture_s"]
+    # a page that shows few of the frames there are is not well
+    page.evaluate(
+        "() => { const { sequence } = transientcam.store;"
+        " sequence.value = { ...sequence.peek(), frame_rate_hz: 1e4 }; }"
+    )
+    state = page.locator("[data-field=state]")
+    expect(state).to_have_text("Live, slow")
+    expect(state).to_have_attribute("title", re.compile("of 10000.0 frames a second are shown"))
 
 
 def test_a_lost_camera_and_a_lost_image_are_said_at_once(page: Page, served: Served) -> None:
@@ -51,6 +59,9 @@ def test_a_lost_camera_and_a_lost_image_are_said_at_once(page: Page, served: Ser
     fault(served, "unplug")
     expect(banner).to_be_visible()
     expect(banner).to_have_attribute("role", "alert")
+    told = page.locator(".toast", has_text="was lost")
+    expect(told).to_be_visible()
+    assert str(told.text_content()).count("lost") == 1
     expect(page.locator("[data-field=state]")).to_have_text("Camera lost")
     last = int(text(page, ".bar", "frame").replace(" ", ""))
     fault(served, "replug")
@@ -67,6 +78,7 @@ def test_a_lost_camera_and_a_lost_image_are_said_at_once(page: Page, served: Ser
         "(before) => transientcam.store.status.lostImages.peek() > before", arg=before
     )
     expect(page.locator("[data-field=lost]")).not_to_have_text("0")
+    expect(page.locator(".toast", has_text="did not arrive intact")).to_be_visible()
 
 
 def test_a_page_opened_while_the_camera_is_away_says_so(page: Page, served: Served) -> None:

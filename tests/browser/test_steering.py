@@ -87,12 +87,13 @@ def test_control_is_taken_over_in_both_directions(page: Page, served: Served, wa
     control(page, "Take over", "bench 2")
     expect(page.locator("[data-field=control]")).to_have_text("You have control")
     watch.refusals_expected = True
-    lease(served, "POST", holder="the day shift", duration_s=600, takeover=True)
+    taken = lease(served, "POST", holder="the day shift", duration_s=600, takeover=True)
     banner = page.locator("[data-banner=control]")
     expect(banner).to_contain_text("the day shift has taken over control.")
     expect(page.get_by_role("button", name="Stop", exact=True)).to_be_disabled()
-    banner.get_by_role("button", name="Dismiss").click()
-    expect(banner).to_have_count(0)
+    lease(served, "DELETE", lease_id=taken.json()["lease_id"])
+    expect(banner).to_have_count(0)  # it is free again
+    expect(page.get_by_role("button", name="Stop", exact=True)).to_be_enabled()
 
 
 def test_the_light_goes_off_whichever_client_has_control(page: Page, served: Served) -> None:
@@ -183,6 +184,7 @@ def test_a_service_that_requires_a_token_gets_one(page_of_guarded: Any) -> None:
     dialog = page.get_by_role("dialog", name="Authentication required")
     expect(dialog).to_be_visible()
     expect(page.locator("[data-field=state]")).to_have_text("Not let in")
+    expect(page.locator(".panel-map .stage-empty")).to_contain_text("with a token")
     show_token(page, "tc_mistyped")
     expect(dialog).to_contain_text("does not know this token")
     show_token(page, tokens[Role.OPERATOR])

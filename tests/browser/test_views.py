@@ -197,6 +197,10 @@ def test_points_stand_where_their_pixels_look(page: Page, served: Served, watch:
         )
         page.mouse.click(*place)
     expect(page.locator(".scene-mark-selected")).to_be_visible()
+    page.keyboard.down("Shift")
+    page.mouse.click(*place)
+    page.keyboard.up("Shift")
+    expect(page.locator(".panel-points [data-pin=A]")).to_be_visible()
 
 
 def smoothest(ranges: NDArray[Any]) -> tuple[int, int]:

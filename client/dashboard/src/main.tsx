@@ -14,7 +14,8 @@ const store = new Store();
 const worker = new Worker(new URL("./stream/worker.ts", import.meta.url), { type: "module" });
 const stream = new StreamClient(store, worker, loop);
 
-loop.add((elapsed_s) => store.player.advance(elapsed_s));
+// nothing plays before there is light; the frame that brings it wakes the loop
+loop.add((elapsed_s) => store.frames.of("coefficients").peek() !== null && store.player.advance(elapsed_s));
 loop.add((elapsed_s) => store.replay.advance(elapsed_s));
 effect(() => {
   if (store.player.playing.value || store.replay.playing.value) loop.wake();

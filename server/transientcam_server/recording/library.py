@@ -15,7 +15,7 @@ from typing import Any, Final
 from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem, RecordingInUse
-from transientcam_server.recording import layout, recovery
+from transientcam_server.recording import layout, names, recovery
 from transientcam_server.recording.descriptions import Descriptions, of_recorder, of_removed
 from transientcam_server.recording.directory import Directory, id_of
 from transientcam_server.recording.layout import Header
@@ -239,6 +239,16 @@ class Library:
             raise unfinished(recording_id)
         return path
 
+    def download_name(self, recording_id: str) -> str:
+        """Return what the file of a recording is called where it is downloaded.
+
+        Raises
+        ------
+        Problem
+            ``unknown-recording``.
+        """
+        return names.download_name(self.describe(recording_id)["name"], recording_id)
+
     def annotate(self, recording_id: str, annotations: Mapping[str, Any]) -> dict[str, Any]:
         """Replace a recording's annotations and describe it."""
         require_annotations(annotations)
@@ -274,7 +284,7 @@ class Library:
     def _recorder(self, options: RecordingOptions, started_s: float) -> Recorder:
         moment = layout.utc(started_s)
         recording_id = f"{moment:%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
-        name = options.name or f"Recording of {moment:%Y-%m-%d %H:%M:%S} UTC"
+        name = options.name or names.default_name(moment)
         header = self._header(recording_id, name, started_s)
         try:
             self._directory.make()

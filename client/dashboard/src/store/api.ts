@@ -281,10 +281,11 @@ export class Api {
   // -- files -------------------------------------------------------------------------------------
 
   /** A file of the service, as the browser keeps large ones: not in memory. */
-  async file(path: string): Promise<Blob> {
+  async file(path: string): Promise<File> {
     const answer = await this.#ask("GET", path, {});
     await this.#refuse(answer);
-    return answer.blob();
+    const [, name = ""] = /filename="([^"]*)"/.exec(answer.headers.get("Content-Disposition") ?? "") ?? [];
+    return new File([await answer.blob()], name);
   }
 
   async #json(method: string, path: string, details: RequestDetails = {}): Promise<unknown> {

@@ -37,6 +37,14 @@ export class Frames {
   readonly #claims = new Map<string, number>();
   readonly #newest = new Map<string, Signal<Frame | null>>();
 
+  /** Since when the camera stands before its scene, by the service's clock; 0 where that is not known. */
+  sceneSince_s = 0;
+
+  /** A name of the scene that a frame is of: what is measured over frames begins anew with another one. */
+  sceneOf({ host_time_s, capture_s }: FrameMeta): string {
+    return `${host_time_s - capture_s < this.sceneSince_s ? "before" : "since"} ${this.sceneSince_s}`;
+  }
+
   /** The newest frame of a product; null until one arrived. */
   of(product: string): Signal<Frame | null> {
     let newest = this.#newest.get(product);

@@ -23,9 +23,9 @@ export class Noise {
   #square = new Float32Array(0);
   #count = new Uint16Array(0);
 
-  take({ values, shape, meta, origin }: Pick<Frame, "values" | "shape" | "meta" | "origin">): void {
-    // Another sequence, calibration or recording measures something else.
-    const key = [shape.join("x"), meta.sequence_id, meta.calibration_id, origin.split("/frames/")[0]].join();
+  take({ values, shape, meta, origin }: Pick<Frame, "values" | "shape" | "meta" | "origin">, scene = ""): void {
+    // Another sequence, calibration, recording or scene: something else is measured.
+    const key = [shape.join("x"), meta.sequence_id, meta.calibration_id, origin.split("/frames/")[0], scene].join();
     if (key !== this.#key) {
       this.#key = key;
       this.#mean = new Float32Array(values.length);
@@ -88,7 +88,7 @@ export class Noises {
     const newest = this.#frames.of(product);
     effect(() => {
       const frame = newest.value;
-      if (frame !== null) untracked(() => noise.take(frame));
+      if (frame !== null) untracked(() => noise.take(frame, this.#frames.sceneOf(frame.meta)));
     });
     return noise;
   }

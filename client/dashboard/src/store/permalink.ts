@@ -3,12 +3,16 @@ import { effect } from "@preact/signals";
 
 import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
-import { isLayout, viewsOf, type Layout } from "../views/layout";
-import { COLOUR_MAPS, type ColourMapName } from "../ui/colourMaps";
+import { viewsOf, type Layout } from "../views/layout";
+import { SIDES, type Side } from "../views/response/sides";
+import type { LightChoice } from "../views/transient/look";
 import { RequestError } from "./api";
-import { isLimits, type LookChoice } from "./looks";
+import { layoutOf, layoutText, lightOf, lightText, looksOf, lookText, partOf, partText, pinsOf, pinsText, pixelOf, pixelText, viewOf, viewText } from "./linkTexts";
+import type { LookChoice } from "./looks";
+import type { Pin, Region } from "./measures";
 import type { Pixel } from "./pixel";
 import type { Store } from "./store";
+import type { View } from "./viewport";
 
 export interface Place {
   readonly map?: string;
@@ -25,6 +29,14 @@ export interface Place {
   readonly layout?: Layout;
   /** Colours, scale and limits of maps, by their products; only of those that were chosen. */
   readonly looks?: Readonly<Record<string, LookChoice>>;
+  /** What is shown of the pixel. */
+  readonly side?: Side;
+  /** How the light is shown. */
+  readonly light?: LightChoice;
+  readonly pins?: readonly Pin[];
+  readonly region?: Region;
+  /** The part of the picture in sight. */
+  readonly sight?: View;
 }
 
 /** What an address says; parts that make no sense are as if they were not there. */
@@ -32,62 +44,52 @@ export function placeOf(hash: string): Place {
   const said = new URLSearchParams(hash.replace(/^#/, ""));
   const [map, map2] = [said.get("map"), said.get("map2")];
   const known = (name: string | null): name is string => MAP_PRODUCTS.some(({ product }) => product === name);
-  const pixel = /^(\d{1,5}),(\d{1,5})$/.exec(said.get("pixel") ?? "");
+  const pixel = pixelOf(said.get("pixel") ?? "");
   const time_ns = said.get("time_ns");
   const view = said.get("view");
   const recording = said.get("recording");
   const frame = said.get("frame");
   const layout = layoutOf(said.get("layout") ?? "");
   const looks = looksOf(said.getAll("look"));
+  const side = SIDES.find(({ value }) => value === said.get("side"))?.value;
+  const light = lightOf(said.get("light") ?? "");
+  const pins = pinsOf(said.get("pins") ?? "");
+  const region = partOf(said.get("region") ?? "");
+  const sight = viewOf(said.get("sight") ?? "");
   return {
     ...(known(map) ? { map } : {}),
     ...(known(map2) ? { map2 } : {}),
-    ...(pixel === null ? {} : { pixel: { x: Number(pixel[1]), y: Number(pixel[2]) } }),
+    ...(pixel === null ? {} : { pixel }),
     ...(time_ns !== null && /^\d+(\.\d+)?$/.test(time_ns) ? { time_ns: Number(time_ns) } : {}),
     ...((VIEW_NAMES as readonly (string | null)[]).includes(view) ? { view: view as string } : {}),
     ...(recording !== null && /^[A-Za-z0-9][\w-]{0,199}$/.test(recording) ? { recording } : {}),
     ...(recording !== null && frame !== null && /^\d{1,12}$/.test(frame) ? { frame: Number(frame) } : {}),
     ...(layout === null ? {} : { layout }),
     ...(Object.keys(looks).length === 0 ? {} : { looks }),
+    ...(side === undefined ? {} : { side }),
+    ...(light === null ? {} : { light }),
+    ...(pins.length === 0 ? {} : { pins }),
+    ...(region === null ? {} : { region }),
+    ...(sight === null ? {} : { sight }),
   };
 }
 
-/** A layout as "2:map.1,transient.1/1:response.2": each row's share, then its views with theirs. */
-function layoutOf(text: string): Layout | null {
-  const rows = text.split("/").map((row) => {
-    const [share, slots = ""] = row.split(":");
-    return { share: Number(share), slots: slots.split(",").map((slot) => ({ view: slot.split(".")[0], share: Number(slot.slice(slot.indexOf(".") + 1)) })) };
-  });
-  return isLayout(rows, VIEW_NAMES) ? rows : null;
-}
-
-function layoutText(layout: Layout): string {
-  const short = (share: number): string => String(Number(share.toPrecision(3)));
-  return layout.map(({ share, slots }) => `${short(share)}:${slots.map((slot) => `${slot.view}.${short(slot.share)}`).join(",")}`).join("/");
-}
-
-/** Looks as "range,viridis,linear,1,3": product, colours, scale, and limits where these were set. */
-function looksOf(texts: readonly string[]): Record<string, LookChoice> {
-  const looks: Record<string, LookChoice> = {};
-  for (const text of texts) {
-    const [product, colours, kind, ...ends] = text.split(",");
-    const limits = ends.length === 2 ? { low: Number(ends[0]), high: Number(ends[1]) } : null;
-    const known = MAP_PRODUCTS.some((each) => each.product === product) && (COLOUR_MAPS as readonly string[]).includes(colours);
-    if (known && (kind === "linear" || kind === "logarithmic") && isLimits(limits)) looks[product] = { colours: colours as ColourMapName, kind, limits };
-  }
-  return looks;
-}
-
-function lookText(product: string, { colours, kind, limits }: LookChoice): string {
-  const ends = limits === null ? [] : [limits.low, limits.high].map((end) => Number(end.toPrecision(6)));
-  return [product, colours, kind, ...ends].join(",");
-}
-
-/** The whole address of what is shown, with layout, colours, scales and limits, for another user. */
+/** The whole address of what is shown, for another user: with layout, colours, scales, limits, pins, region and zoom. */
 export function linkTo(target: Window, store: Store): string {
   const looks = Object.fromEntries([...store.looks.all].filter(([, look]) => look.chosen).map(([product, look]) => [product, look.choice]));
   const whole = new URL(target.location.href);
-  whole.hash = hashOf({ ...placeNow(store), layout: store.layout.peek(), looks });
+  const { pins, region } = store.measures;
+  const part = region.peek();
+  whole.hash = hashOf({
+    ...placeNow(store),
+    layout: store.layout.peek(),
+    looks,
+    side: store.side.peek(),
+    light: store.light.choice,
+    pins: pins.peek(),
+    ...(part === null ? {} : { region: part }),
+    sight: store.viewport.view.peek(),
+  });
   return whole.href;
 }
 
@@ -96,7 +98,7 @@ export async function copyLink(target: Window, store: Store): Promise<void> {
   const whole = linkTo(target, store);
   try {
     await target.navigator.clipboard.writeText(whole);
-    store.events.tell("The link was copied: it shows this layout, pixel, time and these colours.", "good");
+    store.events.tell("The link was copied: it shows this layout, pixel and time, with pins, zoom and colours.", "good");
   } catch {
     // Refused, or not over https.
     store.status.unreadable.value = `The link to what is shown: ${whole}`;
@@ -104,18 +106,24 @@ export async function copyLink(target: Window, store: Store): Promise<void> {
 }
 
 /** The address of a place; "" for nothing in particular. */
-export function hashOf({ map, map2, pixel, time_ns, view, recording, frame, layout, looks = {} }: Place): string {
+export function hashOf({ map, map2, pixel, time_ns, view, recording, frame, layout, looks = {}, side, light, pins = [], region, sight }: Place): string {
+  const part = (name: string, text: string | undefined): string => (text === undefined || text === "" ? "" : `${name}=${text}`);
   const parts = [
-    map === undefined ? "" : `map=${map}`,
-    map2 === undefined ? "" : `map2=${map2}`,
-    pixel === undefined ? "" : `pixel=${pixel.x},${pixel.y}`,
-    time_ns === undefined ? "" : `time_ns=${Number(time_ns.toFixed(3))}`,
-    view === undefined ? "" : `view=${view}`,
-    recording === undefined ? "" : `recording=${recording}`,
-    recording === undefined || frame === undefined ? "" : `frame=${frame}`,
-    layout === undefined ? "" : `layout=${layoutText(layout)}`,
-    ...Object.entries(looks).map(([product, look]) => `look=${lookText(product, look)}`),
-  ].filter((part) => part !== "");
+    part("map", map),
+    part("map2", map2),
+    part("pixel", pixel && pixelText(pixel)),
+    part("time_ns", time_ns === undefined ? "" : String(Number(time_ns.toFixed(3)))),
+    part("view", view),
+    part("recording", recording),
+    part("frame", recording && frame?.toString()),
+    part("layout", layout && layoutText(layout)),
+    ...Object.entries(looks).map(([product, look]) => part("look", lookText(product, look))),
+    part("side", side),
+    part("light", light && lightText(light)),
+    part("pins", pinsText(pins)),
+    part("region", region && partText(region)),
+    part("sight", sight && viewText(sight)),
+  ].filter((text) => text !== "");
   return parts.length === 0 ? "" : `#${parts.join("&")}`;
 }
 
@@ -160,11 +168,16 @@ function placeNow(store: Store): Place {
   };
 }
 
-function go(store: Store, { map, map2, pixel, time_ns, view, recording, frame, layout, looks = {} }: Place): void {
+function go(store: Store, { map, map2, pixel, time_ns, view, recording, frame, layout, looks = {}, side, light, pins, region, sight }: Place): void {
   if (recording === undefined) store.replay.leave();
   else void open(store, recording, frame);
   if (layout !== undefined) store.layout.value = layout;
   for (const [product, choice] of Object.entries(looks)) store.looks.of(product).choice = choice;
+  if (side !== undefined) store.side.value = side;
+  if (light !== undefined) store.light.choice = light;
+  if (pins !== undefined) store.measures.pins.value = pins;
+  if (region !== undefined) store.measures.region.value = region;
+  if (sight !== undefined) store.viewport.view.value = sight;
   if (map !== undefined) store.mapProduct.value = map;
   if (map2 !== undefined) store.secondMapProduct.value = map2;
   if (pixel !== undefined) store.selected.value = pixel;

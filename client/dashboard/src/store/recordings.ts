@@ -6,6 +6,9 @@ import type { RecordingDocument, RecordingRequest, RecordingsDocument } from "./
 /** How often one that runs is looked at. */
 const LOOK_MS = 1000;
 
+/** Seconds of the past that one button saves. */
+export const PAST_S = 10;
+
 /** The recordings of the service, as the page last saw them. */
 export class Recordings {
   readonly document = signal<RecordingsDocument | null>(null);
@@ -45,6 +48,12 @@ export class Recordings {
     const started = await this.#api.startRecording(wanted);
     await this.refresh();
     return started;
+  }
+
+  /** Keeps what the service still holds of the last seconds. */
+  async savePast(wanted: Pick<RecordingRequest, "name"> = {}): Promise<void> {
+    const { id } = await this.start({ ...wanted, history_s: PAST_S });
+    await this.stop(id);
   }
 
   async stop(id: string): Promise<void> {

@@ -77,6 +77,12 @@ export class Status {
   readonly #last_s = signal<number | null>(null);
   #arrivals: number[] = [];
 
+  /** The time at the service, at a time of this page: the same, unless frames seem to come from the future or from long ago. */
+  serviceTime_s(now_s: number): number {
+    const latency_s = this.latency_s.peek() ?? 0;
+    return latency_s >= 0 && latency_s < CREDIBLE_LATENCY_S ? now_s : now_s - latency_s;
+  }
+
   /** A new session with the service: it counts anew. */
   sessionOpened(cameraState: CameraState, now_s: number): void {
     this.#drops.value = new Map();

@@ -23,6 +23,7 @@ import { aBoolean, aNumber, browserShelf, oneOf, remembered, sessionShelf, type 
 import { isLayout, OVERVIEW, SPACE, type Layout } from "../views/layout";
 import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
+import { SIDES, type Side } from "../views/response/sides";
 import { TransientLook } from "../views/transient/look";
 import { Reconstruction } from "./reconstruction";
 import { Recordings } from "./recordings";
@@ -90,6 +91,8 @@ export class Store {
   readonly calibrating = computed(() => this.status.cameraState.value === "calibrating" || this.calibrations.job.value?.state === "running");
   /** How light in flight is shown. */
   readonly light: TransientLook;
+  /** What is shown of the selected pixel. */
+  readonly side: Signal<Side>;
   /** What only the service knows of the selected pixel. */
   readonly details: Details;
   readonly theme: Theme;
@@ -140,6 +143,7 @@ export class Store {
     };
     this.details = new Details(api);
     this.light = new TransientLook(this.frames.of("coefficients"), shelf);
+    this.side = remembered<Side>(shelf, "response.side", "bounds", oneOf(SIDES.map(({ value }) => value)));
     const aMap = oneOf(MAP_PRODUCTS.map(({ product }) => product));
     this.mapProduct = remembered(shelf, "map.product", "range", aMap);
     this.secondMapProduct = remembered(shelf, "second-map.product", "indirect", aMap);

@@ -26,24 +26,26 @@ export class Viewport {
     const { zoom, left, top } = this.view.peek();
     const larger = Math.min(MOST_ZOOM, Math.max(1, zoom * factor));
     const gain = 1 / zoom - 1 / larger;
-    this.#show(larger, left + at.x * gain, top + at.y * gain);
+    this.view.value = windowAt(larger, left + at.x * gain, top + at.y * gain);
   }
 
   /** Moves the picture under the window, by shares of what is seen. */
   pan(by: Point): void {
     const { zoom, left, top } = this.view.peek();
-    this.#show(zoom, left - by.x / zoom, top - by.y / zoom);
+    this.view.value = windowAt(zoom, left - by.x / zoom, top - by.y / zoom);
   }
 
   reset(): void {
     this.view.value = WHOLE;
   }
+}
 
-  #show(zoom: number, left: number, top: number): void {
-    const most = 1 - 1 / zoom;
-    const inside = (value: number): number => Math.min(most, Math.max(0, value));
-    this.view.value = zoom === 1 ? WHOLE : { zoom, left: inside(left), top: inside(top) };
-  }
+/** A part of the picture that lies within it; the whole where nothing is enlarged. */
+export function windowAt(zoom: number, left: number, top: number): View {
+  const larger = Math.min(MOST_ZOOM, zoom);
+  const most = 1 - 1 / larger;
+  const inside = (value: number): number => Math.min(most, Math.max(0, value));
+  return larger <= 1 ? WHOLE : { zoom: larger, left: inside(left), top: inside(top) };
 }
 
 /** Where a place of the picture is seen. */

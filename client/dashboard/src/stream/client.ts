@@ -225,6 +225,7 @@ export class StreamClient {
         if (this.#store.calibrations.document.peek() !== null) void this.#store.calibrations.refresh();
         break;
       case "simulation-changed":
+        this.#store.frames.sceneSince_s = status.serviceTime_s(this.#now_s());
         this.#store.accuracy.sceneChanged();
         this.#store.rangeErrors.sceneChanged();
         if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();

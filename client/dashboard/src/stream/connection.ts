@@ -198,12 +198,13 @@ export class StreamConnection {
   #receive(data: ArrayBuffer): void {
     this.#attempts = 0;
     this.#listen();
+    const bytes = data.byteLength; // who gets the message may transfer its buffer
     try {
       const message = decodeMessage(data);
       if (message === null) return;
       if (message.type === "frame") this.#inFlight.add(message.meta.frame);
       this.#emit({ type: "message", message });
-      this.#weigh(message, data.byteLength);
+      this.#weigh(message, bytes);
     } catch (error) {
       if (!(error instanceof ProtocolError)) throw error;
       this.#emit({ type: "unreadable", reason: error.message });

@@ -3,14 +3,15 @@ import type { Api } from "../store/api";
 import { save } from "./download";
 
 /**
- * Hands a file of the service to the browser's downloads.
+ * Hands a file of the service to the browser's downloads, under the name that the service gives it, else under `name`.
  *
  * Without a token the browser fetches it by itself, with its own progress; with one it cannot show the token, so the
  * page fetches the file into what the browser keeps beside its memory. Raises RequestError then.
  */
 export async function download(api: Api, path: string, name: string): Promise<void> {
   if (api.credentials.token.peek() !== null) {
-    save(name, await api.file(path));
+    const file = await api.file(path);
+    save(file.name || name, file);
     return;
   }
   const link = document.createElement("a");

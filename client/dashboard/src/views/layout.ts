@@ -29,7 +29,7 @@ export const LAYOUTS: Readonly<Record<string, Layout>> = {
   Overview: [row(2, ["map", 2], ["transient", 3]), row(1, ["response", 2], ["sequence", 1])],
   "Six views": [row(1, ["map", 1], ["transient", 1], ["points", 1]), row(1, ["response", 2], ["streak", 1], ["validity", 1])],
   "Two maps": [row(3, ["map", 1], ["second-map", 1]), row(2, ["plots", 1], ["transient", 1])],
-  Steering: [row(3, ["map", 1], ["transient", 1]), row(2, ["sequence", 2], ["response", 1])],
+  Steering: [row(3, ["map", 1], ["transient", 1]), row(2, ["sequence", 1], ["response", 1])],
   Laboratory: [row(3, ["map", 1], ["transient", 1]), row(2, ["recordings", 5], ["calibration", 4], ["reconstruction", 3])],
   Simulation: [row(1, ["map", 1], ["transient", 1]), row(1, ["simulation", 3], ["sequence", 2])],
   Projector: [row(1, ["map", 1], ["transient", 1])],

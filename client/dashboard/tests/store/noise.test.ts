@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 
-import type { Frame } from "../../src/store/frames";
-import { FEWEST, Noise, WINDOW } from "../../src/store/noise";
+import { Frames, type Frame } from "../../src/store/frames";
+import { FEWEST, Noise, Noises, WINDOW } from "../../src/store/noise";
 
 const frame = (values: readonly number[], sequence_id = 1, origin = "/frames/latest"): Frame =>
   ({ values: Float32Array.from(values), shape: [1, values.length], meta: { sequence_id, calibration_id: "nominal" }, origin }) as unknown as Frame;
@@ -50,5 +50,20 @@ describe("noise over frames", () => {
     noise.take(frame([100], sequence_id, origin));
     expect(noise.frames.value).toBe(1);
     expect(noise.std(0)).toBeNaN();
+  });
+
+  test("begins anew with the first frame that is wholly of another scene", () => {
+    const frames = new Frames();
+    const noise = new Noises(frames).of("range");
+    frames.claim(["range"]);
+    const take = (value: number, host_time_s: number): void => {
+      const shown = frame([value]);
+      frames.put({ ...shown, product: "range", meta: { ...shown.meta, host_time_s, capture_s: 0.1 } } as Frame);
+    };
+    for (let n = 0; n < 9; n++) take(1, n);
+    frames.sceneSince_s = 9;
+    for (const host_time_s of [9, 9.05]) take(1, host_time_s);
+    for (let n = 0; n < FEWEST; n++) take(7, 10 + n);
+    expect(noise.std(0)).toBe(0);
   });
 });

@@ -32,7 +32,21 @@ describe("an address", () => {
     expect(placeOf(hashOf(place))).toEqual(place);
   });
 
-  test.each(["#layout=1:secret.1", "#layout=:,/", "#layout=1:map.-1", "#look=range,neon,linear", "#look=range,viridis,linear,3,1", "#look=secret,viridis,linear", "#look=,"])(
+  test("that is handed on says what is shown of pixel and light, pins, a region and the part in sight", () => {
+    const place = {
+      side: "cumulative",
+      light: { play: "gate", colours: "grey", tone: "linear", stops: -2, backdrop: false },
+      pins: [{ name: "A", x: 30, y: 40 }, { name: "C", x: 5, y: 6 }],
+      region: { x0: 50, y0: 40, x1: 69, y1: 54 },
+      sight: { zoom: 4, left: 0.25, top: 0.1 },
+    } as const;
+    expect(hashOf(place)).toBe("#side=cumulative&light=gate,grey,linear,-2,black&pins=A30,40/C5,6&region=50,40/69,54&sight=4,0.25,0.1");
+    expect(placeOf(hashOf(place))).toEqual(place);
+    const polygon = { region: { x0: 30, y0: 20, x1: 90, y1: 50, corners: [{ x: 30, y: 20 }, { x: 90, y: 20 }, { x: 60, y: 50 }] } };
+    expect(placeOf(hashOf(polygon))).toEqual(polygon);
+  });
+
+  test.each(["#side=secret", "#light=gate,neon,root,0,scene", "#light=gate,grey,root,x,scene", "#pins=D1,2/A1", "#region=1,2", "#sight=0.5,0,0", "#sight=4,x,0", "#layout=1:secret.1", "#layout=:,/", "#layout=1:map.-1", "#look=range,neon,linear", "#look=range,viridis,linear,3,1", "#look=secret,viridis,linear", "#look=,"])(
     "with a layout or a look that makes no sense says nothing: %s",
     (hash) => {
       expect(placeOf(hash)).toEqual({});

@@ -154,4 +154,5 @@ async def read_recording_file(
 ) -> FileResponse:
     """Download a recording as HDF5; h5py, xarray and MATLAB open it."""
     path = await asyncio.to_thread(service.recordings.path, recording)
-    return await downloads.answer(path, wanted, media_type=HDF5, filename=path.name)
+    name = await asyncio.to_thread(service.recordings.download_name, recording)
+    return await downloads.answer(path, wanted, media_type=HDF5, filename=name)

@@ -127,6 +127,7 @@ def test_the_built_in_scenes_are_listed_with_a_sentence_each() -> None:
 
     assert [info.name for info in infos] == [
         "calibration",
+        "cornell",
         "corner",
         "corner-left",
         "hall",

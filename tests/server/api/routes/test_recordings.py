@@ -206,14 +206,16 @@ def test_a_change_of_the_sequence_ends_a_recording(http: httpx.Client) -> None:
 
 
 def test_a_file_can_be_downloaded_whole_and_in_parts(http: httpx.Client, directory: Path) -> None:
-    recording = recorded(http)["id"]
+    recording = recorded(http, name="../Vordere Tür, 2. Versuch")["id"]
     data = (directory / f"{recording}.h5").read_bytes()
     url = f"{RECORDINGS}/{recording}/file"
 
     whole = http.get(url)
     assert whole.content == data
     assert whole.headers["accept-ranges"] == "bytes"
-    assert f'filename="{recording}.h5"' in whole.headers["content-disposition"]
+    assert (
+        f'filename="Vordere-Tur-2.-Versuch-{recording}.h5"' in whole.headers["content-disposition"]
+    )
     for wanted, expected in (
         ("bytes=0-99", data[:100]),
         ("bytes=100-", data[100:]),

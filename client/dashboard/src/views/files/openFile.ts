@@ -49,17 +49,17 @@ const OPENERS: Readonly<Record<string, (store: Store, file: OpenedFile) => Promi
 
 /** The recording that a file is of: by the name it was downloaded under, else by its size, where no other is as large. */
 export function recordingIn(recordings: readonly RecordingDocument[], { name, size }: Pick<OpenedFile, "name" | "size">): RecordingDocument | null {
-  const named = recordings.find(({ id }) => name.startsWith(id));
+  const named = recordings.find(({ id }) => name.includes(id));
   if (named !== undefined) return named;
   const alike = recordings.filter(({ size_bytes }) => size_bytes === size);
   return alike.length === 1 ? alike[0] : null;
 }
 
-/** Lets the user choose a file, and opens it. */
-export function chooseFile(store: Store): void {
+/** Lets the user choose a file, by default of any kind that can be opened, and opens it. */
+export function chooseFile(store: Store, kind = Object.keys(OPENERS).join()): void {
   const input = document.createElement("input");
   input.type = "file";
-  input.accept = Object.keys(OPENERS).join();
+  input.accept = kind;
   input.onchange = () => {
     const file = input.files?.[0];
     if (file !== undefined) void openFile(store, file);

@@ -10,6 +10,7 @@ import { Tabs, Toggle } from "../../ui/controls";
 import { saveNumbers, savePicture } from "../../ui/download";
 import { captionOf } from "../../ui/figure";
 import { saveFigure } from "../../ui/figureFiles";
+import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { LimitFields } from "../../ui/LimitFields";
 import { paint } from "../../ui/paint";
@@ -112,18 +113,22 @@ function Map({ look, canvas }: MapProps) {
       <div class="picture">
         <Stage width={width} height={height} label={`${shown.name} map`}>
           <canvas ref={canvas} />
-          {waiting.value && <p class="stage-empty">Waiting for the first frame</p>}
+          {waiting.value && <FirstFrame />}
         </Stage>
-        <ColourBar
-          scale={look.scale.value}
-          colours={look.colours.value}
-          unit={shown.unit}
-          values={frame}
-          marked={marked}
-          onLimit={(limits) => {
-            store.looks.limit(look, limits);
-          }}
-        />
+        {waiting.value ? (
+          <div class="colour-bar" />
+        ) : (
+          <ColourBar
+            scale={look.scale.value}
+            colours={look.colours.value}
+            unit={shown.unit}
+            values={frame}
+            marked={marked}
+            onLimit={(limits) => {
+              store.looks.limit(look, limits);
+            }}
+          />
+        )}
       </div>
       <footer class="panel-foot">
         <div class="panel-row">

@@ -1,6 +1,7 @@
 /** All that the page can do at once, to be searched by words. */
 import { RequestError } from "../../store/api";
 import { copyLink } from "../../store/permalink";
+import { PAST_S } from "../../store/recordings";
 import type { Store } from "../../store/store";
 import { SHORTCUTS } from "../../ui/shortcuts";
 import { THEMES } from "../../ui/theme";
@@ -31,6 +32,7 @@ export function commandsOf(store: Store): Command[] {
     ...(steering && applied !== null ? PRESETS.map(({ name, sequence }) => ({ words: `Sequence: ${name}`, key: "", run: () => void told(store, () => store.sequencing.set({ ...applied, ...sequence })) })) : []),
     ...scenes.map(({ name }) => ({ words: `Scene: ${name}`, key: "", run: () => void told(store, () => store.simulation.stage(name)) })),
     ...THEMES.map((theme) => ({ words: `Colours: ${theme === "auto" ? "as the system" : theme}`, key: "", run: () => void (store.theme.choice.value = theme) })),
+    ...recordingCommands(store),
     { words: "Open a file: scene, recording or calibration…", key: "", run: () => { chooseFile(store); } },
     { words: "Copy a link to what is shown", key: "", run: () => void copyLink(window, store) },
     ...SHORTCUTS.filter(({ shown }) => shown.length === 1 && shown !== "K").map(({ keys, shown, words, run }) => ({
@@ -39,6 +41,15 @@ export function commandsOf(store: Store): Command[] {
       run: () => run(store, new KeyboardEvent("keydown", { key: keys[0] })),
     })),
   ]; // prettier-ignore
+}
+
+/** Recordings need no control of the camera. */
+function recordingCommands(store: Store): Command[] {
+  const { recordings } = store;
+  const active = recordings.active.value;
+  const does = (what: string, work: () => Promise<unknown>): Command => ({ words: `Recording: ${what}`, key: "", run: () => void told(store, work) });
+  if (active !== null) return [does("stop", () => recordings.stop(active.id))];
+  return [does("start", () => recordings.start({})), does(`save the last ${PAST_S} s`, () => recordings.savePast())];
 }
 
 /** Runs a request of the service; says in the page's events why it was refused. */

@@ -14,8 +14,10 @@ import { Choice, Toggle } from "../../ui/controls";
 import { save, savePicture } from "../../ui/download";
 import { download } from "../../ui/files";
 import { grouped } from "../../ui/format";
+import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
+import { PinsRow } from "../map/PinsRow";
 import { LightBar } from "../transient/LightBar";
 import type { TransientLook } from "../transient/look";
 import { byFlags, byValue, colourCloud, fillCloud, type Painter } from "./cloud";
@@ -141,7 +143,8 @@ export function PointsView() {
   };
 
   const bar = useComputed(() => ({ range: rangeLook, light: lightLook, validity: null, flight: null })[colouring.value]);
-  const text = useComputed(() => (range.value === null ? "Waiting for the first frame" : scene.value === null ? "Loading" : null));
+  const frameless = useComputed(() => range.value === null);
+  const loading = useComputed(() => scene.value === null);
   return (
     <Panel
       name="points"
@@ -167,7 +170,7 @@ export function PointsView() {
       <div class="picture">
         <div class="points" ref={box}>
           <SceneStage canvas={canvas} scene={scene} range={range} />
-          {(trouble.value ?? text.value) !== null && <p class="stage-empty">{trouble.value ?? text.value}</p>}
+          {trouble.value !== null ? <p class="stage-empty">{trouble.value}</p> : frameless.value ? <FirstFrame /> : loading.value && <p class="stage-empty">Loading</p>}
         </div>
         {colouring.value === "flight" ? (
           <LightBar look={light} play="density" />
@@ -206,6 +209,7 @@ export function PointsView() {
             </button>
           </span>
         </div>
+        {store.measures.pins.value.length > 0 && <PinsRow look={rangeLook} />}
       </footer>
     </Panel>
   );

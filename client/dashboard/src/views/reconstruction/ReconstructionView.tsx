@@ -91,7 +91,8 @@ interface ParameterProps {
 
 /** One thing that can be set. */
 function Parameter({ parameter, text, wrong, onInput }: ParameterProps) {
-  const { name, description, allowed } = parameter;
+  const { name, allowed } = parameter;
+  const description = parameter.description.replaceAll("`", ""); // written for documents, too
   const choices = allowed ?? (parameter.type === "boolean" ? ["true", "false"] : []);
   return (
     <label class="field" title={description}>

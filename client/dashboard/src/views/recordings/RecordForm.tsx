@@ -1,11 +1,9 @@
 import { useSignal } from "@preact/signals";
 
+import { PAST_S } from "../../store/recordings";
 import { useStore } from "../../store/store";
 import type { Task } from "../../ui/useTask";
 import { limitsOf } from "./limits";
-
-/** Seconds of the past that one button saves. */
-const PAST_S = 10;
 
 /** What to call a recording and when to end it; and a button that saves what just happened. */
 export function RecordForm({ task }: { task: Task }) {
@@ -21,10 +19,7 @@ export function RecordForm({ task }: { task: Task }) {
     if (await task.run("Starting…", () => recordings.start({ ...called, ...limits }))) name.value = "";
   };
   const savePast = async (): Promise<void> => {
-    const saved = await task.run(`Saving the last ${PAST_S} s…`, async () => {
-      const { id } = await recordings.start({ ...called, history_s: PAST_S });
-      await recordings.stop(id);
-    });
+    const saved = await task.run(`Saving the last ${PAST_S} s…`, () => recordings.savePast(called));
     if (saved) name.value = "";
   };
   const number = (label: string, unit: string, text: typeof name, field: string) => (

@@ -8,6 +8,7 @@ import { grouped } from "../../ui/format";
 import { Panel } from "../../ui/Panel";
 import { TaskLine } from "../../ui/Steer";
 import { useTask, type Task } from "../../ui/useTask";
+import { OpenButton } from "../files/OpenButton";
 import { bytes, duration } from "../replay/words";
 import { Annotations } from "./Annotations";
 import { RecordForm } from "./RecordForm";
@@ -27,7 +28,12 @@ export function RecordingsView() {
     <Panel
       name="recordings"
       title={<h2>Recordings</h2>}
-      tools={known?.free_bytes != null && <span class="quiet" title={known.directory}>{bytes(known.free_bytes)} free</span>}
+      tools={
+        <>
+          {known?.free_bytes != null && <span class="quiet" title={known.directory}>{bytes(known.free_bytes)} free</span>}
+          <OpenButton kind=".h5" title="Show a recording of this service by the file that was downloaded" />
+        </>
+      }
     >
       <div class="panel-body">
         {recordings.active.value === null ? <RecordForm task={task} /> : <Running recording={recordings.active.value} task={task} />}

@@ -1,5 +1,6 @@
 import { rangeOfTime_m } from "../../physics/constants";
 import type { PixelDocument, Return } from "../../stream/protocol";
+import { useStore } from "../../store/store";
 import { FLAGS } from "../../ui/flags";
 import { deviation, engineering, fixed } from "../../ui/format";
 import type { FlagHistory } from "./flagShares";
@@ -7,9 +8,11 @@ import { linesOf, sifted, type ReturnHistory, type ReturnLine } from "./returns"
 
 /** What the service found at the pixel: returns, the truth where it is known, and flags. `held` is the number of the frame that is held. */
 export function Found({ told, held, flags, returns }: { told: PixelDocument | null; held: number | null; flags: FlagHistory; returns: ReturnHistory }) {
+  const { frames } = useStore();
   if (told === null) return null;
-  flags.take(told);
-  returns.take(told);
+  const scene = frames.sceneOf(told.meta);
+  flags.take(told, scene);
+  returns.take(told, scene);
   return (
     <>
       {held !== null && held !== told.meta.frame && (

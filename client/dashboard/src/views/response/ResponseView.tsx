@@ -4,7 +4,7 @@ import "uplot/dist/uPlot.min.css";
 
 import { rangeOfTime_m } from "../../physics/constants";
 import { pixelOf } from "../../physics/reflection";
-import { aBoolean, oneOf, remembered } from "../../store/settings";
+import { aBoolean, remembered } from "../../store/settings";
 import type { Frame } from "../../store/frames";
 import { PIN_COLOURS } from "../../store/measures";
 import type { Pixel } from "../../store/pixel";
@@ -23,20 +23,10 @@ import { FlagWords, Found } from "./Listings";
 import { MomentsPlane } from "./MomentsPlane";
 import { responsePlot, type ResponsePlot } from "./plot";
 import { ReturnHistory } from "./returns";
+import { ASPECTS, SIDES } from "./sides";
 
 /** Share of the height that the axis was made for which is left after a frame without such a peak. */
 const SHRINK = 0.96;
-
-type Side = Aspect | "moments";
-const ASPECTS: readonly { readonly value: Aspect; readonly text: string; readonly hint: string }[] = [
-  { value: "density", text: "Density", hint: "The maximum entropy density" },
-  { value: "bounds", text: "Bounds", hint: "What every density with these moments, smoothed, lies between" },
-  { value: "cumulative", text: "Cumulative", hint: "Light up to each time of flight" },
-]; // prettier-ignore
-const SIDES: readonly { readonly value: Side; readonly text: string; readonly hint: string }[] = [
-  ...ASPECTS,
-  { value: "moments", text: "Moments", hint: "The trigonometric moments on the complex plane" },
-];
 
 /** Everything about the selected pixel; its curves are computed here from the streamed coefficients. */
 export function ResponseView() {
@@ -49,7 +39,7 @@ export function ResponseView() {
   const frame = store.frames.of(obstacle === undefined ? "coefficients" : "range");
   useEffect(() => store.details.follow(store.selected, frame), [store, frame]);
   useEffect(() => selectFirst(store, frame), [store, frame]);
-  const side = useMemo(() => remembered<Side>(store.shelf, "response.side", "bounds", oneOf(SIDES.map(({ value }) => value))), [store]);
+  const { side } = store;
   const shown = useMemo(
     () =>
       computed(() => {

@@ -16,9 +16,9 @@ export class FlagHistory {
   #frame = NaN;
   #looks: (readonly string[])[] = [];
 
-  /** Takes a look, once a frame; another pixel begins anew. */
-  take({ x, y, flags, meta }: Pick<PixelDocument, "x" | "y" | "flags" | "meta">): void {
-    const place = `${x},${y},${meta.sequence_id}`;
+  /** Takes a look, once a frame; another pixel or scene begins anew. */
+  take({ x, y, flags, meta }: Pick<PixelDocument, "x" | "y" | "flags" | "meta">, scene = ""): void {
+    const place = `${x},${y},${meta.sequence_id},${scene}`;
     if (place !== this.#place) [this.#place, this.#looks, this.#frame] = [place, [], NaN];
     if (meta.frame === this.#frame) return;
     this.#frame = meta.frame;

@@ -51,9 +51,9 @@ export class ReturnHistory {
   #frame = NaN;
   #looks: (readonly Return[])[] = [];
 
-  /** Takes a look, once a frame; another pixel or sequence begins anew. */
-  take({ x, y, returns, meta }: Pick<PixelDocument, "x" | "y" | "returns" | "meta">): void {
-    const place = `${x},${y},${meta.sequence_id},${meta.calibration_id}`;
+  /** Takes a look, once a frame; another pixel, sequence or scene begins anew. */
+  take({ x, y, returns, meta }: Pick<PixelDocument, "x" | "y" | "returns" | "meta">, scene = ""): void {
+    const place = `${x},${y},${meta.sequence_id},${meta.calibration_id},${scene}`;
     if (place !== this.#place) [this.#place, this.#looks, this.#frame] = [place, [], NaN];
     if (meta.frame === this.#frame) return;
     this.#frame = meta.frame;

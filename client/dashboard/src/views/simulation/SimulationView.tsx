@@ -6,6 +6,7 @@ import { engineering } from "../../ui/format";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { useTask, type Task } from "../../ui/useTask";
+import { OpenButton } from "../files/OpenButton";
 import { effectWords, FAULTS, ordered, possible, sizeShare, sizeWords } from "./words";
 
 /** The scene of a simulated camera, which effects it calls for, and what can be made to go wrong. */
@@ -17,11 +18,18 @@ export function SimulationView() {
   const world = simulation.world.value;
   const explanation = simulation.explanation.value;
   return (
-    <Panel name="simulation" title={<h2>Simulated scene</h2>} tools={world !== null && <ScenePicker task={task} />}>
+    <Panel name="simulation" title={<h2>Simulated scene</h2>} tools={
+        world !== null && (
+          <>
+            <ScenePicker task={task} />
+            <OpenButton kind=".toml" title="Put the camera before a scene of your own: a TOML file" />
+          </>
+        )
+      }>
       <div class="panel-body">
         {simulation.trouble.value !== null && <p class="quiet">{simulation.trouble.value}</p>}
         <Obstacle />
-        {world !== null && <p class="quiet scene-words">{world.scenes.find(({ name }) => name === world.scene)?.description ?? "A scene from a file."} A scene file that is dropped on the page takes its place.</p>}
+        {world !== null && <p class="quiet scene-words">{world.scenes.find(({ name }) => name === world.scene)?.description ?? "A scene from a file"}. A scene of your own is opened here, or dropped on the page.</p>}
         {world !== null && (
           <fieldset class="faults">
             <legend>Let something go wrong</legend>
@@ -48,6 +56,7 @@ function ScenePicker({ task }: { task: Task }) {
       <span class="quiet">Scene</span>
       <select
         name="scene"
+        aria-label="Scene"
         value={world.scene}
         disabled={task.busy.value !== null || obstacle.value !== null}
         onChange={(event) => {

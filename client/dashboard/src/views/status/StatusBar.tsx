@@ -68,9 +68,9 @@ function slowed(state: State, trouble: string | null): State {
 
 /** That less is asked for than there is, and what. */
 function ThinLink() {
-  const { status, sight } = useStore();
+  const { status, sight, replay } = useStore();
   const decision = status.demanded.value;
-  if (decision === null) return null;
+  if (decision === null || replay.active.value) return null;
   const { long, short } = demandWords(decision, sight.value !== null);
   return (
     <span class="chip chip-waiting thin-link" role="status" data-field="link" title={long}>

@@ -1,3 +1,5 @@
+import { useComputed } from "@preact/signals";
+
 import { scaleOf } from "../../gl/tone";
 import { useStore, type Store } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
@@ -14,6 +16,8 @@ export function lightScale(look: TransientLook, store: Store, play: Play): { rea
 
 /** The colour bar of light in flight, or of light gathered over a time. */
 export function LightBar({ look, play }: { look: TransientLook; play: Play }) {
-  const { scale, unit } = lightScale(look, useStore(), play);
-  return scale.high > 0 ? <ColourBar scale={scale} colours={look.colours.value} unit={unit} /> : null;
+  const store = useStore();
+  const dark = useComputed(() => store.frames.of("coefficients").value === null).value;
+  const { scale, unit } = lightScale(look, store, play);
+  return !dark && scale.high > 0 ? <ColourBar scale={scale} colours={look.colours.value} unit={unit} /> : <div class="colour-bar" />;
 }

@@ -6,6 +6,7 @@ import type { Coefficients } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
 import { useStore } from "../../store/store";
 import { colourTable, levelOf } from "../../ui/colourMaps";
+import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing } from "../../ui/hooks";
 import { Stage } from "../../ui/Stage";
 import { AMPLITUDE } from "../map/catalogue";
@@ -50,7 +51,7 @@ export function LightSoFar({ look }: { look: TransientLook }) {
   return (
     <Stage width={width} height={height} label={NAMES[look.play.value]}>
       <canvas ref={canvas} data-product="transient" data-renderer="closed-form" />
-      {useComputed(() => frame.value === null).value && <p class="stage-empty">Waiting for the first frame</p>}
+      {useComputed(() => frame.value === null).value && <FirstFrame />}
     </Stage>
   );
 }

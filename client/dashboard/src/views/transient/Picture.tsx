@@ -5,6 +5,7 @@ import { createRenderer } from "../../gl/createRenderer";
 import type { DensityRenderer } from "../../gl/renderer";
 import { useStore } from "../../store/store";
 import { useDrawing } from "../../ui/hooks";
+import { FirstFrame } from "../../ui/FirstFrame";
 import { Stage } from "../../ui/Stage";
 import { AMPLITUDE } from "../map/catalogue";
 import type { TransientLook } from "./look";
@@ -72,7 +73,7 @@ export function Picture({ look }: { look: TransientLook }) {
   return (
     <Stage width={width} height={height} label="Light in flight">
       <canvas key={attempt.value} ref={canvas} data-product="transient" />
-      {useComputed(() => frame.value === null).value && <p class="stage-empty">Waiting for the first frame</p>}
+      {useComputed(() => frame.value === null).value && <FirstFrame />}
     </Stage>
   );
 }

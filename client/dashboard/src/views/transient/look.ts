@@ -21,6 +21,15 @@ export function gateStart_rad(phase_rad: number, period_s: number): number {
   return Math.max(0, phase_rad - (2 * Math.PI * GATE_S) / period_s);
 }
 
+/** What of the look of light is set by hand; travels in a link. */
+export interface LightChoice {
+  readonly play: Play;
+  readonly colours: ColourMapName;
+  readonly tone: ToneKind;
+  readonly stops: number;
+  readonly backdrop: boolean;
+}
+
 /** How light in flight is shown. */
 export class TransientLook {
   readonly colours: Signal<ColourMapName>;
@@ -43,6 +52,18 @@ export class TransientLook {
     this.backdrop = remembered(shelf, "transient.backdrop", true, aBoolean);
     this.play = remembered<Play>(shelf, "transient.play", "density", oneOf(PLAYS));
     this.white = computed(() => this.#meter(frame.value?.light?.peak ?? NaN) / 2 ** this.stops.value);
+  }
+
+  get choice(): LightChoice {
+    return { play: this.play.peek(), colours: this.colours.peek(), tone: this.tone.peek(), stops: this.stops.peek(), backdrop: this.backdrop.peek() };
+  }
+
+  set choice({ play, colours, tone, stops, backdrop }: LightChoice) {
+    this.play.value = play;
+    this.colours.value = colours;
+    this.tone.value = tone;
+    this.stops.value = stops;
+    this.backdrop.value = backdrop;
   }
 
   get toneNow(): Tone {

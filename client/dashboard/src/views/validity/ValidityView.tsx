@@ -5,6 +5,7 @@ import type { Frame } from "../../store/frames";
 import { useStore } from "../../store/store";
 import { saveNumbers, savePicture } from "../../ui/download";
 import { FLAGS } from "../../ui/flags";
+import { FirstFrame } from "../../ui/FirstFrame";
 import { fixed, grouped } from "../../ui/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
@@ -45,7 +46,7 @@ export function ValidityView() {
     >
       <Stage width={width} height={height} label="Validity map">
         <canvas ref={canvas} data-product="flags" />
-        {empty.value && <p class="stage-empty">Waiting for the first frame</p>}
+        {empty.value && <FirstFrame />}
       </Stage>
       <Legend frame={frame} />
     </Panel>
