@@ -25,8 +25,8 @@ UNSERVED_S = 60.0
 """A laden machine does not turn the light off in tests that are about something else."""
 
 
-# a camera that is to stop, or to be set, is read on for so long; thousands of tests wait for that
-acquisition.READ_TIMEOUT_S = 0.01  # type: ignore[misc]
+# a camera that is to stop or to be set is read on for so long, which hundreds of tests wait for
+acquisition.READ_TIMEOUT_S = 0.03  # type: ignore[misc]
 
 
 class PromptServer(Server):
