@@ -13,6 +13,9 @@ ROOT = Path(__file__).resolve().parents[1]
 
 # no process of a test compiles what it does not ask for; those that test it set it back
 os.environ["TRANSIENTCAM_KERNELS"] = "manual"
+# before NumPy is imported: a product of matrices would begin a thread a core in every worker, and
+# these wait for each other busily, which doubles the processor time of what computes most
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
 # every process that a test starts would compile all modules anew, which takes it a second
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # httpx gives up after 5 s, which a laden machine may take to answer; what hangs is ended by the
@@ -47,6 +50,17 @@ _LIBRARY_THREADS = (
     "Dask-",
     "IO loop",
 )
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Half as many workers again as cores: a fifth of a test's time is spent waiting.
+
+    What is waited for are cameras, which take their images in real time, browsers and daemons.
+    """
+    affinity = getattr(os, "sched_getaffinity", None)  # a container may have fewer than there are
+    cores = len(affinity(0)) if affinity is not None else os.cpu_count() or 1
+    return cores + max(1, cores // 2)
 
 
 # Those of more than half a minute: begun last, one of them would keep one worker alone at the end.

@@ -6,13 +6,16 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from tempfile import TemporaryDirectory
+from types import ModuleType
 from typing import Any
 
+import uvicorn.server
 from fastapi import FastAPI
 
 from transientcam_driver import Camera, open_camera
 from transientcam_driver.clock import Clock
 from transientcam_server.api.app import build_app
+from transientcam_server.camera import acquisition
 from transientcam_server.daemon.server import Server, address, listen
 from transientcam_server.service import Service
 from transientcam_server.settings import Settings
@@ -22,13 +25,31 @@ UNSERVED_S = 60.0
 """A laden machine does not turn the light off in tests that are about something else."""
 
 
+# a camera that is to stop or to be set is read on for so long, which hundreds of tests wait for
+acquisition.READ_TIMEOUT_S = 0.03  # type: ignore[misc]
+
+
 class PromptServer(Server):
-    """Looks every 10 ms whether it is to end, which uvicorn does every 100 ms."""
+    """Looks every 10 ms whether it is to end and whether all has ended, uvicorn every 100 ms."""
 
     async def main_loop(self) -> None:
         """Serve until the end is requested."""
         while not await self.on_tick(0):
             await asyncio.sleep(0.01)
+
+
+class _Prompt(ModuleType):
+    """What uvicorn knows as ``asyncio``: whatever it sleeps is at most 10 ms."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(asyncio, name)
+
+    @staticmethod
+    async def sleep(delay_s: float) -> None:
+        await asyncio.sleep(min(delay_s, 0.01))
+
+
+uvicorn.server.asyncio = _Prompt("asyncio")  # type: ignore[attr-defined]
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.serving import Served, serving
+from tests.waiting import wait_until
 from transientcam import Camera
 
 _BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
@@ -50,8 +51,7 @@ def recording(served: Served, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("recording") / "light.h5"
     with Camera(served.url, timeout_s=60.0) as camera:
         started = camera.record(frames=2)
-        while camera.recording(started["id"])["state"] == "recording":
-            camera.latest(wait_s=10)
+        wait_until(lambda: camera.recording(started["id"])["state"] != "recording")
         camera.download_recording(started["id"], path)
     return path
 

@@ -13,6 +13,7 @@ from matplotlib import pyplot as plt
 
 from tests.conftest import ROOT
 from tests.serving import Served, serving
+from tests.waiting import wait_until
 from transientcam import Camera
 from transientcam.player_widget import PlayerWidget
 
@@ -114,8 +115,7 @@ def test_your_own_file_and_recording(tmp_path: Path, served: Served) -> None:
     np.savez(path, moments=moments, base_frequency_hz=20e6)
     with Camera(served.url, timeout_s=60.0) as camera:
         started = camera.record(frames=2)
-        while camera.recording(started["id"])["state"] == "recording":
-            camera.latest(wait_s=10)
+        wait_until(lambda: camera.recording(started["id"])["state"] != "recording")
         camera.download_recording(started["id"], tmp_path / "own.h5")
         wanted = camera.frame("range", recording=started["id"], number=1).array
 

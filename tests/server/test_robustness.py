@@ -1,8 +1,7 @@
 """What goes wrong for one leaves all others undisturbed."""
 
 import socket
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, NoReturn
@@ -15,6 +14,7 @@ from websockets.uri import parse_uri
 import transientcam_moments as tm
 from tests.server.streaming import streaming
 from tests.serving import Served
+from tests.waiting import wait_until
 from transientcam import wire
 from transientcam_server.broadcast.outbox import Delivery
 
@@ -24,13 +24,6 @@ PATIENCE_S = 60.0
 
 def fault(http: httpx.Client, name: str) -> None:
     assert http.post("/api/v1/simulation/faults", json={"fault": name}).status_code == 200
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < end_s, "it did not happen"
-        time.sleep(0.01)
 
 
 @contextmanager

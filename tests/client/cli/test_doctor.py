@@ -2,7 +2,6 @@
 
 import json
 import sys
-import time
 from collections.abc import Callable, Iterable, Iterator
 from datetime import UTC, datetime, timedelta
 from importlib.metadata import EntryPoint
@@ -17,6 +16,7 @@ from websockets.sync.server import ServerConnection
 
 from tests.client.conftest import ReplayServer
 from tests.serving import Served, serving
+from tests.waiting import wait_until
 from transientcam import Camera
 from transientcam.cli import daemon_checks, findings, run
 from transientcam.cli.findings import Finding, Reported
@@ -164,8 +164,7 @@ def test_an_unplugged_camera_is_a_fault(capsys: pytest.CaptureFixture[str]) -> N
     with serving("sim:wall?noise=off") as served:
         assert served.camera.simulation is not None
         served.camera.simulation.unplug()
-        while served.service.acquisition.status().state != "lost":
-            time.sleep(0.01)
+        wait_until(lambda: served.service.acquisition.status().state == "lost")
         code, document = report(capsys, served.url)
 
     assert code == 1

@@ -1,6 +1,5 @@
 """The contents of a scrape, and that it stays small."""
 
-import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -11,6 +10,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from tests.server.streaming import streaming
 from tests.serving import Served, serving
+from tests.waiting import wait_until
 from transientcam import wire
 from transientcam_driver import RawFrame
 from transientcam_server.api.metrics import Metrics
@@ -75,8 +75,7 @@ def test_recordings_are_counted_with_why_they_ended(tmp_path: Path) -> None:
     ):
         before = scrape(http)
         first = http.post("/api/v1/recordings", json={"frames": 2}).json()["id"]
-        while http.get(f"/api/v1/recordings/{first}").json()["state"] != "complete":
-            time.sleep(0.02)
+        wait_until(lambda: http.get(f"/api/v1/recordings/{first}").json()["state"] == "complete")
         second = http.post("/api/v1/recordings", json={}).json()["id"]
         during = scrape(http)
         stopped = http.post(f"/api/v1/recordings/{second}/stop").json()

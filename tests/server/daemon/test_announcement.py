@@ -8,6 +8,7 @@ import httpx
 import pytest
 
 from tests.serving import serving
+from tests.waiting import wait_until
 from transientcam import Camera, discover
 from transientcam.discovery import FoundCamera
 from transientcam_server.daemon import announcement
@@ -92,8 +93,7 @@ def test_a_network_that_cannot_be_asked_is_logged_and_the_service_goes_on(
     monkeypatch.setattr(announcement, "AsyncZeroconf", fail)
     with serving("sim:wall", announce="on") as served:
         assert httpx.get(f"{served.url}/livez").status_code == 200
-        while "not announced" not in caplog.text:
-            time.sleep(0.01)
+        wait_until(lambda: "not announced" in caplog.text)
 
     assert "Network is unreachable" in caplog.text
 

@@ -11,8 +11,7 @@ import signal
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ import pytest
 
 from tests.driver.usbfs.processes import EmulatedCamera, emulated_camera
 from tests.server.streaming import Client, streaming
+from tests.waiting import wait_until
 
 QUICK = {"harmonics": 1, "zeroth": "estimated", "exposure_s": 0.0005}
 PATIENCE_S = 60.0
@@ -77,13 +77,6 @@ class Daemon:
         self.process.stdout.close()
 
 
-def until(condition: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < end_s, "it did not happen"
-        time.sleep(0.02)
-
-
 @pytest.fixture(scope="module")
 def running() -> Iterator[Daemon]:
     with emulated_camera() as camera:
@@ -98,7 +91,7 @@ def running() -> Iterator[Daemon]:
 def lit(running: Daemon) -> Daemon:
     """The daemon, capturing with the light on."""
     running.put("acquisition", {"running": True})
-    until(lambda: running.state() == "streaming" and running.camera.lit)
+    wait_until(lambda: running.state() == "streaming" and running.camera.lit)
     return running
 
 
@@ -111,7 +104,7 @@ def watching(lit: Daemon) -> Iterator[Client]:
 
 
 def goes_off(daemon: Daemon) -> None:
-    until(lambda: not daemon.camera.lit)
+    wait_until(lambda: not daemon.camera.lit)
 
 
 def test_a_client_that_is_gone_leaves_a_lease_that_lapses(lit: Daemon) -> None:
@@ -119,7 +112,7 @@ def test_a_client_that_is_gone_leaves_a_lease_that_lapses(lit: Daemon) -> None:
         client.post("/api/v1/lease", json=LEASE).raise_for_status()
 
     goes_off(lit)
-    until(lambda: lit.state() == "stopped")
+    wait_until(lambda: lit.state() == "stopped")
     assert not lit.camera.watchdog_tripped
 
 
@@ -133,7 +126,7 @@ def test_a_loop_that_is_stuck_puts_the_light_out_and_it_is_back_with_the_loop(
     watching.notice("light-released")
 
     assert "no client was served for 1 s" in held.details["reason"]
-    until(lambda: lit.camera.lit)
+    wait_until(lambda: lit.camera.lit)
     assert lit.state() in ("starting", "streaming")
 
 
@@ -161,17 +154,17 @@ def test_an_open_interlock_puts_the_light_out_by_itself(lit: Daemon) -> None:
     lit.camera.do("interlock", False)
 
     assert not lit.camera.lit
-    until(lambda: lit.state() == "lost")
+    wait_until(lambda: lit.state() == "lost")
     lit.camera.do("interlock", True)
-    until(lambda: lit.camera.lit)
+    wait_until(lambda: lit.camera.lit)
 
 
 def test_without_the_cable_there_is_no_light_and_with_it_again_there_is(lit: Daemon) -> None:
     lit.camera.do("unplug")
-    until(lambda: lit.state() == "lost")
+    wait_until(lambda: lit.state() == "lost")
     lit.camera.do("replug")
 
-    until(lambda: lit.camera.lit)
+    wait_until(lambda: lit.camera.lit)
 
 
 def test_requests_that_stall_put_the_light_out(lit: Daemon) -> None:
@@ -180,7 +173,7 @@ def test_requests_that_stall_put_the_light_out(lit: Daemon) -> None:
     goes_off(lit)
     lit.camera.do("unplug")
     lit.camera.do("replug")
-    until(lambda: lit.state() == "streaming")
+    wait_until(lambda: lit.state() == "streaming")
 
 
 def test_a_host_that_hangs_is_missed_by_the_device(lit: Daemon) -> None:
@@ -191,7 +184,7 @@ def test_a_host_that_hangs_is_missed_by_the_device(lit: Daemon) -> None:
     finally:
         lit.process.send_signal(signal.SIGCONT)
 
-    until(lambda: lit.camera.lit)
+    wait_until(lambda: lit.camera.lit)
 
 
 def test_a_daemon_that_is_killed_is_missed_by_the_device(lit: Daemon) -> None:

@@ -45,11 +45,15 @@ def tell_stories(url: str, directory: Path, *how: str) -> "subprocess.CompletedP
 
 
 def in_its_own_process(*arguments: str, directory: Path) -> "subprocess.CompletedProcess[str]":
-    """Run Python: plugins, hooks and threads of schemathesis are no business of the tests."""
+    """Run Python: plugins, hooks and threads of schemathesis are no business of the tests.
+
+    Which characters there are is found out once for all tests, and again in every session.
+    """
+    kept = {"HYPOTHESIS_STORAGE_DIRECTORY": str(directory.parent / "hypothesis")}
     return subprocess.run(
         [sys.executable, *arguments],
         cwd=directory,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])},
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])} | kept,
         capture_output=True,
         text=True,
         check=False,

@@ -15,6 +15,7 @@ import transientcam
 import transientcam_moments as tm
 from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, frame, header, record
 from tests.serving import Served, serving
+from tests.waiting import wait_until
 from transientcam import ParameterError, ProblemError, opening
 from transientcam_server.errors.exceptions import DamagedFrame, InputError, NotARecording
 from transientcam_server.imaging.calibration import nominal_gains
@@ -214,8 +215,7 @@ def test_a_daemons_recording_opens_by_its_address_with_the_daemons_numbers(serve
         running = camera.record()["id"]
         with pytest.raises(ProblemError, match="not finished"):
             transientcam.open(f"{served.url}/api/v1/recordings/{running}")
-        while camera.recording(running)["frames"] < 3:
-            camera.latest(wait_s=1.0)
+        wait_until(lambda: camera.recording(running)["frames"] >= 3)
         frames = camera.stop_recording(running)["frames"]
         with transientcam.open(f"{served.url}/api/v1/recordings/{running}") as recording:
             assert len(recording) == frames

@@ -1,5 +1,6 @@
 """A relay before a real origin, both with their own ports: what its clients see and may do."""
 
+import re
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -12,6 +13,7 @@ import transientcam
 from tests.server.relay.forwarder import forwarding
 from tests.server.streaming import VIDEO
 from tests.serving import Served, serving
+from tests.waiting import wait_until
 from transientcam_driver import CameraLost
 from transientcam_server.api.auth import Role
 from transientcam_server.api.auth.tokens import TokenFile, utc_now
@@ -33,9 +35,8 @@ def read_until(stream: transientcam.Stream, wanted: Any) -> transientcam.Frame:
 
 def acquisition_until(camera: transientcam.Camera, *, running: bool) -> dict[str, Any]:
     """Return the acquisition once it captures, or does not."""
-    while (found := camera.acquisition)["running"] is not running:
-        pass
-    return found
+    wait_until(lambda: camera.acquisition["running"] is running)
+    return camera.acquisition
 
 
 @pytest.fixture(scope="module")
@@ -101,10 +102,13 @@ def test_the_relay_states_the_origins_camera(
 
 
 def test_metrics_and_status_name_each_hop(at_relay: transientcam.Camera, relay: Served) -> None:
-    at_relay.latest(wait_s=10.0)
+    before = at_relay.latest(wait_s=10.0)["hops"][0]["missed_frames"]
     text = httpx.get(f"{relay.url}/metrics").text
+    after = at_relay.latest(wait_s=10.0)["hops"][0]["missed_frames"]
     assert 'transientcam_relay_hop_latency_seconds{hop="1"} ' in text
-    assert 'transientcam_relay_hop_missed_frames_total{hop="1"} 0.0' in text
+    missed = re.search(r'transientcam_relay_hop_missed_frames_total\{hop="1"\} (\S+)', text)
+    assert missed is not None
+    assert before <= float(missed[1]) <= after  # a laden machine misses some
     assert "transientcam_relay_origin_restarts_total 0.0" in text
 
 
@@ -189,13 +193,11 @@ def test_a_recording_of_the_relay_has_the_origins_range_to_the_bit(
     active = at_origin.wait_for(job["id"])["result"]["calibration"]
     at_origin.simulate(diffusor=False)
     with serving_relay(relay.url) as second, transientcam.Camera(second.url) as camera:
-        while camera.calibrations.active()["calibration_id"] != active:  # through both
-            pass
+        wait_until(lambda: camera.calibrations.active()["calibration_id"] == active)  # through both
     with at_relay.stream("raw") as stream:
         read_until(stream, lambda frame: frame.meta["calibration_id"] == active)
     recorded = at_relay.record(frames=2)
-    while at_relay.recording(recorded["id"])["state"] != "complete":
-        pass
+    wait_until(lambda: at_relay.recording(recorded["id"])["state"] == "complete")
     path = next(relay.settings.recordings.directory.glob(f"*{recorded['id']}*"))
     with Recording(path) as recording:
         numbers = recording.series("frame")
@@ -241,10 +243,12 @@ def test_a_cut_connection_is_resumed_and_what_is_missing_is_counted(origin: Serv
             stream.receive(timeout_s=PATIENCE_S)
         assert camera.camera["origin"]["reconnects"] >= 1
         held = [each.raw for each in relay.service.history.newest(1e6)]
-    assert held[0].lost_images == 0
+    # a laden machine loses images between camera and origin, too
+    there = {each.number: each.raw.lost_images for each in origin.service.history.newest(1e6)}
+    assert held[0].lost_images == there[held[0].number]
     for before, after in pairwise(held):
         missed = after.number - before.number - 1
-        assert after.lost_images == missed * len(after.labels)
+        assert after.lost_images == there[after.number] + missed * len(after.labels)
         assert after.hops[0].missed_frames == before.hops[0].missed_frames + missed
 
 
@@ -265,8 +269,7 @@ def test_after_a_restart_of_the_origin_frames_go_on(origin: Served) -> None:
                 assert service.history.latest.raw.number > number
                 network.target = "http://127.0.0.1:1"  # nothing answers there
                 network.cut()
-            while camera.acquisition["state"] != "lost":
-                pass
+            wait_until(lambda: camera.acquisition["state"] == "lost")
 
 
 def test_a_loop_is_refused(origin: Served) -> None:
@@ -282,8 +285,7 @@ def test_a_loop_is_refused(origin: Served) -> None:
         assert ids == [watching.info["service_id"], camera.info["service_id"]]
         network.target = second.url  # the first one now relays what relays it
         network.cut()
-        while "loop" not in (watching.acquisition["reason"] or ""):
-            pass
+        wait_until(lambda: "loop" in (watching.acquisition["reason"] or ""))
 
 
 def test_chains_and_ends_leave_the_origin_as_it_was(at_origin: transientcam.Camera) -> None:

@@ -1,6 +1,5 @@
 """Calibrations are measured, used, taken elsewhere, and refused where they are not good."""
 
-import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from pydantic import ValidationError
 
 from tests.server.contract import hold_to_contract
 from tests.serving import Served, serving
+from tests.waiting import wait_until
 from transientcam import Camera, wire
 from transientcam_driver import Sequence
 from transientcam_server.api.documents.calibration import CalibrationRequest
@@ -379,8 +379,7 @@ def started(http: httpx.Client) -> str:
     """Address of a job that would take minutes, once it captures."""
     answer = http.post(CALIBRATIONS, json={"frames": 2000})
     job: str = answer.headers["location"]
-    while http.get(job).json()["step"] != "capturing":
-        time.sleep(0.01)
+    wait_until(lambda: http.get(job).json()["step"] == "capturing")
     return job
 
 

@@ -1,6 +1,7 @@
 import httpx
 
 from tests.serving import Served
+from tests.waiting import wait_until
 
 
 def test_the_camera_is_reported_with_capabilities_status_and_counters(
@@ -28,8 +29,7 @@ def test_a_lost_camera_is_reported_as_lost_with_the_reason(
     served.service.acquisition.submit(lambda: None).result()
     assert served.camera.simulation is not None
     served.camera.simulation.unplug()
-    while served.service.acquisition.status().state != "lost":
-        pass
+    wait_until(lambda: served.service.acquisition.status().state == "lost")
 
     document = http.get("/api/v1/camera").json()
 

@@ -1,12 +1,18 @@
 """The list of cameras on the network, over HTTP."""
 
 import httpx
+import pytest
 
 from tests.server.contract import hold_to_contract
 from tests.serving import serving
+from transientcam_server.api import neighbours
 
 
-def test_a_service_lists_one_that_announces_itself_and_what_its_camera_does() -> None:
+def test_a_service_lists_one_that_announces_itself_and_what_its_camera_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # every request searches, for 1.5 s; how long a result is kept is tested with a clock
+    monkeypatch.setattr(neighbours, "FRESH_S", 0.0)
     with (
         serving("sim:wall?noise=off", announce="on") as other,
         serving("sim:wall?noise=off", announce="auto") as asked,

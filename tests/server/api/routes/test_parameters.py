@@ -1,7 +1,6 @@
 """Parameters describe themselves, and what they say of their limits is what validation does."""
 
 import math
-import time
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +8,7 @@ import httpx
 import pytest
 
 from tests.serving import serving
+from tests.waiting import wait_until
 
 READ_WRITE = "read-write"
 
@@ -146,8 +146,7 @@ def test_a_recording_has_a_sequence_that_can_only_be_read(tmp_path: Path) -> Non
         httpx.Client(base_url=daemon.url, timeout=60) as http,
     ):
         identity = http.post("/api/v1/recordings", json={"frames": 2}).json()["id"]
-        while http.get(f"/api/v1/recordings/{identity}").json()["state"] != "complete":
-            time.sleep(0.02)
+        wait_until(lambda: http.get(f"/api/v1/recordings/{identity}").json()["state"] == "complete")
 
     with (
         serving(f"recording:{tmp_path / identity}.h5?loop=on") as replayed,

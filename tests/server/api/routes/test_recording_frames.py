@@ -15,6 +15,7 @@ import pytest
 from tests.server.contract import hold_to_contract
 from tests.server.recording.made import record
 from tests.serving import Served, serving
+from tests.waiting import wait_until
 from transientcam import wire
 from transientcam_server.recording import Recording
 from transientcam_server.recording.frames import MAX_TIMES, timeline
@@ -50,9 +51,7 @@ def recorded(http: httpx.Client) -> str:
 
 def record_frames(http: httpx.Client, frames: int) -> str:
     recording: str = http.post(RECORDINGS, json={"frames": frames}).json()["id"]
-    # the test's own timeout is the limit
-    while http.get(f"{RECORDINGS}/{recording}").json()["state"] != "complete":
-        http.get("/api/v1/frames/latest", params={"wait_s": 1.0})
+    wait_until(lambda: http.get(f"{RECORDINGS}/{recording}").json()["state"] == "complete")
     return recording
 
 

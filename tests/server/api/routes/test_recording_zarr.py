@@ -15,6 +15,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from tests.server.contract import hold_to_contract
 from tests.server.recording.made import record
 from tests.serving import Served, serving
+from tests.waiting import wait_until
 
 FRAMES = 4
 pytestmark = pytest.mark.usefixtures("zarr_clients")
@@ -164,14 +165,12 @@ def test_a_recording_is_read_while_it_is_written_and_grows(
     http.get("/api/v1/frames/latest", params={"wait_s": 10.0})
     name = http.post(RECORDINGS, json={"name": "grows"}).json()["id"]
     store = f"{RECORDINGS}/{name}/zarr"
-    while frames() < 2:
-        pass
+    wait_until(lambda: frames() >= 2)
     before = xarray.open_zarr(daemon.url + store, chunks=None)
     tag = http.get(f"{store}/.zmetadata").headers["etag"]
     images = before["raw"][1].to_numpy()
     known = before.sizes["frame"]
-    while frames() <= known:
-        pass
+    wait_until(lambda: frames() > known)
     after = xarray.open_zarr(daemon.url + store, chunks=None)
 
     assert after.sizes["frame"] > known >= 2

@@ -6,8 +6,7 @@ After the manner of the Autobahn test suite: each case states what RFC 6455 asks
 import asyncio
 import random
 import socket
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from websockets.uri import parse_uri
 
 from tests.server.streaming import streaming
 from tests.serving import Served, serving
+from tests.waiting import wait_until
 from transientcam import wire
 from transientcam_server.daemon.streams import BoundedStream
 
@@ -113,13 +113,6 @@ def opened(url: str) -> Iterator[Connection]:
             answer += connection.recv(1)
         assert b" 101 " in answer
         yield Connection(connection)
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < end_s, "it did not happen"
-        time.sleep(0.01)
 
 
 BROKEN: dict[str, tuple[bytes, int]] = {
@@ -384,9 +377,7 @@ def test_the_service_ends_while_a_client_that_reads_nothing_closes(
         client = stack.enter_context(opened(served.stream_url))
         client.send(frame(BINARY, everything))
         (stream,) = streams
-        while stream.writable.is_set():  # until nothing more fits on the way to the client
-            time.sleep(0.01)
+        wait_until(lambda: not stream.writable.is_set())  # nothing more fits on the way to it
         client.send(closing(1000))
-        while stream.conn.state is State.OPEN:
-            time.sleep(0.01)
+        wait_until(lambda: stream.conn.state is not State.OPEN)
         service.close()

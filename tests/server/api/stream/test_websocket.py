@@ -1,4 +1,3 @@
-import time
 from contextlib import suppress
 from typing import Any
 
@@ -9,6 +8,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from tests.server.streaming import VIDEO, Client, streaming
 from tests.serving import Served, serving
+from tests.waiting import wait_until
 from transientcam import density, wire
 from transientcam_driver import Sequence
 
@@ -455,8 +455,7 @@ def test_a_client_that_leaves_is_forgotten(served: Served) -> None:
         client.subscribe("flags")
         assert served.service.hub.clients == 1
 
-    while served.service.hub.clients:  # a test that hangs has a limit of its own
-        time.sleep(0.01)
+    wait_until(lambda: not served.service.hub.clients)
 
 
 def test_a_client_is_notified_when_the_service_shuts_down() -> None:
