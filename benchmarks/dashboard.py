@@ -37,6 +37,7 @@ _COUNT_PICTURES = """
 PAGE = Path(__file__).parents[1] / "docs" / "dashboard.md"
 _VIDEO_HZ = 18.6  # the paper's video setting
 _LOOK_EVERY_MS = 15_000
+_PATIENCE_S = 120.0  # a laden machine answers in its own time
 _TICKS_S = os.sysconf("SC_CLK_TCK")
 
 
@@ -80,12 +81,14 @@ def _heap_mb(page: Page) -> float:
 
 def _run(url: str, *, running: bool) -> None:
     """Start or stop the camera."""
-    httpx.put(f"{url}/api/v1/acquisition", json={"running": running}).raise_for_status()
+    httpx.put(
+        f"{url}/api/v1/acquisition", json={"running": running}, timeout=_PATIENCE_S
+    ).raise_for_status()
 
 
 def measure(page: Page, url: str, *, harmonics: int, span_s: float) -> str:
     """Return the row of the table for one order."""
-    document = httpx.get(f"{url}/api/v1/sequence").json()
+    document = httpx.get(f"{url}/api/v1/sequence", timeout=_PATIENCE_S).json()
     known = ("takes", "sub_phases")
     wanted = {name: document[name] for name in known} | {
         "harmonics": harmonics,
@@ -93,7 +96,7 @@ def measure(page: Page, url: str, *, harmonics: int, span_s: float) -> str:
         "zeroth": "estimated",
         "base_frequency_hz": 15e6,  # eight times more would be beyond the device
     }
-    httpx.put(f"{url}/api/v1/sequence", json=wanted).raise_for_status()
+    httpx.put(f"{url}/api/v1/sequence", json=wanted, timeout=_PATIENCE_S).raise_for_status()
     _run(url, running=True)
     open_page(page, f"{url}/?debug")
     page.wait_for_function(
@@ -126,7 +129,8 @@ _NEWEST = "() => transientcam.store.status.newest.peek().frame"
 def endurance(page: Page, url: str, *, frames: int) -> list[str]:
     """Return a table of the page's memory over so many frames."""
     quickest = {"harmonics": 1, "zeroth": "estimated", "exposure_s": 0.0001}
-    applied = httpx.put(f"{url}/api/v1/sequence", json=quickest).raise_for_status().json()
+    answer = httpx.put(f"{url}/api/v1/sequence", json=quickest, timeout=_PATIENCE_S)
+    applied = answer.raise_for_status().json()
     open_page(page, f"{url}/?debug")
     page.evaluate("() => { transientcam.store.player.playing.value = true; }")
     first, begin_s = page.evaluate(_NEWEST), time.monotonic()
@@ -165,6 +169,7 @@ def main() -> None:
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=shutil.which("chromium"))
         page = chromium.new_page(viewport={"width": 1280, "height": 800})
+        page.set_default_timeout(1e3 * _PATIENCE_S)
         for width, height in ((163, 120), (640, 480)):
             with serving(f"sim:mirrors?width={width}&height={height}") as served:
                 for harmonics in (3, 4, 8):
