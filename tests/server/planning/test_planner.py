@@ -27,9 +27,10 @@ from transientcam_server.planning import (
     uniform_scene,
 )
 from transientcam_server.planning.families import EXPOSURES, HARMONICS, TAKES, families
+from transientcam_server.planning.intervals import Figure
 from transientcam_server.planning.measures import pixel_errors
 from transientcam_server.planning.plan import plan
-from transientcam_server.planning.prediction import Figure, Prediction, Predictor
+from transientcam_server.planning.prediction import Prediction, Predictor
 from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.resolving import both_found
 from transientcam_server.planning.search import Search
