@@ -11,15 +11,15 @@ DEFAULT_SCENE: Final = "hall"
 OF_EMULATION: Final = {"scene": f"of the emulation, {DEFAULT_SCENE} without it", **SCENE_OPTIONS}
 
 
-def simulated_scene(name: CameraName) -> SimulatedScene:
-    """Return the scene in front of an emulated camera.
+def simulated_scene(name: CameraName, default: str = DEFAULT_SCENE) -> SimulatedScene:
+    """Return the scene in front of an emulated camera, ``default`` where its name has none.
 
     Raises
     ------
     SpecError
         Naming the part that is not valid.
     """
-    return SimulatedScene.of(name, name.options.get("scene", DEFAULT_SCENE))
+    return SimulatedScene.of(name, name.options.get("scene", default))
 
 
 def require_no_emulation(name: CameraName) -> None:

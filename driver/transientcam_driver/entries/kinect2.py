@@ -24,6 +24,8 @@ from transientcam_driver.simulation.kinect2 import build_kinect2
 
 _EMULATED_SILENCE_S: Final = 60.0
 """An emulated camera may compute for seconds what a scene looks like."""
+_SCENE: Final = "corner"
+"""Of an emulated camera: two returns in a pixel, as many as three frequencies can separate."""
 _OPTIONS: Final = {
     "rows": "top or bottom: from where the camera counts its principal point (docs/cameras.md)",
     "transfers": f"isochronous transfers in flight, a millisecond each; {TRANSFERS} without it",
@@ -40,7 +42,7 @@ def _open(name: CameraName, clock: Clock) -> Camera:
     rows = _rows(name)
     if name.address != EMULATED:
         return Kinect2Camera(lambda serial: _real(name, serial), rows=rows, clock=clock)
-    scene = simulated_scene(name)
+    scene = simulated_scene(name, _SCENE)
     emulated, simulation = build_kinect2(scene.load(), seed=scene.seed, clock=clock)
     return Kinect2Camera(
         lambda serial: Kinect2(emulated.connect(), pause=time.sleep, serial=serial),
@@ -66,7 +68,7 @@ def _check(name: CameraName) -> None:
     _rows(name)
     _transfers(name)
     if name.address == EMULATED:
-        simulated_scene(name).load()
+        simulated_scene(name, _SCENE).load()
     else:
         require_no_emulation(name)
 
@@ -93,5 +95,9 @@ PLUGIN: Final = CameraPlugin(
     find=_find,
     check=_check,
     facts=_facts,
-    options={**_OPTIONS, **OF_EMULATION},
+    options={
+        **_OPTIONS,
+        **OF_EMULATION,
+        "scene": f"of the emulation, {_SCENE} without it",
+    },
 )

@@ -2,7 +2,8 @@
 
 import pytest
 
-from transientcam_driver import CameraError, SpecError
+from transientcam_driver import CameraError, SpecError, open_camera
+from transientcam_driver.clock import VirtualClock
 from transientcam_driver.entries import kinect2
 from transientcam_driver.plugin import CameraName
 
@@ -40,3 +41,9 @@ def test_the_reading_of_the_rows_is_a_fact_of_the_report() -> None:
 
     assert fact[0] == "rows"
     assert "counted from the bottom row" in fact[1]
+
+
+def test_the_emulated_one_stands_before_two_walls_unless_a_scene_is_named() -> None:
+    with open_camera("kinect2:emulated", clock=VirtualClock()) as camera:
+        assert camera.simulation is not None
+        assert camera.simulation.scene == "corner"
