@@ -55,6 +55,7 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 	$(BIN)/python -m benchmarks.power_cuts --write
 	$(BIN)/python -m benchmarks.soak --write
 	$(BIN)/python -m benchmarks.abuse --write
+	$(BIN)/python -m benchmarks.abuse --minutes 10 --write
 	$(BIN)/python -m benchmarks.throughput --write
 	$(BIN)/python -m benchmarks.dashboard --hours 0.1 --write
 	$(BIN)/python -m benchmarks.pictures
