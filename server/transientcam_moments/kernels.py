@@ -74,7 +74,7 @@ LANES = (
     "covariance",
 )
 WHEN_NEEDED = ("likelihood", "pairs", "harmonics")
-"""Those that `compile_in_background` leaves out, but for the likelihood of its first order."""
+"""Those that `compile_in_background` leaves out, but for one of them of its first order."""
 Progress = Callable[[int, int, str], None]
 """Takes lanes done, lanes in all, and the name of the lane that is next ("" after the last)."""
 
@@ -175,21 +175,25 @@ def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the buil
 def compile_in_background(
     harmonics: Sequence[int] = (3, 4, 8),
     precisions: Sequence[str] = ("float32", "float64"),
+    *,
+    also: str = "likelihood",
 ) -> threading.Thread:
     """Start compiling on a thread and return it; arguments and errors as in `compile`.
 
     Leaves out "harmonics" and "pairs", which few cameras need, and "likelihood", which takes long
-    to compile, but for that of the first order: they are prepared by themselves when they are first
-    needed.
+    to compile: they are prepared by themselves when they are first needed. ``also`` names one of
+    them that is compiled for the first order all the same; "pairs" before all others, since a
+    camera whose frequencies have gaps needs little else.
 
     The thread is named "transientcam-compile", and can be joined.
     """
+    chosen("also", also, WHEN_NEEDED)
     keys = [
         key
         for key in _keys(harmonics, precisions)
-        if key.name not in WHEN_NEEDED
-        or (key.name == "likelihood" and key.harmonics == harmonics[0])
+        if key.name not in WHEN_NEEDED or (key.name == also and key.harmonics == harmonics[0])
     ]
+    keys.sort(key=lambda key: key.name != "pairs")
     main = threading.main_thread()
 
     def work() -> None:

@@ -176,6 +176,19 @@ def test_compiling_in_the_background_ends_with_the_lanes_in_use() -> None:
         assert (state["compiling"], state["failed"]) == (None, [])
 
 
+def test_the_pairs_that_a_camera_of_gapped_frequencies_waits_for_are_compiled_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[Key] = []
+    monkeypatch.setattr(tm.kernels, "_compile", lambda keys, *_: asked.extend(keys))
+
+    tm.kernels.compile_in_background([15, 3], also="pairs").join()
+
+    assert [str(key) for key in asked if key.name == "pairs"] == ["pairs m=15 float32"]
+    assert asked[0].name == "pairs"
+    assert "likelihood" not in {key.name for key in asked}
+
+
 def test_a_lane_that_cannot_be_compiled_leaves_numpy_and_the_other_lanes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -246,6 +259,8 @@ def test_orders_and_precisions_out_of_range_are_refused(
     assert caught.value.field == field
     with pytest.raises(tm.ParameterError):
         tm.kernels.compile_in_background(**arguments)  # type: ignore[arg-type]  # likewise
+    with pytest.raises(tm.ParameterError, match="also"):
+        tm.kernels.compile_in_background(also="levinson")
 
 
 def test_every_public_lane_has_its_compiler() -> None:

@@ -93,9 +93,10 @@ def serve(
         with open_camera(settings.camera) as opened:
             start_with(opened, settings.sequence)
             # NumPy serves until the compiled kernels are ready
-            first = opened.applied.sequence.multiples[-1]
-            orders = tuple(dict.fromkeys((first, 3, 4, 8)))
-            compiling = tm.kernels.compile_in_background(orders)
+            sequence = opened.applied.sequence
+            orders = tuple(dict.fromkeys((sequence.multiples[-1], 3, 4, 8)))
+            also = "likelihood" if sequence.sampling.consecutive else "pairs"
+            compiling = tm.kernels.compile_in_background(orders, also=also)
             leave(compiling)
             app = build_app(opened, settings)
             server.freeze_startup_objects(compiling)
