@@ -205,7 +205,8 @@ def report(findings: Findings, *, elapsed_s: float | None) -> str:
         f"{took}. Each was listed, described and deleted, every tenth over HTTP and read there. "
         "Whatever could be opened, and a quarter of the rest, was replayed frame by frame; a "
         "quarter of the unfinished was recovered. A file is bytes damaged "
-        "(`flipped`, `cut`, `overwritten`, `resummed`: changed with HDF5's checksum made right), "
+        "(`flipped`, `cut`, `overwritten`, `resummed`: changed with HDF5's checksum made right, "
+        "`torn`: in a heap of texts), "
         "or rewritten by h5py with wrong types, shapes, places and values.",
         "",
         "| | |",

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_server.errors.exceptions import InputError
 from transientcam_server.recording import swmr
-from transientcam_server.recording.storage import Storage
+from transientcam_server.recording.storage import Storage, open_unknown
 
 _Array = NDArray[Any]
 
@@ -39,9 +39,9 @@ _LASERS: Final = (2, 4)
 def is_tal(path: Path) -> bool:
     """Return whether a file is HDF5 with an impulse response of tal."""
     try:
-        with swmr.open_file(path, "r") as file:
+        with open_unknown(path) as file:
             return "H" in file and "raw" not in file
-    except OSError:
+    except (OSError, ValueError):
         return False
 
 
@@ -115,7 +115,7 @@ def require_some_finite(path: Path, key: str, planes: _Array) -> None:
 
 def _of_hdf5(path: Path) -> dict[str, _Array]:
     try:
-        with swmr.open_file(path, "r") as file:
+        with open_unknown(path) as file:
             storage = Storage(file, path.stat().st_size * _DEFLATE_AT_MOST)
             return {
                 name: storage.values(name)

@@ -8,12 +8,11 @@ Neither times nor the lens are in it; a lens is in a file of its own, in
 
 import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,6 +27,7 @@ from transientcam_server.errors.exceptions import InputError
 from transientcam_server.imaging.calibration import FACTORY_ID
 from transientcam_server.imaging.lens import Intrinsics
 from transientcam_server.recording import Header, RecordingWriter
+from transientcam_server.recording.storage import open_unknown
 from transientcam_server.settings import ReconstructionSettings
 
 Progress = Callable[[int, int], None]
@@ -135,11 +135,11 @@ def _opened(path: Path) -> Iterator[Any]:
     """Open an HDF5 file; h5py says that it is none by an OSError without a number."""
     with path.open("rb"):  # an error of the system is said as such
         pass
-    try:
-        file = h5py.File(path, "r")
-    except OSError as error:
-        raise InputError(str(path), "the file", "not readable as HDF5", "HDF5") from error
-    with file:
+    with ExitStack() as opened:
+        try:
+            file = opened.enter_context(open_unknown(path))
+        except (OSError, ValueError) as error:
+            raise InputError(str(path), "the file", "not readable as HDF5", "HDF5") from error
         yield file
 
 

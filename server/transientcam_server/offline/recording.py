@@ -21,6 +21,7 @@ from transientcam_server.imaging.requirements import unmet
 from transientcam_server.offline.computing import KNOWN, ComputedFrame
 from transientcam_server.offline.formats import SINKS, Block, Content, Row, sink_of, write
 from transientcam_server.recording import swmr
+from transientcam_server.recording.heaps import require_sound_heaps
 from transientcam_server.recording.product_stores import FORMAT
 from transientcam_server.recording.reader import Recording
 from transientcam_server.recording.recipe import recorded_recipe
@@ -233,13 +234,15 @@ def _resumed(part: Path, document: Mapping[str, str]) -> swmr.File:
     """Open an unfinished file to append to, repaired first."""
     scratch = part.with_name(part.name + ".resuming")
     try:
+        with part.open("rb") as stream:
+            require_sound_heaps(stream)
         with swmr.open_unfinished(part) as begun:
             require_same(part, begun.attrs, document)
             products: Sequence[str] = json.loads(document["products"])[:-1]
             rows = min(len(begun[name]) for name in (*products, *_SERIES))
             salvage(begun, scratch, rows, row_axis="frame")
         scratch.rename(part)
-    except (KeyError, RuntimeError) as error:
+    except (KeyError, RuntimeError, ValueError) as error:
         raise InputError(str(part), "its content", swmr.in_words(error), "products") from error
     finally:
         scratch.unlink(missing_ok=True)

@@ -1,7 +1,6 @@
 """Reads recordings, finished or not: every frame as the camera gave it."""
 
 import contextlib
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -12,8 +11,8 @@ from numpy.typing import NDArray
 
 from transientcam_driver import RawFrame
 from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
-from transientcam_server.recording import layout, swmr
-from transientcam_server.recording.heaps import require_sound_heaps
+from transientcam_server.recording import layout, lock, swmr
+from transientcam_server.recording.heaps import CheckedReader, require_sound_heaps
 from transientcam_server.recording.storage import Storage, read_rows
 
 
@@ -41,36 +40,35 @@ class Recording:
 
     def __init__(self, path: Path, *, source: IO[bytes] | None = None) -> None:
         self.path = path
-        self._source = source
+        self._open = contextlib.ExitStack()
+        # the system's errors are clearer than h5py's
+        stream = self._open.enter_context(path.open("rb") if source is None else source)
         try:
-            if source is not None:
-                size_bytes = source.seek(0, os.SEEK_END)
-            else:
-                with path.open("rb") as stream:  # its errors are clearer than h5py's
-                    size_bytes = os.fstat(stream.fileno()).st_size
+            checked = self._open.enter_context(CheckedReader(stream))
         except OSError:
-            self._close_source()
+            self.close()
             raise
         try:
-            with contextlib.nullcontext(source) if source else path.open("rb") as stream:
-                require_sound_heaps(stream)
             # the writer of an unfinished one may still run: only SWMR readers may open it
             unfinished = source is None and path.name.endswith(".part")
-            self._file = (
-                swmr.open_unfinished(path) if unfinished else swmr.open_file(source or path, "r")
-            )
-        except Exception as error:
-            raise NotARecording(str(path), _reason(error)) from error
-        try:
-            storage = Storage(self._file, size_bytes)
+            if unfinished and not lock.is_taken(path):  # nor is it read by a recovery
+                require_sound_heaps(stream)
+            opened = swmr.open_unfinished(path) if unfinished else swmr.open_file(checked, "r")
+            self._file = self._open.enter_context(opened)
+            storage = Storage(self._file, checked.size_bytes)
             self.header = layout.read_header(storage)
             self.labels = layout.read_labels(storage, self.header.applied)
             self._series = layout.read_series(storage)
-            self._raw = storage.dataset("raw", axes=4)
             self.annotations = layout.read_document(storage, "annotations")
             """What people wrote about it, as JSON."""
             self.end = layout.read_end(storage)
             """How it ended; empty while it has not, or when its writer died."""
+            if source is None and not unfinished:
+                # its texts are read: images come faster without a look at every byte
+                self._file.close()
+                self._file = self._open.enter_context(swmr.open_file(path, "r"))
+                storage = Storage(self._file, checked.size_bytes)
+            self._raw = storage.dataset("raw", axes=4)
         except Exception as error:  # h5py raises anything of a damaged file
             self.close()
             raise NotARecording(str(path), _reason(error)) from error
@@ -140,12 +138,7 @@ class Recording:
     def close(self) -> None:
         """Close the file."""
         with contextlib.suppress(Exception):  # of a damaged one
-            self._file.close()
-        self._close_source()
-
-    def _close_source(self) -> None:
-        if self._source is not None:
-            self._source.close()
+            self._open.close()
 
     def __enter__(self) -> "Recording":
         return self

@@ -8,6 +8,7 @@ from typing import Final
 
 from transientcam_server.errors.exceptions import DamagedFrame, NotARecording, RecordingInUse
 from transientcam_server.recording import layout, lock, swmr
+from transientcam_server.recording.heaps import require_sound_heaps
 from transientcam_server.recording.reader import Recording
 from transientcam_server.recording.salvage import rebuild, salvage
 from transientcam_server.recording.seal import sealed_frames
@@ -80,6 +81,8 @@ def _copied(part: Path) -> Path:
     copy = part.with_name(part.name.removesuffix(".part") + SCRATCH_SUFFIX)
     try:
         _require_room(part)
+        with part.open("rb") as stream:
+            require_sound_heaps(stream)
         sealed = sealed_frames(part)
         frames = len(sealed) if sealed else _salvaged(part, copy)
         if sealed:

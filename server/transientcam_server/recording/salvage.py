@@ -8,7 +8,6 @@ import numpy as np
 
 from transientcam_server.errors.exceptions import NotARecording
 from transientcam_server.recording import layout, swmr
-from transientcam_server.recording.heaps import require_sound_heaps
 from transientcam_server.recording.seal import SealedFrame, seal
 from transientcam_server.recording.storage import Storage, is_one_chunk_a_row
 
@@ -68,8 +67,6 @@ def rebuild(part: Path, target: Path, frames: Sequence[SealedFrame]) -> None:
         If it cannot be written.
     """
     try:
-        with part.open("rb") as stream:
-            require_sound_heaps(stream)
         with swmr.open_unfinished(part) as source:
             storage = Storage(source, part.stat().st_size)
             storage.attribute("seals")

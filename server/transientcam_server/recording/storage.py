@@ -6,8 +6,11 @@ file itself, a chunk expands to its stated size at most, and all that is read at
 more memory than the file has bytes.
 """
 
+import contextlib
 import itertools
 import math
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, Final
 
 import h5py
@@ -15,6 +18,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from transientcam_server.recording import swmr
+from transientcam_server.recording.heaps import CheckedReader
 
 SMALL_BYTES: Final = 16 * 1024**2
 """May be read of any file: one that was repacked can hold little data in still less space."""
@@ -26,6 +30,21 @@ _HARD: Final = h5py.h5l.TYPE_HARD  # pyright: ignore[reportAttributeAccessIssue]
 _DEFLATE: Final = h5py.h5z.FILTER_DEFLATE
 _PIPELINES: Final = ((), (_DEFLATE,), (h5py.h5z.FILTER_SHUFFLE, _DEFLATE))
 """Filters that are undone here, in the order of writing."""
+
+
+@contextlib.contextmanager
+def open_unknown(path: Path) -> Iterator[swmr.File]:
+    """Open a file of unknown origin to read it.
+
+    Raises
+    ------
+    ValueError
+        If its texts are damaged, as of every read.
+    OSError
+        If it cannot be read, or is no HDF5 file; h5py may raise anything else of a damaged one.
+    """
+    with CheckedReader(path.open("rb")) as checked, swmr.open_file(checked, "r") as file:
+        yield file
 
 
 class Storage:

@@ -1,10 +1,12 @@
-"""Damage to HDF5 files as bytes: flipped, cut, moved, and changed with the checksum made right."""
+"""Damage to HDF5 files as bytes: flipped, cut, moved, torn, or with checksums made right."""
 
 import random
+import re
 import struct
 from collections.abc import Callable, Iterator
 from typing import Final
 
+_HEAP_BYTES: Final = 4096
 _MASK: Final = 0xFFFFFFFF
 _EXTREMES: Final = (
     0,
@@ -117,7 +119,21 @@ def resummed(data: bytes, draw: random.Random) -> bytes:
     return bytes(changed)
 
 
+def torn(data: bytes, draw: random.Random) -> bytes:
+    """Damage a heap of texts: a sector of it lost, or an object that states another size."""
+    heaps = [match.start() for match in re.finditer(b"GCOL\1", data)]
+    changed = bytearray(data)
+    at, inside = draw.choice(heaps), draw.randrange(0, _HEAP_BYTES, 8)
+    if draw.random() < 0.5:
+        size = min(draw.choice((8, 16, 512, _HEAP_BYTES)), len(data) - at - inside)
+        changed[at + inside : at + inside + size] = bytes(size)
+    else:
+        at += draw.choice((8, 16 + inside))
+        changed[at : at + 8] = draw.choice(_EXTREMES).to_bytes(8, "little")
+    return bytes(changed[: len(data)])
+
+
 DAMAGES: Final[dict[str, Callable[[bytes, random.Random], bytes]]] = {
-    each.__name__: each for each in (flipped, cut, overwritten, resummed)
+    each.__name__: each for each in (flipped, cut, overwritten, resummed, torn)
 }
 """All kinds by name."""

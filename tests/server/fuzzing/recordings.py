@@ -27,7 +27,15 @@ from fastapi import FastAPI
 
 from tests.server.fuzzing.damage import DAMAGES, lookup3
 from tests.server.fuzzing.forgery import BOMB_BYTES, FORGERIES, bomb
-from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, frame, header, record
+from tests.server.recording.made import (
+    APPLIED,
+    HEIGHT,
+    WIDTH,
+    frame,
+    header,
+    record,
+    rewrite_texts_at_the_end,
+)
 from transientcam_driver import DriverError, open_camera
 from transientcam_server.api.app import build_app
 from transientcam_server.api.documents.recording import document
@@ -84,7 +92,7 @@ def in_memory() -> str | None:
 
 
 def seeds(directory: Path) -> list[Path]:
-    """Make what cases are made of: whole, calibrated, and unfinished recordings."""
+    """Make what cases are made of: whole, calibrated, rewritten and unfinished recordings."""
     directory.mkdir(parents=True, exist_ok=True)
     planes = np.exp(1j * np.arange(3 * HEIGHT * WIDTH)).reshape(3, HEIGHT, WIDTH)
     bad = np.zeros((HEIGHT, WIDTH), bool)
@@ -95,6 +103,8 @@ def seeds(directory: Path) -> list[Path]:
         calibration_planes=planes.astype(np.complex64),
         calibration_bad=bad,
     )
+    rewritten = record(directory / "rewritten.h5", FRAMES)
+    rewrite_texts_at_the_end(rewritten)
     writer = RecordingWriter(directory / "left.h5", header())
     for number in range(FRAMES):
         writer.append(frame(number))
@@ -102,7 +112,7 @@ def seeds(directory: Path) -> list[Path]:
     unfinished.write_bytes(writer.part.read_bytes())
     writer.close({})
     writer.path.unlink()
-    return [whole, calibrated, unfinished]
+    return [whole, calibrated, rewritten, unfinished]
 
 
 def forge(seed: Path, target: Path, kind: str, draw: random.Random) -> None:

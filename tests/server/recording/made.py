@@ -5,6 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from transientcam_driver import Capabilities, RawFrame, Sequence, open_camera
@@ -79,3 +80,14 @@ def record(
         writer.append(frame(number))
     writer.close({"reason": "stopped", "frames": frames, "duration_s": 0.1 * frames})
     return path
+
+
+def rewrite_texts_at_the_end(path: Path) -> None:
+    """Rewrite the texts of a recording behind 3 MiB of data; its title is another then."""
+    with h5py.File(path, "r+") as file:
+        file["padding"] = np.random.default_rng(0).integers(256, size=3 * 1024**2, dtype=np.uint8)
+        texts = {name: value for name, value in file.attrs.items() if isinstance(value, str)}
+        for name, value in texts.items():
+            del file.attrs[name]
+            file.attrs[name] = value
+        file.attrs["title"] = "rewritten"

@@ -1,14 +1,21 @@
 """Heaps of texts that lead nowhere: without a look at them first, HDF5 never comes back."""
 
 import io
+from collections.abc import Callable
 from pathlib import Path
+from typing import IO
 
+import numpy as np
 import pytest
 
-from tests.server.recording.made import record
+from tests.server.recording.made import frame, record, rewrite_texts_at_the_end
 from transientcam_server.errors.exceptions import NotARecording
 from transientcam_server.recording import Recording, recover
-from transientcam_server.recording.heaps import require_sound_heaps
+from transientcam_server.recording.heaps import (
+    MAX_HEAP_BYTES,
+    CheckedReader,
+    require_sound_heaps,
+)
 
 
 def heap(*objects: tuple[int, int, int], size: int = 4096) -> io.BytesIO:
@@ -34,15 +41,66 @@ DAMAGED = {
 }
 
 
+def byte_by_byte(stream: IO[bytes]) -> None:
+    """Read a file in the smallest pieces."""
+    reader = CheckedReader(stream)
+    while reader.read(1):
+        pass
+
+
+READERS: dict[str, Callable[[IO[bytes]], object]] = {
+    "all at once": require_sound_heaps,
+    "as it is read": lambda stream: CheckedReader(stream).read(),
+    "byte by byte": byte_by_byte,
+}
+by_all_readers = pytest.mark.parametrize("read", READERS.values(), ids=READERS)
+
+
+@by_all_readers
 @pytest.mark.parametrize("name", SOUND)
-def test_objects_that_follow_one_another_are_sound(name: str) -> None:
-    require_sound_heaps(heap(*SOUND[name]))
+def test_objects_that_follow_one_another_are_sound(
+    name: str, read: Callable[[IO[bytes]], object]
+) -> None:
+    read(heap(*SOUND[name]))
 
 
+@by_all_readers
 @pytest.mark.parametrize("name", DAMAGED)
-def test_objects_that_lead_nowhere_are_damage(name: str) -> None:
+def test_objects_that_lead_nowhere_are_damage(
+    name: str, read: Callable[[IO[bytes]], object]
+) -> None:
     with pytest.raises(ValueError, match="heap of texts at 6"):
-        require_sound_heaps(heap(*DAMAGED[name]))
+        read(heap(*DAMAGED[name]))
+
+
+@by_all_readers
+@pytest.mark.parametrize("size", [MAX_HEAP_BYTES + 8, 10**9])
+def test_a_heap_larger_than_any_text_or_the_file_is_damage(
+    size: int, read: Callable[[IO[bytes]], object]
+) -> None:
+    torn = heap((1, 10, 16)).getvalue()
+    stated = torn[:14] + size.to_bytes(8, "little") + torn[22:]
+    with pytest.raises(ValueError, match="heap of texts at 6"):
+        read(io.BytesIO(stated))
+
+
+@by_all_readers
+def test_data_that_begin_like_a_heap_of_no_possible_size_are_none(
+    read: Callable[[IO[bytes]], object],
+) -> None:
+    read(io.BytesIO(b"GCOL\1" + bytes(range(200, 256))))
+
+
+def test_what_is_read_is_what_the_file_holds() -> None:
+    data = np.random.default_rng(1).bytes(10_000)
+    reader = CheckedReader(io.BytesIO(data))
+    assert reader.readable()
+    assert reader.seekable()
+    assert reader.seek(-100, io.SEEK_END) == 9900
+    assert reader.read(1000) == data[9900:]
+    assert reader.seek(-50, io.SEEK_CUR) == 9950
+    assert reader.tell() == 9950
+    assert reader.read(7) == data[9950:9957]
 
 
 @pytest.mark.timeout(60)
@@ -60,3 +118,25 @@ def test_a_recording_of_which_a_sector_was_lost_is_no_recording(tmp_path: Path) 
     part = path.rename(path.with_name("torn.h5.part"))
     with pytest.raises(NotARecording, match="heap"):
         recover(part)
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("suffix", [".h5", ".h5.part"])
+def test_a_damaged_heap_behind_all_data_makes_no_recording(tmp_path: Path, suffix: str) -> None:
+    path = record(tmp_path / "far.h5", 2)
+    rewrite_texts_at_the_end(path)
+    at = path.read_bytes().rindex(b"GCOL\1")
+    assert at > 3 * 1024**2
+    path = path.rename(tmp_path / f"far{suffix}")
+    with Recording(path) as whole:
+        assert whole.header.name == "rewritten"
+        np.testing.assert_array_equal(whole.frame(1).images, frame(1).images)
+
+    data = bytearray(path.read_bytes())
+    data[at + 16 : at + 4096] = bytes(4080)
+    path.write_bytes(data)
+
+    with pytest.raises(NotARecording, match=f"heap of texts at {at}"):
+        Recording(path)
+    with path.open("rb") as stream, pytest.raises(NotARecording, match="heap of texts"):
+        Recording(Path("elsewhere"), source=stream)
