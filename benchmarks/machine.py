@@ -2,6 +2,7 @@
 
 import os
 import platform
+import subprocess
 from importlib.metadata import version
 from pathlib import Path
 
@@ -14,6 +15,12 @@ def machine() -> str:
     return (
         f"{_processor()}, {cores} cores, {system}, Python {platform.python_version()}, {versions}"
     )
+
+
+def commit_of(checkout: Path) -> str:
+    """Return the short name of the commit that a checkout is at."""
+    command = ["git", "-C", str(checkout), "rev-parse", "--short", "HEAD"]
+    return subprocess.run(command, capture_output=True, check=True, text=True).stdout.strip()
 
 
 def _processor() -> str:

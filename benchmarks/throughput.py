@@ -20,7 +20,7 @@ from typing import Final
 from urllib.request import Request, urlopen
 
 from benchmarks.daemon import Process, running
-from benchmarks.machine import machine
+from benchmarks.machine import commit_of, machine
 from benchmarks.viewers import Seen, Viewer, cut, watch
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
@@ -216,7 +216,7 @@ def main() -> None:
         costs,
         latencies,
         list(daemons),
-        against=arguments.against is not None,
+        against=arguments.against,
         duration_s=arguments.seconds,
     )
     print(page)
@@ -229,7 +229,7 @@ def report(
     latencies: Mapping[str, tuple[float, float]],
     daemons: list[str],
     *,
-    against: bool,
+    against: Path | None,
     duration_s: float,
 ) -> str:
     """Return the page."""
@@ -249,8 +249,8 @@ def report(
         f"{PACED_HZ[640] * duration_s:.0f} frames, so expect some 20 % either way there.",
         "The estimator is Pisarenko's, or the likelihood where that is said.",
     ]
-    if against:
-        lines += ["", "*Before* is the daemon of commit 0553079."]
+    if against is not None:
+        lines += ["", f"*Before* is the daemon of commit {commit_of(against)}."]
     lines += [
         "",
         "| image | m | daemon | processor time, ms/frame | replay alone, ms/frame | frames/s |",

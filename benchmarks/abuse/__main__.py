@@ -4,8 +4,8 @@ Each attack goes on at full speed from 1 and from 16 connections against a daemo
 the simulated camera at the paper's video setting (Sec. 6.3: 18.6 Hz). Meanwhile a viewer streams
 range, /livez is asked, a lease lapses, the light is switched off, and SIGTERM ends it: half a
 minute each. With ``--write`` and the names of some attacks their lines of the page are replaced.
-``--against CHECKOUT`` attacks the daemon of another checkout too, for comparison;
-``--minutes 10`` mixes all attacks for so long instead.
+``--before CHECKOUT`` attacks the daemon of another checkout instead, from 1 connection, and writes
+the page's part that says what was before; ``--minutes 10`` mixes all attacks for so long instead.
 """
 
 import argparse
@@ -13,8 +13,9 @@ from pathlib import Path
 
 from benchmarks.abuse.attacks import ATTACKS
 from benchmarks.abuse.measuring import measure
-from benchmarks.abuse.page import PAGE, mixed_page, page, page_with, row
+from benchmarks.abuse.page import PAGE, mixed_page, page, page_with, page_with_before, row
 from benchmarks.abuse.soaking import soak
+from benchmarks.machine import commit_of
 
 CONNECTIONS = (1, 16)
 DURATION_S = 5.0
@@ -24,7 +25,7 @@ def main() -> None:
     """Attack, print, and with ``--write`` keep the page."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.abuse", description=__doc__)
     parser.add_argument("attacks", nargs="*", metavar="ATTACK", help=f"of {', '.join(ATTACKS)}")
-    parser.add_argument("--against", type=Path, help="another checkout, measured first")
+    parser.add_argument("--before", type=Path, help="another checkout, measured instead")
     parser.add_argument(
         "--connections", type=int, nargs="+", default=CONNECTIONS, help="from how many"
     )
@@ -41,20 +42,18 @@ def main() -> None:
         if arguments.write:
             PAGE.with_name("abuse-soak.md").write_text(text, encoding="utf-8")
         return
-    duration_s = arguments.seconds
+    duration_s, checkout = arguments.seconds, arguments.before
     found = []
     for name in arguments.attacks or ATTACKS:
-        for connections in arguments.connections:
-            before = None
-            if arguments.against is not None:
-                before = measure(
-                    name, connections, duration_s=duration_s, checkout=arguments.against
-                )
-            now = measure(name, connections, duration_s=duration_s)
-            found.append((name, connections, before, now))
+        for connections in arguments.connections if checkout is None else (1,):
+            seen = measure(name, connections, duration_s=duration_s, checkout=checkout)
+            found.append((name, connections, seen))
             print(row(*found[-1]), flush=True)
     command = _command(arguments)
-    if arguments.attacks and arguments.write:
+    if checkout is not None:
+        written = PAGE.read_text(encoding="utf-8")
+        text = page_with_before(written, found, command=command, commit=commit_of(checkout))
+    elif arguments.attacks and arguments.write:
         text = page_with(PAGE.read_text(encoding="utf-8"), found, command=command)
     else:
         text = page(found, duration_s=duration_s, command=command)
@@ -70,8 +69,8 @@ def _command(arguments: argparse.Namespace) -> str:
         parts += ["--connections", *map(str, arguments.connections)]
     if arguments.seconds != DURATION_S:
         parts.append(f"--seconds {arguments.seconds:g}")
-    if arguments.against is not None:
-        parts.append(f"--against {arguments.against.name}")
+    if arguments.before is not None:
+        parts.append("--before CHECKOUT")
     return " ".join([*parts, "--write"])
 
 

@@ -18,7 +18,8 @@ LIGHT_BAR_S: Final = 1.0
 GROWN_BAR_BYTES: Final = 64 * _MIB
 END_BAR_S: Final = 5.0
 
-Found = tuple[str, int, Seen | None, Seen]
+Found = tuple[str, int, Seen]
+_BEFORE: Final = "## Before"
 _COLUMNS: Final = (
     "attack",
     "connections",
@@ -47,13 +48,11 @@ def met(seen: Seen) -> list[str]:
     return [name for name, held in limits.items() if not held]
 
 
-def row(name: str, connections: int, before: Seen | None, now: Seen) -> str:
-    """Return a line of the table, with what was before in parentheses."""
-    cells = [name, str(connections)]
-    for index, cell in enumerate(_cells(now)):
-        cells.append(cell if before is None else f"{cell} ({_cells(before)[index]})")
-    missed = met(now)
-    return "| " + " | ".join([*cells, "missed: " + ", ".join(missed) if missed else "met"]) + " |"
+def row(name: str, connections: int, seen: Seen) -> str:
+    """Return a line of the table."""
+    missed = met(seen)
+    bars = "missed: " + ", ".join(missed) if missed else "met"
+    return "| " + " | ".join([name, str(connections), *_cells(seen), bars]) + " |"
 
 
 def _cells(seen: Seen) -> list[str]:
@@ -74,7 +73,6 @@ def _seconds(value: float | None) -> str:
 
 def page(found: Sequence[Found], *, duration_s: float, command: str) -> str:
     """Return the page."""
-    compared = any(before is not None for _, _, before, _ in found)
     return "\n".join(
         [
             "# Attacks by clients",
@@ -88,11 +86,9 @@ def page(found: Sequence[Found], *, duration_s: float, command: str) -> str:
             "address, and who shares an attacker's address shares its limits (one line shows "
             "that). No attack has a token;",
             f"the daemon asks for none, so that nothing else refuses them. Healthy clients come "
-            f"from {HEALTHY}." + (" In parentheses: before." if compared else ""),
+            f"from {HEALTHY}.",
             "",
-            f"| {' | '.join(_COLUMNS)} |",
-            "|---|" + "---:|" * (len(_COLUMNS) - 2) + "---|",
-            *(row(*each) for each in found),
+            *_table(found),
             "",
             "- frames: of one viewer of range, over those without an attack; bar "
             f"{FRAMES_BAR:.0%}. With TLS, frames captured.",
@@ -110,9 +106,29 @@ def page(found: Sequence[Found], *, duration_s: float, command: str) -> str:
     )
 
 
+def page_with_before(text: str, found: Sequence[Found], *, command: str, commit: str) -> str:
+    """Return a page with a part, new or written anew, that says what was before."""
+    part = [
+        _BEFORE,
+        "",
+        f"The daemon of commit {commit}, without any of the limits that the one above has. "
+        f"Written by `{command}` on {machine()}.",
+        "",
+        *_table(found),
+        "",
+    ]
+    return text.partition(_BEFORE)[0].rstrip() + "\n\n" + "\n".join(part)
+
+
+def _table(found: Sequence[Found]) -> list[str]:
+    head = [f"| {' | '.join(_COLUMNS)} |", "|---|" + "---:|" * (len(_COLUMNS) - 2) + "---|"]
+    return head + [row(*each) for each in found]
+
+
 def page_with(text: str, found: Sequence[Found], *, command: str) -> str:
     """Return a page with some of its lines measured anew or added, which it then says."""
-    lines = text.splitlines()
+    text, begin, before = text.partition(_BEFORE)
+    lines = text.rstrip().splitlines()
     for each in found:
         name, connections, *_ = each
         ours = f"| {name} | {connections} |"
@@ -123,7 +139,7 @@ def page_with(text: str, found: Sequence[Found], *, command: str) -> str:
             lines.insert(place, row(*each))
     names = ", ".join(dict.fromkeys(name for name, *_ in found))
     again = f"- Measured again later, {names}: `{command}` on {machine()}."
-    return "\n".join([*lines, again, ""])
+    return "\n".join([*lines, again, "", begin + before])
 
 
 def mixed_page(result: Soak) -> str:

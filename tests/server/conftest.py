@@ -10,7 +10,7 @@ from fsspec.implementations.http import HTTPFileSystem
 from fsspec.implementations.reference import ReferenceFileSystem
 from zarr.core.sync import cleanup_resources
 
-from tests.server.contract import hold_to_contract
+from tests.server.contract import client_of
 from tests.serving import Served, serving
 
 
@@ -32,8 +32,7 @@ def steady_daemon() -> Iterator[Served]:
 @pytest.fixture(scope="module")
 def steady(steady_daemon: Served) -> Iterator[httpx.Client]:
     """A client of the shared daemon, which has a frame already."""
-    with httpx.Client(base_url=steady_daemon.url, timeout=60.0) as client:
-        hold_to_contract(client, steady_daemon.app)
+    with client_of(steady_daemon) as client:
         client.get("/api/v1/frames/latest", params={"wait_s": 10.0})
         yield client
 
@@ -62,6 +61,5 @@ def zarr_clients() -> Iterator[None]:
 @pytest.fixture
 def http(served: Served) -> Iterator[httpx.Client]:
     """A client whose every answer is checked against the daemon's own OpenAPI document."""
-    with httpx.Client(base_url=served.url, timeout=60.0) as client:
-        hold_to_contract(client, served.app)
+    with client_of(served) as client:
         yield client

@@ -1,19 +1,22 @@
 """Every answer against the OpenAPI document: path, status, media type and JSON body."""
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import httpx
 import jsonschema  # type: ignore[import-untyped]  # its stubs are another package
 from fastapi import FastAPI
 
+from tests.serving import Served
 from transientcam_driver import Capabilities
 
 _API = re.compile(r"^/(api|livez|readyz|metrics)")
 _documents: dict[Capabilities, dict[str, Any]] = {}
 
 
-def hold_to_contract(client: httpx.Client, app: FastAPI) -> None:
+def _hold_to_contract(client: httpx.Client, app: FastAPI) -> None:
     """Check every answer that ``client`` gets from ``app`` from now on."""
     # making the document takes half a second, and it depends on nothing but the camera
     capabilities = app.state.service.camera.capabilities
@@ -26,6 +29,17 @@ def hold_to_contract(client: httpx.Client, app: FastAPI) -> None:
         check_answer(document, response)
 
     client.event_hooks["response"].append(check)
+
+
+@contextmanager
+def client_of(served: Served, path: str = "") -> Iterator[httpx.Client]:
+    """Give a client of a daemon, below a path, every answer of which is held to the contract.
+
+    It waits longer than any answer takes on a laden machine.
+    """
+    with httpx.Client(base_url=served.url + path, timeout=300.0) as client:
+        _hold_to_contract(client, served.app)
+        yield client
 
 
 def check_answer(document: dict[str, Any], response: httpx.Response) -> None:

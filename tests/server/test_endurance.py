@@ -12,7 +12,7 @@ import httpx
 import numpy as np
 import pytest
 
-from tests.server.contract import hold_to_contract
+from tests.server.contract import client_of
 from tests.server.streaming import Client, streaming
 from tests.serving import Served, serving
 from transientcam import wire
@@ -39,8 +39,7 @@ def served(directory: Path) -> Iterator[Served]:
 
 @pytest.fixture
 def http(served: Served) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=served.url + "/api/v1/", timeout=60.0) as client:
-        hold_to_contract(client, served.app)
+    with client_of(served, "/api/v1/") as client:
         yield client
 
 

@@ -10,7 +10,7 @@ import httpx
 import pytest
 from starlette.datastructures import Headers
 
-from tests.server.contract import hold_to_contract
+from tests.server.contract import client_of
 from tests.server.streaming import streaming
 from tests.serving import Served, serving
 from transientcam import Camera, wire
@@ -43,8 +43,7 @@ def daemon(file: TokenFile, tokens: dict[str, str]) -> Iterator[Served]:
 
 @pytest.fixture
 def http(daemon: Served) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=daemon.url, timeout=60.0) as client:
-        hold_to_contract(client, daemon.app)
+    with client_of(daemon) as client:
         yield client
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from tests.server.contract import hold_to_contract
+from tests.server.contract import client_of
 from tests.serving import Served, serving
 from tests.waiting import wait_until
 from transientcam import Camera, wire
@@ -29,8 +29,7 @@ def bench(tmp_path: Path) -> Iterator[Served]:
 
 @pytest.fixture
 def http(bench: Served) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=bench.url, timeout=60.0) as client:
-        hold_to_contract(client, bench.app)
+    with client_of(bench) as client:
         yield client
 
 
@@ -82,9 +81,8 @@ def test_harmonics_are_measured_by_a_phase_sweep_and_taken_out(tmp_path: Path) -
     kept = {"directory": tmp_path / "kept"}
     with (
         serving("sim:calibration?device=prototype", calibrations=kept) as daemon,
-        httpx.Client(base_url=daemon.url, timeout=60.0) as http,
+        client_of(daemon) as http,
     ):
-        hold_to_contract(http, daemon.app)
         sub_phases = {"scheme": "arccos", "n": 4}
         # two frequencies have four sums of opposite images, which find spoilt ones in each take
         sequence = QUICK | {"harmonics": 2, "sub_phases": sub_phases}
@@ -226,9 +224,8 @@ def test_a_disk_that_takes_nothing_is_a_problem_and_no_more(tmp_path: Path) -> N
     occupied.write_text("no directory")
     with (
         serving("sim:calibration", calibrations={"directory": occupied / "kept"}) as daemon,
-        httpx.Client(base_url=daemon.url, timeout=60) as http,
+        client_of(daemon) as http,
     ):
-        hold_to_contract(http, daemon.app)
         sent = http.post(f"{CALIBRATIONS}/import", content=b"PK")
         job = measured(http)
         assert next_meta(http)["calibration_id"] == "nominal"
@@ -243,9 +240,8 @@ def test_a_file_beyond_the_limit_is_refused(tmp_path: Path) -> None:
     limits = {"directory": tmp_path, "max_bytes": 2048}
     with (
         serving("sim:calibration", calibrations=limits) as daemon,
-        httpx.Client(base_url=daemon.url, timeout=60) as http,
+        client_of(daemon) as http,
     ):
-        hold_to_contract(http, daemon.app)
         answer = http.post(f"{CALIBRATIONS}/import", content=b"\x00" * 4096)
 
     assert answer.status_code == 413

@@ -3,7 +3,7 @@
 import httpx
 import pytest
 
-from tests.server.contract import hold_to_contract
+from tests.server.contract import client_of
 from tests.serving import serving
 from transientcam_server.api import neighbours
 
@@ -16,9 +16,8 @@ def test_a_service_lists_one_that_announces_itself_and_what_its_camera_does(
     with (
         serving("sim:wall?noise=off", announce="on") as other,
         serving("sim:wall?noise=off", announce="auto") as asked,
-        httpx.Client(base_url=asked.url, timeout=60.0) as http,
+        client_of(asked) as http,
     ):
-        hold_to_contract(http, asked.app)
         capabilities = other.camera.capabilities
 
         def listed(state: str) -> dict[str, object]:

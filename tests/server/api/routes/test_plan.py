@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
-from tests.server.contract import hold_to_contract
+from tests.server.contract import client_of
 from tests.server.planning.calls import Endless, Here
 from tests.serving import Served, serving
 from transientcam import Camera
@@ -30,8 +30,7 @@ def noisy_daemon() -> Iterator[Served]:
 
 @pytest.fixture(scope="module")
 def noisy(noisy_daemon: Served) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=noisy_daemon.url, timeout=60.0) as client:
-        hold_to_contract(client, noisy_daemon.app)
+    with client_of(noisy_daemon) as client:
         client.get("/api/v1/frames/latest", params={"wait_s": 10.0})
         yield client
 

@@ -12,7 +12,7 @@ import xarray
 from fastapi import FastAPI
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from tests.server.contract import hold_to_contract
+from tests.server.contract import client_of
 from tests.server.recording.made import record
 from tests.serving import Served, serving
 from tests.waiting import wait_until
@@ -56,8 +56,7 @@ def daemon(directory: Path) -> Iterator[Served]:
 
 @pytest.fixture(scope="module")
 def http(daemon: Served) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=daemon.url, timeout=60.0) as client:
-        hold_to_contract(client, daemon.app)
+    with client_of(daemon) as client:
         yield client
 
 

@@ -10,7 +10,7 @@ import httpx
 import numpy as np
 import pytest
 
-from tests.server.contract import hold_to_contract
+from tests.server.contract import client_of
 from tests.server.recording.made import assert_same, record
 from tests.server.recording.test_recovery import abandoned
 from tests.serving import Served, serving
@@ -52,8 +52,7 @@ def captured(daemon: Served) -> list[RawFrame]:
 
 @pytest.fixture
 def http(daemon: Served) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=daemon.url, timeout=60.0) as client:
-        hold_to_contract(client, daemon.app)
+    with client_of(daemon) as client:
         yield client
 
 
@@ -385,9 +384,8 @@ def test_a_directory_that_cannot_be_written_is_a_problem_and_capture_goes_on(
     (tmp_path / "file").write_text("in the way")
     with (
         serving(recordings={"directory": tmp_path / "file" / "here"}) as served,
-        httpx.Client(base_url=served.url, timeout=60.0) as http,
+        client_of(served) as http,
     ):
-        hold_to_contract(http, served.app)
         refused = http.post(RECORDINGS, json={})
         assert refused.status_code == 507
         assert "Not a directory" in refused.json()["detail"]
@@ -406,9 +404,8 @@ def test_what_was_left_unfinished_is_recovered_at_the_start(directory: Path) -> 
     part = abandoned(directory / "left.h5", 4)
     with (
         serving(recordings={"directory": directory}) as served,
-        httpx.Client(base_url=served.url, timeout=60.0) as http,
+        client_of(served) as http,
     ):
-        hold_to_contract(http, served.app)
         document = finished(http, "left", unfinished="interrupted")
 
     assert document["state"] == "complete"
@@ -464,9 +461,8 @@ def test_a_recording_served_as_a_camera_gives_the_same_images_and_refuses_anothe
     path = directory / f"{recording}.h5"
     with (
         serving(f"recording:{path}?loop=on") as replayed,
-        httpx.Client(base_url=replayed.url, timeout=60.0) as again,
+        client_of(replayed) as again,
     ):
-        hold_to_contract(again, replayed.app)
         frame = wire.parse_frame(
             again.get("/api/v1/frames/latest/raw.msgpack", params={"wait_s": 10}).content
         )
