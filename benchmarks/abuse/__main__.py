@@ -9,6 +9,7 @@ the page's part that says what was before; ``--minutes 10`` mixes all attacks fo
 """
 
 import argparse
+import os
 from pathlib import Path
 
 from benchmarks.abuse.attacks import ATTACKS
@@ -43,6 +44,7 @@ def main() -> None:
             PAGE.with_name("abuse-soak.md").write_text(text, encoding="utf-8")
         return
     duration_s, checkout = arguments.seconds, arguments.before
+    load, _, _ = os.getloadavg()
     found = []
     for name in arguments.attacks or ATTACKS:
         for connections in arguments.connections if checkout is None else (1,):
@@ -52,7 +54,8 @@ def main() -> None:
     command = _command(arguments)
     if checkout is not None:
         written = PAGE.read_text(encoding="utf-8")
-        text = page_with_before(written, found, command=command, commit=commit_of(checkout))
+        commit = commit_of(checkout)
+        text = page_with_before(written, found, command=command, commit=commit, load=load)
     elif arguments.attacks and arguments.write:
         text = page_with(PAGE.read_text(encoding="utf-8"), found, command=command)
     else:

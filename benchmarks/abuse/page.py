@@ -106,13 +106,19 @@ def page(found: Sequence[Found], *, duration_s: float, command: str) -> str:
     )
 
 
-def page_with_before(text: str, found: Sequence[Found], *, command: str, commit: str) -> str:
-    """Return a page with a part, new or written anew, that says what was before."""
+def page_with_before(
+    text: str, found: Sequence[Found], *, command: str, commit: str, load: float
+) -> str:
+    """Return a page with a part, new or written anew, that says what was before.
+
+    ``load`` is the system's load average before the first attack.
+    """
     part = [
         _BEFORE,
         "",
-        f"The daemon of commit {commit}, without any of the limits that the one above has. "
-        f"Written by `{command}` on {machine()}.",
+        f"The daemon of commit {commit}, an older one, under the same attacks. "
+        f"Written by `{command}` on {machine()}. "
+        f"Other programs of the machine kept {load:.1f} processors busy before the first attack.",
         "",
         *_table(found),
         "",
