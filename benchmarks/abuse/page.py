@@ -118,7 +118,7 @@ def page_with_before(
         "",
         f"The daemon of commit {commit}, an older one, under the same attacks. "
         f"Written by `{command}` on {machine()}. "
-        f"Other programs of the machine kept {load:.1f} processors busy before the first attack.",
+        f"Other programs ran meanwhile: the load average before the first attack was {load:.1f}.",
         "",
         *_table(found),
         "",
