@@ -46,7 +46,6 @@ from transientcam_moments.likelihood.choice import (
 __all__ = ["likelihood_lane", "portable"]  # which gives the fits' arithmetic its meaning
 
 _MEAN = DELAY_RAD / TAIL_SHAPE
-_INTERLEAVE = 2
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -87,35 +86,50 @@ def _prepare(
 
 
 @njit(error_model="numpy")
-def _fit(
-    order: Any, returns: Any, unknowns: Any, steps: int, cosine: float, sine: float, data_r: Any,
-    data_i: Any, weight: Any, x: Any, y: Any, w: Any, rr: Any, ri: Any, active: Any, bar: Any,
+def _new(
+    order: Any, returns: Any, turns: Any, data_r: Any, data_i: Any, weight: Any, x: Any, y: Any,
+    w: Any, pr: Any, pi: Any, rr: Any, ri: Any,
 ) -> Any:  # fmt: skip
-    """Add a return and fit all of them, until `active` pixels have settled; return chi-square."""
+    """Add the best return for what the others leave; return what all of them leave."""
     m, last = len(order), len(returns) - 1
     like = data_r[0]
+    for j in range(m + 1):
+        rr[j], ri[j] = data_r[j], data_i[j]
+    for k in range(last):
+        sharp.powers(order, x[k], y[k], k, pr, pi)
+    sharp.remains(order, returns[1:], data_r, data_i, pr, pi, w, rr, ri)
     re, im = simd.registers(like, order, 1), simd.registers(like, order, 1)
     total = sharp.weigh_what_is_left(order, weight, rr, ri, re, im)
-    kr, ki = simd.matrix(like, order, 1), simd.matrix(like, order, 1)  # (m + 1)^2 are enough
-    sharp.overlaps(order, returns, weight, total, x, y, kr, ki)
-    flat = weight[0] / total
-    best, bx, by, bw = total * 0.0 - 1.0, total * 0.0, total * 0.0, total * 0.0
-    c, s = 1.0, 0.0
-    for _ in range(choice.phases_of(m)):
-        best, bx, by, bw = sharp.try_phase(
-            order, returns, flat, re, im, total, kr, ki, c, s, best, bx, by, bw
+    kr, ki = simd.matrix(like, order, 2), simd.matrix(like, order, 2)  # 2 (m + 1) are enough
+    sharp.overlaps(order, returns, weight, total, pr, pi, kr, ki)
+    best, apart, bx, by = 0.0 * total, 1.0 + 0.0 * total, 1.0 + 0.0 * total, 0.0 * total
+    for row in range(m + 2):
+        best, apart, bx, by = sharp.try_phases(
+            order, returns, turns, row, re, im, kr, ki, best, apart, bx, by
         )
-        c, s = c * cosine - s * sine, c * sine + s * cosine
-    x[last], y[last], w[last] = bx, by, bw
-    sharp.take_away(order, bx, by, bw, rr, ri)
-    cost = sharp.chi_square(order, weight, rr, ri)
+    x[last], y[last], w[last] = bx, by, best / (apart * total)
+    sharp.powers(order, bx, by, last, pr, pi)
+    sharp.remains(order, returns, data_r, data_i, pr, pi, w, rr, ri)
+    return sharp.chi_square(order, weight, rr, ri)
+
+
+@njit(error_model="numpy")
+def _fit(
+    order: Any, returns: Any, unknowns: Any, steps: int, turns: Any, data_r: Any, data_i: Any,
+    weight: Any, x: Any, y: Any, w: Any, pr: Any, pi: Any, rr: Any, ri: Any, active: Any, bar: Any,
+) -> Any:  # fmt: skip
+    """Add a return and fit all of them, until `active` pixels have settled; return chi-square."""
+    m = len(order)
+    cost = _new(order, returns, turns, data_r, data_i, weight, x, y, w, pr, pi, rr, ri)
     damping = simd.select(active, sharp.FIRST_DAMPING + 0.0 * cost, sharp.SETTLED)
     for _ in range(steps):
         if not simd.some(damping < sharp.SETTLED):
             break
         cost, damping = sharp.step(
-            order, returns, unknowns, data_r, data_i, weight, x, y, w, rr, ri, cost, damping, bar
+            order, returns, unknowns, data_r, data_i, weight, pr, pi, w, rr, ri, cost, damping, bar
         )
+    for k in range(len(returns)):
+        x[k], y[k] = pr[k * m], pi[k * m]
     return cost
 
 
@@ -128,10 +142,13 @@ def _fit_tail(
     like = data_r[0]
     x, y, w, v, ratio, t = choice.start_of_tail(x2, y2, w2, DELAY_RAD)
     d = ratio * _MEAN
+    ur, ui = simd.registers(like, order, 1), simd.registers(like, order, 1)
     qr, qi = simd.registers(like, order, 1), simd.registers(like, order, 1)
     rr, ri = simd.registers(like, order, 1), simd.registers(like, order, 1)
-    tail.shape(order, powers, d, qr, qi)
-    tail.remains(order, data_r, data_i, x, y, w, v, qr, qi, rr, ri)
+    lag = simd.registers(like, order, 1)
+    tail.shape(order, powers, d, lag, qr, qi)
+    tail.turn_back(order, data_r, data_i, x, y, ur, ui)
+    tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
     cost = sharp.chi_square(order, weight, rr, ri) + PRIOR * t * t
     damping = simd.select(allowed, sharp.FIRST_DAMPING + 0.0 * cost, sharp.SETTLED)
     bar = found[SCORE] - 4.0 * penalty
@@ -139,13 +156,10 @@ def _fit_tail(
         if not simd.some(damping < sharp.SETTLED):
             break
         x, y, w, v, d, t, cost, damping = tail.step(
-            order, powers, unknowns, data_r, data_i, weight, PRIOR, x, y, w, v, d, t, qr, qi, rr,
-            ri, cost, damping, bar,
+            order, powers, unknowns, data_r, data_i, weight, PRIOR, x, y, w, v, d, t, lag, qr, qi,
+            rr, ri, cost, damping, bar,
         )  # fmt: skip
-    choice.offer_tail(
-        order, powers, unknowns, weight, PRIOR, x, y, w, v, d, t, qr, qi, rr, ri, cost, penalty,
-        allowed, found,
-    )  # fmt: skip
+    choice.offer_tail(PRIOR, x, y, w, v, d, t, cost, penalty, allowed, found)
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -210,53 +224,64 @@ def write(
 
 @njit(forceinline=True, error_model="numpy")
 def fit_one(
-    order: Any, cosine: float, sine: float, b: Any, variance: Any, error: float, p: int, one: Any,
-    data_r: Any, data_i: Any, weight: Any, x: Any, y: Any, w: Any, rr: Any, ri: Any, found: Any,
+    order: Any, turns: Any, b: Any, variance: Any, error: float, p: int, one: Any, data_r: Any,
+    data_i: Any, weight: Any, x: Any, y: Any, w: Any, pr: Any, pi: Any, rr: Any, ri: Any,
+    found: Any,
 ) -> Any:  # fmt: skip
     """Load pixels and put one return in `found`; return their scale, numbers, use and penalty."""
     far = simd.infinity(one)
     scale, numbers, usable = _prepare(order, b, variance, error, p, one, data_r, data_i, weight)
     penalty = logarithm(numbers) + MARGIN
     choice.nothing(one, far, found)
-    for j in range(len(order) + 1):
-        rr[j], ri[j] = data_r[j], data_i[j]
     cost = _fit(
-        order, (0,), (0, 0), STEPS[0], cosine, sine, data_r, data_i, weight, x, y, w, rr, ri,
+        order, (0,), (0, 0), STEPS[0], turns, data_r, data_i, weight, x, y, w, pr, pi, rr, ri,
         usable, far,
     )  # fmt: skip
-    choice.offer_returns(order, (0,), (0, 0), weight, x, y, w, cost, penalty, one > 0.0, found)
+    choice.offer_returns((0,), x, y, w, cost, penalty, one > 0.0, found)
     return scale, numbers, usable, penalty
+
+
+@njit(error_model="numpy")
+def vary(order: Any, weight: Any, found: Any) -> None:
+    """Put the variances of what was chosen in `found`."""
+    if simd.some(choice.chosen((0,), found)):
+        choice.vary_returns(order, (0,), (0, 0), weight, found)
+    if simd.some(choice.chosen((0, 0), found)):
+        choice.vary_returns(order, (0, 0), (0, 0, 0, 0), weight, found)
+    if simd.some(choice.chosen((0, 0, 0), found)):
+        choice.vary_returns(order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, found)
+    if simd.some(choice.has_tail(found)):
+        choice.vary_tail(order, (0, 0, 0), (0, 0, 0, 0), weight, PRIOR, found)
 
 
 @njit(nogil=True, error_model="numpy")
 def fit_returns(
-    order: Any, slots: Any, cosine: float, sine: float, b: Any, variance: Any, error: float,
-    planes: Any, free: Any, count: Any, start: int, stop: int,
+    order: Any, slots: Any, turns: Any, b: Any, variance: Any, error: float, planes: Any, free: Any,
+    count: Any, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; each model where simpler ones leave enough."""
     m = len(order)
-    one = simd.ones(variance, _INTERLEAVE)
+    one = simd.ones(variance, 1)
     step, far = simd.width(one), simd.infinity(one)
     data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
     rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    pr, pi = simd.matrix(one, order, 2), simd.matrix(one, order, 2)  # 3 m are enough
     weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
     x, y, w = simd.registers(one, (), 3), simd.registers(one, (), 3), simd.registers(one, (), 3)
     for left in range(start, stop, step):
         p = min(left, stop - step)
         scale, numbers, usable, penalty = fit_one(
-            order, cosine, sine, b, variance, error, p, one, data_r, data_i, weight, x, y, w, rr,
+            order, turns, b, variance, error, p, one, data_r, data_i, weight, x, y, w, pr, pi, rr,
             ri, found,
         )  # fmt: skip
         more = found[SCORE] > 4.0 * penalty
         if m >= 2 and simd.some(more):
             cost = _fit(
-                order, (0, 0), (0, 0, 0, 0), STEPS[1], cosine, sine, data_r, data_i, weight, x, y,
-                w, rr, ri, more, far,
+                order, (0, 0), (0, 0, 0, 0), STEPS[1], turns, data_r, data_i, weight, x, y, w, pr,
+                pi, rr, ri, more, far,
             )  # fmt: skip
             allowed = more & (numbers >= 4.0)
-            choice.offer_returns(
-                order, (0, 0), (0, 0, 0, 0), weight, x, y, w, cost, penalty, allowed, found
-            )
+            choice.offer_returns((0, 0), x, y, w, cost, penalty, allowed, found)
             _fit_tail(
                 order, (0, 0, 0), (0, 0, 0, 0), data_r, data_i, weight, x, y, w, penalty, allowed,
                 found,
@@ -264,13 +289,11 @@ def fit_returns(
             more = more & (found[SCORE] > 6.0 * penalty) & (numbers >= 6.0)
             if m >= 3 and simd.some(more):
                 cost = _fit(
-                    order, (0, 0, 0), (0, 0, 0, 0, 0, 0), STEPS[2], cosine, sine, data_r, data_i,
-                    weight, x, y, w, rr, ri, more, found[SCORE] - 6.0 * penalty,
+                    order, (0, 0, 0), (0, 0, 0, 0, 0, 0), STEPS[2], turns, data_r, data_i, weight,
+                    x, y, w, pr, pi, rr, ri, more, found[SCORE] - 6.0 * penalty,
                 )  # fmt: skip
-                choice.offer_returns(
-                    order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, x, y, w, cost, penalty, more,
-                    found,
-                )  # fmt: skip
+                choice.offer_returns((0, 0, 0), x, y, w, cost, penalty, more, found)
+        vary(order, weight, found)
         write(slots, found, scale, numbers, usable, p, planes, free, count)
 
 
@@ -280,11 +303,10 @@ def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:
     real, cplx = real_arrays(precision), complex_arrays(precision)
     run = entry(
         fit_returns,
-        order_type(m), order_type(len(slots)), REAL, REAL, cplx[2], real[2], REAL, real[2],
+        order_type(m), order_type(len(slots)), real[2], cplx[2], real[2], REAL, real[2],
         COUNTS, COUNTS, PIXELS, PIXELS,
     )  # fmt: skip
-    turn = 2 * np.pi / choice.phases_of(m)
-    cosine, sine = float(np.cos(turn)), float(np.sin(turn))
+    turns = choice.turns_of(m).astype(precision)
 
     def lane(
         b: Any,
@@ -303,7 +325,7 @@ def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:
         free, count = empty(pixels, np.int32), empty(pixels, np.int32)
 
         def part(start: int, stop: int) -> None:
-            run(order, slots, cosine, sine, moments, noise, error, planes, free, count, start, stop)
+            run(order, slots, turns, moments, noise, error, planes, free, count, start, stop)
 
         spread(part, pixels)
         four = (planes[k * size : (k + 1) * size] for k in range(4))
