@@ -1,12 +1,17 @@
-"""The likelihood of few returns: the fits of `transientcam_moments.likelihood` in lanes."""
+"""The likelihood of few returns: the fits of `transientcam_moments.likelihood` in lanes.
+
+Pixels go through in blocks. Each model is fitted to the pixels that simpler ones leave something to
+explain, packed without gaps between stages, so that vectors are full; so are the pixels whose tail
+has not settled after a few steps. What a pixel gets does not depend on how it is packed.
+"""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numba import njit
 
-from transientcam_moments._kernels import portable, simd
+from transientcam_moments._kernels import simd
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
@@ -16,242 +21,304 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
+from transientcam_moments._kernels.fits import (
+    DAMPING,
+    fit,
+    fit_one,
+    start_tail,
+    step_tail,
+    vary,
+    write,
+)
+from transientcam_moments._kernels.packing import PIXELS_AT_ONCE, ROW, pack, put, take, unpack
 from transientcam_moments._kernels.pool import empty
-from transientcam_moments._kernels.returns import phase_of
 from transientcam_moments._lanes.parallel import Spread, at_once
-from transientcam_moments.likelihood import choice, sharp, tail
-from transientcam_moments.likelihood.arithmetic import logarithm
+from transientcam_moments.likelihood import choice, sharp
 from transientcam_moments.likelihood.choice import (
-    CHI_SQUARE,
-    COUNT,
-    DELAY_RAD,
-    LENGTH,
-    LENGTH_VARIANCE,
-    MARGIN,
+    FITTED,
     MOST_RETURNS,
-    PHASE_VARIANCE,
+    PLANES,
     PRIOR,
     SCORE,
     STEPS,
-    TAIL,
     TAIL_SHAPE,
     TAIL_STEPS,
-    TAIL_VARIANCE,
-    WEIGHT,
-    WEIGHT_VARIANCE,
-    X,
-    Y,
 )
 
-__all__ = ["likelihood_lane", "portable"]  # which gives the fits' arithmetic its meaning
-
-_MEAN = DELAY_RAD / TAIL_SHAPE
+TAIL_ROUNDS: Final = (3, 3, TAIL_STEPS - 6)
+"""Steps of a tail after each of which the pixels are packed that go on."""
+_FOUND: Final = (0,) * FITTED
+_STATE: Final = (0,) * 8
+# Rows of a room: what was found, the state of the tail, points and weights of two returns, four
+# numbers, and then the data: real and imaginary parts, and weights.
+_TAIL, _POINTS, _PENALTY, _NUMBERS, _SCALE, _USABLE, _DATA = FITTED, 22, 28, 29, 30, 31, 32
 
 
 @njit(forceinline=True, error_model="numpy")
-def _prepare(
-    order: Any, b: Any, variance: Any, error: float, p: int, one: Any, data_r: Any, data_i: Any,
-    weight: Any,
-) -> Any:  # fmt: skip
-    """Load pixels, their largest moment made 1; return that, how many numbers, and their use."""
-    m = len(order)
-    zero = 0.0 * one
-    size, poison, numbers, waves = zero, zero, zero, zero
-    for j in range(m + 1):
-        x, y = simd.load_complex(one, b[j], p)
-        v = simd.load(one, variance[j], p)
-        seen = (v > 0.0) & (v < simd.infinity(one))
-        x = simd.select(seen, x, 0.0)
-        y = simd.select(seen, y, 0.0) if j > 0 else zero
-        size = simd.maximum(size, simd.maximum(simd.absolute(x), simd.absolute(y)))
-        poison = poison + x * 0.0 + y * 0.0
-        numbers = numbers + simd.select(seen, one * (2.0 if j > 0 else 1.0), 0.0)
-        waves = waves + simd.select(seen, one * (1.0 if j > 0 else 0.0), 0.0)
-        data_r[j], data_i[j] = x, y
-        weight[j] = simd.select(seen, v, 0.0)
-    usable = (poison >= 0.0) & (size > 16.0 * simd.tiny(one)) & (size < simd.overflowing(one))
-    usable = usable & (waves > 0.0) & ~((weight[0] > 0.0) & ~(data_r[0] > 0.0))
-    scale = simd.select(usable, size, one)
-    inverse = simd.select(usable, 1.0 / scale, 0.0)
-    rounding = 4.0 * simd.eps(one)
-    for j in range(m + 1):
-        data_r[j] = simd.select(usable, data_r[j] * inverse, one)
-        data_i[j] = simd.select(usable, data_i[j] * inverse, 0.0)
-        seen = weight[j] > 0.0
-        std = simd.sqrt(simd.select(seen, weight[j], one)) * inverse
-        std = simd.minimum(simd.maximum(std, rounding), 1.0 / rounding)
-        each = 1.0 / (std * std + error * error)
-        weight[j] = simd.select(usable, simd.select(seen, each, 0.0), one)
-    return scale, simd.select(usable, numbers, one), usable
+def _put_data(order: Any, data_r: Any, data_i: Any, weight: Any, room: Any, at: int) -> None:
+    size = len(order) + 1
+    for j in range(size):
+        simd.store(room, (_DATA + j) * ROW + at, data_r[j])
+        simd.store(room, (_DATA + size + j) * ROW + at, data_i[j])
+        simd.store(room, (_DATA + 2 * size + j) * ROW + at, weight[j])
+
+
+@njit(forceinline=True, error_model="numpy")
+def _take_data(
+    order: Any, like: Any, data_r: Any, data_i: Any, weight: Any, room: Any, at: int
+) -> None:
+    size = len(order) + 1
+    for j in range(size):
+        data_r[j] = simd.load(like, room, (_DATA + j) * ROW + at)
+        data_i[j] = simd.load(like, room, (_DATA + size + j) * ROW + at)
+        weight[j] = simd.load(like, room, (_DATA + 2 * size + j) * ROW + at)
+
+
+@njit(forceinline=True, error_model="numpy")
+def _pack_data(
+    order: Any, mask: Any, data_r: Any, data_i: Any, weight: Any, room: Any, at: int
+) -> None:
+    size = len(order) + 1
+    for j in range(size):
+        simd.pack(room, (_DATA + j) * ROW + at, mask, data_r[j])
+        simd.pack(room, (_DATA + size + j) * ROW + at, mask, data_i[j])
+        simd.pack(room, (_DATA + 2 * size + j) * ROW + at, mask, weight[j])
 
 
 @njit(error_model="numpy")
-def _new(
-    order: Any, returns: Any, turns: Any, data_r: Any, data_i: Any, weight: Any, x: Any, y: Any,
-    w: Any, pr: Any, pi: Any, rr: Any, ri: Any,
-) -> Any:  # fmt: skip
-    """Add the best return for what the others leave; return what all of them leave."""
-    m, last = len(order), len(returns) - 1
-    like = data_r[0]
-    for j in range(m + 1):
-        rr[j], ri[j] = data_r[j], data_i[j]
-    for k in range(last):
-        sharp.powers(order, x[k], y[k], k, pr, pi)
-    sharp.remains(order, returns[1:], data_r, data_i, pr, pi, w, rr, ri)
-    re, im = simd.registers(like, order, 1), simd.registers(like, order, 1)
-    total = sharp.weigh_what_is_left(order, weight, rr, ri, re, im)
-    kr, ki = simd.matrix(like, order, 2), simd.matrix(like, order, 2)  # 2 (m + 1) are enough
-    sharp.overlaps(order, returns, weight, total, pr, pi, kr, ki)
-    best, apart, bx, by = 0.0 * total, 1.0 + 0.0 * total, 1.0 + 0.0 * total, 0.0 * total
-    for row in range(m + 2):
-        best, apart, bx, by = sharp.try_phases(
-            order, returns, turns, row, re, im, kr, ki, best, apart, bx, by
-        )
-    x[last], y[last], w[last] = bx, by, best / (apart * total)
-    sharp.powers(order, bx, by, last, pr, pi)
-    sharp.remains(order, returns, data_r, data_i, pr, pi, w, rr, ri)
-    return sharp.chi_square(order, weight, rr, ri)
+def _fit_one(
+    order: Any, turns: Any, b: Any, variance: Any, error: float, first: int, last: int, end: int,
+    all_rooms: Any, rooms: Any,
+) -> int:  # fmt: skip
+    """Fit one return to the pixels first..last; pack and count those that it leaves something of.
 
-
-@njit(error_model="numpy")
-def _fit(
-    order: Any, returns: Any, unknowns: Any, steps: int, turns: Any, data_r: Any, data_i: Any,
-    weight: Any, x: Any, y: Any, w: Any, pr: Any, pi: Any, rr: Any, ri: Any, active: Any, bar: Any,
-) -> Any:  # fmt: skip
-    """Add a return and fit all of them, until `active` pixels have settled; return chi-square."""
-    m = len(order)
-    cost = _new(order, returns, turns, data_r, data_i, weight, x, y, w, pr, pi, rr, ri)
-    damping = simd.select(active, sharp.FIRST_DAMPING + 0.0 * cost, sharp.SETTLED)
-    for _ in range(steps):
-        if not simd.some(damping < sharp.SETTLED):
-            break
-        cost, damping = sharp.step(
-            order, returns, unknowns, data_r, data_i, weight, pr, pi, w, rr, ri, cost, damping, bar
-        )
-    for k in range(len(returns)):
-        x[k], y[k] = pr[k * m], pi[k * m]
-    return cost
-
-
-@njit(error_model="numpy")
-def _fit_tail(
-    order: Any, powers: Any, unknowns: Any, data_r: Any, data_i: Any, weight: Any, x2: Any, y2: Any,
-    w2: Any, penalty: Any, allowed: Any, found: Any,
-) -> None:  # fmt: skip
-    """Fit a return with a tail from two returns on, and put it where it is the better model."""
-    like = data_r[0]
-    x, y, w, v, ratio, t = choice.start_of_tail(x2, y2, w2, DELAY_RAD)
-    d = ratio * _MEAN
-    ur, ui = simd.registers(like, order, 1), simd.registers(like, order, 1)
-    qr, qi = simd.registers(like, order, 1), simd.registers(like, order, 1)
-    rr, ri = simd.registers(like, order, 1), simd.registers(like, order, 1)
-    lag = simd.registers(like, order, 1)
-    tail.shape(order, powers, d, lag, qr, qi)
-    tail.turn_back(order, data_r, data_i, x, y, ur, ui)
-    tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
-    cost = sharp.chi_square(order, weight, rr, ri) + PRIOR * t * t
-    damping = simd.select(allowed, sharp.FIRST_DAMPING + 0.0 * cost, sharp.SETTLED)
-    bar = found[SCORE] - 4.0 * penalty
-    for _ in range(TAIL_STEPS):
-        if not simd.some(damping < sharp.SETTLED):
-            break
-        x, y, w, v, d, t, cost, damping = tail.step(
-            order, powers, unknowns, data_r, data_i, weight, PRIOR, x, y, w, v, d, t, lag, qr, qi,
-            rr, ri, cost, damping, bar,
+    `end` is behind the last pixel there is: the last vector ends there.
+    """
+    one = simd.ones(variance, 1)
+    step = simd.width(one)
+    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    pr, pi = simd.registers(one, order, 0), simd.registers(one, order, 0)
+    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
+    points = simd.registers(one, (), 6)
+    x, y, w = simd.registers(one, (), 1), simd.registers(one, (), 1), simd.registers(one, (), 1)
+    count = 0
+    for left in range(first, last, step):
+        scale, numbers, usable, penalty = fit_one(
+            order, turns, b, variance, error, min(left, end - step), one, data_r, data_i, weight, x,
+            y, w, pr, pi, rr, ri, found,
         )  # fmt: skip
-    choice.offer_tail(PRIOR, x, y, w, v, d, t, cost, penalty, allowed, found)
-
-
-@njit(forceinline=True, error_model="numpy")
-def write(
-    slots: Any, found: Any, scale: Any, numbers: Any, usable: Any, p: int, planes: Any, free: Any,
-    count: Any,
-) -> None:  # fmt: skip
-    """Write the attributes of `Likelihood`, its returns sorted by phase."""
-    one = scale / scale
-    nan, far = simd.nan(one), simd.infinity(one)
-    size = len(slots)
-    keys, values = simd.registers(one, slots, 0), simd.registers(one, slots, 0)
-    first, second = simd.registers(one, slots, 0), simd.registers(one, slots, 0)
-    with_tail = found[LENGTH] > 0.0
-    there = 0.0 * one
-    for k in range(size):
-        used = usable & (found[COUNT] > float(k)) & ((found[WEIGHT + k] > 0.0) | with_tail)
-        keys[k] = simd.select(used, phase_of(found[X + k], found[Y + k]), far)
-        values[k] = simd.select(used, found[WEIGHT + k] * scale, 0.0)
-        first[k] = simd.select(used, simd.sqrt(found[PHASE_VARIANCE + k]), nan)
-        second[k] = simd.select(used, simd.sqrt(found[WEIGHT_VARIANCE + k]) * scale, nan)
-        there = there + simd.select(used, one, 0.0)
-    for i in range(size - 1):
-        for k in range(size - 1 - i):
-            swap = keys[k] > keys[k + 1]
-            low, high = simd.minimum(keys[k], keys[k + 1]), simd.maximum(keys[k], keys[k + 1])
-            keys[k], keys[k + 1] = low, high
-            low, high = (
-                simd.select(swap, values[k + 1], values[k]),
-                simd.select(swap, values[k], values[k + 1]),
-            )
-            values[k], values[k + 1] = low, high
-            low, high = (
-                simd.select(swap, first[k + 1], first[k]),
-                simd.select(swap, first[k], first[k + 1]),
-            )
-            first[k], first[k + 1] = low, high
-            low, high = (
-                simd.select(swap, second[k + 1], second[k]),
-                simd.select(swap, second[k], second[k + 1]),
-            )
-            second[k], second[k + 1] = low, high
-    for k in range(size):
-        simd.store(planes[k], p, simd.select(keys[k] < far, keys[k], nan))
-        simd.store(planes[size + k], p, values[k])
-        simd.store(planes[2 * size + k], p, first[k])
-        simd.store(planes[3 * size + k], p, second[k])
-    tailed = usable & with_tail & (found[TAIL] > 0.0)
-    delay = float(TAIL_SHAPE) * found[LENGTH]
-    rest = 4 * size
-    simd.store(planes[rest], p, simd.select(tailed, found[TAIL] * scale, 0.0))
-    std = simd.sqrt(found[TAIL_VARIANCE]) * scale
-    simd.store(planes[rest + 1], p, simd.select(tailed, std, nan))
-    simd.store(planes[rest + 2], p, simd.select(tailed, delay, nan))
-    std = delay * simd.sqrt(found[LENGTH_VARIANCE])
-    simd.store(planes[rest + 3], p, simd.select(tailed, std, nan))
-    simd.store(planes[rest + 4], p, simd.select(usable, found[CHI_SQUARE], nan))
-    unknowns = simd.select(with_tail, 4.0 * one, 2.0 * found[COUNT])
-    simd.store(free, p, simd.select(usable, numbers - unknowns, 0.0))
-    simd.store(count, p, there)
-
-
-@njit(forceinline=True, error_model="numpy")
-def fit_one(
-    order: Any, turns: Any, b: Any, variance: Any, error: float, p: int, one: Any, data_r: Any,
-    data_i: Any, weight: Any, x: Any, y: Any, w: Any, pr: Any, pi: Any, rr: Any, ri: Any,
-    found: Any,
-) -> Any:  # fmt: skip
-    """Load pixels and put one return in `found`; return their scale, numbers, use and penalty."""
-    far = simd.infinity(one)
-    scale, numbers, usable = _prepare(order, b, variance, error, p, one, data_r, data_i, weight)
-    penalty = logarithm(numbers) + MARGIN
-    choice.nothing(one, far, found)
-    cost = _fit(
-        order, (0,), (0, 0), STEPS[0], turns, data_r, data_i, weight, x, y, w, pr, pi, rr, ri,
-        usable, far,
-    )  # fmt: skip
-    choice.offer_returns((0,), x, y, w, cost, penalty, one > 0.0, found)
-    return scale, numbers, usable, penalty
+        at = left - first
+        put(found, _FOUND, all_rooms, 0, at)
+        _put_data(order, data_r, data_i, weight, all_rooms, at)
+        simd.store(all_rooms, _SCALE * ROW + at, scale)
+        simd.store(all_rooms, _NUMBERS * ROW + at, numbers)
+        simd.store(all_rooms, _PENALTY * ROW + at, penalty)
+        simd.store(all_rooms, _USABLE * ROW + at, simd.select(usable, one, 0.0))
+        more = found[SCORE] > 4.0 * penalty
+        if simd.some(more):
+            points[0], points[1], points[2] = x[0], y[0], w[0]
+            pack(more, points, (0, 0, 0), rooms, _POINTS, count)
+            pack(more, found, _FOUND, rooms, 0, count)
+            _pack_data(order, more, data_r, data_i, weight, rooms, count)
+            simd.pack(rooms, _NUMBERS * ROW + count, more, numbers)
+            count += simd.pack(rooms, _PENALTY * ROW + count, more, penalty)
+    simd.store(rooms, _PENALTY * ROW + count, 0.0 * one)  # pixels behind are none
+    return count
 
 
 @njit(error_model="numpy")
-def vary(order: Any, weight: Any, found: Any) -> None:
-    """Put the variances of what was chosen in `found`."""
-    if simd.some(choice.chosen((0,), found)):
-        choice.vary_returns(order, (0,), (0, 0), weight, found)
-    if simd.some(choice.chosen((0, 0), found)):
-        choice.vary_returns(order, (0, 0), (0, 0, 0, 0), weight, found)
-    if simd.some(choice.chosen((0, 0, 0), found)):
-        choice.vary_returns(order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, found)
-    if simd.some(choice.has_tail(found)):
-        choice.vary_tail(order, (0, 0, 0), (0, 0, 0, 0), weight, PRIOR, found)
+def _fit_two(order: Any, turns: Any, rooms: Any, count: int, late: Any) -> int:
+    """Fit two returns, and first steps of a tail; pack and count the pixels that need more."""
+    one = simd.ones(rooms, 1)
+    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    pr, pi = simd.matrix(one, order, 2), simd.matrix(one, order, 2)  # 2 m are enough
+    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
+    points, state = simd.registers(one, (), 6), simd.registers(one, (), 8)
+    x, y, w = simd.registers(one, (), 2), simd.registers(one, (), 2), simd.registers(one, (), 2)
+    moving = 0
+    for at in range(0, count, simd.width(one)):
+        take(found, _FOUND, one, rooms, 0, at)
+        take(points, (0, 0, 0), one, rooms, _POINTS, at)
+        _take_data(order, one, data_r, data_i, weight, rooms, at)
+        penalty = simd.load(one, rooms, _PENALTY * ROW + at)
+        numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
+        active = penalty > 0.0
+        x[0], y[0], w[0] = points[0], points[1], points[2]
+        cost = fit(
+            order, (0, 0), (0, 0, 0, 0), STEPS[1], turns, data_r, data_i, weight, x, y, w, pr, pi,
+            rr, ri, active, simd.infinity(one),
+        )  # fmt: skip
+        allowed = active & (numbers >= 4.0)
+        choice.offer_returns((0, 0), x, y, w, cost, penalty, allowed, found)
+        put(found, _FOUND, rooms, 0, at)
+        for k in range(2):
+            points[3 * k], points[3 * k + 1], points[3 * k + 2] = x[k], y[k], w[k]
+        put(points, (0, 0, 0, 0, 0, 0), rooms, _POINTS, at)
+        start_tail(x, y, w, allowed, state)
+        bar = found[SCORE] - 4.0 * penalty
+        step_tail(
+            order, (0, 0, 0), (0, 0, 0, 0), TAIL_ROUNDS[0], data_r, data_i, weight, state, bar
+        )
+        put(state, _STATE, rooms, _TAIL, at)
+        moving += _pack_moving(order, one, data_r, data_i, weight, state, bar, late, moving)
+    simd.store(late, (_TAIL + DAMPING) * ROW + moving, sharp.SETTLED * one)
+    return moving
+
+
+@njit(forceinline=True, error_model="numpy")
+def _pack_moving(
+    order: Any, one: Any, data_r: Any, data_i: Any, weight: Any, state: Any, bar: Any, late: Any,
+    at: int,
+) -> int:  # fmt: skip
+    """Pack and count the pixels whose tail has not settled."""
+    more = state[DAMPING] < sharp.SETTLED
+    if not simd.some(more):
+        return 0
+    pack(more, state, _STATE, late, _TAIL, at)
+    _pack_data(order, more, data_r, data_i, weight, late, at)
+    return simd.pack(late, _PENALTY * ROW + at, more, bar)
+
+
+@njit(error_model="numpy")
+def _step_late(order: Any, steps: int, rooms: Any, count: int, late: Any) -> int:
+    """Take further steps of tails; pack and count the pixels that need more."""
+    one = simd.ones(rooms, 1)
+    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    weight, state = simd.registers(one, order, 1), simd.registers(one, (), 8)
+    moving = 0
+    for at in range(0, count, simd.width(one)):
+        take(state, _STATE, one, rooms, _TAIL, at)
+        _take_data(order, one, data_r, data_i, weight, rooms, at)
+        bar = simd.load(one, rooms, _PENALTY * ROW + at)
+        step_tail(order, (0, 0, 0), (0, 0, 0, 0), steps, data_r, data_i, weight, state, bar)
+        put(state, _STATE, rooms, _TAIL, at)
+        moving += _pack_moving(order, one, data_r, data_i, weight, state, bar, late, moving)
+    simd.store(late, (_TAIL + DAMPING) * ROW + moving, sharp.SETTLED * one)
+    return moving
+
+
+@njit(error_model="numpy")
+def _bring_back(rooms: Any, count: int, late: Any) -> None:
+    """Put the states of the pixels that were packed back among all."""
+    one = simd.ones(rooms, 1)
+    state = simd.registers(one, (), 8)
+    done = 0
+    for at in range(0, count, simd.width(one)):
+        take(state, _STATE, one, rooms, _TAIL, at)
+        more = state[DAMPING] < sharp.SETTLED
+        unpack(more, state, _STATE, late, _TAIL, done)
+        put(state, _STATE, rooms, _TAIL, at)
+        done += simd.count(more)
+
+
+@njit(error_model="numpy")
+def _offer_tails(order: Any, rooms: Any, count: int, third: Any) -> int:
+    """Choose tails where they are better; pack and count the pixels that leave something then."""
+    one = simd.ones(rooms, 1)
+    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
+    points, state = simd.registers(one, (), 6), simd.registers(one, (), 8)
+    packed = 0
+    for at in range(0, count, simd.width(one)):
+        take(found, _FOUND, one, rooms, 0, at)
+        take(state, _STATE, one, rooms, _TAIL, at)
+        penalty = simd.load(one, rooms, _PENALTY * ROW + at)
+        numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
+        allowed = (penalty > 0.0) & (numbers >= 4.0)
+        choice.offer_tail(
+            PRIOR, state[0], state[1], state[2], state[3], state[4], state[5], state[7], penalty,
+            allowed, found,
+        )  # fmt: skip
+        put(found, _FOUND, rooms, 0, at)
+        more = _needs_three(found, penalty, numbers)
+        if len(order) >= 3 and simd.some(more):
+            take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
+            _take_data(order, one, data_r, data_i, weight, rooms, at)
+            pack(more, points, (0, 0, 0, 0, 0, 0), third, _POINTS, packed)
+            pack(more, found, _FOUND, third, 0, packed)
+            _pack_data(order, more, data_r, data_i, weight, third, packed)
+            packed += simd.pack(third, _PENALTY * ROW + packed, more, penalty)
+    simd.store(third, _PENALTY * ROW + packed, 0.0 * one)
+    return packed
+
+
+@njit(forceinline=True, error_model="numpy")
+def _needs_three(found: Any, penalty: Any, numbers: Any) -> Any:
+    return (penalty > 0.0) & (found[SCORE] > 6.0 * penalty) & (numbers >= 6.0)
+
+
+@njit(error_model="numpy")
+def _fit_three(order: Any, turns: Any, rooms: Any, count: int) -> None:
+    """Fit three returns, and choose them where they are better."""
+    one = simd.ones(rooms, 1)
+    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    pr, pi = simd.matrix(one, order, 2), simd.matrix(one, order, 2)  # 3 m are enough
+    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
+    points = simd.registers(one, (), 6)
+    x, y, w = simd.registers(one, (), 3), simd.registers(one, (), 3), simd.registers(one, (), 3)
+    for at in range(0, count, simd.width(one)):
+        take(found, _FOUND, one, rooms, 0, at)
+        take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
+        _take_data(order, one, data_r, data_i, weight, rooms, at)
+        penalty = simd.load(one, rooms, _PENALTY * ROW + at)
+        active = penalty > 0.0
+        for k in range(2):
+            x[k], y[k], w[k] = points[3 * k], points[3 * k + 1], points[3 * k + 2]
+        cost = fit(
+            order, (0, 0, 0), (0, 0, 0, 0, 0, 0), STEPS[2], turns, data_r, data_i, weight, x, y, w,
+            pr, pi, rr, ri, active, found[SCORE] - 6.0 * penalty,
+        )  # fmt: skip
+        choice.offer_returns((0, 0, 0), x, y, w, cost, penalty, active, found)
+        put(found, _FOUND, rooms, 0, at)
+
+
+@njit(error_model="numpy")
+def _take_three(rooms: Any, count: int, third: Any) -> None:
+    """Put what was found with three returns back among all that were fitted with two."""
+    one = simd.ones(rooms, 1)
+    found = simd.registers(one, (), 22)
+    done = 0
+    for at in range(0, count, simd.width(one)):
+        take(found, _FOUND, one, rooms, 0, at)
+        penalty = simd.load(one, rooms, _PENALTY * ROW + at)
+        numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
+        more = _needs_three(found, penalty, numbers)
+        unpack(more, found, _FOUND, third, 0, done)
+        put(found, _FOUND, rooms, 0, at)
+        done += simd.count(more)
+
+
+@njit(error_model="numpy")
+def _finish(
+    order: Any, slots: Any, all_rooms: Any, rooms: Any, first: int, last: int, end: int,
+    planes: Any, free: Any, count: Any,
+) -> None:  # fmt: skip
+    """Write what was found of the pixels first..last, with its deviations."""
+    one = simd.ones(planes, 1)
+    step = simd.width(one)
+    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
+    size = len(order) + 1
+    done = 0
+    for left in range(first, last, step):
+        at = left - first
+        take(found, _FOUND, one, all_rooms, 0, at)
+        for i in range(FITTED, PLANES):
+            found[i] = 0.0 * one
+        penalty = simd.load(one, all_rooms, _PENALTY * ROW + at)
+        more = found[SCORE] > 4.0 * penalty
+        if len(order) >= 2 and simd.some(more):
+            unpack(more, found, _FOUND, rooms, 0, done)
+            done += simd.count(more)
+        for j in range(size):
+            weight[j] = simd.load(one, all_rooms, (_DATA + 2 * size + j) * ROW + at)
+        vary(order, weight, found)
+        scale = simd.load(one, all_rooms, _SCALE * ROW + at)
+        numbers = simd.load(one, all_rooms, _NUMBERS * ROW + at)
+        usable = simd.load(one, all_rooms, _USABLE * ROW + at) > 0.0
+        write(slots, found, scale, numbers, usable, min(left, end - step), planes, free, count)
 
 
 @njit(nogil=True, error_model="numpy")
@@ -260,41 +327,26 @@ def fit_returns(
     count: Any, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; each model where simpler ones leave enough."""
-    m = len(order)
-    one = simd.ones(variance, 1)
-    step, far = simd.width(one), simd.infinity(one)
-    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    pr, pi = simd.matrix(one, order, 2), simd.matrix(one, order, 2)  # 3 m are enough
-    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
-    x, y, w = simd.registers(one, (), 3), simd.registers(one, (), 3), simd.registers(one, (), 3)
-    for left in range(start, stop, step):
-        p = min(left, stop - step)
-        scale, numbers, usable, penalty = fit_one(
-            order, turns, b, variance, error, p, one, data_r, data_i, weight, x, y, w, pr, pi, rr,
-            ri, found,
-        )  # fmt: skip
-        more = found[SCORE] > 4.0 * penalty
-        if m >= 2 and simd.some(more):
-            cost = _fit(
-                order, (0, 0), (0, 0, 0, 0), STEPS[1], turns, data_r, data_i, weight, x, y, w, pr,
-                pi, rr, ri, more, far,
-            )  # fmt: skip
-            allowed = more & (numbers >= 4.0)
-            choice.offer_returns((0, 0), x, y, w, cost, penalty, allowed, found)
-            _fit_tail(
-                order, (0, 0, 0), (0, 0, 0, 0), data_r, data_i, weight, x, y, w, penalty, allowed,
-                found,
-            )  # fmt: skip
-            more = more & (found[SCORE] > 6.0 * penalty) & (numbers >= 6.0)
-            if m >= 3 and simd.some(more):
-                cost = _fit(
-                    order, (0, 0, 0), (0, 0, 0, 0, 0, 0), STEPS[2], turns, data_r, data_i, weight,
-                    x, y, w, pr, pi, rr, ri, more, found[SCORE] - 6.0 * penalty,
-                )  # fmt: skip
-                choice.offer_returns((0, 0, 0), x, y, w, cost, penalty, more, found)
-        vary(order, weight, found)
-        write(slots, found, scale, numbers, usable, p, planes, free, count)
+    size = (_DATA + 3 * (len(order) + 1)) * ROW
+    all_rooms, rooms = np.empty(size, planes.dtype), np.empty(size, planes.dtype)
+    late, later = np.empty(size, planes.dtype), np.empty(size, planes.dtype)
+    third = np.empty(size, planes.dtype)
+    for first in range(start, stop, PIXELS_AT_ONCE):
+        last = min(first + PIXELS_AT_ONCE, stop)
+        more = _fit_one(order, turns, b, variance, error, first, last, stop, all_rooms, rooms)
+        if len(order) >= 2 and more > 0:
+            moving = _fit_two(order, turns, rooms, more, late)
+            if moving > 0:
+                still = _step_late(order, TAIL_ROUNDS[1], late, moving, later)
+                if still > 0:
+                    _step_late(order, TAIL_ROUNDS[2], later, still, third)
+                    _bring_back(late, moving, later)
+                _bring_back(rooms, more, late)
+            three = _offer_tails(order, rooms, more, third)
+            if len(order) >= 3 and three > 0:
+                _fit_three(order, turns, third, three)
+                _take_three(rooms, more, third)
+        _finish(order, slots, all_rooms, rooms, first, last, stop, planes, free, count)
 
 
 def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:

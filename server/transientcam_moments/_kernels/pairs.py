@@ -18,7 +18,7 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
     sizes_type,
 )
-from transientcam_moments._kernels.likelihood import fit_one, portable, vary, write
+from transientcam_moments._kernels.fits import fit_one, portable, vary, write
 from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments.likelihood import choice, pair_fit, sharp
 from transientcam_moments.likelihood.choice import COUNT, SCORE

@@ -22,11 +22,17 @@ from transientcam_moments.likelihood.arithmetic import (
 )
 
 MOST_RETURNS: Final = 3
-X, Y, WEIGHT, WEIGHT_VARIANCE, PHASE_VARIANCE = 0, 3, 6, 9, 12
-"""First plane of the points of the unit circle, the weights and their variances, of each return."""
-TAIL, LENGTH, TAIL_VARIANCE, LENGTH_VARIANCE = 15, 16, 17, 18
-"""Light v of the tail, d, the variances of v and of log d; all 0 where there is no tail."""
-CHI_SQUARE, SCORE, COUNT = 19, 20, 21
+X, Y, WEIGHT = 0, 3, 6
+"""First plane of the points of the unit circle and the weights of each return."""
+TAIL, LENGTH = 9, 10
+"""Light v of the tail, and d; both 0 where there is no tail."""
+CHI_SQUARE, SCORE, COUNT = 11, 12, 13
+FITTED: Final = 14
+"""So many planes the fits fill; those behind have the variances of what was chosen."""
+WEIGHT_VARIANCE, PHASE_VARIANCE = 14, 17
+"""First plane of the variances of weights and phases of each return."""
+TAIL_VARIANCE, LENGTH_VARIANCE = 20, 21
+"""The variances of v and of log d; 0 where there is no tail."""
 PLANES: Final = 22
 STEPS: Final = (4, 8, 10)
 """Of the fits of one, two and three returns."""

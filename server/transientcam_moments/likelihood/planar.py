@@ -154,7 +154,7 @@ class SharpFit:
     ) -> "SharpFit":
         """Add a return to those of another fit, and fit all of them; `bar` as in `sharp.judge`."""
         x, y, w = before or ((), (), ())
-        point = cls(data, x, y, w)._new()
+        point = cls(data, x, y, w).new_return()
         fit = cls(data, *([*old, new] for old, new in zip((x, y, w), point, strict=True)))
         fit._look()
         fit.improve(STEPS[count - 1], bar)
@@ -194,7 +194,7 @@ class SharpFit:
         sharp.remains(self.order, self.returns, data.re, data.im, *given)
         self.cost = sharp.chi_square(self.order, data.weight, self._rr, self._ri)
 
-    def _new(self) -> tuple[Array, Array, Array]:
+    def new_return(self) -> tuple[Array, Array, Array]:
         """Return point and weight of the best return for what these leave."""
         self._look()
         order, weight, xp = self.order, self.data.weight, namespace(self.cost)

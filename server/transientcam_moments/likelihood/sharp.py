@@ -218,9 +218,7 @@ def try_phases(
     return kept(returns, d, own_d, -x, -y, best, best_apart, bx, by)
 
 
-def information(
-    order: Length, returns: Length, weight: Bank, pr: Bank, pi: Bank, a: Bank
-) -> None:
+def information(order: Length, returns: Length, weight: Bank, pr: Bank, pi: Bank, a: Bank) -> None:
     """Fill the lower half of the information matrix of weights, then phases times weights."""
     m, count = len(order), len(returns)
     n = 2 * count
