@@ -285,7 +285,7 @@ def test_no_step_raises_chi_square(monkeypatch: pytest.MonkeyPatch) -> None:
         return run
 
     monkeypatch.setattr(sharp, "step", watched(sharp.step, 11))
-    monkeypatch.setattr(tail, "step", watched(tail.step, 17))
+    monkeypatch.setattr(tail, "step", watched(tail.step, 18))
     b = some_moments(pixels=300)
 
     tm.likelihood(b, equal_noise(b, 0.003))

@@ -7,7 +7,7 @@ from numba import njit
 from transientcam_moments._kernels import portable, simd
 from transientcam_moments._kernels.returns import phase_of
 from transientcam_moments.likelihood import choice, sharp, tail
-from transientcam_moments.likelihood.arithmetic import logarithm
+from transientcam_moments.likelihood.arithmetic import logarithm, product_bank
 from transientcam_moments.likelihood.choice import (
     CHI_SQUARE,
     COUNT,
@@ -86,7 +86,8 @@ def _new(
     sharp.remains(order, returns[1:], data_r, data_i, pr, pi, w, rr, ri)
     re, im = simd.registers(like, order, 1), simd.registers(like, order, 1)
     total = sharp.weigh_what_is_left(order, weight, rr, ri, re, im)
-    kr, ki = simd.matrix(like, order, 2), simd.matrix(like, order, 2)  # 2 (m + 1) are enough
+    # (m + 1) (K - 1) are enough
+    kr, ki = product_bank(like, order, returns), product_bank(like, order, returns)
     sharp.overlaps(order, returns, weight, total, pr, pi, kr, ki)
     best, apart, bx, by = 0.0 * total, 1.0 + 0.0 * total, 1.0 + 0.0 * total, 0.0 * total
     for row in range(m + 2):
