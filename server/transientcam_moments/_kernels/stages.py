@@ -23,9 +23,6 @@ TAIL_ROUNDS: Final = (3, 3, TAIL_STEPS - 6)
 """Steps of a tail after each of which the pixels are packed that go on."""
 _FOUND: Final = (0,) * FITTED
 _STATE: Final = (0,) * 8
-_FIRST: Final = 2
-"""Registers taken as one where pixels are read and written: in both stages the same, as the last
-vector of all overlaps the one before. Three returns take so many registers that one is best."""
 # Rows of a room: what was found, the state of the tail, points and weights of two returns, what an
 # unknown has to gain (0 behind the last pixel), three more numbers of a pixel, and then the data.
 _TAIL: Final = FITTED
@@ -81,7 +78,7 @@ def fit_first(
 
     `end` is behind the last pixel there is: the last vector ends there.
     """
-    one = simd.ones(variance, _FIRST)
+    one = simd.ones(variance, 1)
     step = simd.width(one)
     data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
     rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
@@ -117,7 +114,7 @@ def fit_first(
 @njit(error_model="numpy")
 def fit_second(order: Any, turns: Any, rooms: Any, count: int, late: Any) -> int:
     """Fit two returns, and first steps of a tail; pack and count the pixels that need more."""
-    one = simd.ones(rooms, 2)
+    one = simd.ones(rooms, 1)
     data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
     rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
     pr, pi = product_bank(one, order, (0, 0)), product_bank(one, order, (0, 0))
@@ -171,7 +168,7 @@ def _pack_moving(
 @njit(error_model="numpy")
 def step_late(order: Any, steps: int, rooms: Any, count: int, late: Any) -> int:
     """Take further steps of tails; pack and count the pixels that need more."""
-    one = simd.ones(rooms, 2)
+    one = simd.ones(rooms, 1)
     data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
     weight, state = simd.registers(one, order, 1), simd.registers(one, (), 8)
     moving = 0
@@ -283,8 +280,11 @@ def finish(
     order: Any, slots: Any, all_rooms: Any, rooms: Any, first: int, last: int, end: int,
     planes: Any, free: Any, count: Any,
 ) -> None:  # fmt: skip
-    """Write what was found of the pixels first..last, with its deviations."""
-    one = simd.ones(planes, _FIRST)
+    """Write what was found of the pixels first..last, with its deviations.
+
+    In vectors as wide as those of `fit_first`, whose last one overlaps the one before.
+    """
+    one = simd.ones(planes, 1)
     step = simd.width(one)
     weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
     size = len(order) + 1

@@ -137,7 +137,9 @@ class SharpFit:
 
     cost: Array
 
-    def __init__(self, data: Data, x: Sequence[Array], y: Sequence[Array], w: Sequence[Array]):
+    def __init__(
+        self, data: Data, x: Sequence[Array], y: Sequence[Array], w: Sequence[Array]
+    ) -> None:
         m, count = data.re.shape[0] - 1, len(x)
         self.data = data
         self.order, self.returns = (0,) * m, (0,) * count
