@@ -289,8 +289,8 @@ def pack(typingctx: Any, array: Any, index: Any, mask: Any, value: Any) -> Any:
         pointer = _pointer(context, builder, array, args[0], args[1], args[3].type)
         pointer = builder.bitcast(pointer, element.as_pointer())
         # a register at a time: some processors take a hundred cycles to write gapless to memory
-        whole = REGISTER_BYTES == 64
-        size = 8 * REGISTER_BYTES // value.element.bitwidth if whole else value.count
+        whole = "+avx512f" in context.codegen().magic_tuple()[2]  # users can turn it off
+        size = 512 // value.element.bitwidth if whole else value.count
         written = ir.IntType(64)(0)
         for first in range(0, value.count, size):
             order = list(range(first, first + size))
@@ -312,7 +312,7 @@ def _pack_register(builder: Any, part: Any, chosen: Any, target: Any) -> None:
     callee = cgutils.get_or_insert_function(builder.module, kind, name)
     packed = builder.call(callee, [part, ir.Constant(part.type, None), chosen])
     where = builder.bitcast(target, part.type.as_pointer())
-    builder.store(packed, where, align=REGISTER_BYTES // part.type.count)
+    builder.store(packed, where, align=64 // part.type.count)
 
 
 def _pack_in_memory(builder: Any, part: Any, chosen: Any, target: Any) -> None:
