@@ -82,6 +82,28 @@ def test_odd_pixels_are_the_same_and_leave_their_neighbours_alone() -> None:
         assert np.array_equal(found[..., others], expected[..., others], equal_nan=True)
 
 
+@pytest.mark.parametrize("pixels", [64, 101, 511, 513, 545, 1039])
+def test_what_a_pixel_gets_does_not_depend_on_how_many_there_are(pixels: int) -> None:
+    b, noise = measured(1500)
+    whole = tm.likelihood(b, noise)
+
+    last = tm.likelihood(b[:, -pixels:], tm.noise.MomentNoise(noise.variance[:, -pixels:]))
+
+    for found, expected in zip(last[:-1], whole[:-1], strict=True):
+        assert np.array_equal(found, expected[..., -pixels:], equal_nan=True)
+
+
+def test_pixels_are_the_same_beside_others_that_need_more_models() -> None:
+    b, noise = measured(2000)
+    simple = np.arange(2000) % 4 == 0  # one return
+
+    alone = tm.likelihood(b[:, simple], tm.noise.MomentNoise(noise.variance[:, simple]))
+    among = tm.likelihood(b, noise)
+
+    for found, expected in zip(alone[:-1], among[:-1], strict=True):
+        assert np.array_equal(found, expected[..., simple], equal_nan=True)
+
+
 def test_other_models_are_left_to_the_planar_statement() -> None:
     mine, theirs = both(*measured(100), returns=2, tail_shape=1)
 

@@ -179,6 +179,50 @@ def test_the_power_series_of_the_arctangent_is_exact_to_rounding(dtype: type) ->
     assert np.abs(out / exact - 1).max() < 3 * np.finfo(dtype).eps
 
 
+@pytest.mark.parametrize("interleave", [1, 2])
+@pytest.mark.parametrize("dtype", TYPES)
+def test_pixels_of_a_mask_are_packed_and_come_back_in_their_places(
+    dtype: type, interleave: int
+) -> None:
+    size = interleave * simd.REGISTER_BYTES // np.dtype(dtype).itemsize
+    random = np.random.default_rng(interleave)
+    x: Array = random.permutation(4 * size).astype(dtype)
+    limit = 2 * size
+    packed, back = np.full(5 * size, -1, dtype), np.zeros_like(x)
+
+    def single(x: Any, packed: Any, back: Any, limit: float) -> int:
+        one = simd.ones(x, 1)
+        count = 0
+        for p in range(0, x.size, simd.width(one)):
+            value = simd.load(one, x, p)
+            count += simd.pack(packed, count, value < limit, value)
+        done = 0
+        for p in range(0, x.size, simd.width(one)):
+            there = simd.load(one, x, p) < limit
+            simd.store(back, p, simd.unpack(packed, done, there, -one))
+            done += simd.count(there)
+        return count
+
+    def double(x: Any, packed: Any, back: Any, limit: float) -> int:
+        one = simd.ones(x, 2)
+        count = 0
+        for p in range(0, x.size, simd.width(one)):
+            value = simd.load(one, x, p)
+            count += simd.pack(packed, count, value < limit, value)
+        done = 0
+        for p in range(0, x.size, simd.width(one)):
+            there = simd.load(one, x, p) < limit
+            simd.store(back, p, simd.unpack(packed, done, there, -one))
+            done += simd.count(there)
+        return count
+
+    count = njit(single if interleave == 1 else double)(x, packed, back, limit)
+
+    assert count == limit
+    assert np.array_equal(packed[:count], x[x < limit])
+    assert np.array_equal(back, np.where(x < limit, x, -1))
+
+
 def test_registers_are_an_array_and_may_be_read_between() -> None:
     x = np.arange(64, dtype=np.float32)
     out = np.zeros(x.size, np.float32)

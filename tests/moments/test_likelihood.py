@@ -273,6 +273,21 @@ def test_a_brighter_scene_with_as_much_more_noise_has_the_same_returns(factor: f
     assert np.allclose(after.weight_std / factor, before.weight_std, rtol=1e-4, equal_nan=True)
 
 
+@pytest.mark.parametrize("m", [1, 2, 5, 8])
+def test_starts_are_tried_at_phases_all_around_the_turn(m: int) -> None:
+    turns = choice.turns_of(m)
+    series = np.random.default_rng(m).normal(size=(2, m + 1, 1))
+    tried = []
+    for row, t in enumerate(2 * np.pi * np.arange(m + 2) / (4 * m + 6)):
+        sums = sharp.four_sums((0,) * m, turns, row, 0, series[0], series[1])
+        for phase, found in zip((t, -t, np.pi - t, np.pi + t), sums, strict=True):
+            angle = np.arange(1, m + 1) * phase
+            waves = np.cos(angle) @ series[0, 1:] + np.sin(angle) @ series[1, 1:]
+            assert np.allclose(found, series[0, 0] + waves)
+            tried.append(round(phase / (2 * np.pi) * (4 * m + 6)) % (4 * m + 6))
+    assert set(tried) == set(range(4 * m + 6))
+
+
 def test_no_step_raises_chi_square(monkeypatch: pytest.MonkeyPatch) -> None:
     costs: list[tuple[np.ndarray, np.ndarray]] = []
 
@@ -285,7 +300,7 @@ def test_no_step_raises_chi_square(monkeypatch: pytest.MonkeyPatch) -> None:
         return run
 
     monkeypatch.setattr(sharp, "step", watched(sharp.step, 11))
-    monkeypatch.setattr(tail, "step", watched(tail.step, 17))
+    monkeypatch.setattr(tail, "step", watched(tail.step, 18))
     b = some_moments(pixels=300)
 
     tm.likelihood(b, equal_noise(b, 0.003))

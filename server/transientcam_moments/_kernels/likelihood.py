@@ -1,4 +1,9 @@
-"""The likelihood of few returns: the fits of `transientcam_moments.likelihood` in lanes."""
+"""The likelihood of few returns: the fits of `transientcam_moments.likelihood` in lanes.
+
+Pixels go through in blocks. Each model is fitted to the pixels that simpler ones leave something to
+explain, packed without gaps between stages, so that vectors are full; so are the pixels whose tail
+has not settled after a few steps. What a pixel gets does not depend on how it is packed.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -6,7 +11,6 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from transientcam_moments._kernels import portable, simd
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
@@ -16,262 +20,51 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
+from transientcam_moments._kernels.packing import PIXELS_AT_ONCE, ROW
 from transientcam_moments._kernels.pool import empty
-from transientcam_moments._kernels.returns import phase_of
-from transientcam_moments._lanes.parallel import Spread, at_once
-from transientcam_moments.likelihood import choice, sharp, tail
-from transientcam_moments.likelihood.arithmetic import logarithm
-from transientcam_moments.likelihood.choice import (
-    CHI_SQUARE,
-    COUNT,
-    DELAY_RAD,
-    LENGTH,
-    LENGTH_VARIANCE,
-    MARGIN,
-    MOST_RETURNS,
-    PHASE_VARIANCE,
-    PRIOR,
-    SCORE,
-    STEPS,
-    TAIL,
-    TAIL_SHAPE,
-    TAIL_STEPS,
-    TAIL_VARIANCE,
-    WEIGHT,
-    WEIGHT_VARIANCE,
-    X,
-    Y,
+from transientcam_moments._kernels.stages import (
+    TAIL_ROUNDS,
+    bring_back,
+    finish,
+    fit_first,
+    fit_second,
+    fit_third,
+    offer_tails,
+    rows_of,
+    step_late,
+    take_three,
 )
-
-__all__ = ["likelihood_lane", "portable"]  # which gives the fits' arithmetic its meaning
-
-_MEAN = DELAY_RAD / TAIL_SHAPE
-_INTERLEAVE = 2
-
-
-@njit(forceinline=True, error_model="numpy")
-def _prepare(
-    order: Any, b: Any, variance: Any, error: float, p: int, one: Any, data_r: Any, data_i: Any,
-    weight: Any,
-) -> Any:  # fmt: skip
-    """Load pixels, their largest moment made 1; return that, how many numbers, and their use."""
-    m = len(order)
-    zero = 0.0 * one
-    size, poison, numbers, waves = zero, zero, zero, zero
-    for j in range(m + 1):
-        x, y = simd.load_complex(one, b[j], p)
-        v = simd.load(one, variance[j], p)
-        seen = (v > 0.0) & (v < simd.infinity(one))
-        x = simd.select(seen, x, 0.0)
-        y = simd.select(seen, y, 0.0) if j > 0 else zero
-        size = simd.maximum(size, simd.maximum(simd.absolute(x), simd.absolute(y)))
-        poison = poison + x * 0.0 + y * 0.0
-        numbers = numbers + simd.select(seen, one * (2.0 if j > 0 else 1.0), 0.0)
-        waves = waves + simd.select(seen, one * (1.0 if j > 0 else 0.0), 0.0)
-        data_r[j], data_i[j] = x, y
-        weight[j] = simd.select(seen, v, 0.0)
-    usable = (poison >= 0.0) & (size > 16.0 * simd.tiny(one)) & (size < simd.overflowing(one))
-    usable = usable & (waves > 0.0) & ~((weight[0] > 0.0) & ~(data_r[0] > 0.0))
-    scale = simd.select(usable, size, one)
-    inverse = simd.select(usable, 1.0 / scale, 0.0)
-    rounding = 4.0 * simd.eps(one)
-    for j in range(m + 1):
-        data_r[j] = simd.select(usable, data_r[j] * inverse, one)
-        data_i[j] = simd.select(usable, data_i[j] * inverse, 0.0)
-        seen = weight[j] > 0.0
-        std = simd.sqrt(simd.select(seen, weight[j], one)) * inverse
-        std = simd.minimum(simd.maximum(std, rounding), 1.0 / rounding)
-        each = 1.0 / (std * std + error * error)
-        weight[j] = simd.select(usable, simd.select(seen, each, 0.0), one)
-    return scale, simd.select(usable, numbers, one), usable
-
-
-@njit(error_model="numpy")
-def _fit(
-    order: Any, returns: Any, unknowns: Any, steps: int, cosine: float, sine: float, data_r: Any,
-    data_i: Any, weight: Any, x: Any, y: Any, w: Any, rr: Any, ri: Any, active: Any, bar: Any,
-) -> Any:  # fmt: skip
-    """Add a return and fit all of them, until `active` pixels have settled; return chi-square."""
-    m, last = len(order), len(returns) - 1
-    like = data_r[0]
-    re, im = simd.registers(like, order, 1), simd.registers(like, order, 1)
-    total = sharp.weigh_what_is_left(order, weight, rr, ri, re, im)
-    kr, ki = simd.matrix(like, order, 1), simd.matrix(like, order, 1)  # (m + 1)^2 are enough
-    sharp.overlaps(order, returns, weight, total, x, y, kr, ki)
-    flat = weight[0] / total
-    best, bx, by, bw = total * 0.0 - 1.0, total * 0.0, total * 0.0, total * 0.0
-    c, s = 1.0, 0.0
-    for _ in range(choice.phases_of(m)):
-        best, bx, by, bw = sharp.try_phase(
-            order, returns, flat, re, im, total, kr, ki, c, s, best, bx, by, bw
-        )
-        c, s = c * cosine - s * sine, c * sine + s * cosine
-    x[last], y[last], w[last] = bx, by, bw
-    sharp.take_away(order, bx, by, bw, rr, ri)
-    cost = sharp.chi_square(order, weight, rr, ri)
-    damping = simd.select(active, sharp.FIRST_DAMPING + 0.0 * cost, sharp.SETTLED)
-    for _ in range(steps):
-        if not simd.some(damping < sharp.SETTLED):
-            break
-        cost, damping = sharp.step(
-            order, returns, unknowns, data_r, data_i, weight, x, y, w, rr, ri, cost, damping, bar
-        )
-    return cost
-
-
-@njit(error_model="numpy")
-def _fit_tail(
-    order: Any, powers: Any, unknowns: Any, data_r: Any, data_i: Any, weight: Any, x2: Any, y2: Any,
-    w2: Any, penalty: Any, allowed: Any, found: Any,
-) -> None:  # fmt: skip
-    """Fit a return with a tail from two returns on, and put it where it is the better model."""
-    like = data_r[0]
-    x, y, w, v, ratio, t = choice.start_of_tail(x2, y2, w2, DELAY_RAD)
-    d = ratio * _MEAN
-    qr, qi = simd.registers(like, order, 1), simd.registers(like, order, 1)
-    rr, ri = simd.registers(like, order, 1), simd.registers(like, order, 1)
-    tail.shape(order, powers, d, qr, qi)
-    tail.remains(order, data_r, data_i, x, y, w, v, qr, qi, rr, ri)
-    cost = sharp.chi_square(order, weight, rr, ri) + PRIOR * t * t
-    damping = simd.select(allowed, sharp.FIRST_DAMPING + 0.0 * cost, sharp.SETTLED)
-    bar = found[SCORE] - 4.0 * penalty
-    for _ in range(TAIL_STEPS):
-        if not simd.some(damping < sharp.SETTLED):
-            break
-        x, y, w, v, d, t, cost, damping = tail.step(
-            order, powers, unknowns, data_r, data_i, weight, PRIOR, x, y, w, v, d, t, qr, qi, rr,
-            ri, cost, damping, bar,
-        )  # fmt: skip
-    choice.offer_tail(
-        order, powers, unknowns, weight, PRIOR, x, y, w, v, d, t, qr, qi, rr, ri, cost, penalty,
-        allowed, found,
-    )  # fmt: skip
-
-
-@njit(forceinline=True, error_model="numpy")
-def write(
-    slots: Any, found: Any, scale: Any, numbers: Any, usable: Any, p: int, planes: Any, free: Any,
-    count: Any,
-) -> None:  # fmt: skip
-    """Write the attributes of `Likelihood`, its returns sorted by phase."""
-    one = scale / scale
-    nan, far = simd.nan(one), simd.infinity(one)
-    size = len(slots)
-    keys, values = simd.registers(one, slots, 0), simd.registers(one, slots, 0)
-    first, second = simd.registers(one, slots, 0), simd.registers(one, slots, 0)
-    with_tail = found[LENGTH] > 0.0
-    there = 0.0 * one
-    for k in range(size):
-        used = usable & (found[COUNT] > float(k)) & ((found[WEIGHT + k] > 0.0) | with_tail)
-        keys[k] = simd.select(used, phase_of(found[X + k], found[Y + k]), far)
-        values[k] = simd.select(used, found[WEIGHT + k] * scale, 0.0)
-        first[k] = simd.select(used, simd.sqrt(found[PHASE_VARIANCE + k]), nan)
-        second[k] = simd.select(used, simd.sqrt(found[WEIGHT_VARIANCE + k]) * scale, nan)
-        there = there + simd.select(used, one, 0.0)
-    for i in range(size - 1):
-        for k in range(size - 1 - i):
-            swap = keys[k] > keys[k + 1]
-            low, high = simd.minimum(keys[k], keys[k + 1]), simd.maximum(keys[k], keys[k + 1])
-            keys[k], keys[k + 1] = low, high
-            low, high = (
-                simd.select(swap, values[k + 1], values[k]),
-                simd.select(swap, values[k], values[k + 1]),
-            )
-            values[k], values[k + 1] = low, high
-            low, high = (
-                simd.select(swap, first[k + 1], first[k]),
-                simd.select(swap, first[k], first[k + 1]),
-            )
-            first[k], first[k + 1] = low, high
-            low, high = (
-                simd.select(swap, second[k + 1], second[k]),
-                simd.select(swap, second[k], second[k + 1]),
-            )
-            second[k], second[k + 1] = low, high
-    for k in range(size):
-        simd.store(planes[k], p, simd.select(keys[k] < far, keys[k], nan))
-        simd.store(planes[size + k], p, values[k])
-        simd.store(planes[2 * size + k], p, first[k])
-        simd.store(planes[3 * size + k], p, second[k])
-    tailed = usable & with_tail & (found[TAIL] > 0.0)
-    delay = float(TAIL_SHAPE) * found[LENGTH]
-    rest = 4 * size
-    simd.store(planes[rest], p, simd.select(tailed, found[TAIL] * scale, 0.0))
-    std = simd.sqrt(found[TAIL_VARIANCE]) * scale
-    simd.store(planes[rest + 1], p, simd.select(tailed, std, nan))
-    simd.store(planes[rest + 2], p, simd.select(tailed, delay, nan))
-    std = delay * simd.sqrt(found[LENGTH_VARIANCE])
-    simd.store(planes[rest + 3], p, simd.select(tailed, std, nan))
-    simd.store(planes[rest + 4], p, simd.select(usable, found[CHI_SQUARE], nan))
-    unknowns = simd.select(with_tail, 4.0 * one, 2.0 * found[COUNT])
-    simd.store(free, p, simd.select(usable, numbers - unknowns, 0.0))
-    simd.store(count, p, there)
-
-
-@njit(forceinline=True, error_model="numpy")
-def fit_one(
-    order: Any, cosine: float, sine: float, b: Any, variance: Any, error: float, p: int, one: Any,
-    data_r: Any, data_i: Any, weight: Any, x: Any, y: Any, w: Any, rr: Any, ri: Any, found: Any,
-) -> Any:  # fmt: skip
-    """Load pixels and put one return in `found`; return their scale, numbers, use and penalty."""
-    far = simd.infinity(one)
-    scale, numbers, usable = _prepare(order, b, variance, error, p, one, data_r, data_i, weight)
-    penalty = logarithm(numbers) + MARGIN
-    choice.nothing(one, far, found)
-    for j in range(len(order) + 1):
-        rr[j], ri[j] = data_r[j], data_i[j]
-    cost = _fit(
-        order, (0,), (0, 0), STEPS[0], cosine, sine, data_r, data_i, weight, x, y, w, rr, ri,
-        usable, far,
-    )  # fmt: skip
-    choice.offer_returns(order, (0,), (0, 0), weight, x, y, w, cost, penalty, one > 0.0, found)
-    return scale, numbers, usable, penalty
+from transientcam_moments._lanes.parallel import Spread, at_once
+from transientcam_moments.likelihood import choice
+from transientcam_moments.likelihood.choice import MOST_RETURNS, TAIL_SHAPE
 
 
 @njit(nogil=True, error_model="numpy")
 def fit_returns(
-    order: Any, slots: Any, cosine: float, sine: float, b: Any, variance: Any, error: float,
-    planes: Any, free: Any, count: Any, start: int, stop: int,
+    order: Any, slots: Any, turns: Any, b: Any, variance: Any, error: float, planes: Any, free: Any,
+    count: Any, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; each model where simpler ones leave enough."""
-    m = len(order)
-    one = simd.ones(variance, _INTERLEAVE)
-    step, far = simd.width(one), simd.infinity(one)
-    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
-    x, y, w = simd.registers(one, (), 3), simd.registers(one, (), 3), simd.registers(one, (), 3)
-    for left in range(start, stop, step):
-        p = min(left, stop - step)
-        scale, numbers, usable, penalty = fit_one(
-            order, cosine, sine, b, variance, error, p, one, data_r, data_i, weight, x, y, w, rr,
-            ri, found,
-        )  # fmt: skip
-        more = found[SCORE] > 4.0 * penalty
-        if m >= 2 and simd.some(more):
-            cost = _fit(
-                order, (0, 0), (0, 0, 0, 0), STEPS[1], cosine, sine, data_r, data_i, weight, x, y,
-                w, rr, ri, more, far,
-            )  # fmt: skip
-            allowed = more & (numbers >= 4.0)
-            choice.offer_returns(
-                order, (0, 0), (0, 0, 0, 0), weight, x, y, w, cost, penalty, allowed, found
-            )
-            _fit_tail(
-                order, (0, 0, 0), (0, 0, 0, 0), data_r, data_i, weight, x, y, w, penalty, allowed,
-                found,
-            )  # fmt: skip
-            more = more & (found[SCORE] > 6.0 * penalty) & (numbers >= 6.0)
-            if m >= 3 and simd.some(more):
-                cost = _fit(
-                    order, (0, 0, 0), (0, 0, 0, 0, 0, 0), STEPS[2], cosine, sine, data_r, data_i,
-                    weight, x, y, w, rr, ri, more, found[SCORE] - 6.0 * penalty,
-                )  # fmt: skip
-                choice.offer_returns(
-                    order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, x, y, w, cost, penalty, more,
-                    found,
-                )  # fmt: skip
-        write(slots, found, scale, numbers, usable, p, planes, free, count)
+    size = rows_of(order) * ROW
+    all_rooms, rooms = np.empty(size, planes.dtype), np.empty(size, planes.dtype)
+    late, later = np.empty(size, planes.dtype), np.empty(size, planes.dtype)
+    third = np.empty(size, planes.dtype)
+    for first in range(start, stop, PIXELS_AT_ONCE):
+        last = min(first + PIXELS_AT_ONCE, stop)
+        more = fit_first(order, turns, b, variance, error, first, last, stop, all_rooms, rooms)
+        if len(order) >= 2 and more > 0:
+            moving = fit_second(order, turns, rooms, more, late)
+            if moving > 0:
+                still = step_late(order, TAIL_ROUNDS[1], late, moving, later)
+                if still > 0:
+                    step_late(order, TAIL_ROUNDS[2], later, still, third)
+                    bring_back(late, moving, later)
+                bring_back(rooms, more, late)
+            three = offer_tails(order, rooms, more, third)
+            if len(order) >= 3 and three > 0:
+                fit_third(order, turns, third, three)
+                take_three(rooms, more, third)
+        finish(order, slots, all_rooms, rooms, first, last, stop, planes, free, count)
 
 
 def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:
@@ -280,11 +73,10 @@ def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:
     real, cplx = real_arrays(precision), complex_arrays(precision)
     run = entry(
         fit_returns,
-        order_type(m), order_type(len(slots)), REAL, REAL, cplx[2], real[2], REAL, real[2],
+        order_type(m), order_type(len(slots)), real[2], cplx[2], real[2], REAL, real[2],
         COUNTS, COUNTS, PIXELS, PIXELS,
     )  # fmt: skip
-    turn = 2 * np.pi / choice.phases_of(m)
-    cosine, sine = float(np.cos(turn)), float(np.sin(turn))
+    turns = choice.turns_of(m).astype(precision)
 
     def lane(
         b: Any,
@@ -303,7 +95,7 @@ def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:
         free, count = empty(pixels, np.int32), empty(pixels, np.int32)
 
         def part(start: int, stop: int) -> None:
-            run(order, slots, cosine, sine, moments, noise, error, planes, free, count, start, stop)
+            run(order, slots, turns, moments, noise, error, planes, free, count, start, stop)
 
         spread(part, pixels)
         four = (planes[k * size : (k + 1) * size] for k in range(4))

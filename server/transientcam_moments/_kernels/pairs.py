@@ -18,7 +18,7 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
     sizes_type,
 )
-from transientcam_moments._kernels.likelihood import fit_one, portable, write
+from transientcam_moments._kernels.fits import fit_one, portable, vary, write
 from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments.likelihood import choice, pair_fit, sharp
 from transientcam_moments.likelihood.choice import COUNT, SCORE
@@ -224,8 +224,8 @@ def _choose(
 
 @njit(nogil=True, error_model="numpy")
 def fit_pairs(
-    order: Any, lists: Any, places: Any, cosine: float, sine: float, same: float, turns: Any,
-    b: Any, variance: Any, error: float, planes: Any, free: Any, count: Any, start: int, stop: int,
+    order: Any, lists: Any, places: Any, first_turns: Any, same: float, turns: Any, b: Any,
+    variance: Any, error: float, planes: Any, free: Any, count: Any, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; two returns where one leaves enough.
 
@@ -236,6 +236,7 @@ def fit_pairs(
     step, far = simd.width(one), simd.infinity(one)
     data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
     rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    pr, pi = simd.registers(one, order, 0), simd.registers(one, order, 0)
     weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
     kr, ki = simd.registers(one, order, 1), simd.registers(one, order, 1)
     kw, share = simd.registers(one, order, 1), simd.registers(one, order, 1)
@@ -257,8 +258,8 @@ def fit_pairs(
     for left in range(start, stop, step):
         p = min(left, stop - step)
         scale, numbers, usable, penalty = fit_one(
-            order, cosine, sine, b, variance, error, p, one, data_r, data_i, weight, x, y, w, rr,
-            ri, found,
+            order, first_turns, b, variance, error, p, one, data_r, data_i, weight, x, y, w, pr,
+            pi, rr, ri, found,
         )  # fmt: skip
         lead = far
         more = (found[SCORE] > 4.0 * penalty) & (numbers >= 4.0)
@@ -284,10 +285,9 @@ def fit_pairs(
                 places, same, kr, ki, kw, share, costs, points, x, y, w, bx, by, bw, directs, room,
                 more,
             )  # fmt: skip
-            choice.offer_returns(
-                order, (0, 0), (0, 0, 0, 0), weight, bx, by, bw, cost, penalty, more, found
-            )
+            choice.offer_returns((0, 0), bx, by, bw, cost, penalty, more, found)
             lead = simd.select(found[COUNT] == 2.0, lead, far)
+        vary(order, weight, found)
         write((0, 0), found, scale, numbers, usable, p, planes, free, count)
         simd.store(planes[13], p, lead)
 
@@ -300,11 +300,10 @@ def pairs_lane(m: int, precision: str) -> Callable[..., Any]:
     real, cplx = real_arrays(precision), complex_arrays(precision)
     run = entry(
         fit_pairs,
-        order_type(m), sizes_type(sizes), PLACES, REAL, REAL, REAL, real[2], cplx[2], real[2], REAL,
+        order_type(m), sizes_type(sizes), PLACES, real[2], REAL, real[2], cplx[2], real[2], REAL,
         real[2], COUNTS, COUNTS, PIXELS, PIXELS,
     )  # fmt: skip
-    turn = 2 * np.pi / choice.phases_of(m)
-    cosine, sine = float(np.cos(turn)), float(np.sin(turn))
+    first_turns = choice.turns_of(m).astype(precision)
     phase, same = grid(m), least_alike(m)
     turns = np.stack([np.cos(phase), np.sin(phase)]).astype(precision)
 
@@ -317,8 +316,8 @@ def pairs_lane(m: int, precision: str) -> Callable[..., Any]:
 
         def part(start: int, stop: int) -> None:
             run(
-                order, lists, places, cosine, sine, same, turns, moments, noise, error, planes,
-                free, count, start, stop,
+                order, lists, places, first_turns, same, turns, moments, noise, error, planes, free,
+                count, start, stop,
             )  # fmt: skip
 
         spread(part, pixels)

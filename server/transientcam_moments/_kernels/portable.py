@@ -20,17 +20,17 @@ types: Any = numba_types
 cgutils: Any = numba_cgutils
 
 
-def _room(function: Callable[..., Any], size: Callable[[int, int], int]) -> None:
+def _room(function: Callable[..., Any], size: Callable[[int, Any], int | None]) -> None:
     """Give a function that makes room its meaning; the room is the calling function's."""
 
     @templates.infer_global(function)
     class _Template(templates.AbstractTemplate):  # type: ignore[misc]  # numba is untyped
         def generic(self, args: Any, kws: Any) -> Any:
-            like, length, extra = args
-            if not isinstance(like, Lanes) or not isinstance(extra, types.IntegerLiteral):
+            like, length, further = args
+            count = size(len(length), further) if isinstance(like, Lanes) else None
+            if count is None:
                 return None
-            room = Registers(like, size(len(length), extra.literal_value))
-            return templates.signature(room, like, length, extra)
+            return templates.signature(Registers(like, count), like, length, further)
 
     @extending.lower_builtin(function, Lanes, types.Any, types.Any)
     def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -38,8 +38,18 @@ def _room(function: Callable[..., Any], size: Callable[[int, int], int]) -> None
         return cgutils.alloca_once(builder, item, size=sig.return_type.size)
 
 
-_room(arithmetic.bank, lambda length, extra: length + extra)
-_room(arithmetic.square_bank, lambda length, extra: (length + extra) ** 2)
+def _more(length: int, number: Any) -> int | None:
+    return length + number.literal_value if isinstance(number, types.IntegerLiteral) else None
+
+
+def _squared(length: int, number: Any) -> int | None:
+    total = _more(length, number)
+    return None if total is None else total**2
+
+
+_room(arithmetic.bank, _more)
+_room(arithmetic.square_bank, _squared)
+_room(arithmetic.product_bank, lambda length, other: length * len(other))
 
 
 def _same(vector: Any) -> Any:
@@ -92,12 +102,16 @@ for _function in (
     linear.solve,
     linear.variances,
     sharp.chi_square,
-    sharp.take_away,
+    sharp.powers,
+    sharp.remains,
     sharp.weigh_what_is_left,
     sharp.judge,
     sharp.overlaps,
-    sharp.try_phase,
+    sharp.four_sums,
+    sharp.kept,
+    sharp.try_phases,
     sharp.information,
+    sharp.gradient,
     sharp.weigh,
     sharp.turned,
     sharp.step,
@@ -111,6 +125,7 @@ for _function in (
     pair_fit.direct,
     sharp.deviations,
     tail.shape,
+    tail.turn_back,
     tail.weigh,
     tail.remains,
     tail.information,
@@ -120,6 +135,9 @@ for _function in (
     choice.offer_returns,
     choice.start_of_tail,
     choice.offer_tail,
-    choice.phases_of,
+    choice.chosen,
+    choice.has_tail,
+    choice.vary_returns,
+    choice.vary_tail,
 ):
     extending.register_jitable(error_model="numpy")(_function)

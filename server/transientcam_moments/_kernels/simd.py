@@ -278,6 +278,70 @@ def store(typingctx: Any, array: Any, index: Any, value: Any) -> Any:
 
 
 @intrinsic
+def pack(typingctx: Any, array: Any, index: Any, mask: Any, value: Any) -> Any:
+    """Write the pixels of a mask, without gaps, from ``index`` on; return how many there are.
+
+    What lies behind them, as far as all pixels would have reached, may be overwritten.
+    """
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        element = context.get_value_type(value.element)
+        pointer = _pointer(context, builder, array, args[0], args[1], args[3].type)
+        pointer = builder.bitcast(pointer, element.as_pointer())
+        # a register at a time: some processors take a hundred cycles to write gapless to memory
+        whole = "+avx512f" in context.codegen().magic_tuple()[2]  # users can turn it off
+        size = 512 // value.element.bitwidth if whole else value.count
+        written = ir.IntType(64)(0)
+        for first in range(0, value.count, size):
+            order = list(range(first, first + size))
+            part = _shuffle(builder, args[3], args[3], order)
+            chosen = _shuffle(builder, args[2], args[2], order)
+            target = builder.gep(pointer, [written])
+            emit = _pack_register if whole else _pack_in_memory
+            emit(builder, part, chosen, target)
+            bits = builder.ctpop(builder.bitcast(chosen, ir.IntType(size)))
+            written = builder.add(written, builder.zext(bits, ir.IntType(64)))
+        return written
+
+    return types.int64(array, types.intp, mask, value), codegen
+
+
+def _pack_register(builder: Any, part: Any, chosen: Any, target: Any) -> None:
+    name = f"llvm.x86.avx512.mask.compress.{_suffix(part.type)}"
+    kind = ir.FunctionType(part.type, [part.type, part.type, chosen.type])
+    callee = cgutils.get_or_insert_function(builder.module, kind, name)
+    packed = builder.call(callee, [part, ir.Constant(part.type, None), chosen])
+    where = builder.bitcast(target, part.type.as_pointer())
+    builder.store(packed, where, align=64 // part.type.count)
+
+
+def _pack_in_memory(builder: Any, part: Any, chosen: Any, target: Any) -> None:
+    name = f"llvm.masked.compressstore.{_suffix(part.type)}"
+    kind = ir.FunctionType(ir.VoidType(), [part.type, target.type, chosen.type])
+    builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [part, target, chosen])
+
+
+def _suffix(vector: Any) -> str:
+    return f"v{vector.count}f{32 if isinstance(vector.element, ir.FloatType) else 64}"
+
+
+@intrinsic
+def unpack(typingctx: Any, array: Any, index: Any, mask: Any, value: Any) -> Any:
+    """Return lanes whose pixels of a mask are those that `pack` wrote; the others are as before."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        vector = args[3].type
+        pointer = _pointer(context, builder, array, args[0], args[1], vector)
+        pointer = builder.bitcast(pointer, vector.element.as_pointer())
+        kind = ir.FunctionType(vector, [pointer.type, args[2].type, vector])
+        name = f"llvm.masked.expandload.{_suffix(vector)}"
+        callee = cgutils.get_or_insert_function(builder.module, kind, name)
+        return builder.call(callee, [pointer, args[2], args[3]])
+
+    return value(array, types.intp, mask, value), codegen
+
+
+@intrinsic
 def stream(typingctx: Any, array: Any, index: Any, value: Any) -> Any:
     """Write pixels past the caches, for results larger than these; aligned to a register."""
 

@@ -28,6 +28,11 @@ def square_bank(like: Array, length: Length, extra: int) -> Bank:
     return [like] * (len(length) + extra) ** 2
 
 
+def product_bank(like: Array, length: Length, other: Length) -> Bank:
+    """Return room for ``len(length) * len(other)`` planes."""
+    return [like] * (len(length) * len(other))
+
+
 def select(mask: Array, yes: Array, no: Array) -> Array:
     """Return ``yes`` where the mask is true, else ``no``."""
     return namespace(mask).where(mask, yes, no)

@@ -5,6 +5,9 @@ What is found of a pixel is a bank of planes, in the order of `Found`. Three ret
 
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from transientcam_moments._arrays import Array
 from transientcam_moments.likelihood import sharp, tail
 from transientcam_moments.likelihood.arithmetic import (
@@ -19,11 +22,17 @@ from transientcam_moments.likelihood.arithmetic import (
 )
 
 MOST_RETURNS: Final = 3
-X, Y, WEIGHT, WEIGHT_VARIANCE, PHASE_VARIANCE = 0, 3, 6, 9, 12
-"""First plane of the points of the unit circle, the weights and their variances, of each return."""
-TAIL, LENGTH, TAIL_VARIANCE, LENGTH_VARIANCE = 15, 16, 17, 18
-"""Light v of the tail, d, the variances of v and of log d; all 0 where there is no tail."""
-CHI_SQUARE, SCORE, COUNT = 19, 20, 21
+X, Y, WEIGHT = 0, 3, 6
+"""First plane of the points of the unit circle and the weights of each return."""
+TAIL, LENGTH = 9, 10
+"""Light v of the tail, and d; both 0 where there is no tail."""
+CHI_SQUARE, SCORE, COUNT = 11, 12, 13
+FITTED: Final = 14
+"""So many planes the fits fill; those behind have the variances of what was chosen."""
+WEIGHT_VARIANCE, PHASE_VARIANCE = 14, 17
+"""First plane of the variances of weights and phases of each return."""
+TAIL_VARIANCE, LENGTH_VARIANCE = 20, 21
+"""The variances of v and of log d; 0 where there is no tail."""
 PLANES: Final = 22
 STEPS: Final = (4, 8, 10)
 """Of the fits of one, two and three returns."""
@@ -41,9 +50,13 @@ LEAST_RATIO, MOST_RATIO = 0.05, 4.0
 """Of a tail's first d over its mean in the prior."""
 
 
-def phases_of(m: int) -> int:
-    """Return how many phases around the turn are tried for a start."""
-    return 4 * m + 6
+def turns_of(m: int) -> NDArray[np.float64]:
+    """Return cosines, then sines, of j t, j = 1 to m, at phases t from 0 to a quarter of a turn.
+
+    They, -t, pi - t and pi + t are 4 m + 6 phases around the turn, which are tried for a start.
+    """
+    angle = np.arange(m + 2)[:, None] * (2 * np.pi / (4 * m + 6)) * np.arange(1, m + 1)
+    return np.concatenate([np.cos(angle), np.sin(angle)], axis=1)
 
 
 def nothing(like: Array, score: Array, found: Bank) -> None:
@@ -54,10 +67,7 @@ def nothing(like: Array, score: Array, found: Bank) -> None:
 
 
 def offer_returns(
-    order: Length,
     returns: Length,
-    unknowns: Length,
-    weight: Bank,
     x: Bank,
     y: Bank,
     w: Bank,
@@ -68,27 +78,49 @@ def offer_returns(
 ) -> None:
     """Put K returns in `found` wherever their score is better and they are `allowed`."""
     count = len(returns)
-    spread = bank(cost, unknowns, 0)
-    sharp.deviations(order, returns, unknowns, weight, x, y, spread)
     score = cost + (2.0 * count) * penalty
     better = (score < found[SCORE]) & allowed
     zero = 0.0 * cost
-    for k in range(MOST_RETURNS):
-        i = min(k, count - 1)
-        there = 1.0 if k < count else 0.0
-        size = larger(w[i], least(cost))
-        found[X + k] = select(better, there * x[i], found[X + k])
-        found[Y + k] = select(better, there * y[i], found[Y + k])
-        found[WEIGHT + k] = select(better, there * w[i], found[WEIGHT + k])
-        variance = there * spread[i]
-        found[WEIGHT_VARIANCE + k] = select(better, variance, found[WEIGHT_VARIANCE + k])
-        variance = there * (spread[count + i] / (size * size))
-        found[PHASE_VARIANCE + k] = select(better, variance, found[PHASE_VARIANCE + k])
-    for i in range(TAIL, LENGTH_VARIANCE + 1):
-        found[i] = select(better, zero, found[i])
+    for k in range(count):
+        found[X + k] = select(better, x[k], found[X + k])
+        found[Y + k] = select(better, y[k], found[Y + k])
+        found[WEIGHT + k] = select(better, w[k], found[WEIGHT + k])
+    for k in range(count, MOST_RETURNS):
+        for first in (X, Y, WEIGHT):
+            found[first + k] = select(better, zero, found[first + k])
+    found[TAIL] = select(better, zero, found[TAIL])
+    found[LENGTH] = select(better, zero, found[LENGTH])
     found[CHI_SQUARE] = select(better, cost, found[CHI_SQUARE])
     found[SCORE] = select(better, score, found[SCORE])
     found[COUNT] = select(better, float(count) + zero, found[COUNT])
+
+
+def chosen(returns: Length, found: Bank) -> Any:
+    """Say where K returns were chosen."""
+    return (found[COUNT] == float(len(returns))) & ~has_tail(found)
+
+
+def has_tail(found: Bank) -> Any:
+    """Say where a return with a tail was chosen."""
+    return found[LENGTH] > 0.0
+
+
+def vary_returns(
+    order: Length, returns: Length, unknowns: Length, weight: Bank, found: Bank
+) -> None:
+    """Put the variances of K returns in `found` wherever they were chosen."""
+    count = len(returns)
+    here = chosen(returns, found)
+    spread = bank(weight[0], unknowns, 0)
+    x, y = bank(weight[0], returns, 0), bank(weight[0], returns, 0)
+    for k in range(count):
+        x[k], y[k] = found[X + k], found[Y + k]
+    sharp.deviations(order, returns, unknowns, weight, x, y, spread)
+    for k in range(count):
+        size = larger(found[WEIGHT + k], least(weight[0]))
+        found[WEIGHT_VARIANCE + k] = select(here, spread[k], found[WEIGHT_VARIANCE + k])
+        variance = spread[count + k] / (size * size)
+        found[PHASE_VARIANCE + k] = select(here, variance, found[PHASE_VARIANCE + k])
 
 
 def start_of_tail(x: Bank, y: Bank, w: Bank, mean: float) -> tuple[Array, ...]:
@@ -115,10 +147,6 @@ def start_of_tail(x: Bank, y: Bank, w: Bank, mean: float) -> tuple[Array, ...]:
 
 
 def offer_tail(
-    order: Length,
-    powers: Length,
-    unknowns: Length,
-    weight: Bank,
     prior: float,
     x: Array,
     y: Array,
@@ -126,30 +154,35 @@ def offer_tail(
     v: Array,
     d: Array,
     t: Array,
-    qr: Bank,
-    qi: Bank,
-    rr: Bank,
-    ri: Bank,
     cost: Array,
     penalty: Array,
     allowed: Any,
     found: Bank,
 ) -> None:
     """Put a return with a tail in `found` wherever its score is better and it is `allowed`."""
-    spread = bank(cost, unknowns, 0)
-    tail.deviations(order, powers, unknowns, weight, prior, x, y, w, v, d, qr, qi, rr, ri, spread)
     score = cost + 4.0 * penalty
     better = (score < found[SCORE]) & allowed
     zero = 0.0 * cost
-    for i in range(LENGTH_VARIANCE + 1):
-        found[i] = select(better, zero, found[i])
     found[X], found[Y] = select(better, x, found[X]), select(better, y, found[Y])
     found[WEIGHT] = select(better, w, found[WEIGHT])
-    found[WEIGHT_VARIANCE] = select(better, spread[0], found[WEIGHT_VARIANCE])
-    found[PHASE_VARIANCE] = select(better, spread[2], found[PHASE_VARIANCE])
+    for k in range(1, MOST_RETURNS):
+        for first in (X, Y, WEIGHT):
+            found[first + k] = select(better, zero, found[first + k])
     found[TAIL], found[LENGTH] = select(better, v, found[TAIL]), select(better, d, found[LENGTH])
-    found[TAIL_VARIANCE] = select(better, spread[1], found[TAIL_VARIANCE])
-    found[LENGTH_VARIANCE] = select(better, spread[3], found[LENGTH_VARIANCE])
     found[CHI_SQUARE] = select(better, larger(cost - prior * t * t, zero), found[CHI_SQUARE])
     found[SCORE] = select(better, score, found[SCORE])
     found[COUNT] = select(better, 1.0 + zero, found[COUNT])
+
+
+def vary_tail(
+    order: Length, powers: Length, unknowns: Length, weight: Bank, prior: float, found: Bank
+) -> None:
+    """Put the variances of a return with a tail in `found` wherever it was chosen."""
+    here = has_tail(found)
+    spread = bank(weight[0], unknowns, 0)
+    w, v, d = found[WEIGHT], found[TAIL], found[LENGTH]
+    tail.deviations(order, powers, unknowns, weight, prior, w, v, d, spread)
+    found[WEIGHT_VARIANCE] = select(here, spread[0], found[WEIGHT_VARIANCE])
+    found[PHASE_VARIANCE] = select(here, spread[2], found[PHASE_VARIANCE])
+    found[TAIL_VARIANCE] = select(here, spread[1], found[TAIL_VARIANCE])
+    found[LENGTH_VARIANCE] = select(here, spread[3], found[LENGTH_VARIANCE])

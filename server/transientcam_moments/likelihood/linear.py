@@ -28,15 +28,18 @@ def decompose(unknowns: Length, a: Bank) -> None:
         a[i * n + i] = 1.0 / larger(pivot, least(pivot))
 
 
-def solve(unknowns: Length, a: Bank, g: Bank) -> None:
-    """Put the solution of the system in the place of `g`; `a` is from `decompose`."""
+def solve(unknowns: Length, a: Bank, g: Bank, first: int) -> None:
+    """Put the solution of the system in the place of `g`, from unknown `first` on.
+
+    `a` is from `decompose`.
+    """
     n = len(unknowns)
     for i in range(1, n):
         total = g[i]
         for k in range(i):
             total = total - a[i * n + k] * g[k]
         g[i] = total
-    for i in range(n - 1, -1, -1):
+    for i in range(n - 1, first - 1, -1):
         total = g[i] * a[i * n + i]
         for k in range(i + 1, n):
             total = total - a[k * n + i] * g[k]

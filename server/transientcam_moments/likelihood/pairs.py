@@ -18,7 +18,7 @@ from transientcam_moments._lanes.parallel import Spread, on_threads
 from transientcam_moments.likelihood import pair_fit
 from transientcam_moments.likelihood.choice import COUNT, PLANES, SCORE, nothing
 from transientcam_moments.likelihood.estimate import Likelihood, dense, prepared, results
-from transientcam_moments.likelihood.planar import Data, SharpFit, where
+from transientcam_moments.likelihood.planar import Data, SharpFit, varied, where
 from transientcam_moments.likelihood.sharp import SETTLED
 from transientcam_moments.noise.moments import MomentNoise
 
@@ -152,7 +152,7 @@ def _fit(data: Data) -> tuple[Array, Array]:
     # chi-square cannot become less than 0: no model with more unknowns is better below
     if len(data.re) > 2:
         planes = where(planes[SCORE] > 4 * data.penalty, more, data, (), planes)
-    return planes[:-1], planes[-1]
+    return varied(data, planes[:-1], 2, 0), planes[-1]
 
 
 class _Pairs:
@@ -209,8 +209,7 @@ def _best_pair(data: Data) -> tuple[SharpFit, Array]:
     x, y = pair_fit.direct(pairs.x, pairs.y, pairs.w)
     other = x * x[0] + y * y[0] < least_alike(len(data.re) - 1)
     lead = np.where(other, pairs.cost, np.inf).min(axis=0) - pairs.cost[0]
-    best = SharpFit(data, 2, None)
-    best.x, best.y, best.w = ([each[0] for each in part] for part in (pairs.x, pairs.y, pairs.w))
+    best = SharpFit(data, *([each[0] for each in part] for part in (pairs.x, pairs.y, pairs.w)))
     best.cost = pairs.cost[0]
     return best, lead
 

@@ -1,6 +1,7 @@
 """The fits of all pixels: each model where the simpler ones leave something to explain."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,11 +16,15 @@ from transientcam_moments.likelihood.choice import (
     SCORE,
     STEPS,
     TAIL_STEPS,
+    chosen,
+    has_tail,
     nothing,
     offer_returns,
     offer_tail,
-    phases_of,
     start_of_tail,
+    turns_of,
+    vary_returns,
+    vary_tail,
 )
 
 
@@ -52,25 +57,25 @@ def fit(data: Data, most: int, shape: int) -> Array:
     """
     xp = namespace(data.re)
     m = data.re.shape[0] - 1
+    most = min(most, m)
     found = [data.re[0]] * PLANES
     far = np.inf + 0 * data.penalty
     nothing(data.penalty, far, found)
     one = SharpFit.start(data, 1, None, far)
     one.offer(found, data.numbers >= 0)
     planes = xp.stack(found)
-    further = min(most, m) >= 2
-    if not further and not (shape and m >= 2):
-        return planes
+    if most < 2 and not (shape and m >= 2):
+        return varied(data, planes, 1, 0)
 
     def more(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
         found = list(planes)
         two = SharpFit.start(data, 2, before, np.inf + 0 * data.penalty)
-        if further:
+        if most >= 2:
             two.offer(found, data.numbers >= 4)
         if shape:
             _offer_tail(data, two, shape, found)
         done = xp.stack(found)
-        if min(most, m) < MOST_RETURNS:
+        if most < MOST_RETURNS:
             return done
 
         def most_of_all(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
@@ -83,7 +88,28 @@ def fit(data: Data, most: int, shape: int) -> Array:
         return where(still, most_of_all, data, two.state(), done)
 
     # chi-square cannot become less than 0: no model with more unknowns is better below
-    return where(planes[SCORE] > 4 * data.penalty, more, data, one.state(), planes)
+    planes = where(planes[SCORE] > 4 * data.penalty, more, data, one.state(), planes)
+    return varied(data, planes, most, shape)
+
+
+def varied(data: Data, planes: Array, most: int, shape: int) -> Array:
+    """Return what was found with the variances of what was chosen."""
+    order = (0,) * (len(data.re) - 1)
+
+    def of_returns(count: int, data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+        found = list(planes)
+        vary_returns(order, (0,) * count, (0,) * (2 * count), data.weight, found)
+        return namespace(planes).stack(found)
+
+    def of_tail(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+        found = list(planes)
+        vary_tail(order, (0,) * shape, (0,) * 4, data.weight, PRIOR, found)
+        return namespace(planes).stack(found)
+
+    for count in range(1, most + 1):
+        here = chosen((0,) * count, planes)
+        planes = where(here, partial(of_returns, count), data, (), planes)
+    return where(has_tail(planes), of_tail, data, (), planes) if shape else planes
 
 
 def where(
@@ -111,36 +137,38 @@ class SharpFit:
 
     cost: Array
 
-    def __init__(self, data: Data, count: int, before: tuple[Array, ...] | None) -> None:
-        m = data.re.shape[0] - 1
+    def __init__(
+        self, data: Data, x: Sequence[Array], y: Sequence[Array], w: Sequence[Array]
+    ) -> None:
+        m, count = data.re.shape[0] - 1, len(x)
         self.data = data
         self.order, self.returns = (0,) * m, (0,) * count
         self.unknowns = (0,) * (2 * count)
-        flat = (list(data.re), list(data.im)) if before is None else (before[0], before[1])
-        self.rr, self.ri = list(flat[0]), list(flat[1])
-        points = () if before is None else before[2:]
-        self.x, self.y, self.w = ([*part, data.re[0]] for part in points or ((), (), ()))
+        self.x, self.y, self.w = list(x), list(y), list(w)
+        self._pr, self._pi = ([data.re[0]] * (m * count) for _ in range(2))
+        self._rr, self._ri = ([data.re[0]] * (m + 1) for _ in range(2))
+        for k in range(count):
+            sharp.powers(self.order, x[k], y[k], k, self._pr, self._pi)
 
     @classmethod
     def start(
         cls, data: Data, count: int, before: tuple[Array, ...] | None, bar: Array
     ) -> "SharpFit":
         """Add a return to those of another fit, and fit all of them; `bar` as in `sharp.judge`."""
-        fit = cls(data, count, before)
-        fit.cost = fit._add()
+        x, y, w = before or ((), (), ())
+        point = cls(data, x, y, w).new_return()
+        fit = cls(data, *([*old, new] for old, new in zip((x, y, w), point, strict=True)))
+        fit._look()
         fit.improve(STEPS[count - 1], bar)
         return fit
 
     @classmethod
     def at(cls, data: Data, x: Sequence[Array], y: Sequence[Array]) -> "SharpFit":
         """Begin with returns at points x + i y of the unit circle, and the best weights there."""
-        fit = cls(data, len(x), None)
-        fit.x, fit.y, fit.w = list(x), list(y), list(x)
-        given = (data.re, data.im, data.weight, fit.x, fit.y, fit.w)
+        fit = cls(data, x, y, x)
+        given = (data.re, data.im, data.weight, fit._pr, fit._pi, fit.w)
         sharp.weigh(fit.order, fit.returns, *given)
-        for point in zip(fit.x, fit.y, fit.w, strict=True):
-            sharp.take_away(fit.order, *point, fit.rr, fit.ri)
-        fit.cost = sharp.chi_square(fit.order, data.weight, fit.rr, fit.ri)
+        fit._look()
         return fit
 
     def improve(self, steps: int, bar: Array) -> None:
@@ -148,57 +176,56 @@ class SharpFit:
         data = self.data
 
         def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
-            x, y, w, rr, ri = (list(part) for part in state[:5])
+            banks = [list(part) for part in state[:5]]
             cost, damping = sharp.step(
                 self.order, self.returns, self.unknowns, data.re, data.im, data.weight,
-                x, y, w, rr, ri, state[5], state[6], bar,
+                *banks, state[5], state[6], bar,
             )  # fmt: skip
-            return tuple(x), tuple(y), tuple(w), tuple(rr), tuple(ri), cost, damping
+            return *(tuple(part) for part in banks), cost, damping
 
-        banks = (tuple(part) for part in (self.x, self.y, self.w, self.rr, self.ri))
+        banks = (tuple(part) for part in (self._pr, self._pi, self.w, self._rr, self._ri))
         damping = sharp.FIRST_DAMPING + 0 * self.cost
         state = _times(steps, step, (*banks, self.cost, damping), _moving)
-        self.x, self.y, self.w, self.rr, self.ri = (list(part) for part in state[:5])
+        self._pr, self._pi, self.w, self._rr, self._ri = (list(part) for part in state[:5])
+        self.x, self.y = (part[:: len(self.order)] for part in (self._pr, self._pi))
         self.cost = state[5]
 
-    def _add(self) -> Array:
-        """Put the best return for what is left in the last place; return chi-square."""
-        order, data = self.order, self.data
-        re, im = list(self.rr), list(self.ri)
-        total = sharp.weigh_what_is_left(order, data.weight, self.rr, self.ri, re, im)
-        phases = phases_of(len(order))
-        cosine, sine = np.cos(2 * np.pi / phases), np.sin(2 * np.pi / phases)
-        kr, ki = [total] * len(order) * 2, [total] * len(order) * 2
-        sharp.overlaps(order, self.returns, data.weight, total, self.x, self.y, kr, ki)
-        flat = data.weight[0] / total
+    def _look(self) -> None:
+        """Find what the returns leave."""
+        data, given = self.data, (self._pr, self._pi, self.w, self._rr, self._ri)
+        sharp.remains(self.order, self.returns, data.re, data.im, *given)
+        self.cost = sharp.chi_square(self.order, data.weight, self._rr, self._ri)
+
+    def new_return(self) -> tuple[Array, Array, Array]:
+        """Return point and weight of the best return for what these leave."""
+        self._look()
+        order, weight, xp = self.order, self.data.weight, namespace(self.cost)
+        returns = (0,) * (len(self.returns) + 1)
+        re, im = list(self._rr), list(self._ri)
+        total = sharp.weigh_what_is_left(order, weight, self._rr, self._ri, re, im)
+        kr, ki = ([total] * ((len(order) + 1) * len(returns)) for _ in range(2))
+        sharp.overlaps(order, returns, weight, total, self._pr, self._pi, kr, ki)
+        turns = xp.asarray(turns_of(len(order)).astype(total.dtype))
 
         def attempt(state: tuple[Array, ...]) -> tuple[Array, ...]:
-            c, s = state[:2]
-            best = sharp.try_phase(
-                order, self.returns, flat, re, im, total, kr, ki, c, s, *state[2:]
-            )
-            return c * cosine - s * sine, c * sine + s * cosine, *best
+            row = state[0]
+            best = sharp.try_phases(order, returns, turns, row, re, im, kr, ki, *state[1:])
+            return row + 1, *best
 
         zero = 0 * total
-        none = zero - 1
-        one = total.dtype.type(1) if namespace(total) is np else 1 + zero
-        state = _times(phases, attempt, (one, 0 * one, none, zero, zero, zero))
-        x, y, w = self.x, self.y, self.w
-        x[-1], y[-1], w[-1] = state[3:]
-        sharp.take_away(order, x[-1], y[-1], w[-1], self.rr, self.ri)
-        return sharp.chi_square(order, data.weight, self.rr, self.ri)
+        state = _times(len(turns), attempt, (0, zero, 1 + zero, 1 + zero, zero))
+        _, along, apart, x, y = state
+        return x, y, along / (apart * total)
 
     def state(self) -> tuple[Array, ...]:
         """Return what a fit of one more return begins with."""
         xp = namespace(self.cost)
-        return tuple(xp.stack(part) for part in (self.rr, self.ri, self.x, self.y, self.w))
+        return tuple(xp.stack(part) for part in (self.x, self.y, self.w))
 
     def offer(self, found: list[Array], allowed: Array) -> None:
         """Put the returns where they are the better model."""
-        offer_returns(
-            self.order, self.returns, self.unknowns, self.data.weight,
-            self.x, self.y, self.w, self.cost, self.data.penalty, allowed, found,
-        )  # fmt: skip
+        penalty = self.data.penalty
+        offer_returns(self.returns, self.x, self.y, self.w, self.cost, penalty, allowed, found)
 
 
 def _offer_tail(data: Data, two: SharpFit, shape: int, found: list[Array]) -> None:
@@ -207,30 +234,28 @@ def _offer_tail(data: Data, two: SharpFit, shape: int, found: list[Array]) -> No
     mean = DELAY_RAD / shape
     x, y, w, v, ratio, t = start_of_tail(two.x, two.y, two.w, DELAY_RAD)
     d = ratio * mean
-    qr, qi, rr, ri = ([d] * len(data.re) for _ in range(4))
-    tail.shape(order, powers, d, qr, qi)
-    tail.remains(order, data.re, data.im, x, y, w, v, qr, qi, rr, ri)
+    ur, ui, lag, qr, qi, rr, ri = ([d] * len(data.re) for _ in range(7))
+    tail.shape(order, powers, d, lag, qr, qi)
+    tail.turn_back(order, data.re, data.im, x, y, ur, ui)
+    tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
     cost = sharp.chi_square(order, data.weight, rr, ri) + PRIOR * t * t
 
     def step(state: Any) -> Any:
-        x, y, w, v, d, t, cost, damping = state[4:]
-        qr, qi, rr, ri = (list(part) for part in state[:4])
+        banks = [list(part) for part in state[:5]]
+        x, y, w, v, d, t, cost, damping = state[5:]
         new = tail.step(
             order, powers, unknowns, data.re, data.im, data.weight, PRIOR,
-            x, y, w, v, d, t, qr, qi, rr, ri, cost, damping, bar,
+            x, y, w, v, d, t, *banks, cost, damping, bar,
         )  # fmt: skip
-        return tuple(qr), tuple(qi), tuple(rr), tuple(ri), *new
+        return *(tuple(part) for part in banks), *new
 
-    banks = (tuple(part) for part in (qr, qi, rr, ri))
+    banks = (tuple(part) for part in (lag, qr, qi, rr, ri))
     damping = sharp.FIRST_DAMPING + 0 * cost
     bar = found[SCORE] - 4 * data.penalty
     state = _times(TAIL_STEPS, step, (*banks, x, y, w, v, d, t, cost, damping), _moving)
-    qr, qi, rr, ri = (list(part) for part in state[:4])
-    x, y, w, v, d, t, cost, _ = state[4:]
-    offer_tail(
-        order, powers, unknowns, data.weight, PRIOR, x, y, w, v, d, t, qr, qi, rr, ri,
-        cost, data.penalty, data.numbers >= 4, found,
-    )  # fmt: skip
+    x, y, w, v, d, t, cost, _ = state[5:]
+    allowed = data.numbers >= 4
+    offer_tail(PRIOR, x, y, w, v, d, t, cost, data.penalty, allowed, found)
 
 
 def _moving(state: Any) -> bool:

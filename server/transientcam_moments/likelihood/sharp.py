@@ -1,13 +1,14 @@
 """Weighted least squares of K sharp returns: b_j = sum_k w_k exp(i j phi_k).
 
 A return is kept as a point z = x + i y of the unit circle and a weight w, so that its moments are
-powers. The unknowns of a step are the weights and the phases times their weights, as in
-`noise.cramer_rao`: with u = exp(i j (phi_l - phi_k)) the normal equations are sums of
-weight_j (Re u, j^2 Re u, j Im u), and no column vanishes with its return.
+powers: z^j of return k is at place k m + j - 1 of the banks ``pr`` and ``pi``. The unknowns of a
+step are the weights and the phases times their weights, as in `noise.cramer_rao`: with
+u = exp(i j (phi_l - phi_k)) the normal equations are sums of weight_j (Re u, j^2 Re u, j Im u), and
+no column vanishes with its return.
 
 ``order`` is a tuple of length m, ``returns`` one of length K; ``weight`` holds the inverse variance
 of each moment's real part, 0 where it was not measured; ``rr``, ``ri`` hold what is left of the
-moments.
+moments. Sums are written so that each product fuses with the sum so far.
 """
 
 from typing import Any
@@ -19,6 +20,7 @@ from transientcam_moments.likelihood.arithmetic import (
     bank,
     larger,
     least,
+    product_bank,
     rounding,
     select,
     smaller,
@@ -67,117 +69,201 @@ def judge(cost: Array, tried: Array, damping: Array, bar: Array) -> tuple[Any, A
     return lower & moving, select(moving & ~little, damping, SETTLED + 0.0 * cost)
 
 
-def take_away(order: Length, x: Array, y: Array, w: Array, rr: Bank, ri: Bank) -> None:
-    """Take a return out of what is left."""
-    rr[0] = rr[0] - w
-    a, b = w, 0.0 * w
-    for j in range(1, len(order) + 1):
-        a, b = a * x - b * y, a * y + b * x
-        rr[j] = rr[j] - a
-        ri[j] = ri[j] - b
+def powers(order: Length, x: Array, y: Array, k: int, pr: Bank, pi: Bank) -> None:
+    """Put the powers 1 to m of a point of the unit circle in the place of return `k`."""
+    m = len(order)
+    p, q = x, y
+    pr[k * m], pi[k * m] = p, q
+    for j in range(1, m):
+        p, q = p * x - q * y, p * y + q * x
+        pr[k * m + j], pi[k * m + j] = p, q
+
+
+def remains(
+    order: Length,
+    returns: Length,
+    data_r: Bank,
+    data_i: Bank,
+    pr: Bank,
+    pi: Bank,
+    w: Bank,
+    rr: Bank,
+    ri: Bank,
+) -> None:
+    """Put what returns leave of the data in `rr` and `ri`."""
+    m, count = len(order), len(returns)
+    for j in range(m + 1):
+        re, im = data_r[j], data_i[j]
+        for k in range(count):
+            if j == 0:
+                re = re - w[k]
+            else:
+                re = re - w[k] * pr[k * m + j - 1]
+                im = im - w[k] * pi[k * m + j - 1]
+        rr[j], ri[j] = re, im
 
 
 def weigh_what_is_left(
     order: Length, weight: Bank, rr: Bank, ri: Bank, re: Bank, im: Bank
 ) -> Array:
     """Put what is left times its weight in `re` and `im`; return the sum of the weights."""
-    total = 0.0 * weight[0]
-    for j in range(len(order) + 1):
+    total = weight[0]
+    re[0], im[0] = weight[0] * rr[0], weight[0] * ri[0]
+    for j in range(1, len(order) + 1):
         re[j], im[j] = weight[j] * rr[j], weight[j] * ri[j]
         total = total + weight[j]
     return larger(total, least(total))
 
 
 def overlaps(
-    order: Length, returns: Length, weight: Bank, total: Array, x: Bank, y: Bank, kr: Bank, ki: Bank
-) -> None:
+    order: Length, returns: Length, weight: Bank, total: Array, pr: Bank, pi: Bank, kr: Bank,
+    ki: Bank,
+) -> None:  # fmt: skip
     """Put the coefficients of what a return at any phase shares with all but the last in banks.
 
     Of return k they are the Fourier coefficients of sum_j weight_j cos(j (phi - phi_k)) over the
-    sum of the weights, j = 1 to m.
+    sum of the weights, j = 0 to m, at the places from k (m + 1) on.
     """
     m = len(order)
     inverse = 1.0 / total
     for k in range(len(returns) - 1):
-        p, q = x[k], y[k]
+        at = k * (m + 1)
+        kr[at], ki[at] = weight[0] * inverse, 0.0 * inverse
         for j in range(1, m + 1):
             share = weight[j] * inverse
-            kr[k * m + j - 1], ki[k * m + j - 1] = share * p, share * q
-            p, q = p * x[k] - q * y[k], p * y[k] + q * x[k]
+            kr[at + j], ki[at + j] = share * pr[k * m + j - 1], share * pi[k * m + j - 1]
 
 
-def try_phase(
-    order: Length,
-    returns: Length,
-    flat: Array,
-    re: Bank,
-    im: Bank,
-    total: Array,
-    kr: Bank,
-    ki: Bank,
-    c: Any,
-    s: Any,
-    best: Array,
-    bx: Array,
-    by: Array,
-    bw: Array,
-) -> tuple[Array, ...]:
-    """Return best gain, point and weight of a return more, after trying the point c + i s.
+def four_sums(
+    order: Length, turns: Any, row: Any, at: int, re: Bank, im: Bank
+) -> tuple[Array, Array, Array, Array]:
+    """Return a Fourier series at the phases t, -t, pi - t and pi + t of a row of `turns`.
 
-    What such a return explains of the space that one of the others spans is not counted; `kr` and
-    `ki` are from `overlaps`, and `flat` is the weight of b_0 over all weights.
+    ``turns`` has cos(j t), then sin(j t), j = 1 to m, in each row. The even and the odd terms of
+    cosines and sines are the same in all four but for their signs.
     """
     m = len(order)
-    found = re[0]
-    a, b = c, s
-    for j in range(1, m + 1):
-        found = found + (re[j] * a + im[j] * b)
-        a, b = a * c - b * s, a * s + b * c
-    apart = 0.0 * total
-    for k in range(len(returns) - 1):
-        same = flat
-        a, b = c, s
-        for j in range(m):
-            same = same + (kr[k * m + j] * a + ki[k * m + j] * b)
-            a, b = a * c - b * s, a * s + b * c
-        apart = larger(apart, same * same)
-    apart = larger(1.0 - apart, LEAST_APART + 0.0 * apart)
-    gain = select(found > 0.0, found * found / apart, 0.0 * found)
-    better = gain > best
-    return (
-        select(better, gain, best),
-        select(better, c + 0.0 * gain, bx),
-        select(better, s + 0.0 * gain, by),
-        select(better, larger(found / (apart * total), 0.0 * gain), bw),
-    )
+    even, odd = re[at], re[at + 1] * turns[row, 0]
+    even_sine, odd_sine = 0.0 * even, im[at + 1] * turns[row, m]
+    for j in range(2, m + 1):
+        c, s = turns[row, j - 1], turns[row, m + j - 1]
+        if j % 2 == 0:
+            even, even_sine = even + re[at + j] * c, even_sine + im[at + j] * s
+        else:
+            odd, odd_sine = odd + re[at + j] * c, odd_sine + im[at + j] * s
+    near, far = even + odd, even - odd
+    near_sine, far_sine = odd_sine + even_sine, odd_sine - even_sine
+    return near + near_sine, near - near_sine, far + far_sine, far - far_sine
 
 
-def information(order: Length, returns: Length, weight: Bank, x: Bank, y: Bank, a: Bank) -> None:
+def kept(
+    returns: Length,
+    along: Array,
+    apart: Array,
+    x: Any,
+    y: Any,
+    best: Array,
+    best_apart: Array,
+    bx: Array,
+    by: Array,
+) -> tuple[Array, Array, Array, Array]:
+    """Return the better one of two points: what lies along it, its own share, and the point.
+
+    It explains along^2 / apart, which is compared without a quotient; `best` is 0 or more.
+    """
+    if len(returns) == 1:
+        better = along > best
+    else:
+        better = (along > 0.0) & (along * along * best_apart > best * best * apart)
+        best_apart = select(better, apart, best_apart)
+    best = select(better, along, best)
+    return best, best_apart, select(better, x + 0.0 * best, bx), select(better, y + 0.0 * best, by)
+
+
+def try_phases(
+    order: Length,
+    returns: Length,
+    turns: Any,
+    row: Any,
+    re: Bank,
+    im: Bank,
+    kr: Bank,
+    ki: Bank,
+    best: Array,
+    best_apart: Array,
+    bx: Array,
+    by: Array,
+) -> tuple[Array, Array, Array, Array]:
+    """Return the best point of a return more, as `kept` does, after trying a row of `four_sums`.
+
+    What such a return explains of the space that one of the others spans is not counted; `kr` and
+    `ki` are from `overlaps`.
+    """
+    m = len(order)
+    a, b, c, d = four_sums(order, turns, row, 0, re, im)
+    own_a = own_b = own_c = own_d = best_apart
+    if len(returns) > 1:
+        one, most = 1.0 + 0.0 * a, LEAST_APART + 0.0 * a
+        own_a = own_b = own_c = own_d = one
+        for k in range(len(returns) - 1):
+            sa, sb, sc, sd = four_sums(order, turns, row, k * (m + 1), kr, ki)
+            own_a, own_b = smaller(own_a, one - sa * sa), smaller(own_b, one - sb * sb)
+            own_c, own_d = smaller(own_c, one - sc * sc), smaller(own_d, one - sd * sd)
+        own_a, own_b = larger(own_a, most), larger(own_b, most)
+        own_c, own_d = larger(own_c, most), larger(own_d, most)
+    x, y = turns[row, 0], turns[row, m]
+    best, best_apart, bx, by = kept(returns, a, own_a, x, y, best, best_apart, bx, by)
+    best, best_apart, bx, by = kept(returns, b, own_b, x, -y, best, best_apart, bx, by)
+    best, best_apart, bx, by = kept(returns, c, own_c, -x, y, best, best_apart, bx, by)
+    return kept(returns, d, own_d, -x, -y, best, best_apart, bx, by)
+
+
+def information(order: Length, returns: Length, weight: Bank, pr: Bank, pi: Bank, a: Bank) -> None:
     """Fill the lower half of the information matrix of weights, then phases times weights."""
     m, count = len(order), len(returns)
     n = 2 * count
+    all_flat, all_curved = weight[0], 0.0 * weight[0]
+    for j in range(1, m + 1):
+        all_flat = all_flat + weight[j]
+        all_curved = all_curved + (float(j) * j) * weight[j]
     for k in range(count):
-        flat, curved = weight[0], 0.0 * weight[0]
-        for j in range(1, m + 1):
-            flat = flat + weight[j]
-            curved = curved + (float(j) * j) * weight[j]
-        a[k * n + k] = flat
-        a[(count + k) * n + count + k] = curved
-        a[(count + k) * n + k] = 0.0 * flat
+        a[k * n + k] = all_flat
+        a[(count + k) * n + count + k] = all_curved
+        a[(count + k) * n + k] = 0.0 * all_flat
         for i in range(k):
-            dx, dy = x[k] * x[i] + y[k] * y[i], y[k] * x[i] - x[k] * y[i]
-            p, q = dx, dy  # z_k / z_i
-            flat, curved, skew = weight[0], 0.0 * weight[0], 0.0 * weight[0]
+            flat, curved, skew = weight[0], 0.0 * all_flat, 0.0 * all_flat
+            # powers of z_k / z_i, by the recurrence of cosines and sines of multiples
+            zr, zi, wr, wi = pr[k * m], pi[k * m], pr[i * m], pi[i * m]
+            p, q = zr * wr + zi * wi, zi * wr - zr * wi
+            twice, before, sine_before = 2.0 * p, 1.0 + 0.0 * p, 0.0 * p
             for j in range(1, m + 1):
-                real, imag = weight[j] * p, weight[j] * q
-                flat = flat + real
-                curved = curved + (float(j) * j) * real
-                skew = skew + float(j) * imag
-                p, q = p * dx - q * dy, p * dy + q * dx
+                along = weight[j] * p
+                flat = flat + along
+                curved = curved + (float(j) * j) * along
+                skew = skew + (float(j) * weight[j]) * q
+                p, before = twice * p - before, p
+                q, sine_before = twice * q - sine_before, q
             a[k * n + i] = flat
             a[(count + k) * n + count + i] = curved
             a[(count + k) * n + i] = -skew
             a[(count + i) * n + k] = skew
+
+
+def gradient(
+    order: Length, returns: Length, weight: Bank, pr: Bank, pi: Bank, rr: Bank, ri: Bank, g: Bank
+) -> None:
+    """Put what is left along each return, then across it, in `g`."""
+    m, count = len(order), len(returns)
+    level = weight[0] * rr[0]
+    for k in range(count):
+        g[k], g[count + k] = level, 0.0 * level
+    for j in range(1, m + 1):
+        re, im = weight[j] * rr[j], weight[j] * ri[j]
+        steep_re, steep_im = float(j) * re, float(j) * im
+        for k in range(count):
+            p, q = pr[k * m + j - 1], pi[k * m + j - 1]
+            g[k] = g[k] + p * re + q * im
+            g[count + k] = g[count + k] + p * steep_im - q * steep_re
 
 
 def weigh(
@@ -186,32 +272,32 @@ def weigh(
     data_r: Bank,
     data_i: Bank,
     weight: Bank,
-    x: Bank,
-    y: Bank,
+    pr: Bank,
+    pi: Bank,
     w: Bank,
 ) -> None:
     """Put the weights in `w` that explain most with given phases; those below 0 become 0."""
     m, count = len(order), len(returns)
     a = square_bank(weight[0], returns, 0)
+    total = weight[0]
+    for j in range(1, m + 1):
+        total = total + weight[j]
+    total = total * (1.0 + rounding(total))
     for k in range(count):
-        along, total = weight[0] * data_r[0], weight[0]
-        p, q = x[k], y[k]
+        along = weight[0] * data_r[0]
         for j in range(1, m + 1):
+            p, q = pr[k * m + j - 1], pi[k * m + j - 1]
             along = along + weight[j] * (p * data_r[j] + q * data_i[j])
-            total = total + weight[j]
-            p, q = p * x[k] - q * y[k], p * y[k] + q * x[k]
         w[k] = along
-        a[k * count + k] = total * (1.0 + rounding(total))
+        a[k * count + k] = total
         for i in range(k):
-            dx, dy = x[k] * x[i] + y[k] * y[i], y[k] * x[i] - x[k] * y[i]
-            p, q = dx, dy
             same = weight[0]
-            for j in range(1, m + 1):
-                same = same + weight[j] * p
-                p, q = p * dx - q * dy, p * dy + q * dx
+            for j in range(m):
+                u, v = k * m + j, i * m + j
+                same = same + weight[j + 1] * (pr[u] * pr[v] + pi[u] * pi[v])
             a[k * count + i] = same
     decompose(returns, a)
-    solve(returns, a, w)
+    solve(returns, a, w, 0)
     for k in range(count):
         w[k] = larger(w[k], 0.0 * w[k])
 
@@ -235,8 +321,8 @@ def step(
     data_r: Bank,
     data_i: Bank,
     weight: Bank,
-    x: Bank,
-    y: Bank,
+    pr: Bank,
+    pi: Bank,
     w: Bank,
     rr: Bank,
     ri: Bank,
@@ -251,33 +337,25 @@ def step(
     m, count = len(order), len(returns)
     n = 2 * count
     a, g = square_bank(cost, unknowns, 0), bank(cost, unknowns, 0)
-    information(order, returns, weight, x, y, a)
+    information(order, returns, weight, pr, pi, a)
     for i in range(n):
         a[i * n + i] = a[i * n + i] * (1.0 + damping)
-    for k in range(count):
-        along, across = weight[0] * rr[0], 0.0 * cost
-        p, q = x[k], y[k]
-        for j in range(1, m + 1):
-            along = along + weight[j] * (p * rr[j] + q * ri[j])
-            across = across + (float(j) * weight[j]) * (p * ri[j] - q * rr[j])
-            p, q = p * x[k] - q * y[k], p * y[k] + q * x[k]
-        g[k], g[count + k] = along, across
+    gradient(order, returns, weight, pr, pi, rr, ri, g)
     decompose(unknowns, a)
-    solve(unknowns, a, g)
-    tx, ty, tw = bank(cost, returns, 0), bank(cost, returns, 0), bank(cost, returns, 0)
-    tr, ti = bank(cost, order, 1), bank(cost, order, 1)
-    for j in range(m + 1):
-        tr[j], ti[j] = data_r[j], data_i[j]
+    solve(unknowns, a, g, count)
+    tr, ti, tw = bank(cost, order, 1), bank(cost, order, 1), bank(cost, returns, 0)
+    qr, qi = product_bank(cost, order, returns), product_bank(cost, order, returns)
     reach = 0.5 * REACH / m
     for k in range(count):
-        tx[k], ty[k] = turned(x[k], y[k], w[k], g[count + k], reach)
-    weigh(order, returns, data_r, data_i, weight, tx, ty, tw)
-    for k in range(count):
-        take_away(order, tx[k], ty[k], tw[k], tr, ti)
+        x, y = turned(pr[k * m], pi[k * m], w[k], g[count + k], reach)
+        powers(order, x, y, k, qr, qi)
+    weigh(order, returns, data_r, data_i, weight, qr, qi, tw)
+    remains(order, returns, data_r, data_i, qr, qi, tw, tr, ti)
     tried = chi_square(order, weight, tr, ti)
     lower, damping = judge(cost, tried, damping, bar)
+    for i in range(count * m):
+        pr[i], pi[i] = select(lower, qr[i], pr[i]), select(lower, qi[i], pi[i])
     for k in range(count):
-        x[k], y[k] = select(lower, tx[k], x[k]), select(lower, ty[k], y[k])
         w[k] = select(lower, tw[k], w[k])
     for j in range(m + 1):
         rr[j], ri[j] = select(lower, tr[j], rr[j]), select(lower, ti[j], ri[j])
@@ -294,7 +372,10 @@ def deviations(
     out: Bank,
 ) -> None:
     """Put the variances of weights, then of phases times weights, in `out`."""
-    a = square_bank(x[0], unknowns, 0)
-    information(order, returns, weight, x, y, a)
+    pr, pi = product_bank(weight[0], order, returns), product_bank(weight[0], order, returns)
+    for k in range(len(returns)):
+        powers(order, x[k], y[k], k, pr, pi)
+    a = square_bank(weight[0], unknowns, 0)
+    information(order, returns, weight, pr, pi, a)
     decompose(unknowns, a)
     variances(unknowns, a, out)

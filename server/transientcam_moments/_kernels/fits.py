@@ -1,0 +1,249 @@
+"""The fits of the likelihood to a vector of pixels: a return more, a tail, and what is written."""
+
+from typing import Any
+
+from numba import njit
+
+from transientcam_moments._kernels import portable, simd
+from transientcam_moments._kernels.returns import phase_of
+from transientcam_moments.likelihood import choice, sharp, tail
+from transientcam_moments.likelihood.arithmetic import logarithm, product_bank
+from transientcam_moments.likelihood.choice import (
+    CHI_SQUARE,
+    COUNT,
+    DELAY_RAD,
+    LENGTH,
+    LENGTH_VARIANCE,
+    MARGIN,
+    PHASE_VARIANCE,
+    PRIOR,
+    STEPS,
+    TAIL,
+    TAIL_SHAPE,
+    TAIL_VARIANCE,
+    WEIGHT,
+    WEIGHT_VARIANCE,
+    X,
+    Y,
+)
+
+__all__ = ["fit", "fit_one", "portable", "vary", "write"]  # portable gives arithmetic its meaning
+
+_MEAN = DELAY_RAD / TAIL_SHAPE
+DAMPING = 6
+"""Place of the damping in the state of a tail: x, y, w, v, d, t, damping, chi-square."""
+
+
+@njit(forceinline=True, error_model="numpy")
+def _prepare(
+    order: Any, b: Any, variance: Any, error: float, p: int, one: Any, data_r: Any, data_i: Any,
+    weight: Any,
+) -> Any:  # fmt: skip
+    """Load pixels, their largest moment made 1; return that, how many numbers, and their use."""
+    m = len(order)
+    zero = 0.0 * one
+    size, poison, numbers, waves = zero, zero, zero, zero
+    for j in range(m + 1):
+        x, y = simd.load_complex(one, b[j], p)
+        v = simd.load(one, variance[j], p)
+        seen = (v > 0.0) & (v < simd.infinity(one))
+        x = simd.select(seen, x, 0.0)
+        y = simd.select(seen, y, 0.0) if j > 0 else zero
+        size = simd.maximum(size, simd.maximum(simd.absolute(x), simd.absolute(y)))
+        poison = poison + x * 0.0 + y * 0.0
+        numbers = numbers + simd.select(seen, one * (2.0 if j > 0 else 1.0), 0.0)
+        waves = waves + simd.select(seen, one * (1.0 if j > 0 else 0.0), 0.0)
+        data_r[j], data_i[j] = x, y
+        weight[j] = simd.select(seen, v, 0.0)
+    usable = (poison >= 0.0) & (size > 16.0 * simd.tiny(one)) & (size < simd.overflowing(one))
+    usable = usable & (waves > 0.0) & ~((weight[0] > 0.0) & ~(data_r[0] > 0.0))
+    scale = simd.select(usable, size, one)
+    inverse = simd.select(usable, 1.0 / scale, 0.0)
+    rounding = 4.0 * simd.eps(one)
+    for j in range(m + 1):
+        data_r[j] = simd.select(usable, data_r[j] * inverse, one)
+        data_i[j] = simd.select(usable, data_i[j] * inverse, 0.0)
+        seen = weight[j] > 0.0
+        std = simd.sqrt(simd.select(seen, weight[j], one)) * inverse
+        std = simd.minimum(simd.maximum(std, rounding), 1.0 / rounding)
+        each = 1.0 / (std * std + error * error)
+        weight[j] = simd.select(usable, simd.select(seen, each, 0.0), one)
+    return scale, simd.select(usable, numbers, one), usable
+
+
+@njit(error_model="numpy")
+def _new(
+    order: Any, returns: Any, turns: Any, data_r: Any, data_i: Any, weight: Any, x: Any, y: Any,
+    w: Any, pr: Any, pi: Any, rr: Any, ri: Any,
+) -> Any:  # fmt: skip
+    """Add the best return for what the others leave; return what all of them leave."""
+    m, last = len(order), len(returns) - 1
+    like = data_r[0]
+    for j in range(m + 1):
+        rr[j], ri[j] = data_r[j], data_i[j]
+    for k in range(last):
+        sharp.powers(order, x[k], y[k], k, pr, pi)
+    sharp.remains(order, returns[1:], data_r, data_i, pr, pi, w, rr, ri)
+    re, im = simd.registers(like, order, 1), simd.registers(like, order, 1)
+    total = sharp.weigh_what_is_left(order, weight, rr, ri, re, im)
+    # (m + 1) (K - 1) are enough
+    kr, ki = product_bank(like, order, returns), product_bank(like, order, returns)
+    sharp.overlaps(order, returns, weight, total, pr, pi, kr, ki)
+    best, apart, bx, by = 0.0 * total, 1.0 + 0.0 * total, 1.0 + 0.0 * total, 0.0 * total
+    for row in range(m + 2):
+        best, apart, bx, by = sharp.try_phases(
+            order, returns, turns, row, re, im, kr, ki, best, apart, bx, by
+        )
+    x[last], y[last], w[last] = bx, by, best / (apart * total)
+    sharp.powers(order, bx, by, last, pr, pi)
+    sharp.remains(order, returns, data_r, data_i, pr, pi, w, rr, ri)
+    return sharp.chi_square(order, weight, rr, ri)
+
+
+@njit(error_model="numpy")
+def fit(
+    order: Any, returns: Any, unknowns: Any, steps: int, turns: Any, data_r: Any, data_i: Any,
+    weight: Any, x: Any, y: Any, w: Any, pr: Any, pi: Any, rr: Any, ri: Any, active: Any, bar: Any,
+) -> Any:  # fmt: skip
+    """Add a return and fit all of them, until `active` pixels have settled; return chi-square."""
+    m = len(order)
+    cost = _new(order, returns, turns, data_r, data_i, weight, x, y, w, pr, pi, rr, ri)
+    damping = simd.select(active, sharp.FIRST_DAMPING + 0.0 * cost, sharp.SETTLED)
+    for _ in range(steps):
+        if not simd.some(damping < sharp.SETTLED):
+            break
+        cost, damping = sharp.step(
+            order, returns, unknowns, data_r, data_i, weight, pr, pi, w, rr, ri, cost, damping, bar
+        )
+    for k in range(len(returns)):
+        x[k], y[k] = pr[k * m], pi[k * m]
+    return cost
+
+
+@njit(error_model="numpy")
+def start_tail(x2: Any, y2: Any, w2: Any, active: Any, state: Any) -> None:
+    """Put the state that the fit of a tail begins with in `state`, from two returns."""
+    x, y, w, v, ratio, t = choice.start_of_tail(x2, y2, w2, DELAY_RAD)
+    state[0], state[1], state[2], state[3], state[4], state[5] = x, y, w, v, ratio * _MEAN, t
+    state[DAMPING] = simd.select(active, sharp.FIRST_DAMPING + 0.0 * x, sharp.SETTLED)
+    state[7] = 0.0 * x
+
+
+@njit(error_model="numpy")
+def step_tail(
+    order: Any, powers: Any, unknowns: Any, steps: int, data_r: Any, data_i: Any, weight: Any,
+    state: Any, bar: Any,
+) -> None:  # fmt: skip
+    """Take at most so many steps of a return with a tail, until all pixels have settled."""
+    like = data_r[0]
+    x, y, w, v, d, t = state[0], state[1], state[2], state[3], state[4], state[5]
+    ur, ui = simd.registers(like, order, 1), simd.registers(like, order, 1)
+    qr, qi = simd.registers(like, order, 1), simd.registers(like, order, 1)
+    rr, ri = simd.registers(like, order, 1), simd.registers(like, order, 1)
+    lag = simd.registers(like, order, 1)
+    tail.shape(order, powers, d, lag, qr, qi)
+    tail.turn_back(order, data_r, data_i, x, y, ur, ui)
+    tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
+    cost = sharp.chi_square(order, weight, rr, ri) + PRIOR * t * t
+    damping = state[DAMPING]
+    for _ in range(steps):
+        if not simd.some(damping < sharp.SETTLED):
+            break
+        x, y, w, v, d, t, cost, damping = tail.step(
+            order, powers, unknowns, data_r, data_i, weight, PRIOR, x, y, w, v, d, t, lag, qr, qi,
+            rr, ri, cost, damping, bar,
+        )  # fmt: skip
+    state[0], state[1], state[2], state[3], state[4], state[5] = x, y, w, v, d, t
+    state[DAMPING], state[7] = damping, cost
+
+
+@njit(forceinline=True, error_model="numpy")
+def write(
+    slots: Any, found: Any, scale: Any, numbers: Any, usable: Any, p: int, planes: Any, free: Any,
+    count: Any,
+) -> None:  # fmt: skip
+    """Write the attributes of `Likelihood`, its returns sorted by phase."""
+    one = scale / scale
+    nan, far = simd.nan(one), simd.infinity(one)
+    size = len(slots)
+    keys, values = simd.registers(one, slots, 0), simd.registers(one, slots, 0)
+    first, second = simd.registers(one, slots, 0), simd.registers(one, slots, 0)
+    with_tail = found[LENGTH] > 0.0
+    there = 0.0 * one
+    for k in range(size):
+        used = usable & (found[COUNT] > float(k)) & ((found[WEIGHT + k] > 0.0) | with_tail)
+        keys[k] = simd.select(used, phase_of(found[X + k], found[Y + k]), far)
+        values[k] = simd.select(used, found[WEIGHT + k] * scale, 0.0)
+        first[k] = simd.select(used, simd.sqrt(found[PHASE_VARIANCE + k]), nan)
+        second[k] = simd.select(used, simd.sqrt(found[WEIGHT_VARIANCE + k]) * scale, nan)
+        there = there + simd.select(used, one, 0.0)
+    for i in range(size - 1):
+        for k in range(size - 1 - i):
+            swap = keys[k] > keys[k + 1]
+            low, high = simd.minimum(keys[k], keys[k + 1]), simd.maximum(keys[k], keys[k + 1])
+            keys[k], keys[k + 1] = low, high
+            low, high = (
+                simd.select(swap, values[k + 1], values[k]),
+                simd.select(swap, values[k], values[k + 1]),
+            )
+            values[k], values[k + 1] = low, high
+            low, high = (
+                simd.select(swap, first[k + 1], first[k]),
+                simd.select(swap, first[k], first[k + 1]),
+            )
+            first[k], first[k + 1] = low, high
+            low, high = (
+                simd.select(swap, second[k + 1], second[k]),
+                simd.select(swap, second[k], second[k + 1]),
+            )
+            second[k], second[k + 1] = low, high
+    for k in range(size):
+        simd.store(planes[k], p, simd.select(keys[k] < far, keys[k], nan))
+        simd.store(planes[size + k], p, values[k])
+        simd.store(planes[2 * size + k], p, first[k])
+        simd.store(planes[3 * size + k], p, second[k])
+    tailed = usable & with_tail & (found[TAIL] > 0.0)
+    delay = float(TAIL_SHAPE) * found[LENGTH]
+    rest = 4 * size
+    simd.store(planes[rest], p, simd.select(tailed, found[TAIL] * scale, 0.0))
+    std = simd.sqrt(found[TAIL_VARIANCE]) * scale
+    simd.store(planes[rest + 1], p, simd.select(tailed, std, nan))
+    simd.store(planes[rest + 2], p, simd.select(tailed, delay, nan))
+    std = delay * simd.sqrt(found[LENGTH_VARIANCE])
+    simd.store(planes[rest + 3], p, simd.select(tailed, std, nan))
+    simd.store(planes[rest + 4], p, simd.select(usable, found[CHI_SQUARE], nan))
+    unknowns = simd.select(with_tail, 4.0 * one, 2.0 * found[COUNT])
+    simd.store(free, p, simd.select(usable, numbers - unknowns, 0.0))
+    simd.store(count, p, there)
+
+
+@njit(forceinline=True, error_model="numpy")
+def fit_one(
+    order: Any, turns: Any, b: Any, variance: Any, error: float, p: int, one: Any, data_r: Any,
+    data_i: Any, weight: Any, x: Any, y: Any, w: Any, pr: Any, pi: Any, rr: Any, ri: Any,
+    found: Any,
+) -> Any:  # fmt: skip
+    """Load pixels and put one return in `found`; return their scale, numbers, use and penalty."""
+    far = simd.infinity(one)
+    scale, numbers, usable = _prepare(order, b, variance, error, p, one, data_r, data_i, weight)
+    penalty = logarithm(numbers) + MARGIN
+    choice.nothing(one, far, found)
+    cost = fit(
+        order, (0,), (0, 0), STEPS[0], turns, data_r, data_i, weight, x, y, w, pr, pi, rr, ri,
+        usable, far,
+    )  # fmt: skip
+    choice.offer_returns((0,), x, y, w, cost, penalty, one > 0.0, found)
+    return scale, numbers, usable, penalty
+
+
+@njit(error_model="numpy")
+def vary(order: Any, weight: Any, found: Any) -> None:
+    """Put the variances of what was chosen in `found`."""
+    if simd.some(choice.chosen((0,), found)):
+        choice.vary_returns(order, (0,), (0, 0), weight, found)
+    if simd.some(choice.chosen((0, 0), found)):
+        choice.vary_returns(order, (0, 0), (0, 0, 0, 0), weight, found)
+    if simd.some(choice.chosen((0, 0, 0), found)):
+        choice.vary_returns(order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, found)
+    if simd.some(choice.has_tail(found)):
+        choice.vary_tail(order, (0, 0, 0), (0, 0, 0, 0), weight, PRIOR, found)

@@ -1,0 +1,308 @@
+"""The stages of the likelihood's lane: each does a block of pixels, packed in rows (`packing`)."""
+
+from typing import Any, Final
+
+from numba import njit
+
+from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.fits import (
+    DAMPING,
+    fit,
+    fit_one,
+    start_tail,
+    step_tail,
+    vary,
+    write,
+)
+from transientcam_moments._kernels.packing import ROW, pack, put, take, unpack
+from transientcam_moments.likelihood import choice, sharp
+from transientcam_moments.likelihood.arithmetic import product_bank
+from transientcam_moments.likelihood.choice import FITTED, PLANES, PRIOR, SCORE, STEPS, TAIL_STEPS
+
+TAIL_ROUNDS: Final = (3, 3, TAIL_STEPS - 6)
+"""Steps of a tail after each of which the pixels are packed that go on."""
+_FOUND: Final = (0,) * FITTED
+_STATE: Final = (0,) * 8
+# Rows of a room: what was found, the state of the tail, points and weights of two returns, what an
+# unknown has to gain (0 behind the last pixel), three more numbers of a pixel, and then the data.
+_TAIL: Final = FITTED
+_POINTS: Final = _TAIL + 8
+_PENALTY: Final = _POINTS + 6
+_NUMBERS, _SCALE, _USABLE = _PENALTY + 1, _PENALTY + 2, _PENALTY + 3
+_DATA: Final = _PENALTY + 4
+
+
+@njit(forceinline=True, error_model="numpy")
+def rows_of(order: Any) -> int:
+    """Return how many rows a room has; the last ones hold the data, then their weights."""
+    return _DATA + 3 * (len(order) + 1)
+
+
+@njit(forceinline=True, error_model="numpy")
+def _put_data(order: Any, data_r: Any, data_i: Any, weight: Any, room: Any, at: int) -> None:
+    size = len(order) + 1
+    for j in range(size):
+        simd.store(room, (_DATA + j) * ROW + at, data_r[j])
+        simd.store(room, (_DATA + size + j) * ROW + at, data_i[j])
+        simd.store(room, (_DATA + 2 * size + j) * ROW + at, weight[j])
+
+
+@njit(forceinline=True, error_model="numpy")
+def _take_data(
+    order: Any, like: Any, data_r: Any, data_i: Any, weight: Any, room: Any, at: int
+) -> None:
+    size = len(order) + 1
+    for j in range(size):
+        data_r[j] = simd.load(like, room, (_DATA + j) * ROW + at)
+        data_i[j] = simd.load(like, room, (_DATA + size + j) * ROW + at)
+        weight[j] = simd.load(like, room, (_DATA + 2 * size + j) * ROW + at)
+
+
+@njit(forceinline=True, error_model="numpy")
+def _pack_data(
+    order: Any, mask: Any, data_r: Any, data_i: Any, weight: Any, room: Any, at: int
+) -> None:
+    size = len(order) + 1
+    for j in range(size):
+        simd.pack(room, (_DATA + j) * ROW + at, mask, data_r[j])
+        simd.pack(room, (_DATA + size + j) * ROW + at, mask, data_i[j])
+        simd.pack(room, (_DATA + 2 * size + j) * ROW + at, mask, weight[j])
+
+
+@njit(error_model="numpy")
+def fit_first(
+    order: Any, turns: Any, b: Any, variance: Any, error: float, first: int, last: int, end: int,
+    all_rooms: Any, rooms: Any,
+) -> int:  # fmt: skip
+    """Fit one return to the pixels first..last; pack and count those that it leaves something of.
+
+    `end` is behind the last pixel there is: the last vector ends there.
+    """
+    one = simd.ones(variance, 1)
+    step = simd.width(one)
+    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    pr, pi = simd.registers(one, order, 0), simd.registers(one, order, 0)
+    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
+    points = simd.registers(one, (), 6)
+    x, y, w = simd.registers(one, (), 1), simd.registers(one, (), 1), simd.registers(one, (), 1)
+    count = 0
+    for left in range(first, last, step):
+        scale, numbers, usable, penalty = fit_one(
+            order, turns, b, variance, error, min(left, end - step), one, data_r, data_i, weight, x,
+            y, w, pr, pi, rr, ri, found,
+        )  # fmt: skip
+        at = left - first
+        put(found, _FOUND, all_rooms, 0, at)
+        _put_data(order, data_r, data_i, weight, all_rooms, at)
+        simd.store(all_rooms, _SCALE * ROW + at, scale)
+        simd.store(all_rooms, _NUMBERS * ROW + at, numbers)
+        simd.store(all_rooms, _PENALTY * ROW + at, penalty)
+        simd.store(all_rooms, _USABLE * ROW + at, simd.select(usable, one, 0.0))
+        more = found[SCORE] > 4.0 * penalty
+        if simd.some(more):
+            points[0], points[1], points[2] = x[0], y[0], w[0]
+            pack(more, points, (0, 0, 0), rooms, _POINTS, count)
+            pack(more, found, _FOUND, rooms, 0, count)
+            _pack_data(order, more, data_r, data_i, weight, rooms, count)
+            simd.pack(rooms, _NUMBERS * ROW + count, more, numbers)
+            count += simd.pack(rooms, _PENALTY * ROW + count, more, penalty)
+    simd.store(rooms, _PENALTY * ROW + count, 0.0 * one)  # pixels behind are none
+    return count
+
+
+@njit(error_model="numpy")
+def fit_second(order: Any, turns: Any, rooms: Any, count: int, late: Any) -> int:
+    """Fit two returns, and first steps of a tail; pack and count the pixels that need more."""
+    one = simd.ones(rooms, 1)
+    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    pr, pi = product_bank(one, order, (0, 0)), product_bank(one, order, (0, 0))
+    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
+    points, state = simd.registers(one, (), 6), simd.registers(one, (), 8)
+    x, y, w = simd.registers(one, (), 2), simd.registers(one, (), 2), simd.registers(one, (), 2)
+    moving = 0
+    for at in range(0, count, simd.width(one)):
+        take(found, _FOUND, one, rooms, 0, at)
+        take(points, (0, 0, 0), one, rooms, _POINTS, at)
+        _take_data(order, one, data_r, data_i, weight, rooms, at)
+        penalty = simd.load(one, rooms, _PENALTY * ROW + at)
+        numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
+        active = penalty > 0.0
+        x[0], y[0], w[0] = points[0], points[1], points[2]
+        cost = fit(
+            order, (0, 0), (0, 0, 0, 0), STEPS[1], turns, data_r, data_i, weight, x, y, w, pr, pi,
+            rr, ri, active, simd.infinity(one),
+        )  # fmt: skip
+        allowed = active & (numbers >= 4.0)
+        choice.offer_returns((0, 0), x, y, w, cost, penalty, allowed, found)
+        put(found, _FOUND, rooms, 0, at)
+        for k in range(2):
+            points[3 * k], points[3 * k + 1], points[3 * k + 2] = x[k], y[k], w[k]
+        put(points, (0, 0, 0, 0, 0, 0), rooms, _POINTS, at)
+        start_tail(x, y, w, allowed, state)
+        bar = found[SCORE] - 4.0 * penalty
+        step_tail(
+            order, (0, 0, 0), (0, 0, 0, 0), TAIL_ROUNDS[0], data_r, data_i, weight, state, bar
+        )
+        put(state, _STATE, rooms, _TAIL, at)
+        moving += _pack_moving(order, one, data_r, data_i, weight, state, bar, late, moving)
+    simd.store(late, (_TAIL + DAMPING) * ROW + moving, sharp.SETTLED * one)
+    return moving
+
+
+@njit(forceinline=True, error_model="numpy")
+def _pack_moving(
+    order: Any, one: Any, data_r: Any, data_i: Any, weight: Any, state: Any, bar: Any, late: Any,
+    at: int,
+) -> Any:  # fmt: skip
+    """Pack and count the pixels whose tail has not settled."""
+    more = state[DAMPING] < sharp.SETTLED
+    if not simd.some(more):
+        return 0
+    pack(more, state, _STATE, late, _TAIL, at)
+    _pack_data(order, more, data_r, data_i, weight, late, at)
+    return simd.pack(late, _PENALTY * ROW + at, more, bar)
+
+
+@njit(error_model="numpy")
+def step_late(order: Any, steps: int, rooms: Any, count: int, late: Any) -> int:
+    """Take further steps of tails; pack and count the pixels that need more."""
+    one = simd.ones(rooms, 1)
+    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    weight, state = simd.registers(one, order, 1), simd.registers(one, (), 8)
+    moving = 0
+    for at in range(0, count, simd.width(one)):
+        take(state, _STATE, one, rooms, _TAIL, at)
+        _take_data(order, one, data_r, data_i, weight, rooms, at)
+        bar = simd.load(one, rooms, _PENALTY * ROW + at)
+        step_tail(order, (0, 0, 0), (0, 0, 0, 0), steps, data_r, data_i, weight, state, bar)
+        put(state, _STATE, rooms, _TAIL, at)
+        moving += _pack_moving(order, one, data_r, data_i, weight, state, bar, late, moving)
+    simd.store(late, (_TAIL + DAMPING) * ROW + moving, sharp.SETTLED * one)
+    return moving
+
+
+@njit(error_model="numpy")
+def bring_back(rooms: Any, count: int, late: Any) -> None:
+    """Put the states of the tails that went on in `late` back among all."""
+    one = simd.ones(rooms, 1)
+    state = simd.registers(one, (), 8)
+    done = 0
+    for at in range(0, count, simd.width(one)):
+        take(state, _STATE, one, rooms, _TAIL, at)
+        more = state[DAMPING] < sharp.SETTLED
+        unpack(more, state, _STATE, late, _TAIL, done)
+        put(state, _STATE, rooms, _TAIL, at)
+        done += simd.count(more)
+
+
+@njit(error_model="numpy")
+def offer_tails(order: Any, rooms: Any, count: int, third: Any) -> int:
+    """Choose tails where they are better; pack and count the pixels that leave something then."""
+    one = simd.ones(rooms, 1)
+    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
+    points, state = simd.registers(one, (), 6), simd.registers(one, (), 8)
+    packed = 0
+    for at in range(0, count, simd.width(one)):
+        take(found, _FOUND, one, rooms, 0, at)
+        take(state, _STATE, one, rooms, _TAIL, at)
+        penalty = simd.load(one, rooms, _PENALTY * ROW + at)
+        numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
+        allowed = (penalty > 0.0) & (numbers >= 4.0)
+        choice.offer_tail(
+            PRIOR, state[0], state[1], state[2], state[3], state[4], state[5], state[7], penalty,
+            allowed, found,
+        )  # fmt: skip
+        put(found, _FOUND, rooms, 0, at)
+        more = _needs_three(found, penalty, numbers)
+        if len(order) >= 3 and simd.some(more):
+            take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
+            _take_data(order, one, data_r, data_i, weight, rooms, at)
+            pack(more, points, (0, 0, 0, 0, 0, 0), third, _POINTS, packed)
+            pack(more, found, _FOUND, third, 0, packed)
+            _pack_data(order, more, data_r, data_i, weight, third, packed)
+            packed += simd.pack(third, _PENALTY * ROW + packed, more, penalty)
+    simd.store(third, _PENALTY * ROW + packed, 0.0 * one)
+    return packed
+
+
+@njit(forceinline=True, error_model="numpy")
+def _needs_three(found: Any, penalty: Any, numbers: Any) -> Any:
+    return (penalty > 0.0) & (found[SCORE] > 6.0 * penalty) & (numbers >= 6.0)
+
+
+@njit(error_model="numpy")
+def fit_third(order: Any, turns: Any, rooms: Any, count: int) -> None:
+    """Fit three returns, and choose them where they are better."""
+    one = simd.ones(rooms, 1)
+    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    pr, pi = product_bank(one, order, (0, 0, 0)), product_bank(one, order, (0, 0, 0))
+    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
+    points = simd.registers(one, (), 6)
+    x, y, w = simd.registers(one, (), 3), simd.registers(one, (), 3), simd.registers(one, (), 3)
+    for at in range(0, count, simd.width(one)):
+        take(found, _FOUND, one, rooms, 0, at)
+        take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
+        _take_data(order, one, data_r, data_i, weight, rooms, at)
+        penalty = simd.load(one, rooms, _PENALTY * ROW + at)
+        active = penalty > 0.0
+        for k in range(2):
+            x[k], y[k], w[k] = points[3 * k], points[3 * k + 1], points[3 * k + 2]
+        cost = fit(
+            order, (0, 0, 0), (0, 0, 0, 0, 0, 0), STEPS[2], turns, data_r, data_i, weight, x, y, w,
+            pr, pi, rr, ri, active, found[SCORE] - 6.0 * penalty,
+        )  # fmt: skip
+        choice.offer_returns((0, 0, 0), x, y, w, cost, penalty, active, found)
+        put(found, _FOUND, rooms, 0, at)
+
+
+@njit(error_model="numpy")
+def take_three(rooms: Any, count: int, third: Any) -> None:
+    """Put what was found with three returns back among all that were fitted with two."""
+    one = simd.ones(rooms, 1)
+    found = simd.registers(one, (), 22)
+    done = 0
+    for at in range(0, count, simd.width(one)):
+        take(found, _FOUND, one, rooms, 0, at)
+        penalty = simd.load(one, rooms, _PENALTY * ROW + at)
+        numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
+        more = _needs_three(found, penalty, numbers)
+        unpack(more, found, _FOUND, third, 0, done)
+        put(found, _FOUND, rooms, 0, at)
+        done += simd.count(more)
+
+
+@njit(error_model="numpy")
+def finish(
+    order: Any, slots: Any, all_rooms: Any, rooms: Any, first: int, last: int, end: int,
+    planes: Any, free: Any, count: Any,
+) -> None:  # fmt: skip
+    """Write what was found of the pixels first..last, with its deviations.
+
+    In vectors as wide as those of `fit_first`, whose last one overlaps the one before.
+    """
+    one = simd.ones(planes, 1)
+    step = simd.width(one)
+    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
+    size = len(order) + 1
+    done = 0
+    for left in range(first, last, step):
+        at = left - first
+        take(found, _FOUND, one, all_rooms, 0, at)
+        for i in range(FITTED, PLANES):
+            found[i] = 0.0 * one
+        penalty = simd.load(one, all_rooms, _PENALTY * ROW + at)
+        more = found[SCORE] > 4.0 * penalty
+        if len(order) >= 2 and simd.some(more):
+            unpack(more, found, _FOUND, rooms, 0, done)
+            done += simd.count(more)
+        for j in range(size):
+            weight[j] = simd.load(one, all_rooms, (_DATA + 2 * size + j) * ROW + at)
+        vary(order, weight, found)
+        scale = simd.load(one, all_rooms, _SCALE * ROW + at)
+        numbers = simd.load(one, all_rooms, _NUMBERS * ROW + at)
+        usable = simd.load(one, all_rooms, _USABLE * ROW + at) > 0.0
+        write(slots, found, scale, numbers, usable, min(left, end - step), planes, free, count)
