@@ -25,7 +25,6 @@ CHOSEN = {
     "motion": "on",
     **dict.fromkeys(("distortion", "gloss", "interreflection", "scattering"), "off"),
 }
-OF_ELLIPSOIDS_ALONE = {"met", "shade", "upright"}
 VIDEO = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005)
 
 
@@ -95,7 +94,7 @@ def test_images_are_the_same_with_and_without_lanes(board: bool, mixed: str) -> 
     assert there == expected
     assert used >= {"points", "received", "darkened", "blended", "overlapped", "layered"}
     if mixed == "on":
-        assert used == set(LANES._ready) - (OF_ELLIPSOIDS_ALONE if board else set())
+        assert used == set(LANES._ready)
 
 
 def planes(shape: tuple[int, int]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
