@@ -131,10 +131,10 @@ class Ends:
                 irradiance *= self._clear(segment, on, movers, beside)
             if len(on) < len(distance_m):
                 delay_s = (length_m + distance_m[on]) / SPEED_OF_LIGHT_M_S
-                ways.append((k, Way(on, delay_s, irradiance * sent[on])))
+                ways.append((k, Way(on, delay_s, sent[on] * irradiance)))
             elif irradiance.any():
                 delay_s = (length_m + distance_m) / SPEED_OF_LIGHT_M_S
-                ways.append((k, Way(on, delay_s, irradiance * sent)))
+                ways.append((k, Way(on, delay_s, sent * irradiance)))
         return LitEnds(self, reflectance, len(lights), tuple(ways))
 
     def _highlight(

@@ -209,7 +209,7 @@ class MovingResponses:
     def _pixel(self) -> NDArray[np.intp]:
         """Pixels of layers by index."""
         assert self._layers is not None  # noqa: S101  (who asks has some)
-        pixel: NDArray[np.intp] = np.ravel_multi_index(tuple(self._layers.places), self._shape)
+        pixel: NDArray[np.intp] = self._layers.places[0] * self._shape[1] + self._layers.places[1]
         return pixel
 
     @cached_property
