@@ -131,10 +131,12 @@ class Ends:
                 irradiance *= self._clear(segment, on, movers, beside)
             if len(on) < len(distance_m):
                 delay_s = (length_m + distance_m[on]) / SPEED_OF_LIGHT_M_S
-                ways.append((k, Way(on, delay_s, sent[on] * irradiance)))
+                ways.append(
+                    (k, Way(on, delay_s, np.multiply(sent[on], irradiance, dtype=np.float64)))
+                )
             elif irradiance.any():
                 delay_s = (length_m + distance_m) / SPEED_OF_LIGHT_M_S
-                ways.append((k, Way(on, delay_s, sent * irradiance)))
+                ways.append((k, Way(on, delay_s, np.multiply(sent, irradiance, dtype=np.float64))))
         return LitEnds(self, reflectance, len(lights), tuple(ways))
 
     def _highlight(
