@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.simulation.effects.effect import LightPlanes
 from transientcam_driver.simulation.light import View
-from transientcam_driver.simulation.light.bundle import Region
+from transientcam_driver.simulation.light.bundle import Region, holds
 
 Plane = NDArray[np.float32]
 
@@ -23,11 +23,8 @@ class Quadratures:
 
     @classmethod
     def of(cls, planes: LightPlanes) -> "Quadratures":
-        """Take planes apart into contiguous ones."""
-        terms = tuple(
-            (k, np.ascontiguousarray(term.real), np.ascontiguousarray(term.imag))
-            for k, term in planes.terms.items()
-        )
+        """Take planes apart; a copy of it has contiguous ones."""
+        terms = tuple((k, term.real, term.imag) for k, term in planes.terms.items())
         return cls(planes.constant, planes.mean + planes.constant, terms)
 
     def at(self, phasors: dict[int, complex], *, illumination: bool) -> Plane:
@@ -71,7 +68,7 @@ class Canvas:
         self, background: View, quadratures_of: Callable[[View, Region | None], Quadratures]
     ) -> None:
         self._of = quadratures_of
-        self._still = quadratures_of(background, None)
+        self._still = quadratures_of(background, None).copy()
         self._now = self._still.copy()
         self._shown: tuple[View, Region] | None = None
 
@@ -81,7 +78,8 @@ class Canvas:
         if self._shown is not None:
             if self._shown[0] is view:
                 return self._now
-            self._copy(self._still, self._shown[1])
+            if not holds(view.region, self._shown[1]):  # or all of it is drawn over
+                self._copy(self._still, self._shown[1])
         self._shown = view, view.region
         if view.region[0].stop > view.region[0].start:
             self._paste(self._of(view, view.region), view.region)

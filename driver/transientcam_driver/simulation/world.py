@@ -268,7 +268,7 @@ class World:
             plan.view = view
             plan.quadratures.clear()
         if harmonic not in plan.quadratures:
-            plan.quadratures[harmonic] = of(view, None)
+            plan.quadratures[harmonic] = of(view, None).copy()
         return plan.quadratures[harmonic]
 
     def _planes(

@@ -2,16 +2,20 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.light.coverage import Plane
-from transientcam_driver.simulation.scene.geometry import Points, Shape
+from transientcam_driver.simulation.light.lanes import LANES
+from transientcam_driver.simulation.scene.geometry import Ellipsoid, Points, Shape
 
 Region = tuple[slice, slice]
-_TILE = 4  # pixels a side
+NOWHERE: Final[Region] = (slice(0, 0), slice(0, 0))
+TILE: Final = 4
+"""Pixels a side."""
 _AROUND = 1  # pixels beside a tile, whose squares what is seen just outside of them may reach
 _ACROSS = 0.05  # cosine to the middle line, below which a line's place beside it is not taken
 
@@ -28,6 +32,8 @@ class Bundle:
         (3, 3) the middle line, and two unit vectors across it.
     low, high
         (2, R, C) along these two, tangents of the angles of a tile's lines to the middle line.
+    rows
+        Lowest and highest (2, R) of these in each row of tiles.
     """
 
     apex: Points
@@ -37,6 +43,7 @@ class Bundle:
     frame: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
+    rows: tuple[NDArray[np.float64], NDArray[np.float64]]
 
     @classmethod
     def of(
@@ -65,10 +72,20 @@ class Bundle:
             frame,
             low,
             high,
+            (low.min(axis=2), high.max(axis=2)),
         )
 
-    def meeting(self, shapes: list[Shape]) -> list[Region | None]:
-        """Return the regions of the pixels whose lines may meet shapes; None if there are none."""
+    def meeting(self, shapes: list[Shape]) -> tuple[NDArray[np.bool_], list[Region | None]]:
+        """Return which tiles (N, R, C) have lines that may meet shapes, and regions that hold them.
+
+        A region is None if there are none.
+        """
+        lane = LANES.find("met")
+        balls = [each for each in shapes if isinstance(each, Ellipsoid)]
+        if lane is not None and len(balls) == len(shapes):
+            axes = np.array([(each.centre, each.radii) for each in balls])
+            tiles, spans = lane(axes, self.apex, self.frame, self.low, self.high, *self.rows)
+            return tiles, self._regions(spans.tolist())
         middle, *across = self.frame
         meets: NDArray[np.bool_] = np.ones((len(shapes), *self.low.shape[1:]), dtype=bool)
         for axis, low, high in zip(across, self.low, self.high, strict=True):
@@ -76,13 +93,20 @@ class Bundle:
             meets &= (low <= limits[:, 1, None, None]) & (high >= limits[:, 0, None, None])
         rows: NDArray[np.bool_] = np.logical_or.reduce(meets, axis=2)
         columns: NDArray[np.bool_] = np.logical_or.reduce(meets, axis=1)
-        there: NDArray[np.bool_] = np.logical_or.reduce(rows, axis=1)
+        spans = np.stack([*_span(rows), *_span(columns)], axis=1)
+        return meets, self._regions((spans * rows.any(axis=1, keepdims=True)).tolist())
+
+    def _regions(self, spans: list[list[int]]) -> list[Region | None]:
+        """Return regions of pixels, given their first tiles and those after the last."""
         height, width = self.way[0].shape
         return [
-            (slice(top, min(bottom, height)), slice(left, min(right, width))) if met else None
-            for top, bottom, left, right, met in zip(
-                *_span(rows), *_span(columns), there.tolist(), strict=True
+            (
+                slice(top * TILE, min(bottom * TILE, height)),
+                slice(left * TILE, min(right * TILE, width)),
             )
+            if bottom
+            else None
+            for top, bottom, left, right in spans
         ]
 
     def within(self, region: Region) -> tuple[tuple[Plane, Plane, Plane], Plane, Plane]:
@@ -91,10 +115,9 @@ class Bundle:
         return (x, y, z), self.near[region], self.far[region]
 
 
-def _span(tiles: NDArray[np.bool_]) -> tuple[list[int], list[int]]:
-    """Return the first pixels of the first tiles (N, T) that are true, and those after the last."""
-    first, after = tiles.argmax(axis=1), tiles.shape[1] - tiles[:, ::-1].argmax(axis=1)
-    return (first * _TILE).tolist(), (after * _TILE).tolist()
+def _span(tiles: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the first tiles (N, T) that are true, and those after the last."""
+    return tiles.argmax(axis=1), tiles.shape[1] - tiles[:, ::-1].argmax(axis=1)
 
 
 def _frame(middle: Points) -> NDArray[np.float64]:
@@ -110,11 +133,11 @@ def _of_tiles(
 ) -> NDArray[np.float64]:
     """Lowest or highest values (2, R, C) of tiles and of the pixels around each."""
     height, width = planes.shape[1:]
-    padding = [(_AROUND, _AROUND + -size % _TILE) for size in (height, width)]
+    padding = [(_AROUND, _AROUND + -size % TILE) for size in (height, width)]
     padded = np.pad(planes, [(0, 0), *padding], mode="edge")
-    side = _TILE + 2 * _AROUND
-    windows = sliding_window_view(padded, (side, side), axis=(1, 2))[:, ::_TILE, ::_TILE]
-    return most(windows, axis=(-2, -1))
+    side = TILE + 2 * _AROUND
+    windows = sliding_window_view(padded, (side, side), axis=(1, 2))[:, ::TILE, ::TILE]
+    return np.ascontiguousarray(most(windows, axis=(-2, -1)))
 
 
 def extent(region: Region) -> tuple[int, int]:
@@ -130,7 +153,7 @@ def numbers(region: Region) -> tuple[int, int, int, int]:
 def union(regions: list[Region]) -> Region:
     """Return the smallest region that holds all; an empty one if there are none."""
     if not regions:
-        return slice(0, 0), slice(0, 0)
+        return NOWHERE
     rows, columns = zip(*regions, strict=True)
     return (
         slice(min(r.start for r in rows), max(r.stop for r in rows)),
@@ -146,6 +169,11 @@ def overlap(one: Region, other: Region) -> Region | None:
     if rows.start >= rows.stop or columns.start >= columns.stop:
         return None
     return rows, columns
+
+
+def holds(whole: Region, region: Region) -> bool:
+    """Whether a region lies in another one."""
+    return all(a.start <= b.start and b.stop <= a.stop for a, b in zip(whole, region, strict=True))
 
 
 def inside(region: Region, whole: Region) -> Region:

@@ -14,6 +14,7 @@ from transientcam_driver.simulation.light.compiling import (
     PLACES,
     PLANE,
     REGION,
+    TILES,
     WHOLE,
     float32,
     inner,
@@ -75,21 +76,53 @@ def _at_border(value: Any, up: Any, down: Any, left: Any, right: Any) -> Any:
 
 
 @inner
+def _beside(place: int, count: int) -> Any:
+    """Return the places before and after one; at an end, the one on the other side for both."""
+    before = place - 1 if place > 0 else min(1, count - 1)
+    after = place + 1 if place < count - 1 else max(count - 2, 0)
+    return before, after
+
+
+@inner
 def _share(inside: Plane, row: int, column: int) -> Any:
-    """Return share of a pixel as `coverage.covered`; at a border, the mean square root there."""
-    height, width = inside.shape
-    value = inside[row, column]
-    up = inside[row - 1 if row > 0 else min(1, height - 1), column]
-    down = inside[row + 1 if row < height - 1 else max(height - 2, 0), column]
-    left = inside[row, column - 1 if column > 0 else min(1, width - 1)]
-    right = inside[row, column + 1 if column < width - 1 else max(width - 2, 0)]
-    if _alike(value, up, down, left, right):
-        return (_ONE if value > _ZERO else _ZERO), _ZERO, False
-    share, value, along, across = _at_border(value, up, down, left, right)
-    width_ = np.sqrt(along * along + across * across)
-    high, low = max(value + width_ / _TWO, _LEAST), max(value - width_ / _TWO, _ZERO)
+    """Return share of a pixel at a border as `coverage.covered`, and the mean square root there."""
+    above, below = _beside(row, inside.shape[0])
+    before, after = _beside(column, inside.shape[1])
+    share, value, along, across = _at_border(
+        inside[row, column], inside[above, column], inside[below, column],
+        inside[row, before], inside[row, after],
+    )  # fmt: skip
+    width = np.sqrt(along * along + across * across)
+    high, low = max(value + width / _TWO, _LEAST), max(value - width / _TWO, _ZERO)
     cubes = high * np.sqrt(high) - low * np.sqrt(low)
-    return share, cubes / max(_CUBE * (high - low), _LEAST), True
+    return share, cubes / max(_CUBE * (high - low), _LEAST)
+
+
+@inner
+def _mark(inside: Plane, row: int, start: int, end: int, border: Any) -> None:
+    """Mark pixels of a row, from ``start`` to ``end``, with a neighbour on the other side of 0.
+
+    In loops that a compiler makes vectors of: few pixels are at a border.
+    """
+    height, width = inside.shape
+    above, below = _beside(row, height)
+    on, marks = inside[row, start:end], border[start:end]
+    up, down = inside[above, start:end], inside[below, start:end]
+    for i in range(len(on)):
+        there = on[i] > _ZERO
+        marks[i] = ((up[i] > _ZERO) != there) | ((down[i] > _ZERO) != there)
+    # at an end, the neighbour on the other side stands for both, which the other loop compares
+    first, after = max(start, 1), min(end, width - 1)
+    on, beside, marks = inside[row, first:end], inside[row, first - 1 : end - 1], border[first:end]
+    for i in range(len(on)):
+        marks[i] |= (on[i] > _ZERO) != (beside[i] > _ZERO)
+    on, beside, marks = (
+        inside[row, start:after],
+        inside[row, start + 1 : after + 1],
+        border[start:after],
+    )
+    for i in range(len(on)):
+        marks[i] |= (on[i] > _ZERO) != (beside[i] > _ZERO)
 
 
 @inner
@@ -191,6 +224,14 @@ def _cross(ball: Any, x: Plane, y: Plane, z: Plane, of: Any, inside: Plane, span
         spans[row, 0], spans[row, 1] = max(first, 0), min(after, width)
 
 
+@inner
+def _show(at: Any, inside: Any, near: Any, far: Any, fills: Any, share: Any) -> None:
+    """Put shares of pixels of a row that show an ellipsoid, but for those at its border."""
+    for i in range(len(at)):
+        shows = (inside[i] > _ZERO) & (at[i] > near[i]) & (at[i] < far[i])
+        share[i] = fills[i] if shows else _ZERO
+
+
 @lane(LINE, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, REGION)
 def seen(
     numbers: Any, x: Plane, y: Plane, z: Plane, near: Plane, far: Plane, fills: Plane, of: Any
@@ -200,81 +241,245 @@ def seen(
     ball, right = _eight(numbers), left + width
     inside, at = np.empty((height, width), float32), np.empty((height, width), float32)
     share, spans = np.zeros((height, width), float32), np.empty((height, 2), int64)
+    border = np.zeros(width, np.bool_)
     _cross(ball, x, y, z, of, inside, spans)
     for row in range(height):
-        r = top + row
+        r, start, end = top + row, spans[row, 0], spans[row, 1]
         _entered_row(
             ball, x[r, left:right], y[r, left:right], z[r, left:right], inside[row], at[row]
         )
-        for column in range(spans[row, 0], spans[row, 1]):
-            c = left + column
-            part, root, border = _share(inside, row, column)
-            if border:
+        if start >= end:
+            continue
+        _mark(inside, row, start, end, border)
+        _show(
+            at[row, start:end], inside[row, start:end], near[r, left + start : left + end],
+            far[r, left + start : left + end], fills[r, left + start : left + end],
+            share[row, start:end],
+        )  # fmt: skip
+        for column in range(start, end):
+            if border[column]:
+                c = left + column
+                part, root = _share(inside, row, column)
                 squared = _squared(ball, x[r, c], y[r, c], z[r, c])
                 closest = -(_along(ball, x[r, c], y[r, c], z[r, c]) / squared)
                 at[row, column] = closest - root / np.sqrt(squared)
-            if at[row, column] > near[r, c] and at[row, column] < far[r, c]:
-                share[row, column] = part * fills[r, c]
+                shows = at[row, column] > near[r, c] and at[row, column] < far[r, c]
+                share[row, column] = part * fills[r, c] if shows else _ZERO
     return share, at
 
 
-@lane(LINE, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, REGION, float32)
-def shaded(
-    numbers: Any, x: Plane, y: Plane, z: Plane, near: Plane, far: Plane, of: Any, touching: Any
-) -> Any:
-    """Return shares of pixels whose light an ellipsoid blocks."""
-    top, left, height, width = of
-    ball = _eight(numbers)
-    inside, spans = np.empty((height, width), float32), np.empty((height, 2), int64)
-    share = np.zeros((height, width), float32)
-    _cross(ball, x, y, z, of, inside, spans)
+@inner
+def _runs(tiles: Any, side: int, of: Any, grown: int) -> Any:
+    """Return runs of tiles in the rows of a region that are met, or beside such if grown.
+
+    As rows and columns of pixels in the region: the first ones, and those after the last.
+    """
+    top, start, height, width = of
+    first_tile, tile_after = start // side, (start + width + side - 1) // side
+    rows, columns = (height + side - 1) // side, tile_after - first_tile
+    runs, count = np.empty((rows * (columns // 2 + 1), 4), int64), 0
+    wanted = np.empty(columns + 1, np.bool_)
+    wanted[columns] = False
+    for k in range(rows):
+        row = top // side + k
+        line = tiles[row, first_tile:tile_after]
+        wanted[:columns] = line
+        if grown:
+            for r in range(max(row - 1, 0), min(row + 2, tiles.shape[0])):
+                line = tiles[r, first_tile:tile_after]
+                for c in range(columns):
+                    wanted[c] |= line[c]
+                for c in range(columns - 1):
+                    wanted[c] |= line[c + 1]
+                for c in range(1, columns):
+                    wanted[c] |= line[c - 1]
+        first = -1
+        for c in range(columns + 1):
+            if wanted[c] and first < 0:
+                first = c
+            elif not wanted[c] and first >= 0:
+                runs[count, 0], runs[count, 1] = k * side, min((k + 1) * side, height)
+                runs[count, 2], runs[count, 3] = first * side, min(c * side, width)
+                first, count = -1, count + 1
+    return runs[:count]
+
+
+@inner
+def _cross_run(ball: Any, x: Any, y: Any, z: Any, inside: Any, closest: Any, share: Any) -> None:
+    """Cross some lines of a row with an ellipsoid."""
+    for i in range(len(x)):
+        along = _along(ball, x[i], y[i], z[i])
+        at = along / _squared(ball, x[i], y[i], z[i])
+        inside[i] = along * at + ball[6]
+        closest[i] = -at
+        share[i] = _ZERO
+
+
+@inner
+def _block(inside: Any, closest: Any, near: Any, far: Any, touching: Any, share: Any) -> Any:
+    """Put shares of pixels of a row whose light is blocked, but for those at a border."""
+    found = 0
+    for i in range(len(inside)):
+        blocks = (closest[i] > near[i] + touching) & (closest[i] < far[i] * (_ONE - touching))
+        share[i] = _ONE if blocks & (inside[i] > _ZERO) else _ZERO
+        found += share[i] > _ZERO
+    return found > 0
+
+
+@inner
+def _overlap(one: Any, other: Any, row: int, column: int, of: Any, sign: Any) -> Any:
+    """Return the share of a pixel in both of two shapes.
+
+    The first has a plane of all pixels, the second one of a region, of its rest if the sign is -1.
+    """
+    top, start, height, width = of
+    first, second = one[top + row, start + column], other[row, column]
+    if sign < _ZERO:
+        second = _ONE - second
+    across = first * second
+    if not (first > _ZERO and first < _ONE and second > _ZERO and second < _ONE):
+        return across
+    (up, down), (left, right) = _beside(row, height), _beside(column, width)
+    r, c = top + row, start + column
+    x = one[top + down, c] - one[top + up, c]
+    y = one[r, start + right] - one[r, start + left]
+    u, v = other[down, column] - other[up, column], other[row, right] - other[row, left]
+    if sign < _ZERO:
+        u = (_ONE - other[down, column]) - (_ONE - other[up, column])
+        v = (_ONE - other[row, right]) - (_ONE - other[row, left])
+    size = np.sqrt((x * x + y * y) * (u * u + v * v))
+    cosine = (x * u + y * v) / max(size, _LEAST)
+    along = max(first + second - _ONE, _ZERO)
+    if cosine > _ZERO:
+        along = min(first, second)
+    return across + cosine * cosine * (along - across)
+
+
+@inner
+def _shade(
+    ball: Any, lines: Any, tiles: Any, side: int, of: Any, touching: Any, left: Plane
+) -> bool:
+    """Take from shares of light what an ellipsoid blocks; whether it blocks any."""
+    x, y, z, near, far = lines
+    top, start, height, width = of
+    inside, closest = np.empty((height, width), float32), np.empty((height, width), float32)
+    share, border = np.empty((height, width), float32), np.empty((height, width), np.bool_)
+    for run in _runs(tiles, side, of, 1):
+        first, end = run[2], run[3]
+        for row in range(run[0], run[1]):
+            r, a, b = top + row, start + first, start + end
+            _cross_run(
+                ball, x[r, a:b], y[r, a:b], z[r, a:b], inside[row, first:end],
+                closest[row, first:end], share[row, first:end],
+            )  # fmt: skip
+    found, runs = False, _runs(tiles, side, of, 0)
+    for run in runs:
+        first, end = run[2], run[3]
+        for row in range(run[0], run[1]):
+            r, a, b = top + row, start + first, start + end
+            _mark(inside, row, first, end, border[row])
+            found |= _block(
+                inside[row, first:end], closest[row, first:end], near[r, a:b], far[r, a:b],
+                touching, share[row, first:end],
+            )  # fmt: skip
+            for column in range(first, end):
+                if border[row, column]:
+                    at, c = closest[row, column], start + column
+                    part = _share(inside, row, column)[0]
+                    between = at > near[r, c] + touching and at < far[r, c] * (_ONE - touching)
+                    share[row, column] = part if between else _ZERO
+                    found |= share[row, column] > _ZERO
+    if found:
+        _take(left, share, border, inside, runs, of)
+    return found
+
+
+@inner
+def _take(left: Plane, share: Plane, border: Any, kept: Plane, runs: Any, of: Any) -> None:
+    """Take shares of pixels from what is left of light, as `coverage.overlapped`."""
+    top, start, _height, _width = of
+    for run in runs:  # before anything is taken that others are compared with
+        for row in range(run[0], run[1]):
+            for column in range(run[2], run[3]):
+                if border[row, column]:
+                    kept[row, column] = _overlap(left, share, row, column, of, -_ONE)
+    for run in runs:
+        for row in range(run[0], run[1]):
+            light, dark = (
+                left[top + row, start + run[2] : start + run[3]],
+                share[row, run[2] : run[3]],
+            )
+            for i in range(len(light)):
+                light[i] *= _ONE - dark[i]
+            for column in range(run[2], run[3]):
+                if border[row, column]:
+                    left[top + row, start + column] = kept[row, column]
+
+
+@lane(WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, TILES, int64, AROUND, float32, WHOLE)
+def shade(
+    balls: Any, x: Plane, y: Plane, z: Plane, near: Plane, far: Plane, tiles: Any, side: int,
+    of: Any, touching: Any, left: Plane,
+) -> Any:  # fmt: skip
+    """Take from the shares of light that are left what ellipsoids block; return which block any."""
+    blocks = np.zeros(len(balls), np.bool_)
+    for k in range(len(balls)):
+        region = of[k, 0], of[k, 1], of[k, 2], of[k, 3]
+        if region[2] > 0:
+            lines = x, y, z, near, far
+            blocks[k] = _shade(_eight(balls[k]), lines, tiles[k], side, region, touching, left)
+    return blocks
+
+
+@lane(WHOLE, WHOLE, REGION)
+def dimmed(seen: Plane, left: Plane, of: Any) -> Any:
+    """Return rows and columns of pixels in a region that are seen in shadow, and the light left.
+
+    ``seen`` and ``left`` are shares of all pixels.
+    """
+    top, start, height, width = of
+    part = left[top : top + height, start : start + width]
+    count = 0
     for row in range(height):
-        r = top + row
-        for column in range(spans[row, 0], spans[row, 1]):
-            c = left + column
-            part = _share(inside, row, column)[0]
-            if part > _ZERO:
-                squared = _squared(ball, x[r, c], y[r, c], z[r, c])
-                at = -(_along(ball, x[r, c], y[r, c], z[r, c]) / squared)
-                if at > near[r, c] + touching and at < far[r, c] * (_ONE - touching):
-                    share[row, column] = part
-    return share
+        line, shown = part[row], seen[top + row, start : start + width]
+        for column in range(len(line)):
+            count += (line[column] < _ONE) & (shown[column] > _ZERO)
+    places, light, k = np.empty((2, count), int64), np.empty(count, float32), 0
+    for row in range(height):
+        line, shown = part[row], seen[top + row, start : start + width]
+        for column in range(len(line)):
+            if not (line[column] < _ONE and shown[column] > _ZERO):
+                continue
+            places[0, k], places[1, k], light[k] = top + row, start + column, _ZERO
+            if line[column] > _ZERO:
+                both = _overlap(seen, part, row, column, of, _ONE)
+                light[k] = both / max(shown[column], _LEAST)
+            k += 1
+    return places, light
 
 
 @lane(PLANE)
 def covered(inside: Plane) -> Any:
     """Return shares of pixels where a function is above 0."""
-    share = np.empty(inside.shape, float32)
-    for row in range(inside.shape[0]):
-        for column in range(inside.shape[1]):
-            share[row, column] = _share(inside, row, column)[0]
+    height, width = inside.shape
+    share, border = np.empty(inside.shape, float32), np.empty(width, np.bool_)
+    for row in range(height):
+        _mark(inside, row, 0, width, border)
+        for column in range(width):
+            share[row, column] = _ONE if inside[row, column] > _ZERO else _ZERO
+            if border[column]:
+                share[row, column] = _share(inside, row, column)[0]
     return share
 
 
 @lane(PLANE, PLANE)
 def overlapped(one: Plane, other: Plane) -> Any:
     """Return the share of each pixel that lies in both of two shapes."""
-    height, width = one.shape
     both = np.empty(one.shape, float32)
-    for row in range(height):
-        up = row - 1 if row > 0 else min(1, height - 1)
-        down = row + 1 if row < height - 1 else max(height - 2, 0)
-        for column in range(width):
-            first, second = one[row, column], other[row, column]
-            across = first * second
-            both[row, column] = across
-            if not (first > _ZERO and first < _ONE and second > _ZERO and second < _ONE):
-                continue
-            left = column - 1 if column > 0 else min(1, width - 1)
-            right = column + 1 if column < width - 1 else max(width - 2, 0)
-            x, y = one[down, column] - one[up, column], one[row, right] - one[row, left]
-            u, v = other[down, column] - other[up, column], other[row, right] - other[row, left]
-            size = np.sqrt((x * x + y * y) * (u * u + v * v))
-            cosine = (x * u + y * v) / max(size, _LEAST)
-            along = max(first + second - _ONE, _ZERO)
-            if cosine > _ZERO:
-                along = min(first, second)
-            both[row, column] = across + cosine * cosine * (along - across)
+    of = 0, 0, one.shape[0], one.shape[1]
+    for row in range(one.shape[0]):
+        for column in range(one.shape[1]):
+            both[row, column] = _overlap(one, other, row, column, of, _ONE)
     return both
 
 

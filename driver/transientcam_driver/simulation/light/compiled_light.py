@@ -8,12 +8,17 @@ from typing import Any
 import numpy as np
 
 from transientcam_driver.simulation.light.compiling import (
+    AROUND,
+    DOUBLES,
     LINE,
     PLACES,
     PLANE,
+    PLANES,
     REGION,
+    ROWS,
     WHOLE,
     float32,
+    inner,
     int64,
     lane,
 )
@@ -21,6 +26,69 @@ from transientcam_driver.simulation.light.compiling import (
 Plane = Any
 """A float32 array as numba compiles it."""
 _ZERO, _ONE = np.float32(0), np.float32(1)
+_CLEAR = 1e-9  # as in Ellipsoid.tangents
+
+
+@inner
+def _times(one: Any, other: Any) -> Any:
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+
+
+@inner
+def _tangents(away: Any, radii: Any, middle: Any, across: Any) -> Any:
+    """Return what `Ellipsoid.tangents` does, of one that is so far away."""
+    along, aside = _times(away, middle), _times(away, across)
+    along_m, across_m = radii * middle, radii * across
+    a = along * along - _times(along_m, along_m)
+    if along <= 0 or a <= _CLEAR:
+        return -np.inf, np.inf
+    b = along * aside - _times(along_m, across_m)
+    c = aside * aside - _times(across_m, across_m)
+    root = np.sqrt(max(b * b - a * c, 0.0))
+    return (b - root) / a, (b + root) / a
+
+
+@inner
+def _met_row(tiles: Any, low: Any, high: Any, down: Any, up: Any, of: Any) -> Any:
+    """Mark the tiles of a row; return the first, and the one after the last."""
+    width = len(tiles)
+    for k in range(width):
+        across = (low[k] <= of[1]) & (high[k] >= of[0])
+        tiles[k] = across & (down[k] <= of[3]) & (up[k] >= of[2])
+    first, after = 0, width
+    while first < after and not tiles[first]:
+        first += 1
+    while after > first and not tiles[after - 1]:
+        after -= 1
+    return first, after
+
+
+@lane(PLANES, DOUBLES, ROWS, PLANES, PLANES, ROWS, ROWS)
+def met(axes: Any, apex: Any, frame: Any, low: Any, high: Any, lowest: Any, highest: Any) -> Any:
+    """Return tiles whose lines may meet ellipsoids, and their spans of rows and of columns."""
+    count, height, width = len(axes), low.shape[1], low.shape[2]
+    tiles = np.zeros((count, height, width), np.bool_)
+    spans = np.zeros((count, 4), int64)
+    for n in range(count):
+        away, radii = axes[n, 0] - apex, axes[n, 1]
+        first, last = _tangents(away, radii, frame[0], frame[1])
+        start, end = _tangents(away, radii, frame[0], frame[2])
+        top, bottom, left, right = height, 0, width, 0
+        for row in range(height):
+            if lowest[0, row] > last or highest[0, row] < first:
+                continue
+            if lowest[1, row] > end or highest[1, row] < start:
+                continue
+            found = _met_row(
+                tiles[n, row], low[0, row], high[0, row], low[1, row], high[1, row],
+                (first, last, start, end),
+            )  # fmt: skip
+            if found[0] < found[1]:
+                top, bottom = min(top, row), row + 1
+                left, right = min(left, found[0]), max(right, found[1])
+        if bottom:
+            spans[n, 0], spans[n, 1], spans[n, 2], spans[n, 3] = top, bottom, left, right
+    return tiles, spans
 
 
 @lane(PLANE, PLANE, PLANE, PLANE, PLANE, int64, int64, LINE)
@@ -86,21 +154,75 @@ def received(
     return length_m, irradiance, cosine
 
 
-@lane(WHOLE, WHOLE, WHOLE, int64, int64, int64, int64)
-def darkened(
-    moments: Plane, each: Plane, left: Plane, top: int, start: int, row: int, column: int
-) -> Any:
+@lane(WHOLE, WHOLE, AROUND, LINE, int64, int64)
+def darkened(moments: Plane, each: Plane, places: Any, left: Any, top: int, start: int) -> None:
     """Take from moments the part that a shadow leaves out of those by one chain of mirrors.
 
-    Planes of moments hold real and imaginary parts in turn; the shadow begins at a row and a column
-    of the moments, and at ``top`` and ``start`` of all pixels.
+    Planes of moments hold real and imaginary parts in turn; the moments begin at a row and a column
+    of all pixels.
     """
-    for r in range(left.shape[0]):
-        for c in range(left.shape[1]):
-            dark = _ONE - left[r, c]
-            for k in range(2):
-                part = dark * each[top + r, 2 * (start + c) + k]
-                moments[row + r, 2 * (column + c) + k] -= part
+    rows, columns = places[0], places[1]
+    for k in range(len(rows)):
+        dark = _ONE - left[k]
+        row, column = rows[k], 2 * columns[k]
+        at = column - 2 * start
+        moments[row - top, at] -= dark * each[row, column]
+        moments[row - top, at + 1] -= dark * each[row, column + 1]
+
+
+@lane(WHOLE, PLACES, DOUBLES, LINE, LINE)
+def turned(of_rays: Any, on: Any, weight: Any, cosine: Any, sine: Any) -> None:
+    """Add phasors to moments of some points, real and imaginary parts in turn."""
+    for k in range(len(on)):
+        i = on[k]
+        of_rays[i, 0] = of_rays[i, 0] + weight[k] * cosine[k]
+        of_rays[i, 1] = of_rays[i, 1] + weight[k] * sine[k]
+
+
+@lane(LINE, LINE, LINE, WHOLE, PLACES)
+def upright(x: Any, y: Any, z: Any, balls: Any, ends: Any) -> Any:
+    """Return unit normals of ellipsoids, each with some of the points."""
+    normal = np.empty((3, len(x)), float32)
+    for n in range(len(balls)):
+        ball = balls[n, 0], balls[n, 1], balls[n, 2], balls[n, 3], balls[n, 4], balls[n, 5]
+        for i in range(ends[n], ends[n + 1]):
+            a, b, c = (
+                (x[i] - ball[0]) / ball[3],
+                (y[i] - ball[1]) / ball[4],
+                (z[i] - ball[2]) / ball[5],
+            )
+            length = np.sqrt(a * a + b * b + c * c)
+            normal[0, i], normal[1, i], normal[2, i] = a / length, b / length, c / length
+    return normal
+
+
+@lane(WHOLE, WHOLE, AROUND, WHOLE, LINE, int64, int64)
+def layered(
+    moments: Plane, uncovered: Plane, places: Any, of_rays: Any, share: Any, top: int, left: int
+) -> None:
+    """Leave of moments what is not covered, and add those of what covers it, by its share."""
+    width = moments.shape[1] // 2
+    for row in range(moments.shape[0]):
+        line, rest = moments[row], uncovered[top + row, left : left + width]
+        for c in range(len(rest)):
+            line[2 * c] *= rest[c]
+            line[2 * c + 1] *= rest[c]
+    rows, columns = places[0], places[1]
+    for k in range(len(rows)):
+        row, column = rows[k] - top, 2 * (columns[k] - left)
+        moments[row, column] += of_rays[k, 0] * share[k]
+        moments[row, column + 1] += of_rays[k, 1] * share[k]
+
+
+@lane(WHOLE, AROUND, LINE)
+def uncover(uncovered: Plane, places: Any, share: Any) -> None:
+    """Take from pixels what layers cover of them, one after the other; at most all is covered."""
+    rows, columns = places[0], places[1]
+    for k in range(len(rows)):
+        uncovered[rows[k], columns[k]] -= share[k]
+    for k in range(len(rows)):
+        left = uncovered[rows[k], columns[k]]
+        uncovered[rows[k], columns[k]] = max(left, _ZERO)
 
 
 @lane(WHOLE, REGION, float32, WHOLE, REGION, float32, WHOLE, REGION)
@@ -114,18 +236,17 @@ def blended(
     then, later = np.empty(2 * width, float32), np.empty(2 * width, float32)
     for row in range(height):
         r = top + row
-        for c in range(2 * width):
-            then[c] = later[c] = total[r, 2 * left + c]
+        still = total[r, 2 * left : 2 * (left + width)]
+        then[:], later[:] = still, still
         place = r - of_first[0]
         if 0 <= place < of_first[2]:
             shift = 2 * (of_first[1] - left)
-            for c in range(2 * of_first[3]):
-                then[shift + c] = first[place, c]
+            then[shift : shift + 2 * of_first[3]] = first[place]
         place = r - of_second[0]
         if 0 <= place < of_second[2]:
             shift = 2 * (of_second[1] - left)
-            for c in range(2 * of_second[3]):
-                later[shift + c] = second[place, c]
-        for c in range(2 * width):
-            mixed[row, c] = one * then[c] + other * later[c]
+            later[shift : shift + 2 * of_second[3]] = second[place]
+        line = mixed[row]
+        for c in range(len(line)):
+            line[c] = one * then[c] + other * later[c]
     return mixed

@@ -5,6 +5,7 @@ from contextlib import suppress
 from typing import Any
 
 from numba import float32 as numba_float32
+from numba import float64 as numba_float64
 from numba import int64 as numba_int64
 from numba import njit
 from numba import types as numba_types
@@ -14,11 +15,16 @@ LANES: dict[str, Callable[..., Any]] = {}
 
 # numba is only partly annotated
 float32: Any = numba_float32
+float64: Any = numba_float64
 int64: Any = numba_int64
 _types: Any = numba_types
 LINE = float32[::1]
 PLANE = _types.Array(float32, 2, "A")
 WHOLE = _types.Array(float32, 2, "C")
+DOUBLES = float64[::1]
+ROWS = float64[:, ::1]
+PLANES = float64[:, :, ::1]
+TILES = _types.boolean[:, :, ::1]
 PLACES = int64[::1]
 AROUND = int64[:, ::1]
 REGION = _types.UniTuple(int64, 4)

@@ -62,6 +62,15 @@ class Segment:
 
 
 @dataclass(frozen=True, slots=True)
+class Way:
+    """Light by one chain of mirrors on some points, by index: times of flight, and weights."""
+
+    on: NDArray[np.intp]
+    delay_s: NDArray[np.float64]
+    weight: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
 class Ends:
     """Points on surfaces that rays of the camera end on.
 
@@ -79,6 +88,8 @@ class Ends:
         Components of the unit vectors along which rays of the camera arrive.
     throughput
         Share of light that mirrors leave on its way to the camera.
+    boxes
+        (S, 2, 3) lowest and highest coordinates of all surfaces.
     """
 
     still: Scene
@@ -88,51 +99,59 @@ class Ends:
     distance_m: Plane
     direction: tuple[Plane, Plane, Plane]
     throughput: NDArray[np.float64]
+    boxes: NDArray[np.float64]
 
     def lit(
         self, lights: tuple[ImageLight, ...], *, movers: tuple[int, ...], around: Around | None
-    ) -> Lit:
+    ) -> "LitEnds":
         """Return the light by each chain of mirrors; on the back of a rectangle there is none.
 
         ``movers`` are the surfaces that move. They, and mirrors, cover shares of the pixels around
         points, unless it is not known what is ``around`` these.
         """
-        count = len(self.distance_m)
         normal = self._normals()
         along = sum(n * d for n, d in zip(normal, self.direction, strict=True))
         facing = np.where(along < 0, self.throughput, 0.0)
         albedo = np.array([surface.reflectivity for surface in self.surfaces])
-        lit = Lit(
-            self.index,
-            np.stack(self.point, axis=-1).astype(np.float64),
-            self.distance_m.astype(np.float64),
-            albedo[self.index] * facing,
-            np.zeros((len(lights), count)),
-            np.zeros((len(lights), count)),
-        )
+        distance_m, reflectance = self.distance_m.astype(np.float64), albedo[self.index] * facing
         glossy = any(surface.gloss for surface in self.surfaces)
+        ways: list[tuple[int, Way]] = []
         for k, light in enumerate(lights):
-            sent = lit.reflectance
-            if glossy:
-                direction = np.stack(self.direction, axis=-1).astype(np.float64)
-                ends = RayEnds(
-                    np.arange(count), lit.point, self.index, lit.distance_m, facing, direction
-                )
-                sent = sent + highlight(
-                    self.still, light, ends, np.stack(normal, axis=-1).astype(np.float64)
-                )
             on, shown, beside, segments = _ways(light, self.point, around)
             if not on.size:
                 continue
+            sent = reflectance
+            if glossy:
+                sent = sent + self._highlight(light, normal, facing)
             length_m, irradiance = self._irradiance(light, normal, on)
             irradiance *= shown
             for mirror in light.mirrors:
                 irradiance *= np.float32(mirror.reflectivity)
             for segment in segments:
                 irradiance *= self._clear(segment, on, movers, beside)
-            lit.delay_s[k, on] = (length_m + lit.distance_m[on]) / SPEED_OF_LIGHT_M_S
-            lit.weight[k, on] = irradiance * sent[on]
-        return lit
+            if len(on) < len(distance_m):
+                delay_s = (length_m + distance_m[on]) / SPEED_OF_LIGHT_M_S
+                ways.append(
+                    (k, Way(on, delay_s, np.multiply(sent[on], irradiance, dtype=np.float64)))
+                )
+            elif irradiance.any():
+                delay_s = (length_m + distance_m) / SPEED_OF_LIGHT_M_S
+                ways.append((k, Way(on, delay_s, np.multiply(sent, irradiance, dtype=np.float64))))
+        return LitEnds(self, reflectance, len(lights), tuple(ways))
+
+    def _highlight(
+        self, light: ImageLight, normal: tuple[Plane, ...], facing: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Reflectance of gloss towards the camera."""
+        point, direction, up = (
+            np.stack(each, axis=-1).astype(np.float64)
+            for each in (self.point, self.direction, normal)
+        )
+        ends = RayEnds(
+            np.arange(len(facing)), point, self.index, self.distance_m.astype(np.float64), facing,
+            direction,
+        )  # fmt: skip
+        return highlight(self.still, light, ends, up)
 
     def _irradiance(
         self, light: ImageLight, normal: tuple[Plane, ...], on: NDArray[np.intp]
@@ -164,9 +183,10 @@ class Ends:
         clear = np.ones(len(on), dtype=np.float32)
         low, high = segment.box
         mine = self.index[on]
-        for index, surface in enumerate(self.surfaces):
-            least, most = surface.shape.box
-            if (most < low).any() or (least > high).any() or surface is segment.mirror:
+        near = ((self.boxes[:, 0] <= high) & (self.boxes[:, 1] >= low)).all(axis=1)
+        for index in np.flatnonzero(near).tolist():
+            surface = self.surfaces[index]
+            if surface is segment.mirror:
                 continue
             if surface.opaque is not None:
                 assert isinstance(surface.shape, Rectangle)  # noqa: S101  (stencils are)
@@ -179,11 +199,17 @@ class Ends:
         return clear
 
     def _normals(self) -> tuple[Plane, Plane, Plane]:
-        normals = tuple(np.empty_like(self.distance_m) for _ in range(3))
         starts = np.flatnonzero(np.diff(self.index, prepend=-1))
+        shapes = [self.surfaces[self.index[start]].shape for start in starts]
+        lane = LANES.find("upright")
+        balls = [(*each.centre, *each.radii**2) for each in shapes if isinstance(each, Ellipsoid)]
+        if lane is not None and len(balls) == len(shapes):
+            ends = np.append(starts, len(self.index))
+            across, along, up = lane(*self.point, np.array(balls, dtype=np.float32), ends)
+            return across, along, up
+        normals = tuple(np.empty_like(self.distance_m) for _ in range(3))
         for start, stop in zip(starts, [*starts[1:], len(self.index)], strict=True):
-            shape = self.surfaces[self.index[start]].shape
-            mine = slice(int(start), int(stop))
+            shape, mine = self.surfaces[self.index[start]].shape, slice(int(start), int(stop))
             for k, plane in enumerate(normals):
                 if isinstance(shape, Ellipsoid):
                     centre, squared = np.float32(shape.centre[k]), np.float32(shape.radii[k] ** 2)
@@ -193,6 +219,31 @@ class Ends:
         x, y, z = normals
         length = np.sqrt(x * x + y * y + z * z)
         return single(x / length), single(y / length), single(z / length)
+
+
+@dataclass(frozen=True, slots=True)
+class LitEnds:
+    """Points in light by some of so many chains of mirrors, each with its index."""
+
+    ends: Ends
+    reflectance: NDArray[np.float64]
+    chains: int
+    ways: tuple[tuple[int, Way], ...]
+
+    def all(self) -> Lit:
+        """Return the light by all chains."""
+        delay_s, weight = np.zeros((2, self.chains, len(self.reflectance)))
+        for k, way in self.ways:
+            delay_s[k, way.on], weight[k, way.on] = way.delay_s, way.weight
+        ends = self.ends
+        return Lit(
+            ends.index,
+            np.stack(ends.point, axis=-1).astype(np.float64),
+            ends.distance_m.astype(np.float64),
+            self.reflectance,
+            delay_s,
+            weight,
+        )
 
 
 def _dim(
@@ -248,12 +299,15 @@ def _ways(
     for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
         way = _from(image_m, start)
         kept, part, at = _shown(mirror.mirror, image_m, way, around)
-        on, share = on[kept], share[kept] * part
-        if not on.size:
-            return on, share, around, []
-        around = around if around is None else among(kept, around)
-        segments = [each.of(kept) for each in segments]
-        x, y, z = (w[kept] for w in way)
+        if not kept.size:
+            return kept, part, around, []
+        if len(kept) < len(on):  # mostly few points, or all
+            on, share = on[kept], share[kept]
+            around = around if around is None else among(kept, around)
+            segments = [each.of(kept) for each in segments]
+            way = way[0][kept], way[1][kept], way[2][kept]
+        share = share * part
+        x, y, z = way
         segments.append(Segment(image_m, (x, y, z), at, last))
         start = _moved(image_m, (x * at, y * at, z * at))
         last = mirror

@@ -7,8 +7,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.light.bundle import Region, extent, inside
+from transientcam_driver.simulation.light.bundle import Region, inside, numbers
 from transientcam_driver.simulation.light.coverage import Plane, overlapped, single
+from transientcam_driver.simulation.light.ends import LitEnds
 from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.light.paths import Lit, scatter_of, sparse_image
 from transientcam_driver.simulation.light.still import StillLight
@@ -20,23 +21,35 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Layers:
-    """Pixels, by index, that show something that moves, and by which share.
+    """Pixels that show something that moves, by row and column (2, P), and by which share.
 
     Each of the ``parts`` is one surface from one point, with each pixel once.
     """
 
-    pixel: NDArray[np.intp]
+    places: NDArray[np.intp]
     share: NDArray[np.float32]
-    lit: Lit
+    lit: LitEnds
     parts: tuple[slice, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Shadow:
-    """Share (h, w) of the light by a chain of mirrors that is left on what stands still."""
+    """Shares (H, W) of the light by a chain of mirrors that are left on what stands still.
+
+    Outside of a region all is left.
+    """
 
     chain: int
     region: Region
+    left: Plane
+
+
+@dataclass(frozen=True, slots=True)
+class _Dimmed:
+    """Pixels by row and column (2, P), and what of their light by a chain of mirrors is left."""
+
+    chain: int
+    places: NDArray[np.intp]
     left: Plane
 
 
@@ -54,7 +67,7 @@ class MovingResponses:
         still: StillLight,
         scene: Scene,
         layers: Layers | None,
-        shadows: tuple[Shadow, ...],
+        shadows: list[Shadow],
         region: Region,
     ) -> None:
         self.region = region
@@ -63,18 +76,22 @@ class MovingResponses:
         self._found: dict[float, NDArray[np.complex64]] = {}
         self._shape = still.height, still.width
         self._layers = layers
-        self._uncovered = np.ones(still.height * still.width, dtype=np.float32)
+        self._uncovered = np.ones(self._shape, dtype=np.float32)
         if layers is not None:
-            for part in layers.parts:
-                self._uncovered[layers.pixel[part]] -= layers.share[part]
-        np.maximum(self._uncovered, 0, out=self._uncovered)  # what rounding leaves
-        self._shadows = tuple(self._uncovered_part(each) for each in shadows)
+            _uncover(self._uncovered, layers)
+        self._dimmed = tuple(self._dim(each) for each in shadows)
 
-    def _uncovered_part(self, shadow: Shadow) -> Shadow:
-        """Return a shadow by its share of what of each pixel is not covered."""
-        seen = self._uncovered.reshape(self._shape)[shadow.region]
-        left = overlapped(seen, shadow.left) / np.maximum(seen, np.float32(1e-9))
-        return Shadow(shadow.chain, shadow.region, single(left))
+    def _dim(self, shadow: Shadow) -> _Dimmed:
+        """Return what a shadow leaves of the light on what is not covered."""
+        lane = LANES.find("dimmed")
+        if lane is not None:
+            places, light = lane(self._uncovered, shadow.left, numbers(shadow.region))
+            return _Dimmed(shadow.chain, places, light)
+        seen, left = self._uncovered[shadow.region], shadow.left[shadow.region]
+        on = np.nonzero((left < 1) & (seen > 0))
+        light = overlapped(seen, left)[on] / np.maximum(seen[on], np.float32(1e-9))
+        corner = [[of.start] for of in shadow.region]
+        return _Dimmed(shadow.chain, np.stack(on) + corner, single(light))
 
     @property
     def kind(self) -> Literal["sparse", "dense"]:
@@ -109,51 +126,45 @@ class MovingResponses:
         each, total = self._still.phasors(frequency_hz)
         region = self.region
         moments = total[region].copy()
-        for shadow in self._shadows:
-            _darken(moments, region, shadow, each[shadow.chain])
-        moments *= self._uncovered.reshape(self._shape)[region]
-        if self._layers is not None:
-            flat, of_rays = moments.reshape(-1), self._of_layers(self._layers, frequency_hz)
-            for part in self._layers.parts:
-                flat[self._places[part]] += of_rays[part]
+        for dimmed in self._dimmed:
+            _darken(moments, region, dimmed, each[dimmed.chain])
+        if self._layers is None:
+            return moments
+        of_rays, places = self._of_layers(self._layers, frequency_hz), self._layers.places
+        top, left = (of.start for of in region)
+        lane = LANES.find("layered")
+        if lane is not None:
+            pairs = of_rays.view(np.float32).reshape(-1, 2)
+            share = self._layers.share
+            lane(moments.view(np.float32), self._uncovered, places, pairs, share, top, left)
+            return moments
+        moments *= self._uncovered[region]
+        of_rays *= self._layers.share
+        for part in self._layers.parts:
+            rows, columns = places[:, part]
+            moments[rows - top, columns - left] += of_rays[part]
         return moments
 
-    @cached_property
-    def _places(self) -> NDArray[np.intp]:
-        """Where the pixels of layers are in the region that differs."""
-        assert self._layers is not None  # noqa: S101  (who asks has some)
-        rows, columns = np.divmod(self._layers.pixel, self._shape[1])
-        top, left = self.region[0].start, self.region[1].start
-        places: NDArray[np.intp] = (rows - top) * extent(self.region)[1] + columns - left
-        return places
-
-    @cached_property
-    def _ways(self) -> list[tuple[slice | NDArray[np.intp], Values, Values]]:
-        """Points of layers, delays and weights, of each chain of mirrors where it lights any."""
-        assert self._layers is not None  # noqa: S101  (who asks has some)
-        ways: list[tuple[slice | NDArray[np.intp], Values, Values]] = []
-        for delay_s, weight in zip(self._layers.lit.delay_s, self._layers.lit.weight, strict=True):
-            on = np.flatnonzero(weight)
-            if len(on) == len(weight):
-                ways.append((slice(None), delay_s, weight))
-            elif on.size:
-                ways.append((on, delay_s[on], weight[on]))
-        return ways
-
     def _of_layers(self, layers: Layers, frequency_hz: float) -> NDArray[np.complex64]:
-        """Moments of the points of layers by their shares, in single precision."""
-        of_rays = np.zeros(len(layers.pixel), dtype=np.complex64)
-        for on, delay_s, weight in self._ways:
+        """Moments of the points of layers, in single precision."""
+        of_rays = np.zeros(layers.places.shape[1], dtype=np.complex64)
+        lane = LANES.find("turned")
+        for _chain, way in layers.lit.ways:
+            on = slice(None) if len(way.on) == len(of_rays) else way.on
             if not frequency_hz:
-                of_rays.real[on] += weight
+                of_rays.real[on] += way.weight
                 continue
-            phase_rad = (2 * np.pi * frequency_hz * delay_s).astype(np.float32)
-            of_rays.real[on] += weight * np.cos(phase_rad)
-            of_rays.imag[on] += weight * np.sin(phase_rad)
-        scatter = layers.lit.scatter(self.scene)
+            phase_rad = (2 * np.pi * frequency_hz * way.delay_s).astype(np.float32)
+            cosine, sine = np.cos(phase_rad), np.sin(phase_rad)
+            if lane is not None:
+                pairs = of_rays.view(np.float32).reshape(-1, 2)
+                lane(pairs, way.on, way.weight, cosine, sine)
+                continue
+            of_rays.real[on] += way.weight * cosine
+            of_rays.imag[on] += way.weight * sine
+        scatter = scatter_of(self.scene, layers.lit.ends.index)
         if scatter is not None:
             of_rays *= scatter.transfer(frequency_hz)
-        of_rays *= layers.share
         return of_rays
 
     def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -178,7 +189,7 @@ class MovingResponses:
         )
         if self._layers is not None:
             most = np.flatnonzero(self._layers.share > 0.5)  # of a pixel, one at most
-            pixel, of = self._layers.pixel[most], self._layers.lit
+            pixel, of = self._pixel[most], self._layers.lit.all()
             lit.surface[pixel] = of.surface[most]
             lit.point[pixel] = of.point[most]
             lit.distance_m[pixel] = of.distance_m[most]
@@ -187,22 +198,28 @@ class MovingResponses:
     @cached_property
     def reflectance(self) -> NDArray[np.float32]:
         """(H, W) of what the pixels see, by its shares."""
-        reflectance = self._still.reflectance * self._uncovered
+        reflectance = self._still.reflectance * self._uncovered.ravel()
         if self._layers is not None:
             more = (self._layers.share * self._layers.lit.reflectance).astype(np.float32)
             for part in self._layers.parts:
-                reflectance[self._layers.pixel[part]] += more[part]
+                reflectance[self._pixel[part]] += more[part]
         return reflectance.reshape(self._shape)
+
+    @cached_property
+    def _pixel(self) -> NDArray[np.intp]:
+        """Pixels of layers by index."""
+        assert self._layers is not None  # noqa: S101  (who asks has some)
+        pixel: NDArray[np.intp] = self._layers.places[0] * self._shape[1] + self._layers.places[1]
+        return pixel
 
     @cached_property
     def _whole(self) -> SparseResponses:
         delay_s, weight, scatter = self._still.returns
-        weight = weight * self._uncovered
+        weight = weight * self._uncovered.ravel()
         chains = len(self._still.lit.weight)
-        for shadow in self._shadows:
-            planes = weight[shadow.chain :: chains].reshape(-1, *self._shape)
-            planes[:, *shadow.region] *= shadow.left  # a view of weight
-            weight[shadow.chain :: chains] = planes.reshape(len(planes), -1)
+        for dimmed in self._dimmed:
+            pixel = np.ravel_multi_index(tuple(dimmed.places), self._shape)
+            weight[dimmed.chain :: chains, pixel] *= dimmed.left
         delays, weights, spreads = [delay_s], [weight], [scatter]
         if self._layers is not None:
             for part in self._layers.parts:
@@ -218,22 +235,35 @@ class MovingResponses:
 
     def _planes_of(self, layers: Layers, part: slice) -> tuple[Values, Values, Scatter | None]:
         """Delays, weights and spread of a layer, (K, H W)."""
-        lit, pixel = layers.lit.part(part), layers.pixel[part]
-        shape = (len(lit.weight), len(self._uncovered))
+        lit, pixel = layers.lit.all().part(part), self._pixel[part]
+        shape = (len(lit.weight), self._uncovered.size)
         delay_s, weight = np.zeros(shape), np.zeros(shape)
         delay_s[:, pixel] = lit.delay_s
         weight[:, pixel] = layers.share[part] * lit.weight
         return delay_s, weight, scatter_of(self.scene, np.full(shape, lit.surface[0]))
 
 
+def _uncover(uncovered: Plane, layers: Layers) -> None:
+    """Take from shares (H, W) of pixels what layers cover."""
+    lane = LANES.find("uncover")
+    if lane is not None:
+        lane(uncovered, layers.places, layers.share)
+        return
+    for part in layers.parts:
+        rows, columns = layers.places[:, part]
+        uncovered[rows, columns] -= layers.share[part]
+    np.maximum(uncovered, 0, out=uncovered)  # what rounding leaves
+
+
 def _darken(
-    moments: NDArray[np.complex64], region: Region, shadow: Shadow, each: NDArray[np.complex64]
+    moments: NDArray[np.complex64], region: Region, dimmed: _Dimmed, each: NDArray[np.complex64]
 ) -> None:
     """Take what a shadow leaves out of light by one chain (H, W) from the moments of a region."""
-    at = inside(shadow.region, region)
+    top, left = (of.start for of in region)
     lane = LANES.find("darkened")
-    if lane is None:
-        moments[at] -= (1 - shadow.left) * each[shadow.region]
+    if lane is not None:
+        planes = moments.view(np.float32), each.view(np.float32)
+        lane(*planes, dimmed.places, dimmed.left, top, left)
         return
-    starts = (of.start for of in (*shadow.region, *at))
-    lane(moments.view(np.float32), each.view(np.float32), shadow.left, *starts)
+    rows, columns = dimmed.places
+    moments[rows - top, columns - left] -= (1 - dimmed.left) * each[rows, columns]

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from transientcam_driver.simulation.light.bundle import (
     Bundle,
     Region,
-    extent,
     inside,
     overlap,
     union,
@@ -26,7 +25,7 @@ from transientcam_driver.simulation.light.ends import Ends
 from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.light.layers import Layers, MovingResponses, Shadow
 from transientcam_driver.simulation.light.paths import ImageLight, image_lights
-from transientcam_driver.simulation.light.shares import above, around, seen, shaded
+from transientcam_driver.simulation.light.shares import above, around, seen, shade
 from transientcam_driver.simulation.light.still import Sight, StillLight
 from transientcam_driver.simulation.scene.geometry import Points, Shape
 from transientcam_driver.simulation.scene.scene import Scene
@@ -97,12 +96,13 @@ class MovingLight:
         layers = self._lit(scene, visible) if visible else None
         shadows = [shadow for k in range(len(self._chains)) if (shadow := self._shadow(shapes, k))]
         region = union([*(each.region for each in visible), *(each.region for each in shadows)])
-        return MovingResponses(self.still, scene, layers, tuple(shadows), region)
+        return MovingResponses(self.still, scene, layers, shadows, region)
 
     def _cover(self, shapes: list[Shape], sight: Sight) -> Iterator[_Seen]:
         """Shares of pixels that surfaces cover, where nothing that stands still is before them."""
         bundle = sight.bundle
-        for index, shape, region in zip(self._movers, shapes, bundle.meeting(shapes), strict=True):
+        _tiles, regions = bundle.meeting(shapes)
+        for index, shape, region in zip(self._movers, shapes, regions, strict=True):
             if region is None:
                 continue
             share, at_m = seen(shape, bundle, region, sight.fills, soft=self._soft)
@@ -141,6 +141,7 @@ class MovingLight:
             at_m,
             (components[3], components[4], components[5]),
             np.repeat([each.sight.throughput for each in visible], counts),
+            np.array([each.shape.box for each in scene.surfaces]),
         ).lit(
             self._lights,
             movers=self._movers,
@@ -148,26 +149,19 @@ class MovingLight:
         )
         ends = np.cumsum([0, *counts]).tolist()
         parts = tuple(slice(*pair) for pair in pairwise(ends))
-        return Layers(rows * self.still.width + columns, share, lit, parts)
+        return Layers(np.stack([rows, columns]), share, lit, parts)
 
     def _shadow(self, shapes: list[Shape], chain: int) -> Shadow | None:
         """Share of the light by a chain of mirrors that is left on what stands still."""
-        dark: list[tuple[Region, Plane]] = []
+        left: Plane | None = None
+        regions: list[Region] = []
         for bundle in self._chains[chain]:
-            for shape, region in zip(shapes, bundle.meeting(shapes), strict=True):
-                if region is None:
-                    continue
-                share = shaded(shape, bundle, region, soft=self._soft)
-                if share.any():
-                    dark.append((region, share))
-        if not dark:
+            if left is None:
+                left = np.ones((self.still.height, self.still.width), dtype=np.float32)
+            regions += shade(shapes, bundle, left, soft=self._soft)
+        if left is None or not regions:
             return None
-        whole = union([region for region, _share in dark])
-        left = np.ones(extent(whole), dtype=np.float32)
-        for region, share in dark:
-            at = inside(region, whole)
-            left[at] = overlapped(left[at], 1 - share)
-        return Shadow(chain, whole, left)
+        return Shadow(chain, union(regions), left)
 
     def _light_segments(self, chain: int, light: ImageLight) -> list[Bundle]:
         """Ways of light to what stands still, where it arrives, one bundle a segment."""

@@ -6,7 +6,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.light.bundle import Bundle, Region, numbers
+from transientcam_driver.simulation.light.bundle import NOWHERE, TILE, Bundle, Region, numbers
 from transientcam_driver.simulation.light.coverage import (
     TOUCHING,
     Crossing,
@@ -15,6 +15,7 @@ from transientcam_driver.simulation.light.coverage import (
     covered,
     covered_among,
     crossing,
+    overlapped,
 )
 from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.scene.geometry import Ellipsoid, Shape
@@ -44,16 +45,30 @@ def seen(
     return share, at
 
 
-def shaded(shape: Shape, bundle: Bundle, region: Region, *, soft: bool) -> Plane:
-    """Return shares (h, w) of pixels whose lines a shape blocks between two of their points."""
-    lane = LANES.find("shaded")
-    if lane is not None and soft and isinstance(shape, Ellipsoid):
+def shade(shapes: list[Shape], bundle: Bundle, left: Plane, *, soft: bool) -> list[Region]:
+    """Take from shares (H, W) of light what shapes block; return the regions of those that do.
+
+    Light is blocked on a bundle's lines between two of their points.
+    """
+    tiles, regions = bundle.meeting(shapes)
+    lane = LANES.find("shade")
+    balls = [ball_of(each, bundle.apex) for each in shapes if isinstance(each, Ellipsoid)]
+    if lane is not None and soft and len(balls) == len(shapes):
+        of = np.array([numbers(each or NOWHERE) for each in regions])
         lines = *bundle.way, bundle.near, bundle.far
-        dark: Plane = lane(ball_of(shape, bundle.apex), *lines, numbers(region), TOUCHING)
-        return dark
-    way, near, far = bundle.within(region)
-    cross = crossing(shape, bundle.apex, way)
-    return _share(cross, soft=soft)[0] * cross.between(near, far)
+        blocks = lane(np.array(balls), *lines, tiles, TILE, of, TOUCHING, left)
+        return [each for each, does in zip(regions, blocks, strict=True) if each and does]
+    blocking: list[Region] = []
+    for shape, region in zip(shapes, regions, strict=True):
+        if region is None:
+            continue
+        way, near, far = bundle.within(region)
+        cross = crossing(shape, bundle.apex, way)
+        dark = _share(cross, soft=soft)[0] * cross.between(near, far)
+        if dark.any():
+            left[region] = overlapped(left[region], 1 - dark)
+            blocking.append(region)
+    return blocking
 
 
 def above(values: Plane, *, soft: bool) -> Plane:

@@ -92,7 +92,7 @@ def test_images_are_the_same_with_and_without_lanes(board: bool, mixed: str) -> 
         expected = images(scene, times_s)
 
     assert there == expected
-    assert used >= {"points", "received", "darkened", "blended", "overlapped"}
+    assert used >= {"points", "received", "darkened", "blended", "overlapped", "layered"}
     if mixed == "on":
         assert used == set(LANES._ready)
 
