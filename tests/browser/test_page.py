@@ -74,13 +74,13 @@ def test_keys_are_listed_and_do_what_the_list_says(page: Page) -> None:
     page.get_by_role("button", name="Save").click()
     page.locator(".panel-second-map .panel-title").drag_to(page.locator(".panel-plots"))
     shown = page.locator("[data-view]")
-    assert views_of(shown) == ["map", "plots", "second-map", "transient"]
+    assert views_of(shown) == ["map", "plots", "second-map", "response"]
     page.keyboard.press("z")
     expect(shown.nth(1)).to_have_attribute("data-view", "second-map")
     page.keyboard.press("z")
     expect(shown).to_have_count(6)
     choose_from(page, PAGE_MENU, "pair")
-    assert views_of(shown) == ["map", "second-map", "plots", "transient"]
+    assert views_of(shown) == ["map", "second-map", "plots", "response"]
 
 
 def views_of(panels: Locator) -> list[str]:
@@ -111,7 +111,7 @@ def test_nothing_hangs_over_the_edge_and_every_control_has_a_name(page: Page) ->
     layouts = ("Overview", "Six views", "Two maps", "Projector", "One pixel")
     for layout in layouts:
         choose_from(page, PAGE_MENU, layout)
-        page.locator(".panel-transient").wait_for()
+        page.locator(".panel-map, .panel-streak").first.wait_for()
         if layout == "Overview":
             page.get_by_role("button", name="Edit").click()
         for width in (390, 1280):

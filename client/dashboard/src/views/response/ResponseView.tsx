@@ -24,6 +24,7 @@ import { MomentsPlane } from "./MomentsPlane";
 import { responsePlot, type ResponsePlot } from "./plot";
 import { ReturnHistory } from "./returns";
 import { ASPECTS, SIDES } from "./sides";
+import { NO_STEMS, stemsOf } from "./stems";
 
 /** Share of the height that the axis was made for which is left after a frame without such a peak. */
 const SHRINK = 0.96;
@@ -94,7 +95,7 @@ export function ResponseView() {
         ) : side.value === "moments" ? (
           <MomentsPlane pixel={levinson} />
         ) : (
-          <Plot key={side.value} aspect={side.value} logarithmic={side.value === "density" && logarithmic.value} shown={shown} pointed={pointed} />
+          <Plot key={side.value} aspect={side.value} logarithmic={side.value === "density" && logarithmic.value} shown={shown} returns={returns} pointed={pointed} />
         )}
         {place.value !== null && (
           <aside class="response-side" aria-label="What was found at the pixel" tabIndex={0}>
@@ -128,12 +129,13 @@ interface PlotProps {
   readonly aspect: Aspect;
   readonly logarithmic: boolean;
   readonly shown: { readonly value: Shown | null };
+  readonly returns: ReturnHistory;
   /** Set to what is under the pointer, in words. */
   readonly pointed: { value: string };
 }
 
 /** The curves of one aspect over time of flight. */
-function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
+function Plot({ aspect, logarithmic, shown, returns, pointed }: PlotProps) {
   const store = useStore();
   const { measures } = store;
   const box = useRef<HTMLDivElement>(null);
@@ -171,10 +173,11 @@ function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
 
   useDrawing(() => {
     const now = shown.value;
-    const truth = store.details.document.value?.truth ?? null;
+    const told = store.details.document.value;
+    const truth = told?.truth ?? null;
     if (plot.value === null || size.value.width === 0) return;
     if (now === null) {
-      plot.value.show(null, null, new Map());
+      plot.value.show(null, NO_STEMS, new Map());
       return;
     }
     const { curves, ofPins } = drawnOf(aspect, now, measures.pins.value, truth);
@@ -184,8 +187,9 @@ function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
     held.current = now.pixel === heldFor.current ? Math.max(highest, SHRINK * held.current) : highest;
     heldFor.current = now.pixel;
     top.current = autoLimits(top.current, { low: 0, high: held.current });
-    plot.value.show(curves, truth, ofPins);
-  }, [plot, shown, aspect]);
+    if (told !== null) returns.take(told, store.frames.sceneOf(told.meta));
+    plot.value.show(curves, told === null ? NO_STEMS : stemsOf(told, truth, returns), ofPins);
+  }, [plot, shown, returns, aspect]);
 
   useDrawing(() => {
     const turn = store.player.turn.value;
@@ -197,15 +201,21 @@ function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
     <div class="response-plot-box">
       <div class="response-plot" ref={box} data-empty={shown.value === null} data-aspect={aspect} />
         <p class="key">
-          {aspect === "bounds" && <span class="key-band">any light with these moments</span>}
+          {aspect === "bounds" && <span class="key-band" title="Any light with these moments lies within them">bounds</span>}
           <span>estimate</span>
           {measures.pins.value.map(({ name }) => (
             <span key={name} class="key-pin" style={{ "--pin": PIN_COLOURS[name] }}>
               {name}
             </span>
           ))}
-          {simulated && aspect !== "density" && <span class="key-truth">truth</span>}
-          {simulated && <span class="key-stem" title="As high as their share of the light">true returns</span>}
+          <span class="key-stem" title="As high as their share of the light">
+            returns ± 1 σ
+          </span>
+          {simulated && (
+            <span class="key-truth" title="Stems are the true returns, as high as their share of the light">
+              truth
+            </span>
+          )}
           {aspect === "bounds" && <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">smoothed</em>}
           {aspect !== "cumulative" && !logarithmic && <em title="Linear near zero, logarithmic where it is high: what is dim stays in sight beside narrow and high peaks">height: asinh</em>}
         </p>
