@@ -36,7 +36,7 @@ const hero = (view: string, ...beside: readonly (readonly [string, number])[]): 
 
 /** Layouts to begin with. */
 export const LAYOUTS: Readonly<Record<string, Layout>> = {
-  Overview: hero("transient", ["map", 9], ["response", 10], ["sequence", 4]),
+  Overview: hero("transient", ["map", 9], ["response", 10], ["sequence", 5]),
   "Six views": [row(1, ["map", 1], ["transient", 1], ["points", 1]), row(1, ["response", 2], ["streak", 1], ["validity", 1])],
   "Two maps": [row(3, ["map", 1], ["second-map", 1]), row(2, ["plots", 1], ["response", 1])],
   Steering: hero("transient", ["map", 8], ["sequence", 9]),
@@ -44,7 +44,7 @@ export const LAYOUTS: Readonly<Record<string, Layout>> = {
   Simulation: hero("transient", ["simulation", 11], ["map", 9]),
   Projector: hero("transient", ["map", 1], ["points", 1]),
   "One pixel": [row(1, ["transient", 1], ["streak", 1]), row(1, ["response", 1])],
-  Space: hero("points", ["map", 9], ["response", 10], ["sequence", 4]),
+  Space: hero("points", ["map", 9], ["response", 10], ["sequence", 5]),
 };
 
 export const OVERVIEW = LAYOUTS["Overview"];

@@ -217,7 +217,7 @@ function Plot({ aspect, logarithmic, shown, returns, pointed }: PlotProps) {
             </span>
           )}
           {aspect === "bounds" && <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">smoothed</em>}
-          {aspect !== "cumulative" && !logarithmic && <em title="Linear near zero, logarithmic where it is high: what is dim stays in sight beside narrow and high peaks">height: asinh</em>}
+          {aspect !== "cumulative" && !logarithmic && <em title="Linear near zero, logarithmic where it is high: what is dim stays in sight beside narrow and high peaks">asinh</em>}
         </p>
     </div>
   );

@@ -2,7 +2,7 @@ import uPlot from "uplot";
 
 import { rangeOfTime_m } from "../../physics/constants";
 import { PIN_COLOURS, PIN_NAMES } from "../../store/measures";
-import { fixed, grouped, significant } from "../../ui/format";
+import { grouped, significant, withUnit } from "../../ui/format";
 import { ESTIMATES, type Aspect, type Curves, type PinLines } from "./curves";
 import { drawStems, NO_STEMS, type Stems } from "./stems";
 
@@ -79,7 +79,7 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, perio
             : { range: () => [0, top()] },
       },
       axes: [
-        { ...axis, size: 20, gap: 2, values: (_plot, splits) => splits.map((time_ns, at) => (at === splits.length - 1 ? fixed(time_ns, 0, "ns") : String(time_ns))) },
+        { ...axis, size: 20, gap: 2, values: (_plot, splits) => splits.map((time_ns, at) => withUnit(String(time_ns), at === splits.length - 1 ? "ns" : "")) },
         { ...axis, size: 52, gap: 4, label: aspect === "cumulative" ? "DN" : "DN/ns", labelSize: 16, labelGap: 0, space: 28, values: (_plot, splits) => splits.map(tickText), ...(logarithmic ? { splits: powersOfTen, filter: all } : aspect !== "cumulative" ? { splits: bentSplits(ASINH_SHARES[aspect]), filter: all } : {}) },
         {
           ...axis,
