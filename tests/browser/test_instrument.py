@@ -127,9 +127,10 @@ def test_limits_are_drawn_typed_refused_and_shared(page: Page, served: Served) -
     grip = handle.bounding_box()
     assert bar is not None
     assert grip is not None
-    page.mouse.move(grip["x"] + grip["width"] / 2, grip["y"] + grip["height"] / 2)
+    middle = grip["y"] + grip["height"] / 2
+    page.mouse.move(grip["x"] + grip["width"] / 2, middle)
     page.mouse.down()
-    page.mouse.move(grip["x"] + 5, grip["y"] + bar["height"] / 3, steps=3)
+    page.mouse.move(grip["x"] + 5, middle + bar["height"] / 3, steps=3)
     page.mouse.up()
     low_m, high_m = (float(str(canvas.get_attribute(f"data-{end}"))) for end in ("low", "high"))
     assert high_m == pytest.approx(before - 0.4 * (before - low_m), rel=0.05)

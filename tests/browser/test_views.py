@@ -227,12 +227,12 @@ def test_points_turn_and_change_their_colours(page: Page, served: Served) -> Non
     page.mouse.move(box["x"] + 160, box["y"] + 120, steps=3)
     page.mouse.up()
     seen.append(canvas_pixels_of_scene(page))
-    look_at(page, "points")
     for colouring, shows in (
         ("light", "brightness"),
         ("validity", "flags"),
         ("flight", "coefficients"),
     ):
+        look_at(page, "points")
         page.get_by_label("Colour by").select_option(colouring)
         expect(canvas).to_have_attribute("data-colouring", colouring)
         page.wait_for_function(f"() => transientcam.store.frames.of('{shows}').value !== null")
@@ -279,22 +279,22 @@ def test_panels_are_moved_added_closed_and_resized_and_stay_so(page: Page, serve
     assert box is not None
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 40)
     page.mouse.down()
-    page.mouse.move(box["x"] + 150, box["y"] + 40, steps=4)
+    page.mouse.move(box["x"] - 150, box["y"] + 40, steps=4)
     page.mouse.up()
-    wider = page.locator(".panel-validity").bounding_box()
-    assert wider is not None
-    assert wider["width"] > before["width"] + 100
-    splitter.focus()
-    page.keyboard.press("ArrowLeft")
     narrower = page.locator(".panel-validity").bounding_box()
     assert narrower is not None
-    assert narrower["width"] < wider["width"]
+    assert narrower["width"] < before["width"] - 100
+    splitter.focus()
+    page.keyboard.press("ArrowRight")
+    wider = page.locator(".panel-validity").bounding_box()
+    assert wider is not None
+    assert wider["width"] > narrower["width"]
     page.reload()
     page.locator(".panel-streak").wait_for()
     assert shown() == ["transient", "validity", "sequence", "response", "streak"]
     again = page.locator(".panel-validity").bounding_box()
     assert again is not None
-    assert again["width"] == pytest.approx(narrower["width"], abs=1)
+    assert again["width"] == pytest.approx(wider["width"], abs=1)
     choose(page, "response", "Show alone")
     assert shown() == ["response"]
     choose(page, "response", "Show all panels")

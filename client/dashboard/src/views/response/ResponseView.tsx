@@ -1,4 +1,4 @@
-import { computed, effect, signal, untracked, useComputed, useSignal, type ReadonlySignal } from "@preact/signals";
+import { computed, effect, signal, untracked, useComputed, useSignal, type ReadonlySignal, type Signal } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import "uplot/dist/uPlot.min.css";
 
@@ -78,11 +78,6 @@ export function ResponseView() {
         <>
           {side.value !== "moments" && <span data-field="sample">{pointed}</span>}
           <Tabs label="What of the pixel" value={side.value} options={SIDES} onChange={(value) => (side.value = value)} />
-          {side.value === "density" && (
-            <Toggle pressed={logarithmic.value} title="Logarithmic density" onToggle={() => (logarithmic.value = !logarithmic.peek())}>
-              log
-            </Toggle>
-          )}
         </>
       }
     >
@@ -95,7 +90,7 @@ export function ResponseView() {
         ) : side.value === "moments" ? (
           <MomentsPlane pixel={levinson} />
         ) : (
-          <Plot key={side.value} aspect={side.value} logarithmic={side.value === "density" && logarithmic.value} shown={shown} returns={returns} pointed={pointed} />
+          <Plot key={side.value} aspect={side.value} logarithmic={logarithmic} shown={shown} returns={returns} pointed={pointed} />
         )}
         {place.value !== null && (
           <aside class="response-side" aria-label="What was found at the pixel" tabIndex={0}>
@@ -127,7 +122,8 @@ interface Shown extends Subject {
 
 interface PlotProps {
   readonly aspect: Aspect;
-  readonly logarithmic: boolean;
+  /** Whether the density's height is logarithmic. */
+  readonly logarithmic: Signal<boolean>;
   readonly shown: { readonly value: Shown | null };
   readonly returns: ReturnHistory;
   /** Set to what is under the pointer, in words. */
@@ -135,8 +131,9 @@ interface PlotProps {
 }
 
 /** The curves of one aspect over time of flight. */
-function Plot({ aspect, logarithmic, shown, returns, pointed }: PlotProps) {
+function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProps) {
   const store = useStore();
+  const logarithmic = aspect === "density" && wanted.value;
   const { measures } = store;
   const box = useRef<HTMLDivElement>(null);
   const size = useMemo(() => signal({ width: 0, height: 0 }), []);
@@ -200,25 +197,30 @@ function Plot({ aspect, logarithmic, shown, returns, pointed }: PlotProps) {
   return (
     <div class="response-plot-box">
       <div class="response-plot" ref={box} data-empty={shown.value === null} data-aspect={aspect} />
-        <p class="key">
-          {aspect === "bounds" && <span class="key-band" title="Any light with these moments lies within them">bounds</span>}
-          <span>estimate</span>
-          {measures.pins.value.map(({ name }) => (
-            <span key={name} class="key-pin" style={{ "--pin": PIN_COLOURS[name] }}>
-              {name}
-            </span>
-          ))}
-          <span class="key-stem" title="As high as their share of the light">
-            returns ± 1 σ
+      <div class="key">
+        {aspect === "bounds" && <span class="key-band" title="Any light with these moments lies within them">bounds</span>}
+        <span>estimate</span>
+        {measures.pins.value.map(({ name }) => (
+          <span key={name} class="key-pin" style={{ "--pin": PIN_COLOURS[name] }}>
+            {name}
           </span>
-          {simulated && (
-            <span class="key-truth" title="Stems are the true returns, as high as their share of the light">
-              truth
-            </span>
-          )}
-          {aspect === "bounds" && <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">smoothed</em>}
-          {aspect !== "cumulative" && !logarithmic && <em title="Linear near zero, logarithmic where it is high: what is dim stays in sight beside narrow and high peaks">asinh</em>}
-        </p>
+        ))}
+        <span class="key-stem" title="As high as their share of the light">
+          returns ± 1 σ
+        </span>
+        {simulated && (
+          <span class="key-truth" title="Stems are the true returns, as high as their share of the light">
+            truth
+          </span>
+        )}
+        {aspect === "bounds" && <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">smoothed</em>}
+        {aspect !== "cumulative" && !logarithmic && <em title="Height: linear near zero, logarithmic where it is high, so that what is dim stays in sight beside narrow and high peaks">asinh</em>}
+        {aspect === "density" && (
+          <Toggle pressed={logarithmic} title="Logarithmic density" onToggle={() => (wanted.value = !wanted.peek())}>
+            log
+          </Toggle>
+        )}
+      </div>
     </div>
   );
 }
