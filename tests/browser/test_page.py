@@ -106,8 +106,9 @@ def test_light_and_dark_are_chosen_and_stay(page: Page) -> None:
     expect(root).to_have_attribute("data-theme", "dark")
 
 
-def test_nothing_hangs_over_the_edge_and_every_control_has_a_name(page: Page) -> None:
+def test_nothing_hangs_over_the_edge_and_every_control_has_a_name_and_type_three_sizes(page: Page) -> None:
     open_page(page)
+    sizes_px: set[float] = set()
     layouts = ("Overview", "Six views", "Two maps", "Projector", "One pixel")
     for layout in layouts:
         choose_from(page, PAGE_MENU, layout)
@@ -124,6 +125,13 @@ def test_nothing_hangs_over_the_edge_and_every_control_has_a_name(page: Page) ->
                  .map((it) => it.outerHTML)"""
         )
         assert unnamed == [], layout
+        sizes_px |= set(page.evaluate(_SIZES_OF_TYPE_PX))
+    assert sizes_px == {12, 13, 20}
 
 
+_SIZES_OF_TYPE_PX = """
+() => [...document.querySelectorAll("body *:not(svg *, noscript, script)")]
+    .filter((each) => [...each.childNodes].some((it) => it.nodeType === 3 && it.data.trim()))
+    .map((each) => parseFloat(getComputedStyle(each).fontSize))
+"""
 _PAINTED = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"

@@ -222,9 +222,10 @@ def test_points_turn_and_change_their_colours(page: Page, served: Served) -> Non
     seen.append(canvas_pixels_of_scene(page))
     box = canvas.bounding_box()
     assert box is not None
-    page.mouse.move(box["x"] + 100, box["y"] + 100)
+    middle = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + 100, middle)
     page.mouse.down()
-    page.mouse.move(box["x"] + 160, box["y"] + 120, steps=3)
+    page.mouse.move(box["x"] + 160, middle + 20, steps=3)
     page.mouse.up()
     seen.append(canvas_pixels_of_scene(page))
     for colouring, shows in (

@@ -12,6 +12,7 @@ import { type Store, useStore } from "../../store/store";
 import { Tabs, Toggle } from "../../ui/controls";
 import { fixed, significant } from "../../ui/format";
 import { save } from "../../ui/download";
+import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { autoLimits, type Span } from "../../ui/scale";
@@ -57,6 +58,7 @@ export function ResponseView() {
   const logarithmic = useMemo(() => remembered(store.shelf, "response.logarithmic", false, aBoolean), [store]);
   const pointed = useSignal("");
   const pixel = useComputed(() => (absent.value["coefficients"] === undefined ? (shown.value?.pixel ?? null) : store.selected.value));
+  const frameless = useComputed(() => frame.value === null);
   const place = useComputed(() => (pixel.value === null ? null : `${pixel.value.x}, ${pixel.value.y}`));
   const download = (aspect: Aspect) => (): void => {
     const now = shown.peek();
@@ -82,7 +84,7 @@ export function ResponseView() {
       }
     >
       <div class="response">
-        {place.value === null && <p class="stage-empty">Click a pixel in one of the pictures.</p>}
+        {frameless.value ? <FirstFrame /> : place.value === null && <p class="stage-empty">Click a pixel in one of the pictures.</p>}
         {place.value === null ? null : obstacle !== undefined ? (
           <p class="absent" data-field="absent">
             This camera has no density of light over time: {obstacle}.

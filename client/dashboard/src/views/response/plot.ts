@@ -33,7 +33,7 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, perio
   const ink = style.getPropertyValue("--quiet");
   const hairline = style.getPropertyValue("--hairline");
   const line = style.getPropertyValue("--curve");
-  const font = `11px ${style.fontFamily}`;
+  const font = `${style.getPropertyValue("--small")} ${style.fontFamily}`;
   const axis = { stroke: ink, font, labelFont: font, grid: { stroke: hairline, width: 1 }, ticks: { stroke: hairline, width: 1, size: 4 } };
   const wash = style.getPropertyValue("--curve-wash");
   const truthInk = style.getPropertyValue("--truth");
