@@ -96,9 +96,8 @@ def predict(page: Page) -> None:
 
 
 def picture(page: Page, path: Path) -> None:
-    """Save the page itself, at an arrival of light, once deviations of the pixel are known."""
+    """Save the page itself, at the first arrival of light, once deviations of the pixel are known."""
     predict(page)
-    page.keyboard.press("n")
     page.locator(".returns [data-found=true] td:first-child small:not(:empty)").first.wait_for()
     page.screenshot(path=path)
 
@@ -138,7 +137,6 @@ def views(page: Page, to: Path) -> None:
     page.mouse.up()
     page.keyboard.up("Shift")
     predict(page)
-    page.keyboard.press("n")
     shown: list[dict[str, str]] = page.evaluate(
         "() => [...transientcam.layouts.map((layout) => ({ layout, view: '' })),"
         " ...transientcam.views.map((view) => ({ layout: 'Overview', view }))]"

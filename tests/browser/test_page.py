@@ -135,3 +135,28 @@ _SIZES_OF_TYPE_PX = """
     .map((each) => parseFloat(getComputedStyle(each).fontSize))
 """
 _PAINTED = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (1920, 1080), (1280, 800)])
+def test_the_light_takes_most_of_the_page_in_a_stage_of_its_own_shape(
+    page: Page, width: int, height: int
+) -> None:
+    page.set_viewport_size({"width": width, "height": height})
+    open_page(page)
+    page.evaluate(_PAINTED)
+
+    def size_of(selector: str) -> tuple[float, float]:
+        box = page.locator(f".panel-transient{selector}").bounding_box()
+        assert box is not None
+        return box["width"], box["height"]
+
+    assert size_of("")[0] > 0.6 * width
+    picture_px, picture_height_px = size_of(" .stage-picture")
+    assert picture_px > 0.55 * width
+    assert picture_px / picture_height_px == pytest.approx(163 / 120, rel=0.01)
+    # the black stage holds the picture, the colour bar and 12 px between and beside them
+    stage_px, stage_height_px = size_of(" .picture")
+    assert stage_px == pytest.approx(picture_px + size_of(" .colour-bar")[0] + 12, abs=1.5)
+    assert stage_height_px == pytest.approx(picture_height_px, abs=1.5)
+    assert size_of(" .timeline")[1] >= 96
+    assert page.evaluate("document.documentElement.scrollHeight") <= height
