@@ -96,7 +96,7 @@ def predict(page: Page) -> None:
 
 
 def picture(page: Page, path: Path) -> None:
-    """Save the page itself, at the first arrival of light, once deviations of the pixel are known."""
+    """Save the page itself, as it opens, once deviations of the pixel are known."""
     predict(page)
     page.locator(".returns [data-found=true] td:first-child small:not(:empty)").first.wait_for()
     page.screenshot(path=path)

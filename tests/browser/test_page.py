@@ -106,7 +106,7 @@ def test_light_and_dark_are_chosen_and_stay(page: Page) -> None:
     expect(root).to_have_attribute("data-theme", "dark")
 
 
-def test_nothing_hangs_over_the_edge_and_every_control_has_a_name_and_type_three_sizes(page: Page) -> None:
+def test_nothing_hangs_over_the_edge_controls_have_names_and_type_three_sizes(page: Page) -> None:
     open_page(page)
     sizes_px: set[float] = set()
     layouts = ("Overview", "Six views", "Two maps", "Projector", "One pixel")
