@@ -93,6 +93,7 @@ def predict(page: Page) -> None:
     page.locator(".accuracy[data-predicted=true]").wait_for()
     page.locator("[data-field=accuracy-status]:not(:has(progress))").wait_for()
     page.locator(".performance").click()
+    page.mouse.move(0, 0)  # off the button
 
 
 def picture(page: Page, path: Path) -> None:
