@@ -93,12 +93,12 @@ def predict(page: Page) -> None:
     page.locator(".accuracy[data-predicted=true]").wait_for()
     page.locator("[data-field=accuracy-status]:not(:has(progress))").wait_for()
     page.locator(".performance").click()
+    page.mouse.move(0, 0)  # off the button
 
 
 def picture(page: Page, path: Path) -> None:
-    """Save the page itself, at an arrival of light, once deviations of the pixel are known."""
+    """Save the page itself, as it opens, once deviations of the pixel are known."""
     predict(page)
-    page.keyboard.press("n")
     page.locator(".returns [data-found=true] td:first-child small:not(:empty)").first.wait_for()
     page.screenshot(path=path)
 
@@ -138,7 +138,6 @@ def views(page: Page, to: Path) -> None:
     page.mouse.up()
     page.keyboard.up("Shift")
     predict(page)
-    page.keyboard.press("n")
     shown: list[dict[str, str]] = page.evaluate(
         "() => [...transientcam.layouts.map((layout) => ({ layout, view: '' })),"
         " ...transientcam.views.map((view) => ({ layout: 'Overview', view }))]"

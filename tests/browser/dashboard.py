@@ -168,6 +168,11 @@ def choose_from(place: Page | Locator, menu: str, action: str) -> None:
     place.get_by_role("menuitem", name=action, exact=True).click()
 
 
+def look_at(page: Page, panel: str) -> None:
+    """Open what there is to choose of a picture's look."""
+    page.get_by_role("button", name=f"Look of the {panel}", exact=True).click()
+
+
 def choose(page: Page, panel: str, action: str) -> None:
     """Choose from the menu of a panel."""
     choose_from(page.locator(f".panel-{panel}"), f"Panel {panel}", action)

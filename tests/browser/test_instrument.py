@@ -14,6 +14,7 @@ from tests.browser.dashboard import (
     canvas_pixels,
     choose,
     choose_from,
+    look_at,
     map_canvas,
     map_colours,
     open_page,
@@ -50,11 +51,11 @@ def test_keys_never_do_what_was_not_asked_for(page: Page) -> None:
         page.locator(f".panel-map canvas[data-product={shown}]").wait_for()
         expect(picture).to_be_focused()
     # the space bar plays, whatever was clicked last; a button that was reached by keys it presses
+    page.get_by_role("tab", name="Density").click()
     logarithmic = page.get_by_role("button", name="log")
     logarithmic.click()
     page.keyboard.press("Space")
     expect(logarithmic).to_have_attribute("aria-pressed", "true")
-    expect(page.locator(".panel-map .colour-bar-tick").nth(2)).to_be_visible()
     expect(page.get_by_role("button", name="Pause")).to_be_visible()
     page.keyboard.press("Tab")
     page.keyboard.press("Shift+Tab")
@@ -73,7 +74,7 @@ def test_the_page_opens_with_a_pixel_of_several_returns(page: Page) -> None:
     rows = page.locator(".returns tbody tr")
     expect(rows.and_(page.locator("[data-found=true]")).nth(1)).to_be_visible()
     expect(rows).to_have_count(4)  # however many returns there are
-    expect(page.locator(".key")).to_contain_text("true returns")
+    expect(page.locator(".key")).to_contain_text("truth")
 
 
 def test_all_pictures_are_zoomed_and_moved_together(page: Page, served: Served) -> None:
@@ -112,21 +113,24 @@ def test_limits_are_drawn_typed_refused_and_shared(page: Page, served: Served) -
     canvas = map_canvas(page)
     before = float(str(canvas.get_attribute("data-high")))
     # a reversed pair is refused in words, and nothing changes
+    look_at(page, "map")
     low = page.get_by_label("Low end of the scale in m")
     low.fill("9")
     low.press("Enter")
     expect(page.locator("[data-field=limits-refusal]")).to_contain_text("does not lie below")
     expect(low).to_have_attribute("aria-invalid", "true")
     assert float(str(canvas.get_attribute("data-high"))) == before
+    page.keyboard.press("Escape")
     # the upper handle, drawn down by a third of the bar
     handle = page.locator(".panel-map .colour-bar-high")
     bar = page.locator(".panel-map .colour-bar-body").bounding_box()
     grip = handle.bounding_box()
     assert bar is not None
     assert grip is not None
-    page.mouse.move(grip["x"] + grip["width"] / 2, grip["y"] + grip["height"] / 2)
+    middle = grip["y"] + grip["height"] / 2
+    page.mouse.move(grip["x"] + grip["width"] / 2, middle)
     page.mouse.down()
-    page.mouse.move(grip["x"] + 5, grip["y"] + bar["height"] / 3, steps=3)
+    page.mouse.move(grip["x"] + 5, middle + bar["height"] / 3, steps=3)
     page.mouse.up()
     low_m, high_m = (float(str(canvas.get_attribute(f"data-{end}"))) for end in ("low", "high"))
     assert high_m == pytest.approx(before - 0.4 * (before - low_m), rel=0.05)
@@ -238,6 +242,7 @@ def test_a_copied_link_shows_the_same_page_to_another_user(
     open_page(page)
     choose_from(page, "Page: layout, colours, help", "One pixel")
     choose_from(page.locator(".panel-streak"), "Panel streak", "Maps")
+    look_at(page, "map")
     page.get_by_label("High end of the scale in m").fill("3,5")
     page.get_by_label("High end of the scale in m").press("Enter")
     page.locator(".panel-map").get_by_label("Colours").select_option("cividis")

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
 from tests.browser.dashboard import (
+    look_at,
     map_canvas,
     map_colours,
     map_pixels,
@@ -85,6 +86,7 @@ def test_the_scale_holds_nearly_all_values_and_the_pointer_reads_them(
 
 def test_limits_and_colours_that_were_set_stay_across_a_reload(page: Page, served: Served) -> None:
     open_page(page)
+    look_at(page, "map")
     page.get_by_label("High end of the scale in m").fill("5")
     page.get_by_label("Low end of the scale in m").fill("1")
     page.get_by_label("Low end of the scale in m").press("Enter")

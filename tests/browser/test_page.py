@@ -74,13 +74,13 @@ def test_keys_are_listed_and_do_what_the_list_says(page: Page) -> None:
     page.get_by_role("button", name="Save").click()
     page.locator(".panel-second-map .panel-title").drag_to(page.locator(".panel-plots"))
     shown = page.locator("[data-view]")
-    assert views_of(shown) == ["map", "plots", "second-map", "transient"]
+    assert views_of(shown) == ["map", "plots", "second-map", "response"]
     page.keyboard.press("z")
     expect(shown.nth(1)).to_have_attribute("data-view", "second-map")
     page.keyboard.press("z")
     expect(shown).to_have_count(6)
     choose_from(page, PAGE_MENU, "pair")
-    assert views_of(shown) == ["map", "second-map", "plots", "transient"]
+    assert views_of(shown) == ["map", "second-map", "plots", "response"]
 
 
 def views_of(panels: Locator) -> list[str]:
@@ -106,12 +106,13 @@ def test_light_and_dark_are_chosen_and_stay(page: Page) -> None:
     expect(root).to_have_attribute("data-theme", "dark")
 
 
-def test_nothing_hangs_over_the_edge_and_every_control_has_a_name(page: Page) -> None:
+def test_nothing_hangs_over_the_edge_controls_have_names_and_type_three_sizes(page: Page) -> None:
     open_page(page)
+    sizes_px: set[float] = set()
     layouts = ("Overview", "Six views", "Two maps", "Projector", "One pixel")
     for layout in layouts:
         choose_from(page, PAGE_MENU, layout)
-        page.locator(".panel-transient").wait_for()
+        page.locator(".panel-map, .panel-streak").first.wait_for()
         if layout == "Overview":
             page.get_by_role("button", name="Edit").click()
         for width in (390, 1280):
@@ -124,6 +125,38 @@ def test_nothing_hangs_over_the_edge_and_every_control_has_a_name(page: Page) ->
                  .map((it) => it.outerHTML)"""
         )
         assert unnamed == [], layout
+        sizes_px |= set(page.evaluate(_SIZES_OF_TYPE_PX))
+    assert sizes_px == {12, 13, 20}
 
 
+_SIZES_OF_TYPE_PX = """
+() => [...document.querySelectorAll("body *:not(svg *, noscript, script)")]
+    .filter((each) => [...each.childNodes].some((it) => it.nodeType === 3 && it.data.trim()))
+    .map((each) => parseFloat(getComputedStyle(each).fontSize))
+"""
 _PAINTED = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (1920, 1080), (1280, 800)])
+def test_the_light_takes_most_of_the_page_in_a_stage_of_its_own_shape(
+    page: Page, width: int, height: int
+) -> None:
+    page.set_viewport_size({"width": width, "height": height})
+    open_page(page)
+    page.evaluate(_PAINTED)
+
+    def size_of(selector: str) -> tuple[float, float]:
+        box = page.locator(f".panel-transient{selector}").bounding_box()
+        assert box is not None
+        return box["width"], box["height"]
+
+    assert size_of("")[0] > 0.6 * width
+    picture_px, picture_height_px = size_of(" .stage-picture")
+    assert picture_px > 0.55 * width
+    assert picture_px / picture_height_px == pytest.approx(163 / 120, rel=0.01)
+    # the black stage holds the picture, the colour bar and 12 px between and beside them
+    stage_px, stage_height_px = size_of(" .picture")
+    assert stage_px == pytest.approx(picture_px + size_of(" .colour-bar")[0] + 12, abs=1.5)
+    assert stage_height_px == pytest.approx(picture_height_px, abs=1.5)
+    assert size_of(" .timeline")[1] >= 96
+    assert page.evaluate("document.documentElement.scrollHeight") <= height

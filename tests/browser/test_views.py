@@ -15,6 +15,7 @@ from tests.browser.dashboard import (
     canvas_pixels,
     choose,
     colours,
+    look_at,
     map_colours,
     open_page,
     point_at,
@@ -78,6 +79,7 @@ def test_the_streak_holds_the_light_that_the_daemon_integrates(page: Page, serve
     brightness = cumulative[-1]
     np.testing.assert_allclose(shown / (BINS * F_HZ) / brightness, light / brightness, atol=2e-3)
     # and is painted as its numbers say
+    look_at(page, "streak")
     page.locator(".panel-streak").get_by_label("Tone").select_option("linear")
     page.locator(".panel-streak").get_by_label("Colours").select_option("viridis")
     canvas = page.locator("canvas[data-product=streak]")
@@ -159,6 +161,7 @@ def test_points_stand_where_their_pixels_look(page: Page, served: Served, watch:
     ranges = product(served, "range")
     expect(canvas).to_have_attribute("data-points", str(np.isfinite(ranges).sum()))
     aside = canvas_pixels_of_scene(page)
+    look_at(page, "points")
     page.locator(".panel-points").get_by_label("Size of a point").select_option("6")
     page.get_by_role("button", name="Camera's eye").click()
     assert np.any(aside != canvas_pixels_of_scene(page))
@@ -219,9 +222,10 @@ def test_points_turn_and_change_their_colours(page: Page, served: Served) -> Non
     seen.append(canvas_pixels_of_scene(page))
     box = canvas.bounding_box()
     assert box is not None
-    page.mouse.move(box["x"] + 100, box["y"] + 100)
+    middle = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + 100, middle)
     page.mouse.down()
-    page.mouse.move(box["x"] + 160, box["y"] + 120, steps=3)
+    page.mouse.move(box["x"] + 160, middle + 20, steps=3)
     page.mouse.up()
     seen.append(canvas_pixels_of_scene(page))
     for colouring, shows in (
@@ -229,6 +233,7 @@ def test_points_turn_and_change_their_colours(page: Page, served: Served) -> Non
         ("validity", "flags"),
         ("flight", "coefficients"),
     ):
+        look_at(page, "points")
         page.get_by_label("Colour by").select_option(colouring)
         expect(canvas).to_have_attribute("data-colouring", colouring)
         page.wait_for_function(f"() => transientcam.store.frames.of('{shows}').value !== null")
@@ -261,36 +266,36 @@ def test_panels_are_moved_added_closed_and_resized_and_stay_so(page: Page, serve
         )
         return views
 
-    assert shown() == ["map", "transient", "response", "sequence"]
+    assert shown() == ["transient", "map", "response", "sequence"]
     choose(page, "map", "Sequence and accuracy")
-    assert shown() == ["sequence", "transient", "response", "map"]
+    assert shown() == ["transient", "sequence", "response", "map"]
     choose(page, "map", "Close")
     choose(page, "response", "Streak →")
     choose(page, "transient", "Validity ↓")
-    assert shown() == ["sequence", "transient", "validity", "response", "streak"]
+    assert shown() == ["transient", "validity", "sequence", "response", "streak"]
     splitter = page.get_by_role("separator", name="Width of the panels").first
-    before = page.locator(".panel-sequence").bounding_box()
+    before = page.locator(".panel-validity").bounding_box()
     box = splitter.bounding_box()
     assert before is not None
     assert box is not None
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 40)
     page.mouse.down()
-    page.mouse.move(box["x"] + 150, box["y"] + 40, steps=4)
+    page.mouse.move(box["x"] - 150, box["y"] + 40, steps=4)
     page.mouse.up()
-    wider = page.locator(".panel-sequence").bounding_box()
-    assert wider is not None
-    assert wider["width"] > before["width"] + 100
-    splitter.focus()
-    page.keyboard.press("ArrowLeft")
-    narrower = page.locator(".panel-sequence").bounding_box()
+    narrower = page.locator(".panel-validity").bounding_box()
     assert narrower is not None
-    assert narrower["width"] < wider["width"]
+    assert narrower["width"] < before["width"] - 100
+    splitter.focus()
+    page.keyboard.press("ArrowRight")
+    wider = page.locator(".panel-validity").bounding_box()
+    assert wider is not None
+    assert wider["width"] > narrower["width"]
     page.reload()
     page.locator(".panel-streak").wait_for()
-    assert shown() == ["sequence", "transient", "validity", "response", "streak"]
-    again = page.locator(".panel-sequence").bounding_box()
+    assert shown() == ["transient", "validity", "sequence", "response", "streak"]
+    again = page.locator(".panel-validity").bounding_box()
     assert again is not None
-    assert again["width"] == pytest.approx(narrower["width"], abs=1)
+    assert again["width"] == pytest.approx(wider["width"], abs=1)
     choose(page, "response", "Show alone")
     assert shown() == ["response"]
     choose(page, "response", "Show all panels")

@@ -191,7 +191,7 @@ class Search:
         times_s = [shortest_s * ratio**k * (1 + 1e-9) for k in range(ON_FRONT)]
         choices = []
         for done, k in enumerate(_coarse_to_fine(ON_FRONT)):
-            progress.at(done / ON_FRONT, f"captures of {times_s[k] * 1e3:.3g} ms")
+            progress.at(done / ON_FRONT, f"captures of {times_s[k] * 1e3:.0f} ms")
             choice = self.finest(leading, times_s[k], contenders=1)
             if choice is not None:
                 choices.append(choice)

@@ -63,7 +63,7 @@ export class Layouts {
 
 /** Which view stands where, whatever the sizes. */
 function placesOf(layout: Layout): string {
-  return layout.map(({ slots }) => slots.map(({ view }) => view).join()).join("/");
+  return JSON.stringify(layout, (key, value: unknown) => (key === "share" ? undefined : value));
 }
 
 function isNamed(value: unknown): value is Named {

@@ -1,7 +1,7 @@
 /** Parts of an address as text, and back: where the views stand, how maps and light are shown, what is pinned. */
 import { TONES, type ToneKind } from "../gl/tone";
 import { COLOUR_MAPS, type ColourMapName } from "../ui/colourMaps";
-import { isLayout, type Layout } from "../views/layout";
+import { isLayout, isStack, type Layout, type Slot, type Stack } from "../views/layout";
 import { MAP_PRODUCTS } from "../views/map/catalogue";
 import { VIEW_NAMES } from "../views/names";
 import { PLAYS, type LightChoice, type Play } from "../views/transient/look";
@@ -20,18 +20,25 @@ export function pixelText({ x, y }: Pixel): string {
   return `${x},${y}`;
 }
 
-/** A layout as "2:map.1,transient.1/1:response.2": each row's share, then its views with theirs. */
+/** A layout as "2:transient.1,2_map.1_points.1/1:response.2": each row's share, then its views with theirs; views of a stack follow its share. */
 export function layoutOf(text: string): Layout | null {
+  const slotOf = (slot: string): Slot => ({ view: slot.split(".")[0], share: Number(slot.slice(slot.indexOf(".") + 1)) });
+  const placeOf = (place: string): Slot | Stack => {
+    const [share, ...slots] = place.split("_");
+    return slots.length === 0 ? slotOf(place) : { share: Number(share), slots: slots.map(slotOf) };
+  };
   const rows = text.split("/").map((row) => {
     const [share, slots = ""] = row.split(":");
-    return { share: Number(share), slots: slots.split(",").map((slot) => ({ view: slot.split(".")[0], share: Number(slot.slice(slot.indexOf(".") + 1)) })) };
+    return { share: Number(share), slots: slots.split(",").map(placeOf) };
   });
   return isLayout(rows, VIEW_NAMES) ? rows : null;
 }
 
 export function layoutText(layout: Layout): string {
   const short = (share: number): string => String(Number(share.toPrecision(3)));
-  return layout.map(({ share, slots }) => `${short(share)}:${slots.map((slot) => `${slot.view}.${short(slot.share)}`).join(",")}`).join("/");
+  const slotText = ({ view, share }: Slot): string => `${view}.${short(share)}`;
+  const placeText = (place: Slot | Stack): string => (isStack(place) ? [short(place.share), ...place.slots.map(slotText)].join("_") : slotText(place));
+  return layout.map(({ share, slots }) => `${short(share)}:${slots.map(placeText).join(",")}`).join("/");
 }
 
 /** Looks as "range,viridis,linear,1,3": product, colours, scale, and limits where these were set. */

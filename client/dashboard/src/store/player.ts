@@ -6,6 +6,12 @@ export const SPEEDS_NS = [0.5, 1, 2, 5, 10, 20] as const;
 /** An arrival as near as this, in shares of the period, is where the light is already. */
 const NEAR = 1e-3;
 
+/** A part of the period, in shares of it. */
+export interface Lit {
+  readonly first: number;
+  readonly last: number;
+}
+
 /** Which moment of the flight is looked at, and how it moves on. */
 export class Player {
   /** Share of the period that has passed, 0 to 1: it keeps its meaning when the base frequency changes. */
@@ -14,7 +20,7 @@ export class Player {
   readonly speed_ns = signal<number>(5);
   readonly time_s: ReadonlySignal<number>;
   /** The part of the period in which there is light, in shares of it: what plays passes over the rest. */
-  readonly lit = signal<{ readonly first: number; readonly last: number } | null>(null);
+  readonly lit = signal<Lit | null>(null);
   /** When most light arrives in the whole picture, in shares of the period, in their order. */
   readonly arrivals = signal<readonly number[]>([]);
   readonly phase_rad = computed(() => 2 * Math.PI * this.turn.value);
@@ -22,6 +28,13 @@ export class Player {
   /** `period_s` is 1/f of what is streamed: the time after which the flight repeats. */
   constructor(readonly period_s: ReadonlySignal<number>) {
     this.time_s = computed(() => this.turn.value * this.period_s.value);
+  }
+
+  /** Takes when there is light; who has not looked at any moment yet is shown the first arrival. */
+  learn(lit: Lit | null, arrivals: readonly number[]): void {
+    if (this.arrivals.peek().length === 0 && this.turn.peek() === 0 && arrivals.length > 0) this.turn.value = arrivals[0];
+    this.lit.value = lit;
+    this.arrivals.value = arrivals;
   }
 
   /** Lets `elapsed_s` of watching pass; true while there is more to come. */

@@ -71,14 +71,14 @@ export function ColourBar({ scale, colours, unit, values, marked, onLimit }: Col
   const write = (value: number): string => (base.kind === "linear" ? fixed(value, decimals) : significant(value, 1));
   const ends = onLimit === undefined ? [] : (["low", "high"] as const);
   return (
-    <div class="colour-bar" role="group" aria-label={`Colour scale from ${write(scale.low)} to ${withUnit(write(scale.high), unit)}`}>
+    <div class={`colour-bar ${values === undefined ? "colour-bar-bare" : ""}`} role="group" aria-label={`Colour scale from ${write(scale.low)} to ${withUnit(write(scale.high), unit)}`}>
       <p class="colour-bar-unit">{unit === "1" ? "" : unit}</p>
       <div
         class="colour-bar-body"
         title={onLimit === undefined ? undefined : "Drag the handles; double click lets the ends follow the data"}
         onDblClick={() => onLimit?.(null)}
       >
-        <canvas ref={canvas} width={COLOURS_PX + HISTOGRAM_PX} height={ROWS} aria-hidden="true" />
+        <canvas ref={canvas} width={COLOURS_PX + (values === undefined ? 0 : HISTOGRAM_PX)} height={ROWS} aria-hidden="true" />
         {numbers.map((value) => (
           <span key={value} class="colour-bar-tick" style={{ bottom: `${100 * onBar(base, value)}%` }}>
             {write(value)}

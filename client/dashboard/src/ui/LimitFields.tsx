@@ -1,7 +1,7 @@
 import { useSignal } from "@preact/signals";
 
 import type { Look, Looks } from "../store/looks";
-import { Toggle } from "./controls";
+import { Check } from "./controls";
 import type { Span } from "./scale";
 
 /** Limits with one end typed anew, or why they make no sense. */
@@ -34,29 +34,32 @@ export function LimitFields({ look, looks }: { look: Look; looks: Looks }) {
       }}
     />
   );
+  const { unit } = look.product;
   return (
-    <div class="limits">
-      {wrong.value !== null && (
-        <span class="refusal" role="alert" data-field="limits-refusal">
-          {wrong.value.words}
+    <>
+      <p class="limits">
+        <span class="quiet">Limits</span>
+        <span>
+          {field("low", "Low")} <span class="quiet">to</span> {field("high", "High")} {unit === "1" ? "" : unit}
         </span>
+      </p>
+      {wrong.value !== null && (
+        <p class="refusal" role="alert" data-field="limits-refusal">
+          {wrong.value.words}
+        </p>
       )}
-      {field("low", "Low")}
-      <span class="quiet">to</span>
-      {field("high", "High")}
-      <Toggle
-        pressed={look.manual.value === null}
-        title="Let the ends of the scale follow the data"
-        onToggle={() => {
+      <Check
+        checked={look.manual.value === null}
+        onChange={(follows) => {
           wrong.value = null;
-          looks.limit(look, look.manual.peek() === null ? { low: scale.low, high: scale.high } : null);
+          looks.limit(look, follows ? null : { low: scale.low, high: scale.high });
         }}
       >
-        auto
-      </Toggle>
-      <Toggle pressed={looks.locked.value} title={`The same limits for all maps in ${look.product.unit}`} onToggle={() => looks.lock(look, !looks.locked.peek())}>
-        lock
-      </Toggle>
-    </div>
+        Limits follow the data
+      </Check>
+      <Check checked={looks.locked.value} onChange={(locked) => { looks.lock(look, locked); }}>
+        The same limits for all maps{unit === "1" ? " without a unit" : ` in ${unit}`}
+      </Check>
+    </>
   );
 }

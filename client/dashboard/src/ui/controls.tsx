@@ -80,6 +80,29 @@ export function Tabs<T extends string>({ label, value, options, onChange }: Tabs
   );
 }
 
+interface CheckProps {
+  readonly checked: boolean;
+  readonly title?: string;
+  readonly onChange: (checked: boolean) => void;
+  readonly children: ComponentChildren;
+}
+
+/** A box that is ticked or not, with its words. */
+export function Check({ checked, title, onChange, children }: CheckProps) {
+  return (
+    <label class="check" title={title}>
+      <input
+        type="checkbox"
+        checked={checked}
+        onChange={(event) => {
+          onChange(event.currentTarget.checked);
+        }}
+      />
+      <span>{children}</span>
+    </label>
+  );
+}
+
 interface ToggleProps {
   readonly pressed: boolean;
   readonly title: string;

@@ -63,3 +63,8 @@ export function superscript(exponent: number): string {
   const digits = "⁰¹²³⁴⁵⁶⁷⁸⁹";
   return String(exponent).replace(/./g, (sign) => (sign === "-" ? "⁻" : digits[Number(sign)]));
 }
+
+/** A time of day of 24 hours, where the reader is. */
+export function timeOfDay(unix_s: number): string {
+  return new Date(1000 * unix_s).toLocaleTimeString(undefined, { hourCycle: "h23" });
+}

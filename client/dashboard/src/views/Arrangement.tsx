@@ -1,9 +1,10 @@
 import { Fragment } from "preact";
+import { useComputed } from "@preact/signals";
 import { useRef } from "preact/hooks";
 
-import { useStore } from "../store/store";
+import { useStore, type Store } from "../store/store";
 import { DRAGGED, Panel, SlotContext } from "../ui/Panel";
-import { below, beside, closed, replaced, split, viewsOf, type Layout, type Row } from "./layout";
+import { below, beside, closed, isStack, replaced, split, viewsOf, type Layout, type Row, type Slot, type Stack } from "./layout";
 import { VIEWS } from "./registry";
 
 /** The views in their places, with splitters between them. */
@@ -15,8 +16,9 @@ export function Arrangement() {
   const change = (made: Layout): void => {
     store.layout.value = made;
   };
+  const aspect = useComputed(() => aspectOf(store)).value;
   return (
-    <main class="views" data-alone={alone !== null}>
+    <main class="views" data-alone={alone !== null} style={{ "--aspect": aspect }}>
       {rows.map((row, at) => (
         <Fragment key={at}>
           {at > 0 && <Splitter kind="rows" place={rows[at - 1].share / (rows[at - 1].share + row.share)} onMove={(place) => change(split(rows, at - 1, place))} />}
@@ -32,21 +34,58 @@ export function Arrangement() {
   );
 }
 
+/** Width of the light's picture over its height; the paper's sensor's before there is one. */
+function aspectOf({ frames }: Store): number {
+  const { width, height } = frames.of("coefficients").value?.coefficients ?? { width: 163, height: 120 };
+  return width / height;
+}
+
 function RowOfViews({ row, onChange }: { row: Row; onChange: (row: Row) => void }) {
   return (
     <div class="views-row" style={{ "--share": row.share }}>
-      {row.slots.map(({ view, share }, at) => (
-        <Fragment key={view}>
+      {row.slots.map((place, at) => (
+        <Fragment key={isStack(place) ? `stack ${at}` : place.view}>
           {at > 0 && (
             <Splitter
               kind="columns"
-              place={row.slots[at - 1].share / (row.slots[at - 1].share + share)}
-              onMove={(place) => {
-                onChange({ ...row, slots: split(row.slots, at - 1, place) });
+              place={row.slots[at - 1].share / (row.slots[at - 1].share + place.share)}
+              onMove={(share) => {
+                onChange({ ...row, slots: split(row.slots, at - 1, share) });
               }}
             />
           )}
-          <Place view={view} share={share} />
+          {isStack(place) ? (
+            <StackOfViews
+              stack={place}
+              onChange={(made) => {
+                onChange({ ...row, slots: row.slots.map((each, n) => (n === at ? made : each)) });
+              }}
+            />
+          ) : (
+            <Place {...place} />
+          )}
+        </Fragment>
+      ))}
+    </div>
+  );
+}
+
+function StackOfViews({ stack, onChange }: { stack: Stack; onChange: (stack: Stack) => void }) {
+  const { slots } = stack;
+  return (
+    <div class="views-stack" style={{ "--share": stack.share }}>
+      {slots.map((slot, at) => (
+        <Fragment key={slot.view}>
+          {at > 0 && (
+            <Splitter
+              kind="rows"
+              place={slots[at - 1].share / (slots[at - 1].share + slot.share)}
+              onMove={(share) => {
+                onChange({ ...stack, slots: split(slots, at - 1, share) });
+              }}
+            />
+          )}
+          <Place {...slot} />
         </Fragment>
       ))}
     </div>
@@ -54,7 +93,7 @@ function RowOfViews({ row, onChange }: { row: Row; onChange: (row: Row) => void 
 }
 
 /** A view and what its panel may do with its place. */
-function Place({ view, share }: { view: string; share: number }) {
+function Place({ view, share }: Slot) {
   const store = useStore();
   const shown = VIEWS.find(({ name }) => name === view);
   if (shown === undefined) return null;
@@ -82,6 +121,7 @@ function Place({ view, share }: { view: string; share: number }) {
   return (
     <div
       class="place"
+      data-place={view}
       style={{ "--share": share }}
       onDragOver={(event) => {
         if (event.dataTransfer?.types.includes(DRAGGED)) event.preventDefault();

@@ -25,7 +25,7 @@ describe("changes of the layout", () => {
   test("by a splitter are one, however far it was drawn", () => {
     const current = signal<Layout>(OVERVIEW);
     const layouts = new Layouts(null, current);
-    for (const place of [0.4, 0.5, 0.6]) current.value = split(current.value, 0, place);
+    for (const place of [0.4, 0.5, 0.6]) current.value = current.value.map((row) => ({ ...row, slots: split(row.slots, 0, place) }));
     layouts.undo();
     expect(current.value).toBe(OVERVIEW);
     expect(layouts.undoable.value).toBe(false);

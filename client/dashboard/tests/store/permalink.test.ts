@@ -25,10 +25,10 @@ describe("an address", () => {
 
   test("that is handed on says the layout, and the looks that were chosen", () => {
     const place = {
-      layout: [{ share: 2, slots: [{ view: "map", share: 1 }, { view: "transient", share: 0.5 }] }, { share: 1, slots: [{ view: "response", share: 1 }] }],
+      layout: [{ share: 2, slots: [{ view: "map", share: 1 }, { share: 0.5, slots: [{ view: "transient", share: 3 }, { view: "streak", share: 1 }] }] }, { share: 1, slots: [{ view: "response", share: 1 }] }],
       looks: { range: { colours: "cividis", kind: "linear", limits: { low: 1, high: 3.5 } }, direct: { colours: "grey", kind: "logarithmic", limits: null } },
     } as const;
-    expect(hashOf(place)).toBe("#layout=2:map.1,transient.0.5/1:response.1&look=range,cividis,linear,1,3.5&look=direct,grey,logarithmic");
+    expect(hashOf(place)).toBe("#layout=2:map.1,0.5_transient.3_streak.1/1:response.1&look=range,cividis,linear,1,3.5&look=direct,grey,logarithmic");
     expect(placeOf(hashOf(place))).toEqual(place);
   });
 
@@ -46,7 +46,7 @@ describe("an address", () => {
     expect(placeOf(hashOf(polygon))).toEqual(polygon);
   });
 
-  test.each(["#side=secret", "#light=gate,neon,root,0,scene", "#light=gate,grey,root,x,scene", "#pins=D1,2/A1", "#region=1,2", "#sight=0.5,0,0", "#sight=4,x,0", "#layout=1:secret.1", "#layout=:,/", "#layout=1:map.-1", "#look=range,neon,linear", "#look=range,viridis,linear,3,1", "#look=secret,viridis,linear", "#look=,"])(
+  test.each(["#side=secret", "#light=gate,neon,root,0,scene", "#light=gate,grey,root,x,scene", "#pins=D1,2/A1", "#region=1,2", "#sight=0.5,0,0", "#sight=4,x,0", "#layout=1:secret.1", "#layout=:,/", "#layout=1:map.-1", "#layout=1:map.1,1_map.1", "#layout=1:1_", "#look=range,neon,linear", "#look=range,viridis,linear,3,1", "#look=secret,viridis,linear", "#look=,"])(
     "with a layout or a look that makes no sense says nothing: %s",
     (hash) => {
       expect(placeOf(hash)).toEqual({});

@@ -89,6 +89,19 @@ describe("the player", () => {
     expect(player.turn.value).toBe(0.2);
   });
 
+  test("begins at the first arrival of light, unless another time was chosen before", () => {
+    const fresh = new Player(period_s);
+    fresh.learn({ first: 0.25, last: 0.5 }, [0.3, 0.4]);
+    expect([fresh.turn.value, fresh.lit.value?.first]).toEqual([0.3, 0.25]);
+    fresh.seek(0);
+    fresh.learn({ first: 0.25, last: 0.5 }, [0.31]);
+    expect([fresh.turn.value, fresh.arrivals.value]).toEqual([0, [0.31]]);
+    const linked = new Player(period_s);
+    linked.seek(0.7);
+    linked.learn(null, [0.3]);
+    expect(linked.turn.value).toBe(0.7);
+  });
+
   test("steps back over the start to the end", () => {
     player.seek(0);
     player.step(-1e-9);

@@ -4,6 +4,7 @@ import type { PixelDocument } from "../../src/stream/protocol";
 import { FlagHistory, LOOKS } from "../../src/views/response/flagShares";
 import { richestPixel } from "../../src/views/response/interesting";
 import { linesOf, ReturnHistory, sifted } from "../../src/views/response/returns";
+import { stemsOf } from "../../src/views/response/stems";
 import { momentsOf, picture } from "../oracle";
 
 const look = (frame: number, flags: readonly string[], x = 4): PixelDocument => ({ x, y: 5, flags, meta: { frame, sequence_id: 1 } }) as unknown as PixelDocument;
@@ -96,5 +97,23 @@ describe("the pixel that is shown first", () => {
   test("is none where no pixel has a density", () => {
     const c = scene(16, 10, () => false);
     expect(richestPixel({ ...c, planes: c.planes.map(() => 0) })).toBeNull();
+  });
+});
+
+describe("stems of returns", () => {
+  test("stand as high as their share of the light, the found ones with the scatter of their time", () => {
+    const history = new ReturnHistory();
+    for (let frame = 0; frame < 10; frame++) {
+      history.take({ x: 1, y: 2, returns: [at(frame % 2 === 0 ? 10 : 11, 300), at(30, 100)], meta: { frame } } as unknown as PixelDocument);
+    }
+    const { found, truth } = stemsOf({ returns: [at(10.5, 300), at(30, 100)] }, { kind: "paths", range_m: 1.5, brightness: 400, returns: [at(10, 100)] }, history);
+    expect(found.map(({ share }) => share)).toEqual([0.75, 0.25]);
+    expect(found[0].std_s).toBeCloseTo(Math.sqrt(10 / 9) * 0.5e-9, 15);
+    expect(found[1].std_s).toBeCloseTo(0, 15);
+    expect(truth).toEqual([{ time_s: 10e-9, std_s: NaN, share: 0.25 }]);
+  });
+
+  test("of weak returns are left out, as in the table", () => {
+    expect(stemsOf({ returns: [at(10, 990), at(20, 10)] }, null, new ReturnHistory()).found).toHaveLength(1);
   });
 });

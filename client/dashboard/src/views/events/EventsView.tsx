@@ -1,4 +1,5 @@
 import { useStore } from "../../store/store";
+import { timeOfDay } from "../../ui/format";
 import { Panel } from "../../ui/Panel";
 
 /** What happened since the page was opened, the newest first. */
@@ -12,7 +13,7 @@ export function EventsView() {
         <ul class="events" tabIndex={0} aria-label="What happened">
           {all.map(({ number, at_s, words, tone }) => (
             <li key={number} class={`event event-${tone}`}>
-              <time class="quiet">{new Date(1000 * at_s).toLocaleTimeString()}</time> {words}
+              <time class="quiet">{timeOfDay(at_s)}</time> {words}
             </li>
           ))}
         </ul>

@@ -6,13 +6,14 @@ import type { Look } from "../../store/looks";
 import { useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
 import { ColourChoice } from "../../ui/ColourChoice";
-import { Tabs, Toggle } from "../../ui/controls";
+import { Check, Tabs } from "../../ui/controls";
 import { saveNumbers, savePicture } from "../../ui/download";
 import { captionOf } from "../../ui/figure";
 import { saveFigure } from "../../ui/figureFiles";
 import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { LimitFields } from "../../ui/LimitFields";
+import { PopoverButton } from "../../ui/PopoverButton";
 import { paint } from "../../ui/paint";
 import { Panel } from "../../ui/Panel";
 import { Stage } from "../../ui/Stage";
@@ -66,9 +67,24 @@ function MapPanel({ name, choice }: MapPanelProps) {
           onChange={(product) => (choice.value = product)}
         />
       }
+      tools={<MapLookMenu key={shown.product} look={look} name={name} />}
     >
       <Map look={look} canvas={canvas} />
     </Panel>
+  );
+}
+
+/** How the map is coloured, behind a button: limits, scale and colours. */
+function MapLookMenu({ look, name }: { look: Look; name: ViewName }) {
+  const { looks } = useStore();
+  return (
+    <PopoverButton face="Look" label={`Look of the ${name}`} title="Limits, scale and colours" kind="look">
+      <LimitFields look={look} looks={looks} />
+      <Check checked={look.kind.value === "logarithmic"} onChange={(logarithmic) => (look.kind.value = logarithmic ? "logarithmic" : "linear")}>
+        Logarithmic
+      </Check>
+      <ColourChoice colours={look.colours} />
+    </PopoverButton>
   );
 }
 
@@ -131,20 +147,7 @@ function Map({ look, canvas }: MapProps) {
         )}
       </div>
       <footer class="panel-foot">
-        <div class="panel-row">
-          <Readout key={shown.product} look={look} />
-          <div class="panel-tools">
-            <LimitFields key={`${shown.product} limits`} look={look} looks={store.looks} />
-            <Toggle
-              pressed={look.kind.value === "logarithmic"}
-              title="Logarithmic scale"
-              onToggle={() => (look.kind.value = look.kind.peek() === "linear" ? "logarithmic" : "linear")}
-            >
-              log
-            </Toggle>
-            <ColourChoice colours={look.colours} />
-          </div>
-        </div>
+        <Readout key={shown.product} look={look} />
         <Measured look={look} />
       </footer>
     </>

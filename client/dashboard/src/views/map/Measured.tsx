@@ -50,8 +50,8 @@ function RegionRow({ look }: { look: Look }) {
   if (found === null) return null;
   return (
     <div class="panel-row measured" role="group" aria-label="Region">
-      <span>
-        <span class="quiet">region mean</span> <span data-field="region-mean">{fixed(found.mean, decimals, unit)}</span>
+      <span title="Mean over the pixels of the region">
+        <span class="quiet">region</span> <span data-field="region-mean">{fixed(found.mean, decimals, unit)}</span>
       </span>
       <span title="Standard deviation over the pixels of the region: of noise and of shape">
         <span class="quiet">σ</span> <span data-field="region-std">{fixed(found.std, decimals, unit)}</span>
@@ -59,7 +59,8 @@ function RegionRow({ look }: { look: Look }) {
       <span title="Pixels that have a value">
         <span class="quiet">N</span> <span data-field="region-count">{grouped(found.count)}</span>{" "}
         <span class="quiet">
-          of {grouped(found.pixels)}, <span data-field="region-filled">{fixed((100 * found.count) / found.pixels, 0, "%")}</span>
+          <span class="measured-more">of {grouped(found.pixels)}, </span>
+          <span data-field="region-filled">{fixed((100 * found.count) / found.pixels, 0, "%")}</span>
         </span>
       </span>
       {plane !== null && (
@@ -69,8 +70,8 @@ function RegionRow({ look }: { look: Look }) {
         </span>
       )}
       <RegionHistogram look={look} figures={figures} />
-      <button type="button" onClick={() => (measures.region.value = null)}>
-        Remove region
+      <button type="button" class="remove" aria-label="Remove region" title="Remove region" onClick={() => (measures.region.value = null)}>
+        ✕
       </button>
     </div>
   );

@@ -44,8 +44,8 @@ export function PinsRow({ look }: { look: Look }) {
             </span>
           );
         })}
-      <button type="button" onClick={() => (measures.pins.value = [])}>
-        Remove pins
+      <button type="button" class="remove" aria-label="Remove pins" title="Remove pins" onClick={() => (measures.pins.value = [])}>
+        ✕
       </button>
     </div>
   );

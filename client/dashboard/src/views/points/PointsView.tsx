@@ -17,6 +17,7 @@ import { grouped } from "../../ui/format";
 import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
+import { PopoverButton } from "../../ui/PopoverButton";
 import { PinsRow } from "../map/PinsRow";
 import { LightBar } from "../transient/LightBar";
 import type { TransientLook } from "../transient/look";
@@ -29,7 +30,7 @@ import { SceneStage } from "./SceneStage";
 
 const COLOURINGS = ["range", "light", "validity", "flight"] as const;
 type Colouring = (typeof COLOURINGS)[number];
-const NAMES: Record<Colouring, string> = { range: "range", light: "light", validity: "validity", flight: "light in flight" };
+const NAMES: Record<Exclude<Colouring, "light">, string> = { range: "range", validity: "validity", flight: "light in flight" };
 /** What the colours are made of, besides the range and the light. */
 const NEEDED: Record<Colouring, readonly string[]> = { range: [], light: [], validity: ["flags"], flight: ["coefficients"] };
 
@@ -150,10 +151,10 @@ export function PointsView() {
       name="points"
       title={<h2>Points in space</h2>}
       tools={
-        <>
-          <Choice label="Colour by" value={colouring.value} options={COLOURINGS.map((each) => ({ value: each, text: NAMES[each] }))} onChange={(each) => (colouring.value = each)} />
+        <PopoverButton face="Look" label="Look of the points" title="What the points are coloured by, and their size" kind="look">
+          <Choice label="Colour by" value={colouring.value} options={COLOURINGS.map((each) => ({ value: each, text: each === "light" ? ofLight : NAMES[each] }))} onChange={(each) => (colouring.value = each)} />
           <Choice label="Size of a point" value={pointSize.value} options={[1, 2, 3, 4, 6].map((each) => ({ value: each, text: `${each} px` }))} onChange={(each) => (pointSize.value = each)} />
-        </>
+        </PopoverButton>
       }
       downloads={[
         {

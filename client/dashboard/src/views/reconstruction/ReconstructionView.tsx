@@ -111,7 +111,7 @@ function Parameter({ parameter, text, wrong, onInput }: ParameterProps) {
           <span class="quiet">{unitOf(parameter)}</span>
         </span>
       )}
-      <small class="quiet">{description}</small>
+      <small class="quiet field-description">{description}</small>
       {isNumber(parameter) && <small class="quiet">{spanOf(parameter)}</small>}
     </label>
   );

@@ -1,10 +1,10 @@
 /** Sizes, durations and times of recordings, for people. */
 import { engineering, fixed, NOTHING } from "../../ui/format";
 
-/** A date and a time as the reader's country writes them. */
+/** A date as the reader's country writes it, and a time of 24 hours. */
 export function clock(unix_s: number | null): string {
   if (unix_s === null) return NOTHING;
-  return new Date(1000 * unix_s).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "medium" });
+  return new Date(1000 * unix_s).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "medium", hourCycle: "h23" });
 }
 
 /** 4.2 s, 1:05 min, 2:03:04 h. */

@@ -1,4 +1,4 @@
-import { computed, effect, signal, untracked, useComputed, useSignal, type ReadonlySignal } from "@preact/signals";
+import { computed, effect, signal, untracked, useComputed, useSignal, type ReadonlySignal, type Signal } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import "uplot/dist/uPlot.min.css";
 
@@ -12,6 +12,7 @@ import { type Store, useStore } from "../../store/store";
 import { Tabs, Toggle } from "../../ui/controls";
 import { fixed, significant } from "../../ui/format";
 import { save } from "../../ui/download";
+import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { autoLimits, type Span } from "../../ui/scale";
@@ -24,6 +25,7 @@ import { MomentsPlane } from "./MomentsPlane";
 import { responsePlot, type ResponsePlot } from "./plot";
 import { ReturnHistory } from "./returns";
 import { ASPECTS, SIDES } from "./sides";
+import { NO_STEMS, stemsOf } from "./stems";
 
 /** Share of the height that the axis was made for which is left after a frame without such a peak. */
 const SHRINK = 0.96;
@@ -56,6 +58,7 @@ export function ResponseView() {
   const logarithmic = useMemo(() => remembered(store.shelf, "response.logarithmic", false, aBoolean), [store]);
   const pointed = useSignal("");
   const pixel = useComputed(() => (absent.value["coefficients"] === undefined ? (shown.value?.pixel ?? null) : store.selected.value));
+  const frameless = useComputed(() => frame.value === null);
   const place = useComputed(() => (pixel.value === null ? null : `${pixel.value.x}, ${pixel.value.y}`));
   const download = (aspect: Aspect) => (): void => {
     const now = shown.peek();
@@ -77,16 +80,11 @@ export function ResponseView() {
         <>
           {side.value !== "moments" && <span data-field="sample">{pointed}</span>}
           <Tabs label="What of the pixel" value={side.value} options={SIDES} onChange={(value) => (side.value = value)} />
-          {side.value === "density" && (
-            <Toggle pressed={logarithmic.value} title="Logarithmic density" onToggle={() => (logarithmic.value = !logarithmic.peek())}>
-              log
-            </Toggle>
-          )}
         </>
       }
     >
       <div class="response">
-        {place.value === null && <p class="stage-empty">Click a pixel in one of the pictures.</p>}
+        {frameless.value ? <FirstFrame /> : place.value === null && <p class="stage-empty">Click a pixel in one of the pictures.</p>}
         {place.value === null ? null : obstacle !== undefined ? (
           <p class="absent" data-field="absent">
             This camera has no density of light over time: {obstacle}.
@@ -94,7 +92,7 @@ export function ResponseView() {
         ) : side.value === "moments" ? (
           <MomentsPlane pixel={levinson} />
         ) : (
-          <Plot key={side.value} aspect={side.value} logarithmic={side.value === "density" && logarithmic.value} shown={shown} pointed={pointed} />
+          <Plot key={side.value} aspect={side.value} logarithmic={logarithmic} shown={shown} returns={returns} pointed={pointed} />
         )}
         {place.value !== null && (
           <aside class="response-side" aria-label="What was found at the pixel" tabIndex={0}>
@@ -126,15 +124,18 @@ interface Shown extends Subject {
 
 interface PlotProps {
   readonly aspect: Aspect;
-  readonly logarithmic: boolean;
+  /** Whether the density's height is logarithmic. */
+  readonly logarithmic: Signal<boolean>;
   readonly shown: { readonly value: Shown | null };
+  readonly returns: ReturnHistory;
   /** Set to what is under the pointer, in words. */
   readonly pointed: { value: string };
 }
 
 /** The curves of one aspect over time of flight. */
-function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
+function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProps) {
   const store = useStore();
+  const logarithmic = aspect === "density" && wanted.value;
   const { measures } = store;
   const box = useRef<HTMLDivElement>(null);
   const size = useMemo(() => signal({ width: 0, height: 0 }), []);
@@ -171,10 +172,11 @@ function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
 
   useDrawing(() => {
     const now = shown.value;
-    const truth = store.details.document.value?.truth ?? null;
+    const told = store.details.document.value;
+    const truth = told?.truth ?? null;
     if (plot.value === null || size.value.width === 0) return;
     if (now === null) {
-      plot.value.show(null, null, new Map());
+      plot.value.show(null, NO_STEMS, new Map());
       return;
     }
     const { curves, ofPins } = drawnOf(aspect, now, measures.pins.value, truth);
@@ -184,8 +186,9 @@ function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
     held.current = now.pixel === heldFor.current ? Math.max(highest, SHRINK * held.current) : highest;
     heldFor.current = now.pixel;
     top.current = autoLimits(top.current, { low: 0, high: held.current });
-    plot.value.show(curves, truth, ofPins);
-  }, [plot, shown, aspect]);
+    if (told !== null) returns.take(told, store.frames.sceneOf(told.meta));
+    plot.value.show(curves, told === null ? NO_STEMS : stemsOf(told, truth, returns), ofPins);
+  }, [plot, shown, returns, aspect]);
 
   useDrawing(() => {
     const turn = store.player.turn.value;
@@ -196,19 +199,30 @@ function Plot({ aspect, logarithmic, shown, pointed }: PlotProps) {
   return (
     <div class="response-plot-box">
       <div class="response-plot" ref={box} data-empty={shown.value === null} data-aspect={aspect} />
-        <p class="key">
-          {aspect === "bounds" && <span class="key-band">any light with these moments</span>}
-          <span>estimate</span>
-          {measures.pins.value.map(({ name }) => (
-            <span key={name} class="key-pin" style={{ "--pin": PIN_COLOURS[name] }}>
-              {name}
-            </span>
-          ))}
-          {simulated && aspect !== "density" && <span class="key-truth">truth</span>}
-          {simulated && <span class="key-stem" title="As high as their share of the light">true returns</span>}
-          {aspect === "bounds" && <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">smoothed</em>}
-          {aspect !== "cumulative" && !logarithmic && <em title="Linear near zero, logarithmic where it is high: what is dim stays in sight beside narrow and high peaks">height: asinh</em>}
-        </p>
+      <div class="key">
+        {aspect === "bounds" && <span class="key-band" title="Any light with these moments lies within them">bounds</span>}
+        <span>estimate</span>
+        {measures.pins.value.map(({ name }) => (
+          <span key={name} class="key-pin" style={{ "--pin": PIN_COLOURS[name] }}>
+            {name}
+          </span>
+        ))}
+        <span class="key-stem" title="As high as their share of the light">
+          returns ± 1 σ
+        </span>
+        {simulated && (
+          <span class="key-truth" title="Stems are the true returns, as high as their share of the light">
+            truth
+          </span>
+        )}
+        {aspect === "bounds" && <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">smoothed</em>}
+        {aspect !== "cumulative" && !logarithmic && <em title="Height: linear near zero, logarithmic where it is high, so that what is dim stays in sight beside narrow and high peaks">asinh</em>}
+        {aspect === "density" && (
+          <Toggle pressed={logarithmic} title="Logarithmic density" onToggle={() => (wanted.value = !wanted.peek())}>
+            log
+          </Toggle>
+        )}
+      </div>
     </div>
   );
 }

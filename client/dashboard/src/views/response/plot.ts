@@ -2,15 +2,16 @@ import uPlot from "uplot";
 
 import { rangeOfTime_m } from "../../physics/constants";
 import { PIN_COLOURS, PIN_NAMES } from "../../store/measures";
-import { grouped, significant } from "../../ui/format";
-import { ESTIMATES, type Aspect, type Curves, type PinLines, type Truth } from "./curves";
+import { grouped, significant, withUnit } from "../../ui/format";
+import { ESTIMATES, type Aspect, type Curves, type PinLines } from "./curves";
+import { drawStems, NO_STEMS, type Stems } from "./stems";
 
 /** The plot, and the line that marks the player's time in it. */
 export interface ResponsePlot {
   readonly plot: uPlot;
   readonly head: HTMLElement;
-  /** Shows curves of the aspect that the plot was made for, the times of true returns, and the estimates of pins at the same times. */
-  show(curves: Curves | null, truth: Truth | null, pins: PinLines): void;
+  /** Shows curves of the aspect that the plot was made for, the returns, and the estimates of pins at the same times. */
+  show(curves: Curves | null, stems: Stems, pins: PinLines): void;
 }
 
 export interface PlotOptions {
@@ -32,11 +33,11 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, perio
   const ink = style.getPropertyValue("--quiet");
   const hairline = style.getPropertyValue("--hairline");
   const line = style.getPropertyValue("--curve");
-  const font = `11px ${style.fontFamily}`;
+  const font = `${style.getPropertyValue("--small")} ${style.fontFamily}`;
   const axis = { stroke: ink, font, labelFont: font, grid: { stroke: hairline, width: 1 }, ticks: { stroke: hairline, width: 1, size: 4 } };
   const wash = style.getPropertyValue("--curve-wash");
   const truthInk = style.getPropertyValue("--truth");
-  let truth: Truth | null = null;
+  let stems = NO_STEMS;
   const solid = { stroke: line, width: 1.5, points: { show: false }, spanGaps: false };
   const edge = { ...solid, width: 0.75 };
   const true_ = { ...solid, stroke: truthInk, width: 1.25, dash: [5, 4] };
@@ -65,7 +66,7 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, perio
         ],
         draw: [
           (drawn) => {
-            if (truth !== null) drawTruth(drawn, truth, truthInk);
+            drawStems(drawn, stems, { found: line, truth: truthInk });
           },
         ],
       },
@@ -78,7 +79,7 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, perio
             : { range: () => [0, top()] },
       },
       axes: [
-        { ...axis, size: 20, gap: 2, label: "time of flight (ns)", labelSize: 16, labelGap: 0 },
+        { ...axis, size: 20, gap: 2, values: (_plot, splits) => splits.map((time_ns, at) => withUnit(String(time_ns), at === splits.length - 1 ? "ns" : "")) },
         { ...axis, size: 52, gap: 4, label: aspect === "cumulative" ? "DN" : "DN/ns", labelSize: 16, labelGap: 0, space: 28, values: (_plot, splits) => splits.map(tickText), ...(logarithmic ? { splits: powersOfTen, filter: all } : aspect !== "cumulative" ? { splits: bentSplits(ASINH_SHARES[aspect]), filter: all } : {}) },
         {
           ...axis,
@@ -108,32 +109,14 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, perio
   return {
     plot,
     head,
-    show: (curves, truthNow, pins) => {
-      truth = truthNow;
+    show: (curves, stemsNow, pins) => {
+      stems = stemsNow;
       // Where the axis bends; it follows the axis, and uPlot takes it from here.
       Object.assign(plot.scales["y"], { asinh: top() / ASINH_SHARES[aspect] });
       if (curves === null) plot.setData(empty());
       else plot.setData([curves.time_ns, ...curves.lines, ...PIN_NAMES.map((name) => pins.get(name) ?? curves.time_ns.map(() => NaN))]);
     },
   };
-}
-
-/** A mark at the foot of the plot for each true return, as high as its share of the light. */
-function drawTruth(plot: uPlot, { returns, brightness }: Truth, ink: string): void {
-  const { ctx } = plot;
-  const { top, height } = plot.bbox;
-  ctx.save();
-  ctx.strokeStyle = ink;
-  ctx.lineWidth = 2 * devicePixelRatio;
-  ctx.setLineDash([]);
-  for (const { time_s, weight } of returns) {
-    const x = plot.valToPos(time_s * 1e9, "x", true);
-    ctx.beginPath();
-    ctx.moveTo(x, top + height);
-    ctx.lineTo(x, top + height * (1 - Math.min(1, weight / brightness)));
-    ctx.stroke();
-  }
-  ctx.restore();
 }
 
 /** The axis over the height from which heights grow by factors instead of by steps: a narrow peak leaves the rest in sight, and what is smoothed has none so narrow. */

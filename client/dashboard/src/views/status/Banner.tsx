@@ -3,6 +3,7 @@ import { useComputed, useSignal } from "@preact/signals";
 
 import { lossReason } from "../../store/events";
 import { useStore } from "../../store/store";
+import { timeOfDay } from "../../ui/format";
 
 /** Says at once what is wrong, and what is being done about it; goes away with it. */
 export function Banner({ onRetry }: { onRetry: () => void }) {
@@ -37,7 +38,7 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
     return (
       <div class="banner" role="alert" data-banner="camera">
         <p>
-          <strong>Camera lost</strong> at {new Date(1000 * loss.at_s).toLocaleTimeString()}. The service looks for it and
+          <strong>Camera lost</strong> at {timeOfDay(loss.at_s)}. The service looks for it and
           goes on by itself; what you see is the last frame.{" "}
           {loss.reason !== null && <span class="quiet">Reason: {lossReason(loss.reason)}</span>}
         </p>

@@ -12,6 +12,7 @@ import { npy, save, savePicture } from "../../ui/download";
 import { fixed, significant } from "../../ui/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
+import { PopoverButton } from "../../ui/PopoverButton";
 import { ticks } from "../../ui/scale";
 import { ToneChoice } from "../../ui/ToneChoice";
 import { BINS, paintStreak, Streak, whiteOf } from "./streak";
@@ -68,10 +69,10 @@ export function StreakView() {
         </h2>
       }
       tools={
-        <>
+        <PopoverButton face="Look" label="Look of the streak" title="Tone and colours" kind="look">
           <ToneChoice tone={tone} />
           <ColourChoice colours={colours} />
-        </>
+        </PopoverButton>
       }
       downloads={[
         { text: "Picture (PNG)", run: () => { savePicture(name(), canvas.current); } },

@@ -1,5 +1,5 @@
 import { ColourChoice } from "../../ui/ColourChoice";
-import { Choice } from "../../ui/controls";
+import { Check, Choice } from "../../ui/controls";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { ToneChoice } from "../../ui/ToneChoice";
 import type { TransientLook } from "./look";
@@ -14,10 +14,9 @@ export function LookMenu({ look }: { look: TransientLook }) {
       <Choice label="Exposure" value={look.stops.value} options={STOPS.map((stops) => ({ value: stops, text: stopsText(stops) }))} onChange={(stops) => (look.stops.value = stops)} />
       <ColourChoice colours={look.colours} />
       {look.play.value === "density" && (
-        <label class="check" title="Show the still scene behind the light">
-          <input type="checkbox" checked={look.backdrop.value} onChange={(event) => (look.backdrop.value = event.currentTarget.checked)} />
+        <Check title="Show the still scene behind the light" checked={look.backdrop.value} onChange={(shown) => (look.backdrop.value = shown)}>
           Scene behind the light
-        </label>
+        </Check>
       )}
     </PopoverButton>
   );

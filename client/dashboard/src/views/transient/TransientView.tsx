@@ -4,7 +4,7 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 import { rangeOfTime_m } from "../../physics/constants";
 import { densityAt } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
-import { SPEEDS_NS } from "../../store/player";
+import { SPEEDS_NS, type Lit } from "../../store/player";
 import { type Store, useStore } from "../../store/store";
 import { Choice, Tabs } from "../../ui/controls";
 import { savePicture } from "../../ui/download";
@@ -48,8 +48,7 @@ export function TransientView() {
   useDrawing(() => {
     const arrivals = frame.value?.light?.arrivals;
     if (arrivals === undefined) return;
-    player.lit.value = steady(player.lit.peek(), litOf(arrivals));
-    player.arrivals.value = peaksOf(arrivals);
+    player.learn(steady(player.lit.peek(), litOf(arrivals)), peaksOf(arrivals));
   }, [frame, player]);
   const play = look.play.value;
   const subject = useMemo(() => ({ snapshot: () => look.snapshot(), parts: () => partsOf(look, store) }), [look, store]);
@@ -135,7 +134,7 @@ export function TransientView() {
 }
 
 /** Ends that noise alone moves stay where they are. */
-function steady(before: ReturnType<typeof litOf>, now: ReturnType<typeof litOf>): ReturnType<typeof litOf> {
+function steady(before: Lit | null, now: Lit | null): Lit | null {
   const near = before !== null && now !== null && Math.abs(before.first - now.first) + Math.abs(before.last - now.last) < 0.03;
   return near ? before : now;
 }

@@ -1,5 +1,7 @@
 /** When light arrives in the whole picture: mean densities at evenly spaced times over one period. */
 
+import type { Lit } from "../../store/player";
+
 /** Share of the brightest moment's light from which a moment is worth a picture. */
 const LEAST = 0.05;
 
@@ -16,7 +18,7 @@ export function turnsOf(arrivals: ArrayLike<number>, count: number): number[] {
 }
 
 /** From when to when there is light, in shares of the period, with a little dark around it; null where there is none. */
-export function litOf(arrivals: ArrayLike<number>): { readonly first: number; readonly last: number } | null {
+export function litOf(arrivals: ArrayLike<number>): Lit | null {
   const all = Array.from(arrivals);
   const least = LEAST * Math.max(...all);
   const worth = all.map((value) => value > least && value > 0);
