@@ -86,7 +86,7 @@ class ClosedForm:
             Figure(value, value / SPREAD, value * SPREAD, 2 * value, value * MARGIN)
             for value in each
         )
-        return Prediction(std, bias, error, 0.0)
+        return Prediction(std, bias, error, 0.0, bias.median, bias_known=True)
 
     def beyond_scene(self, sequence: Sequence) -> bool:
         return False
