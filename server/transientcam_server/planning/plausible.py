@@ -28,8 +28,11 @@ from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, chi_square_
 _Array = NDArray[Any]
 POWERS: Final = (1, 2, 3)
 """Shapes p of the tails."""
-DELAYS_RAD: Final = np.geomspace(0.025, 5.0, 32)
-"""Their mean delays."""
+DELAYS_RAD: Final = np.geomspace(0.025, 5.0, 64)
+"""Their mean delays; between them chi-square is taken for a parabola."""
+SEARCHED_EVERY: Final = 4
+"""The phase of a shape is searched far and wide for one in so many delays; between them it moves by
+little."""
 WIDTHS_RAD: Final = (0.04, 0.09, 0.17)
 """Standard deviations of exponential tails that are widened."""
 UNKNOWNS: Final = 4
@@ -123,16 +126,16 @@ def plausible_ranges(
     moments = b[1:].astype(complex)
     total = (weight * np.abs(moments) ** 2).sum(axis=0)
     pixels = _Turned(weight * moments, weight, total).turned(near)
-    single, _ = _fitted(pixels, j, None)
+    single, _ = _fitted(pixels, j, None, None)
     limit = chi_square_quantile(free, SIGNIFICANCE)
     least = single
-    for q in _tails(j):
-        chi_square, phase = _fitted(pixels, j, q)
-        least = np.minimum(least, chi_square)
+    for chi_square, phase in _families(pixels, j):
+        least = np.minimum(least, chi_square.min(axis=0))
         begins_m = direct_m + tm.range_m(phase, finest_hz)
         possible = chi_square <= limit
-        earliest_m = np.where(possible, np.minimum(earliest_m, begins_m), earliest_m)
-        latest_m = np.where(possible, np.maximum(latest_m, begins_m), latest_m)
+        first_m = np.where(possible, begins_m, np.inf).min(axis=0)
+        last_m = np.where(possible, begins_m, -np.inf).max(axis=0)
+        earliest_m, latest_m = np.minimum(earliest_m, first_m), np.maximum(latest_m, last_m)
     plain = single <= least + SPLIT
     return (
         np.where(plain, direct_m, np.maximum(earliest_m, 0.0)),
@@ -140,18 +143,51 @@ def plausible_ranges(
     )
 
 
-def _tails(j: _Array) -> Iterator[_Array]:
-    """Yield the moments (m) of tails that begin at phase 0, at harmonics over the highest."""
-    for delay in DELAYS_RAD:
-        for power in POWERS:
-            yield (1 - 1j * j * delay / power) ** -power
-        for width in WIDTHS_RAD:
-            yield np.exp(-((j * width) ** 2) / 2) / (1 - 1j * j * delay)
+def _families(pixels: _Turned, j: _Array) -> Iterator[tuple[_Array, _Array]]:
+    """Yield the least chi-square (K, P) of tails of one form, and the phases at which they begin.
+
+    Parameters
+    ----------
+    j
+        (m) harmonics over the highest.
+    """
+    widened = [(np.exp(-((j * width) ** 2) / 2), 1) for width in WIDTHS_RAD]
+    for factor, power in [*((np.ones_like(j), each) for each in POWERS), *widened]:
+        found: list[tuple[_Array, _Array]] = []
+        for place, delay in enumerate(DELAYS_RAD):
+            q = factor * (1 - 1j * j * delay / power) ** -power
+            near = None if place % SEARCHED_EVERY == 0 else found[-1][1]
+            found.append(_fitted(pixels, j, q, near))
+        chi_square, phase = (np.array(each) for each in zip(*found, strict=True))
+        yield _with_minima(chi_square, phase)
 
 
-def _fitted(pixels: _Turned, j: _Array, q: _Array | None) -> tuple[_Array, _Array]:
-    """Return the least chi-square (P) of a shape, and at which phase (P) it begins."""
-    coarse = pixels.explained(np.exp(1j * j[:, None] * _COARSE_RAD), q)
-    phase = _COARSE_RAD[coarse.argmax(axis=0)]
-    fine = pixels.turned(phase).explained(np.exp(1j * j[:, None] * _FINE_RAD), q)
-    return pixels.total - fine.max(axis=0), phase + _FINE_RAD[fine.argmax(axis=0)]
+def _with_minima(chi_square: _Array, phase: _Array) -> tuple[_Array, _Array]:
+    """Put the least values between those of three delays in the place of the middle one's."""
+    before, here, after = chi_square[:-2], chi_square[1:-1], chi_square[2:]
+    bend = before - 2 * here + after
+    valley = (here <= before) & (here <= after) & (bend > 0)
+    place = np.where(valley, (before - after) / (2 * np.where(valley, bend, 1.0)), 0.0)
+    slope = (phase[2:] - phase[:-2]) / 2
+    least = np.maximum(here - place * (before - after) / 4, 0.0)
+    chi_square, phase = chi_square.copy(), phase.copy()
+    chi_square[1:-1] = np.where(valley, least, here)
+    phase[1:-1] += place * slope
+    return chi_square, phase
+
+
+def _fitted(
+    pixels: _Turned, j: _Array, q: _Array | None, near: _Array | None
+) -> tuple[_Array, _Array]:
+    """Return the least chi-square (P) of a shape, and at which phase (P) it begins.
+
+    Parameters
+    ----------
+    near
+        (P) a phase that is near; searched where it is None.
+    """
+    if near is None:
+        coarse = pixels.explained(np.exp(1j * j[:, None] * _COARSE_RAD), q)
+        near = _COARSE_RAD[coarse.argmax(axis=0)]
+    fine = pixels.turned(near).explained(np.exp(1j * j[:, None] * _FINE_RAD), q)
+    return pixels.total - fine.max(axis=0), near + _FINE_RAD[fine.argmax(axis=0)]
