@@ -44,8 +44,9 @@ def page(rows: list[Kept], scenes: int, refused: int, seed: int) -> str:
     below = np.mean([row.measured["error"] < row.interval[0] for row in rows])
     lines = [
         f"{len(rows)} plans on {scenes} random scenes of seed {seed}; {refused} goals were "
-        f"refused. The intervals, 90 %, hold {held:.0%} of the errors (bar: 85 to 95 %). An interval reaches from the error without bias to that with the most bias that "
-        f"the moments of the look allow, or with {MOST_BIAS:g} times the predicted one, if that is "
+        f"refused. The intervals, 90 %, hold {held:.0%} of the errors (bar: 85 to 95 %). An "
+        "interval reaches from the error without bias to that with the most bias that the moments "
+        f"of the look allow, or with {MOST_BIAS:g} times the predicted one, if that is "
         "more. So much of the errors it would hold with another factor:",
         "",
         "| factor | errors below | within | above |",
@@ -54,7 +55,7 @@ def page(rows: list[Kept], scenes: int, refused: int, seed: int) -> str:
     for each in FACTORS:
         over = float(np.mean([above(row, each) for row in rows]))
         lines.append(f"| {each:g} | {below:.0%} | {1 - over - below:.0%} | {over:.0%} |")
-    lines += ["", f"{by_mark(rows)}"]
+    lines += ["", by_mark(rows)]
     lines += [
         "",
         "| scene | plans | bias unknown | measured / predicted error: 10 %, 50 %, 90 % | below "

@@ -78,7 +78,7 @@ def expectations(rows: list[Kept]) -> str:
 
 
 def by_mark(rows: list[Kept]) -> str:
-    """State how many intervals hold, and targets are met, by whether the bias is said to be known."""
+    """State how many intervals hold and targets are met, with a known bias and without."""
     words = []
     for known, name in ((True, "known"), (False, "unknown")):
         own = [row for row in rows if row.bias_known == known]

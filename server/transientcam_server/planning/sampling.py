@@ -6,6 +6,7 @@ by chance, 128 pixels know that share to 4 %; taken evenly from lit pixels in th
 kind, to less than 1 %.
 """
 
+import itertools
 from typing import Any, Final
 
 import numpy as np
@@ -68,8 +69,7 @@ def _evenly(order: _Array, parts: int) -> list[_Array]:
     """Cut an order into so many parts, which share elements where there are too few."""
     edges = np.linspace(0, order.size, parts + 1)
     return [
-        order[int(low) : max(int(high), int(low) + 1)]
-        for low, high in zip(edges[:-1], edges[1:], strict=True)
+        order[int(low) : max(int(high), int(low) + 1)] for low, high in itertools.pairwise(edges)
     ]
 
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from transientcam_server.planning.intervals import (
     RESAMPLED,
     Figure,

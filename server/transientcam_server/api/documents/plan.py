@@ -165,7 +165,8 @@ class SeenDocument(Document):
     dim_share: float
     """Share of those that are so dim, at their range, that other surfaces may light them alone."""
     moving_share: float
-    """Share of the lit pixels that changed while the scene was looked at: what moves is not predicted."""
+    """Share of the lit pixels that changed while the scene was looked at: what moves is not
+    predicted."""
     ambiguity_checked: bool
     """Whether a second base frequency showed that no range is short by a period."""
 
