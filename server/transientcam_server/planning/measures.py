@@ -45,7 +45,7 @@ class PixelErrors:
     def farthest_m(self, earliest_m: _Array, latest_m: _Array) -> _Array:
         """Return the bias (P) if the truth is the one of two ranges (P) that is farther away."""
         off_m = np.maximum(np.abs(self.centre_m - earliest_m), np.abs(self.centre_m - latest_m))
-        return np.maximum(off_m, self.bias_m)
+        return np.asarray(np.maximum(off_m, self.bias_m))
 
 
 def pixel_errors(

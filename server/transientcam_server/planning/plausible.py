@@ -84,7 +84,7 @@ class _Turned:
         v = ww * late - wv * sharp
         both = (w * sharp + v * late) / (ww * vv - wv**2)
         one = np.maximum(sharp**2 / ww, late**2 / vv)
-        return np.where((w > 0) & (v > 0), both, one)
+        return np.asarray(np.where((w > 0) & (v > 0), both, one))
 
     def turned(self, phase: _Array) -> "_Turned":
         """Return the moments turned back further, by a phase (P) of the highest harmonic."""

@@ -76,4 +76,4 @@ def _evenly(order: _Array, parts: int) -> list[_Array]:
 def _middles(order: _Array) -> _Array:
     """Return `STRATUM` elements at equal distances."""
     places = (np.arange(STRATUM) + 0.5) / STRATUM * order.size
-    return order[places.astype(int)]
+    return np.asarray(order[places.astype(int)])

@@ -1,7 +1,10 @@
 """Ranges that moments do not contradict."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_server.planning.description import dim_share
@@ -11,9 +14,10 @@ BASE_HZ = 11.5e6
 HARMONICS = 12
 NOISE = 2e-3
 PIXELS = 40
+Looked = tuple[NDArray[Any], NDArray[Any]]
 
 
-def looked(delays_ns: list[float], weights: list[float], decay_ns: float = 0.0) -> tuple:
+def looked(delays_ns: list[float], weights: list[float], decay_ns: float = 0.0) -> Looked:
     """Noisy moments of returns that all go on for so long, with their variance."""
     j = np.arange(HARMONICS + 1)[:, None]
     omega = 2 * np.pi * BASE_HZ * j
@@ -24,11 +28,9 @@ def looked(delays_ns: list[float], weights: list[float], decay_ns: float = 0.0) 
     return b + NOISE * noise, np.full(b.shape, NOISE**2)
 
 
-def bounds(
-    b: np.ndarray, variance: np.ndarray, direct_m: float, uncertainty_m: float = 0.0
-) -> tuple[np.ndarray, np.ndarray]:
+def bounds(moments: Looked, direct_m: float, uncertainty_m: float = 0.0) -> Looked:
     full = np.full(PIXELS, direct_m), np.full(PIXELS, uncertainty_m)
-    return plausible_ranges(b, variance, BASE_HZ, *full)
+    return plausible_ranges(*moments, BASE_HZ, *full)
 
 
 def range_m(delay_ns: float) -> float:
@@ -37,15 +39,15 @@ def range_m(delay_ns: float) -> float:
 
 def test_a_single_return_is_where_it_seems() -> None:
     direct_m = range_m(13.0)
-    earliest_m, latest_m = bounds(*looked([13.0], [1.0]), direct_m)
+    earliest_m, latest_m = bounds(looked([13.0], [1.0]), direct_m)
     assert np.mean((earliest_m == direct_m) & (latest_m == direct_m)) > 0.95
 
 
 @pytest.mark.parametrize("decay_ns", [0.4, 0.8, 1.2])
 def test_light_out_of_a_material_may_begin_where_it_does(decay_ns: float) -> None:
     # where the estimate lies is not told: as late as light comes back on average
-    b, variance = looked([13.0], [1.0], decay_ns)
-    earliest_m, latest_m = bounds(b, variance, range_m(13.0 + decay_ns))
+    moments = looked([13.0], [1.0], decay_ns)
+    earliest_m, latest_m = bounds(moments, range_m(13.0 + decay_ns))
     true_m = range_m(13.0)
     near_m = range_m(0.1 * decay_ns)  # delays are on a grid
     assert np.mean((earliest_m <= true_m + near_m) & (latest_m >= true_m)) > 0.75
@@ -53,7 +55,7 @@ def test_light_out_of_a_material_may_begin_where_it_does(decay_ns: float) -> Non
 
 def test_returns_far_apart_are_no_tail() -> None:
     direct_m = range_m(13.0)
-    earliest_m, latest_m = bounds(*looked([13.0, 22.0], [0.6, 0.4]), direct_m, 2e-3)
+    earliest_m, latest_m = bounds(looked([13.0, 22.0], [0.6, 0.4]), direct_m, 2e-3)
     assert earliest_m == pytest.approx(direct_m)
     assert latest_m == pytest.approx(direct_m + 2e-3)
 

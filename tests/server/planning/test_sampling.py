@@ -1,7 +1,10 @@
 """Pixels that stand for a scene of several kinds."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from transientcam_server.planning.sampling import (
     STRATUM,
@@ -13,7 +16,7 @@ from transientcam_server.planning.sampling import (
 COUNT = 128
 
 
-def moments(share: float, pixels: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def moments(share: float, pixels: int, seed: int = 0) -> tuple[NDArray[Any], NDArray[Any]]:
     """Moments of single returns, and of so many pixels with two, in any order; which have two."""
     random = np.random.default_rng(seed)
     two = random.permutation(pixels) < share * pixels
