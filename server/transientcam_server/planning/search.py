@@ -31,6 +31,7 @@ LONGEST_S: Final = 5.0
 POINTS: Final = 8
 """At most twice as many make a line."""
 _STEPS: Final = 5
+_LEAST_WRONG: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,7 +316,8 @@ class Search:
             choice = self.choice(family, member)
             over = max(choice.error_with_margin(name) / limit for name, limit in targets.items())
             # few draws were wrong by that factor: on to where they predict as much less, or more
-            wanted = {name: self._quick(family, place, name) / over for name in targets}
+            wrong = max(over, _LEAST_WRONG)
+            wanted = {name: self._quick(family, place, name) / wrong for name in targets}
             if over <= 1:
                 best, last = choice, place - 1
             else:
