@@ -12,6 +12,7 @@ PARTS: Final = {
     "promises": "Do plans keep what they promise?",
     "audit": "The worst cases of an audit",
     "calibrating": "What the intervals are made of",
+    "checking": "Do intervals hold on scenes that took no part in them?",
     "regret": "How much quicker could a plan have been?",
 }
 _HEAD: Final = """# Do plans keep what they promise?

@@ -8,7 +8,7 @@ WRONG = """\
 - The bias is predicted too small where light comes back late and no frequency of the look shows it:
   where it enters the material, as in wax and soap, or where a part of the scene is lit by other
   walls alone. A longer capture does not help there. The upper end of an interval is made for such
-  scenes."""
+  scenes, and plans for them are marked: `bias_known` is false, and the summary says why."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,7 @@ class Kept:
     measured: dict[str, float]
     saturated: float
     planned_in_s: float
+    bias_known: bool
 
     @property
     def ratios(self) -> dict[str, float]:
@@ -69,10 +70,25 @@ def expectations(rows: list[Kept]) -> str:
         f"- The interval that a plan states, 90 %, holds the measured error of {inside} of "
         f"{len(rows)}, {inside / len(rows):.0%} (bar: 85 to 95 %). {len(above)} errors lie above "
         f"it{_of(above)}, {len(below)} below it{_of(below)}.",
+        f"- {by_mark(rows)}",
         f"- Noise: 80 % of the measured deviations are {low:.2f} to {high:.2f} of the predicted.",
         WRONG,
     ]
     return "\n".join(lines)
+
+
+def by_mark(rows: list[Kept]) -> str:
+    """State how many intervals hold and targets are met, with a known bias and without."""
+    words = []
+    for known, name in ((True, "known"), (False, "unknown")):
+        own = [row for row in rows if row.bias_known == known]
+        held = sum(row.covered for row in own)
+        targets = [row.met for row in own if row.met is not None]
+        words.append(
+            f"of {len(own)} plans whose bias is said to be {name} the intervals hold {held}, and "
+            f"{sum(targets)} of {len(targets)} targets are met"
+        )
+    return ("; ".join(words) + ".").capitalize()
 
 
 def _of(rows: list[Kept]) -> str:

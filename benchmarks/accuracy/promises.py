@@ -43,7 +43,8 @@ OWN = Path(__file__).parent / "scenes"
 BUILT_IN = ("wall", "corner", "corner-left", "mirrors", "translucent")
 BEGINS_S: Final = 5.0
 LOOK_SEED, CAPTURE_SEED = 7, 11
-PIXELS: Final = 400
+PIXELS: Final = 2000
+_NO_LIGHT: Final = 1e-12
 SETTINGS = ReconstructionSettings()
 GOALS: Final = {
     "20 mm": Goal(range_error_m=0.020),
@@ -78,19 +79,25 @@ def looked(scene: str) -> tuple[Planner, SceneStatistics]:
         return planner, planner.look(camera, Sequence())
 
 
+def dimmest_dn_per_s(statistics: SceneStatistics) -> float:
+    """Return how much light the dimmest pixel has that a plan is for: the others are not lit."""
+    return float(statistics.brightness_dn_per_s.min())
+
+
 def measured(
-    scene: str, sequence: Sequence, estimator: str, captures: int
+    scene: str, sequence: Sequence, estimator: str, captures: int, dimmest: float = 0.0
 ) -> tuple[dict[str, float], float, float]:
     """Capture, and return noise, bias, error and outliers, the device's time, and saturation.
 
-    Each range is held against the truth in the middle of its own capture: scenes may move.
+    Each range is held against the truth in the middle of its own capture: scenes may move. Pixels
+    with less light than the dimmest are left out, in DN for each second of exposure.
     """
     with opened(scene, CAPTURE_SEED) as camera:
-        return measured_by(camera, sequence, estimator, captures)
+        return measured_by(camera, sequence, estimator, captures, dimmest)
 
 
 def measured_by(
-    camera: Camera, sequence: Sequence, estimator: str, captures: int
+    camera: Camera, sequence: Sequence, estimator: str, captures: int, dimmest: float = 0.0
 ) -> tuple[dict[str, float], float, float]:
     """Do the same with a simulated camera that is open."""
     assert camera.simulation is not None
@@ -104,7 +111,8 @@ def measured_by(
         device_s = raw.capture_s
         truth = camera.simulation.truth(device_time_s=raw.device_time_s + device_s / 2)
         if pixels is None:
-            lit = np.flatnonzero(np.isfinite(truth.range_m) & (truth.brightness > 0))
+            least = max(dimmest * applied.sequence.exposure_s, _NO_LIGHT)
+            lit = np.flatnonzero(np.isfinite(truth.range_m) & (truth.brightness >= least))
             random = np.random.default_rng(1)
             pixels = np.sort(random.choice(lit, min(PIXELS, lit.size), replace=False))
             full = float((raw.images.max(axis=0).ravel()[lit] >= sensor.highest_dn).mean())
@@ -155,7 +163,9 @@ def kept(scene: str, goals: dict[str, Goal], captures: int) -> Iterator[Kept | R
             yield Refused(name, wanted, problem.detail)
             continue
         planned_in_s = time.process_time() - begin_s
-        values, device_s, full = measured(scene, best.applied.sequence, best.estimator, captures)
+        values, device_s, full = measured(
+            scene, best.applied.sequence, best.estimator, captures, dimmest_dn_per_s(statistics)
+        )
         yield Kept(
             name,
             wanted,
@@ -168,6 +178,7 @@ def kept(scene: str, goals: dict[str, Goal], captures: int) -> Iterator[Kept | R
             values,
             full,
             planned_in_s,
+            best.predicted.bias_known,
         )
 
 
@@ -176,6 +187,7 @@ def _predicted(choice: Choice) -> dict[str, float]:
     return {
         "std": predicted.range_std.median,
         "bias": predicted.range_bias.median,
+        "most_bias": predicted.most_bias_m,
         "error": predicted.range_error.median,
         "outliers": predicted.outlier_share,
     }

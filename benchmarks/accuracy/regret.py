@@ -23,7 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.accuracy import evidence
-from benchmarks.accuracy.promises import GOALS, LOOK_SEED, looked, measured, opened
+from benchmarks.accuracy.promises import (
+    GOALS,
+    LOOK_SEED,
+    dimmest_dn_per_s,
+    looked,
+    measured,
+    opened,
+)
 from transientcam_driver import Sequence
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.planning import Goal, Planner, SceneStatistics
@@ -77,10 +84,11 @@ def _regrets(
 ) -> Iterator[Regret]:
     planner, statistics = looked(scene)
     true_m = true_ranges_m(scene)
+    dimmest = dimmest_dn_per_s(statistics)
 
     @cache
     def captured(estimator: str, sequence: Sequence) -> dict[str, float]:
-        values, _, _ = measured(scene, sequence, estimator, CAPTURES)
+        values, _, _ = measured(scene, sequence, estimator, CAPTURES, dimmest)
         return values
 
     for name in targets:

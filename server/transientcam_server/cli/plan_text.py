@@ -27,7 +27,7 @@ def print_plan(document: Mapping[str, Any], *, computing: bool) -> None:
     typer.echo(
         f"range to {error['median'] * 1e3:.2f} mm ({error['low'] * 1e3:.2f} to "
         f"{error['high'] * 1e3:.2f}): noise {std['median'] * 1e3:.2f} mm, "
-        f"bias {predicted['range_bias_m'] * 1e3:.2f} mm; "
+        f"bias {_bias_mm(predicted, '.2f')} mm; "
         f"{predicted['outlier_share']:.1%} of the ranges are outliers"
     )
     typer.echo(document["summary"])
@@ -70,10 +70,15 @@ def _row(choice: Mapping[str, Any]) -> tuple[str, ...]:
         f"{error['median'] * 1e3:.3g}",
         f"{error['low'] * 1e3:.3g} to {error['high'] * 1e3:.3g}",
         f"{predicted['range_std_m']['median'] * 1e3:.3g}",
-        f"{predicted['range_bias_m'] * 1e3:.3g}",
+        _bias_mm(predicted, ".3g"),
         f"{predicted['outlier_share']:.1%}",
         in_words(Sequence.from_document(choice["sequence"]), choice["estimator"]),
     )
+
+
+def _bias_mm(predicted: Mapping[str, Any], digits: str) -> str:
+    """Return a bias in mm; with a question mark where the look does not tell it."""
+    return f"{predicted['range_bias_m'] * 1e3:{digits}}" + "?" * (not predicted["bias_known"])
 
 
 def _print_scene(scene: Mapping[str, Any]) -> None:

@@ -88,6 +88,8 @@ class Choice:
                 "range_error_m": self.predicted.range_error.to_document(),
                 "range_std_m": self.predicted.range_std.to_document(),
                 "range_bias_m": self.predicted.range_bias.median,
+                "range_bias_most_m": self.predicted.most_bias_m,
+                "bias_known": self.predicted.bias_known,
                 "outlier_share": self.predicted.outlier_share,
                 "beyond_scene": self.beyond_scene,
                 "bound_width": self.bound_width,

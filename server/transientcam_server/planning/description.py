@@ -10,6 +10,8 @@ import transientcam_moments as tm
 from transientcam_server.imaging.calibration import nominal_gains
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.planning.estimation import direct_range
+from transientcam_server.planning.plausible import plausible_ranges
+from transientcam_server.planning.sampling import typical_pixels
 from transientcam_server.planning.scene import PIXELS, SceneStatistics
 from transientcam_server.settings import ReconstructionSettings
 
@@ -19,7 +21,10 @@ LIT_DEVIATIONS: Final = 5.0
 MOVED_DEVIATIONS: Final = 5.0
 _EARLY: Final = 0.9
 """Share of a period by which a direct return may come before the mean of all light."""
-_SEED: Final = 0
+DIM: Final = 0.2
+"""What a surface gets from a lit one beside it, over what that one gets, is hardly more."""
+BRIGHT_SHARE: Final = 0.95
+"""All but the brightest pixels, which may be a mirror's."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,21 +116,17 @@ def describe(
     if not lit.any():
         return None
     there = np.flatnonzero(lit)
-    random = np.random.default_rng(_SEED)
-    pixels = np.sort(random.choice(there, PIXELS, replace=there.size < PIXELS))
+    pixels = there[typical_pixels(seen.at(there)[0], PIXELS)]
     b, mean_dn = seen.at(pixels)
     variance = seen.variance(mean_dn) / len(seen.moments)
     base_hz = seen.recipe.base_frequency_hz
     direct_m, uncertainty_m = direct_range(b, variance, base_hz, settings)
-    # by how hard they are: every other pixel is then as good a sample of the scene as all of them
-    order = np.argsort(uncertainty_m, kind="stable")
-    pixels, b, mean_dn, variance, direct_m, uncertainty_m = (
-        each[..., order] for each in (pixels, b, mean_dn, variance, direct_m, uncertainty_m)
-    )
+    earliest_m, latest_m = plausible_ranges(b, variance, base_hz, direct_m, uncertainty_m)
     light_dn = _brightness(b if coarse is None else coarse.at(pixels)[0], b)
     checked = coarse is not None
     if coarse is not None:
-        direct_m = _unwrapped(direct_m, b, coarse, pixels, base_hz)
+        wrapped_m, direct_m = direct_m, _unwrapped(direct_m, b, coarse, pixels, base_hz)
+        earliest_m, latest_m = (each + direct_m - wrapped_m for each in (earliest_m, latest_m))
     if ambient_dn_per_s is None:
         # an image holds, on average over four phases, dark + ambient + b_0 / 2
         ambient = np.maximum(mean_dn - light_dn / 2, 0.0) / seen.exposure_s
@@ -142,12 +143,15 @@ def describe(
         brightest_dn_per_s=seen.brightest_dn / seen.exposure_s,
         direct_m=direct_m,
         uncertainty_m=uncertainty_m,
+        earliest_m=earliest_m,
+        latest_m=latest_m,
         delay_s=np.where(weight > 0, phase / (2 * np.pi * base_hz), np.nan),
         share=weight / np.maximum(1.0, weight.sum(axis=0)),
         base_frequency_hz=base_hz,
         measured=relative,
         relative_noise=np.sqrt(variance[1]) / light_dn,
         lit_share=float(lit.mean()),
+        dim_share=dim_share(light_dn, direct_m),
         moving_share=_moving_share(seen, lit),
         ambiguity_checked=checked,
     )
@@ -168,6 +172,17 @@ def lit_pixels(seen: Seen) -> _Array:
         power = (np.abs(b) ** 2 / variance).sum(axis=0)
         lit: _Array = seen.usable & (power > 2 * m + LIT_DEVIATIONS * 2 * np.sqrt(m))
     return lit
+
+
+def dim_share(light: _Array, range_m: _Array) -> float:
+    """Return the share of pixels (P) that may be lit by other surfaces alone.
+
+    Those with less than `DIM` of the light of bright ones, both as if they were at one range. Their
+    light may come around a corner of the scene, and nothing in their moments shows that.
+    """
+    at_one_range = light * range_m**2
+    bright = np.quantile(at_one_range, BRIGHT_SHARE)
+    return float((at_one_range < DIM * bright).mean())
 
 
 def _brightness(low: _Array, b: _Array) -> _Array:

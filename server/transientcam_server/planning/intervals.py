@@ -1,10 +1,11 @@
 """Intervals of predicted errors: between which values a capture is expected to measure them.
 
 The interval of the noise covers the sampling of pixels and what the model is wrong by. How far the
-bias lies from its prediction is another matter, and the larger one: light that comes back late may
-show in no frequency of the look, and where nothing comes back late the prediction states what the
-noise of the look could hide. By how much is measured on random scenes
-(``python -m benchmarks.accuracy.calibrating``), and the interval of the error is as wide.
+bias lies from its prediction is another matter, and the larger one: where nothing comes back late
+the prediction states what the noise of the look could hide, and where light comes back late it may
+begin at any range that the moments do not contradict (`plausible`). The interval of the error
+begins without bias and ends with the larger one of that and `MOST_BIAS` times the predicted bias,
+which ``python -m benchmarks.accuracy.calibrating`` measures on random scenes.
 """
 
 import math
@@ -25,8 +26,10 @@ MODEL_SPREAD: Final = 0.08
 """Standard deviation of the logarithm of measured over predicted errors beyond what the sampling
 of pixels explains (docs/accuracy.md)."""
 MOST_BIAS: Final = 2.0
-"""Measured over predicted bias, at most: on random scenes some 85 % of the errors are smaller than
-one with so much bias (docs/plans.md, decision 1030)."""
+"""Measured over predicted bias, at most (docs/plans.md, decision 1030)."""
+DOUBTFUL: Final = 2.0
+"""A bias is not known where ranges that the moments do not contradict make the error larger than so
+many times the predicted one."""
 RESAMPLED: Final = 100
 _LEAST_M: Final = 1e-9
 
@@ -77,24 +80,20 @@ def figure(errors_m: _Array, median: Callable[[_Array], float], picks: _Array) -
     return Figure(value, low, high, float(np.quantile(errors_m, 0.9)), likely)
 
 
-def with_unknown_bias(error: Figure, std_m: float, bias_m: float) -> Figure:
+def with_unknown_bias(error: Figure, without: Figure, most: Figure) -> Figure:
     """Return the figure of an error whose interval holds other biases than the predicted one.
-
-    It begins with the error without bias: what is predicted is in part what the noise of the look
-    could hide. It ends with that of `MOST_BIAS`.
 
     Parameters
     ----------
     error
         Of noise and bias together.
-    std_m, bias_m
-        Predicted noise and bias of the median pixel.
+    without
+        Of noise alone: what is predicted of the bias is in part what the noise of the look could
+        hide.
+    most
+        Of noise and the most that the bias may be.
     """
-    predicted = math.hypot(std_m, bias_m)
-    if not 0 < predicted < math.inf:
-        return error
-    low, high = (math.hypot(std_m, factor * bias_m) / predicted for factor in (0.0, MOST_BIAS))
-    return replace(error, low=error.low * low, high=error.high * high)
+    return replace(error, low=min(error.low, without.low), high=max(error.high, most.high))
 
 
 def _widened(value: float, sampled: float, deviations: float) -> float:

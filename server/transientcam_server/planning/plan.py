@@ -34,7 +34,8 @@ class Plan:
     leading
         The target by which they are compared.
     summary
-        One sentence about noise, bias and what half the error costs.
+        A sentence about noise, bias and what half the error costs, and one where the bias is not
+        known.
     scene
         What it was planned for.
     """
@@ -131,11 +132,27 @@ def plan(
     progress.at(0.8, "twice the accuracy")
     half = {leading: best.error(leading) / 2}
     twice = search.without_budgets().quickest(half, contenders=1)
-    return Plan(best, half_time, twice, leading, _summary(best, twice), predictor.scene)
+    summary = _summary(best, twice) + doubt(best, predictor.scene)
+    return Plan(best, half_time, twice, leading, summary, predictor.scene)
 
 
-def in_a_sentence(front: list[Choice]) -> str:
-    """State from where on bias rules, of choices by rising time."""
+def doubt(choice: Choice, scene: SceneStatistics) -> str:
+    """Return a sentence, after a space, on why the bias of a choice is not known; or nothing."""
+    if choice.predicted.bias_known:
+        return ""
+    if scene.lit_in_part:
+        return (
+            f" Bias unknown: {scene.dim_share:.0%} of the lit pixels are so dim that other "
+            "surfaces may light them alone, and by how much that light is late does not show."
+        )
+    return (
+        " Bias unknown: light that goes on coming, as out of wax or from other walls, would look "
+        f"the same, and put the range {choice.predicted.most_bias_m * 1e3:.2g} mm off."
+    )
+
+
+def in_a_sentence(front: list[Choice], scene: SceneStatistics) -> str:
+    """State from where on bias rules, of choices by rising time, and whether it is known."""
     if not front:
         return "Nothing reaches any accuracy on this scene."
     finest = front[-1]
@@ -150,9 +167,10 @@ def in_a_sentence(front: list[Choice]) -> str:
         )
     )
     if not ruled:
-        return f"Noise rules everywhere: more time buys accuracy; {best}."
+        return f"Noise rules everywhere: more time buys accuracy; {best}." + doubt(finest, scene)
     since = _time_in_words(ruled[-1].applied.capture_s)
-    return f"From {since} on bias rules and more time buys little; {best}."
+    rules = f"From {since} on bias rules and more time buys little; {best}."
+    return rules + doubt(finest, scene)
 
 
 def _time_in_words(time_s: float) -> str:

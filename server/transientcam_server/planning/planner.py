@@ -104,9 +104,9 @@ class Planner:
         search = Search(goal, found, predictor, self._computing)
         choices: list[Choice] = []
         for choices in search.fronts(goal.leading, progress.part(0.0, 0.8)):
-            progress.show(_front_document(choices, []))
+            progress.show(_front_document(choices, [], scene))
         progress.at(0.8, "lines")
-        return _front_document(choices, search.lines(choices))
+        return _front_document(choices, search.lines(choices), scene)
 
     def _predictor(
         self, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
@@ -118,7 +118,9 @@ class Planner:
         return timer_of(self._capabilities, self._settings)
 
 
-def _front_document(choices: list[Choice], lines: list[Line]) -> dict[str, Any]:
+def _front_document(
+    choices: list[Choice], lines: list[Line], scene: SceneStatistics
+) -> dict[str, Any]:
     return {
         "front": [choice.to_document() for choice in choices],
         "lines": [
@@ -130,7 +132,7 @@ def _front_document(choices: list[Choice], lines: list[Line]) -> dict[str, Any]:
             }
             for line in lines
         ],
-        "summary": in_a_sentence(choices),
+        "summary": in_a_sentence(choices, scene),
     }
 
 

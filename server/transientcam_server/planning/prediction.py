@@ -22,6 +22,8 @@ from transientcam_server.imaging.noise import MEDIAN_OF_NORMAL
 from transientcam_server.imaging.ranging import ranges_m
 from transientcam_server.planning.estimation import MOST_HARMONICS
 from transientcam_server.planning.intervals import (
+    DOUBTFUL,
+    MOST_BIAS,
     RESAMPLED,
     Figure,
     figure,
@@ -29,6 +31,7 @@ from transientcam_server.planning.intervals import (
 )
 from transientcam_server.planning.measures import PixelErrors, pixel_errors
 from transientcam_server.planning.resolving import Resolving
+from transientcam_server.planning.sampling import resampled
 from transientcam_server.planning.scene import SceneStatistics
 from transientcam_server.settings import ReconstructionSettings
 
@@ -38,7 +41,7 @@ DRAWS: Final = 6
 FINE_DRAWS: Final = 30
 """And for the one that is stated."""
 FEW: Final = slice(None, None, 2)
-"""The pixels that first predictions are made of."""
+"""The pixels that first predictions are made of: every other one of each kind."""
 STEP: Final = 4.0
 """Factor between steps of noise."""
 NOMINAL: Final = Sequence(exposure_s=1e-3, zeroth="estimated")
@@ -58,12 +61,19 @@ class Prediction:
         Noise, systematic error, and the root sum of squares of both, pixel by pixel.
     outlier_share
         Share of the ranges beyond five standard deviations.
+    most_bias_m
+        Bias of the median pixel if the light begins where the moments only just allow it.
+    bias_known
+        Whether the moments tell the bias: not where shapes of light that explain them alike put
+        the range elsewhere, nor where many pixels may be lit by other surfaces alone.
     """
 
     range_std: Figure
     range_bias: Figure
     range_error: Figure
     outlier_share: float
+    most_bias_m: float
+    bias_known: bool
 
 
 class Predictor:
@@ -164,15 +174,22 @@ class Predictor:
         errors = self._errors(
             estimator, harmonics, sequence.base_frequency_hz, noise, FINE_DRAWS, sequence.zeroth
         )
-        picks = np.random.default_rng(self._seed).integers(0, noise.size, (RESAMPLED, noise.size))
-        std = figure(errors.std_m, _typical, picks)
-        bias = figure(errors.bias_m, _median, picks)
+        picks = resampled(noise.size, RESAMPLED, self._seed)
+        farthest_m = errors.farthest_m(self.scene.earliest_m, self.scene.latest_m)
+        most_m = np.hypot(errors.std_m, np.maximum(MOST_BIAS * errors.bias_m, farthest_m))
         error = figure(errors.error_m, _median, picks)
+        doubted_m = _median(np.hypot(errors.std_m, farthest_m))
         return Prediction(
-            std,
-            bias,
-            with_unknown_bias(error, std.median, bias.median),
+            figure(errors.std_m, _typical, picks),
+            figure(errors.bias_m, _median, picks),
+            with_unknown_bias(
+                error,
+                figure(errors.std_m, _median, picks),
+                figure(most_m, _median, picks),
+            ),
             errors.outlier_share,
+            _median(farthest_m),
+            not self.scene.lit_in_part and doubted_m <= DOUBTFUL * error.median,
         )
 
     def beyond_scene(self, sequence: Sequence) -> bool:

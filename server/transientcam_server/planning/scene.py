@@ -12,7 +12,9 @@ from transientcam_moments.pisarenko import DIRECT_THRESHOLD
 
 _Array = NDArray[Any]
 PIXELS: Final = 128
-"""How many lit pixels stand for a scene."""
+"""How many lit pixels stand for a scene, a multiple of `sampling.STRATUM`."""
+MOSTLY_DIM: Final = 0.25
+"""Share of dim pixels from which on it matters to the median one."""
 AMBIGUOUS_SHARE: Final = 0.02
 """Share of the pixels whose direct return may lie beyond the unambiguous range."""
 LATE_SHARE: Final = 0.05
@@ -36,6 +38,8 @@ class SceneStatistics:
         (P) range of the direct return.
     uncertainty_m
         (P) by how much that may be wrong: what the look at the scene did not resolve.
+    earliest_m, latest_m
+        (P) between which ranges the direct return lies: what the moments do not contradict.
     delay_s, share
         (K, P) returns: time of flight (NaN where unused) and share of the pixel's light (0 where
         unused). What the shares leave to 1 comes back evenly at all times.
@@ -46,6 +50,8 @@ class SceneStatistics:
         (P) deviation of these moments over the brightness.
     lit_share
         Share of all pixels whose light stands clear of the noise.
+    dim_share
+        Share of the lit pixels that other surfaces may light alone.
     moving_share
         Share of the lit pixels that changed while the scene was looked at.
     ambiguity_checked
@@ -57,12 +63,15 @@ class SceneStatistics:
     brightest_dn_per_s: float
     direct_m: _Array
     uncertainty_m: _Array
+    earliest_m: _Array
+    latest_m: _Array
     delay_s: _Array
     share: _Array
     base_frequency_hz: float = 0.0
     measured: _Array | None = None
     relative_noise: _Array | None = None
     lit_share: float = 1.0
+    dim_share: float = 0.0
     moving_share: float = 0.0
     ambiguity_checked: bool = True
 
@@ -73,9 +82,15 @@ class SceneStatistics:
             "brightness_dn_per_s": float(np.median(self.brightness_dn_per_s)),
             "ambient_dn_per_s": float(np.median(self.ambient_dn_per_s)),
             "lit_share": self.lit_share,
+            "dim_share": self.dim_share,
             "moving_share": self.moving_share,
             "ambiguity_checked": self.ambiguity_checked,
         }
+
+    @property
+    def lit_in_part(self) -> bool:
+        """Whether so many pixels may be lit by other surfaces alone that no range is certain."""
+        return self.dim_share >= MOSTLY_DIM
 
     def covers(self, harmonics: int, base_frequency_hz: float) -> bool:
         """Whether moments at these frequencies are known without a model of the returns."""
@@ -137,12 +152,15 @@ def uniform_scene(
     delay_s = np.broadcast_to(2 * range_m[:, None] / tm.SPEED_OF_LIGHT_M_S, repeated)
     share = np.broadcast_to(weight[:, None] / weight.sum(), repeated)
     counts = weight >= DIRECT_THRESHOLD * weight.max()
+    direct_m = np.full(PIXELS, range_m[counts].min())
     return SceneStatistics(
         brightness_dn_per_s=np.full(PIXELS, brightness_dn_per_s),
         ambient_dn_per_s=np.full(PIXELS, ambient_dn_per_s),
         brightest_dn_per_s=brightness_dn_per_s + ambient_dn_per_s,
-        direct_m=np.full(PIXELS, range_m[counts].min()),
+        direct_m=direct_m,
         uncertainty_m=np.zeros(PIXELS),
+        earliest_m=direct_m,
+        latest_m=direct_m,
         delay_s=delay_s,
         share=share,
     )

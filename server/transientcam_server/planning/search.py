@@ -18,7 +18,7 @@ from transientcam_server.planning.progress import Progress
 
 Timed = Callable[[Sequence, str], float]
 """Computing time in s of a frame of a sequence with an estimator."""
-HOPE: Final = 1.1
+HOPE: Final = 1.25
 """A family is looked at closely where few draws predict up to so many times a target."""
 CONTENDERS: Final = 3
 """Families of which more draws decide."""
@@ -30,7 +30,8 @@ LONGEST_S: Final = 5.0
 """The longest of them."""
 POINTS: Final = 8
 """At most twice as many make a line."""
-_STEPS: Final = 4
+_STEPS: Final = 5
+_LEAST_WRONG: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,38 +120,39 @@ class Search:
     def quickest(self, targets: dict[str, float], *, contenders: int = CONTENDERS) -> Choice | None:
         """Return the choice within the budgets that reaches targets soonest; None without any.
 
-        The families are searched with few draws, the best of them again with many; where those
-        do not bear the target out, the next longer member is taken.
+        The families are searched with few draws, the best of them again with many. What few draws
+        promised may take longer with many: then those that are to take less time are next.
         """
-        wrong: set[tuple[str, Sequence]] = set()
+        seen: set[tuple[str, Sequence]] = set()
+        best: Choice | None = None
         while True:
-            contending = self._contending(targets, wrong)[:contenders]
+            limit_s = math.inf if best is None else best.applied.capture_s
+            contending = self._contending(targets, seen, limit_s)[:contenders]
             if not contending:
-                return None
-            best: Choice | None = None
+                return best
             for each in contending:
                 limit_s = math.inf if best is None else best.applied.capture_s
                 best = self._borne_out(each, targets, limit_s) or best
-            if best is not None:
-                return best
-            # few draws were wrong about these: the next ones may be slower than they promised
-            wrong |= {(each.family.estimator, each.family.first) for each in contending}
+            seen |= {(each.family.estimator, each.family.first) for each in contending}
 
     def _contending(
-        self, targets: dict[str, float], wrong: set[tuple[str, Sequence]]
+        self, targets: dict[str, float], seen: set[tuple[str, Sequence]], limit_s: float
     ) -> list[Found]:
-        """Return the quickest member of each family by few draws, those near the quickest."""
+        """Return the quickest member of each family by few draws, those near the quickest.
+
+        None of families that were ``seen``, nor any that takes as long as a limit.
+        """
         found: list[Found] = []
         best_s = math.inf
         for family, place in self._hopeful(targets):
-            if family.members[place].capture_s > NEAR * best_s:
+            if family.members[place].capture_s > min(NEAR * best_s, limit_s):
                 break
-            if (family.estimator, family.first) in wrong:
+            if (family.estimator, family.first) in seen:
                 continue
             if self._least_bias(family) > targets.get("range_error_m", math.inf):
                 continue
             soonest = self._soonest(family, place, targets, NEAR * best_s)
-            if soonest is not None:
+            if soonest is not None and family.members[soonest].capture_s < limit_s:
                 found.append(Found(family, soonest, 0.0))
                 best_s = min(best_s, found[-1].member.capture_s)
         return sorted(found, key=lambda each: each.member.capture_s)
@@ -274,10 +276,8 @@ class Search:
         return last
 
     def _reaches(self, family: Family, place: int, targets: dict[str, float]) -> bool:
-        return all(
-            self._quick(family, place, name) <= limit * self._hope(name)
-            for name, limit in targets.items()
-        )
+        hoped = {name: limit * self._hope(name) for name, limit in targets.items()}
+        return self._within(family, hoped, place)
 
     @staticmethod
     def _hope(target: str) -> float:
@@ -305,33 +305,32 @@ class Search:
         return std_m if target == "range_std_m" else error_m
 
     def _borne_out(self, found: Found, targets: dict[str, float], limit_s: float) -> Choice | None:
-        """Return the first member from one on that many draws find to reach the targets."""
+        """Return the first member that many draws find to reach the targets, near one by few."""
         family, place = found.family, found.place
+        failed, last = -1, len(family.members) - 1
+        best: Choice | None = None
         for _ in range(_STEPS):
             member = family.members[place]
             if member.capture_s >= limit_s or not self._affords(family, member):
-                return None
+                break
             choice = self.choice(family, member)
             over = max(choice.error_with_margin(name) / limit for name, limit in targets.items())
+            # few draws were wrong by that factor: on to where they predict as much less, or more
+            wrong = max(over, _LEAST_WRONG)
+            wanted = {name: self._quick(family, place, name) / wrong for name in targets}
             if over <= 1:
-                return choice
-            # few draws were wrong by that factor: on to where they predict as much less
-            wanted = {name: self._quick(family, place, name) / over for name in targets}
-            later = range(place + 1, len(family.members))
-            place = (
-                bisect.bisect_left(
-                    later,
-                    x=True,
-                    key=lambda each: all(
-                        self._quick(family, each, name) <= limit for name, limit in wanted.items()
-                    ),
-                )
-                + place
-                + 1
-            )
-            if place >= len(family.members):
-                return None
-        return None
+                best, last = choice, place - 1
+            else:
+                failed = place
+            reaches = partial(self._within, family, wanted)
+            between = range(failed + 1, last + 1)
+            place = failed + 1 + bisect.bisect_left(between, x=True, key=reaches)
+            if place > last:
+                break
+        return best
+
+    def _within(self, family: Family, limits: dict[str, float], place: int) -> bool:
+        return all(self._quick(family, place, name) <= limit for name, limit in limits.items())
 
 
 def _coarse_to_fine(count: int) -> list[int]:

@@ -86,7 +86,7 @@ class ClosedForm:
             Figure(value, value / SPREAD, value * SPREAD, 2 * value, value * MARGIN)
             for value in each
         )
-        return Prediction(std, bias, error, 0.0)
+        return Prediction(std, bias, error, 0.0, bias.median, bias_known=True)
 
     def beyond_scene(self, sequence: Sequence) -> bool:
         return False
@@ -156,6 +156,65 @@ def test_bias_rules_out_what_noise_alone_would_recommend(capabilities: Capabilit
     assert noise.predicted.range_bias.median > 0.005
     assert both.predicted.range_bias.median < 0.005
     assert noise.applied.capture_s < both.applied.capture_s
+
+
+class Doubtful(ClosedForm):
+    """A look that does not tell the bias."""
+
+    def __init__(self, dim_share: float) -> None:
+        super().__init__()
+        self.scene = dataclasses.replace(self.scene, dim_share=dim_share)
+
+    def predict(self, estimator: str, sequence: Sequence) -> Prediction:
+        found = super().predict(estimator, sequence)
+        return dataclasses.replace(found, most_bias_m=0.04, bias_known=False)
+
+
+@pytest.mark.parametrize(
+    ("dim_share", "reason"), [(0.0, "put the range 40 mm off"), (0.4, "40% of the lit pixels")]
+)
+def test_a_bias_that_is_not_known_is_marked_with_the_reason(
+    dim_share: float, reason: str, capabilities: Capabilities
+) -> None:
+    predictor = cast(Predictor, Doubtful(dim_share))
+    found = plan(Goal(capture_s=0.1), predictor, capabilities, timed=lambda *_: 1e-3)
+    assert "Bias unknown: " in found.summary
+    assert reason in found.summary
+    predicted = found.to_document()["predicted"]
+    assert (predicted["bias_known"], predicted["range_bias_most_m"]) == (False, 0.04)
+    assert "unknown" not in planned(Goal(capture_s=0.1), capabilities).summary
+
+
+class Hasty(ClosedForm):
+    """Few draws see a third of the error of one estimator, and the other's as it is."""
+
+    def quick(self, estimator: str, sequence: Sequence, scale: float) -> tuple[float, float, float]:
+        std_m, bias_m, error_m = super().quick(estimator, sequence, scale)
+        part = 1 / 3 if estimator == "maximum-entropy" else 1.0
+        return std_m, bias_m, part * error_m
+
+    def predict(self, estimator: str, sequence: Sequence) -> Prediction:
+        exact = super().quick(estimator, sequence, self.noise_scale(sequence))
+        std, bias, error = (Figure(each, each, each, each, each) for each in exact)
+        return Prediction(std, bias, error, 0.0, bias.median, bias_known=True)
+
+
+@pytest.mark.parametrize("target_m", [0.02, 0.008, 0.003])
+def test_what_few_draws_promised_in_vain_rules_out_no_quicker_family(
+    target_m: float, capabilities: Capabilities
+) -> None:
+    goal, predictor = Goal(range_error_m=target_m), Hasty()
+    found = plan(goal, cast(Predictor, predictor), capabilities, timed=lambda *_: 1e-3)
+    quickest_s = min(
+        member.capture_s
+        for family in families(goal, cast(Predictor, predictor), capabilities)
+        for member in family.members
+        if predictor.predict(
+            family.estimator, family.applied(member).sequence
+        ).range_error.with_margin
+        <= target_m
+    )
+    assert found.recommended.applied.capture_s == pytest.approx(quickest_s)
 
 
 def test_a_plan_shows_what_it_recommends(capabilities: Capabilities) -> None:

@@ -140,6 +140,10 @@ export interface Choice {
     readonly range_error_m: { readonly median: number; readonly low: number; readonly high: number; readonly p90: number };
     readonly range_std_m: { readonly median: number };
     readonly range_bias_m: number;
+    /** If light begins where the moments of the look only just allow it. */
+    readonly range_bias_most_m: number;
+    /** Whether the look tells the bias. */
+    readonly bias_known: boolean;
     readonly outlier_share: number;
   };
 }

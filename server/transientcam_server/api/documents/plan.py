@@ -109,6 +109,13 @@ class PredictedDocument(Document):
     """Noise: standard deviation between captures."""
     range_bias_m: float
     """How far the mean range of the median pixel is off; more captures do not reduce it."""
+    range_bias_most_m: float
+    """How far it is off where light begins as early, or as late, as the moments of the look only
+    just allow."""
+    bias_known: bool
+    """Whether the look tells the bias. It does not where shapes of light that explain its moments
+    alike put the range elsewhere, nor where many pixels may be lit by other surfaces alone: then
+    `range_bias_m` holds only for the simplest light, and `summary` says why."""
     outlier_share: float
     """Share of the ranges that are off by more than five times `range_error_m`; pixels whose bias
     none of the frequencies looked at shows are not in it."""
@@ -155,8 +162,11 @@ class SeenDocument(Document):
     """Light that is not the camera's, in DN an image for each second of exposure."""
     lit_share: float
     """Share of all pixels whose light stands clear of the noise; no others count."""
+    dim_share: float
+    """Share of those that are so dim, at their range, that other surfaces may light them alone."""
     moving_share: float
-    """Share of those that changed while the scene was looked at: what moves is not predicted."""
+    """Share of the lit pixels that changed while the scene was looked at: what moves is not
+    predicted."""
     ambiguity_checked: bool
     """Whether a second base frequency showed that no range is short by a period."""
 
@@ -167,7 +177,7 @@ class PlanDocument(ChoiceDocument):
     compared_by: str
     """The target that neighbours are compared by."""
     summary: str
-    """Noise and bias in a sentence, and what half the error costs."""
+    """Noise and bias in a sentence, what half the error costs, and why a bias is not known."""
     scene: SeenDocument
     half_time: NeighbourDocument | None = None
     """What half the time gives; null where nothing is that quick."""

@@ -7,6 +7,8 @@ import { ZEROTH_NAMES } from "./words";
 export function ChoiceFacts({ choice }: { choice: Choice }) {
   const { sequence, predicted } = choice;
   const { low, high } = predicted.range_error_m;
+  const bias = engineering(predicted.range_bias_m, "m");
+  const doubt = predicted.bias_known ? "" : ` – unknown, up to ${engineering(predicted.range_bias_most_m, "m", 2)}`;
   return (
     <dl class="facts" data-field="choice">
       <Fact name="Harmonics m" value={String(sequence.harmonics)} field="choice_harmonics" strong />
@@ -17,7 +19,7 @@ export function ChoiceFacts({ choice }: { choice: Choice }) {
       <Fact name="Range by" value={choice.estimator.replaceAll("-", " ")} field="choice_estimator" />
       <Fact name="Error, 90 % within" value={`${engineering(low, "m", 2)} to ${engineering(high, "m", 2)}`} field="choice_range_error_interval_m" />
       <Fact name="of that noise" value={engineering(predicted.range_std_m.median, "m")} field="choice_range_std_m" />
-      <Fact name="of that bias" value={engineering(predicted.range_bias_m, "m")} field="choice_range_bias_m" />
+      <Fact name="of that bias" value={bias + doubt} field="choice_range_bias_m" />
       <Fact name="Outliers" value={fixed(100 * predicted.outlier_share, 1, "%")} field="choice_outlier_share" />
     </dl>
   );
