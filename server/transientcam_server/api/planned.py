@@ -90,7 +90,7 @@ def require_scene(service: Service) -> None:
         ``only-moments``.
     """
     if service.looks.needs_frame:
-        service.require_images("The scene is looked at")
+        service.require_images("The scene is seen")
 
 
 async def _takes(service: Service, address: str) -> list[dict[str, Any]]:

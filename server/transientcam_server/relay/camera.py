@@ -280,8 +280,14 @@ class RelayCamera(HostCamera):
                 self._gone = f"the origin has lost its camera: {notice.details.get('reason')}"
             case "calibration-changed" | "simulation-changed" | "reconstruction-changed":
                 self._outdated = True
-            case "dropped":
+            case "dropped" if notice.details["channel"] == self._counted:
                 self.relayed.dropped_frames += int(notice.details["count"])
+
+    @property
+    def _counted(self) -> int | None:
+        """The channel whose frames are counted: all products of one are dropped together."""
+        hello = None if self._stream is None else self._stream.hello
+        return None if hello is None else hello.channels[0].channel
 
     def _receive(self, timeout_s: float) -> RawFrame | None:
         """Return the next frame of the sequence that is set, None if none came in time."""
