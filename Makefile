@@ -50,6 +50,7 @@ docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (mo
 	$(BIN)/python -m benchmarks.first_program --write
 	$(BIN)/python -m benchmarks.stream_load --write
 	$(BIN)/python -m benchmarks.relay --write
+	$(BIN)/python -m benchmarks.relay_moments --write
 	$(BIN)/python -m benchmarks.robustness --write
 	$(BIN)/python -m benchmarks.fuzz_recordings --write
 	$(BIN)/python -m benchmarks.power_cuts --write

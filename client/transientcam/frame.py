@@ -171,7 +171,7 @@ class Frame:
 
     @property
     def frequencies_hz(self) -> Sequence[float]:
-        """Modulation frequency of each plane of ``moments``, 0 for b_0; empty otherwise."""
+        """Modulation frequency of each plane of moments, 0 for b_0; empty otherwise."""
         return tuple(self.extra.get("frequencies_hz", ()))
 
     @property

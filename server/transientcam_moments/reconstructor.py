@@ -143,6 +143,29 @@ class Reconstructor:
                 saturated_pixels = saturated_pixels & ~self._bad
         return self._of_moments(moments, saturated_pixels, kept, spread, repaired)
 
+    def of_measured(
+        self,
+        moments: Array,
+        *,
+        saturated_pixels: Array | None = None,
+        spread: Spread = at_once,
+    ) -> Reconstruction:
+        """Go on from the moments that another reconstruction began with.
+
+        Where that one had several takes and the same settings, calibration and bad pixels, all
+        that follows is equal to the bit; with one take the compiled pass may round in another way.
+
+        Parameters
+        ----------
+        moments : array, shape (m + 1, ...)
+            `Reconstruction.measured`: calibrated, and bad pixels replaced already.
+        saturated_pixels : boolean array, shape (...), optional
+            Pixels to be flagged; none, when left out.
+        spread : callable
+            As of a call.
+        """
+        return self._of_moments(moments, saturated_pixels, None, spread)
+
     def _require_labels(self) -> tuple[str, int]:
         """Return how b_0 was measured and the number of takes, where raw images can be read."""
         settings, calibration = self.settings, self._calibration

@@ -41,6 +41,7 @@ from transientcam_server.camera.light import LightGuard
 from transientcam_server.camera.origin_lease import OriginLease
 from transientcam_server.camera.shared import SharedAcquisition
 from transientcam_server.camera.source import sensor_of, twin_of
+from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import (
     NOMINAL_ID,
@@ -113,7 +114,9 @@ class Service:
         )
         self.workers = Workers(self._executor, count=settings.workers)
         self._sensor = sensor = sensor_of(camera, settings.sensor)
-        reconstruction = suited(settings.reconstruction, camera.capabilities.sampling)
+        reconstruction = self._of_origin(
+            suited(settings.reconstruction, camera.capabilities.sampling)
+        )
         self.planner = Planner(camera.capabilities, sensor, reconstruction)
         self.planning = PlanningQueue(PlanningProcess())
         kept = CalibrationStore(settings.calibrations, given=settings.calibration)
@@ -124,6 +127,7 @@ class Service:
             sensor=sensor,
             calibration=_calibration(camera, settings, kept),
             intrinsics=lambda: self.intrinsics,
+            images_known=self.has_images,
         )
         simulated = camera.simulation is not None
         twin = partial(twin_of, camera, settings.camera) if simulated else None
@@ -218,6 +222,11 @@ class Service:
         return tuple(each.describe(self.camera.capabilities, self.applied) for each in channels)
 
     @property
+    def has_images(self) -> bool:
+        """Whether frames have images, and not their moments alone."""
+        return self.relay is None or self.relay.has_images
+
+    @property
     def watched(self) -> bool:
         """Whether frames are sent to a client or recorded."""
         recorded = self.recordings.active_id is not None
@@ -267,8 +276,9 @@ class Service:
         Raises
         ------
         Problem
-            As `Library.start`.
+            As `Library.start`; ``only-moments`` without images.
         """
+        self.require_images("Images are recorded")
         if not history_s:
             return await asyncio.to_thread(self.recordings.start, options)
         # it waits for its past, also where the client is gone
@@ -314,15 +324,45 @@ class Service:
         Raises
         ------
         Problem
-            ``estimator-misfit`` where the estimator needs other frequencies than there are.
+            ``estimator-misfit`` where the estimator needs other frequencies than there are,
+            ``only-moments`` for what is done with images that this service does not have.
         """
         require_estimator(settings, self.applied.sequence, field="estimator")
+        if settings != self._of_origin(settings):
+            self.require_images("What becomes of spoilt images is set")
+        return self._reconstruct_with(settings)
+
+    def _reconstruct_with(self, settings: ReconstructionSettings) -> SettingsVersion:
         before = self.pipeline.reconstruction
         now = self.pipeline.reconstruction = before.followed_by(settings)
         if now is not before:
             self.planner.reconstruct_with(settings)
             self.hub.notify("reconstruction-changed", {"reconstruction": now.to_document()})
         return now
+
+    def _of_origin(self, settings: ReconstructionSettings) -> ReconstructionSettings:
+        """Return settings with what the origin of moments has done before they come here."""
+        if self.relay is None or self.has_images:
+            return settings
+        return settings.model_copy(update={"spoilt_images": self.relay.origin.spoilt_images})
+
+    def require_images(self, done: str) -> None:
+        """Refuse what needs images, where this service relays moments alone.
+
+        ``done`` says what, for a sentence that goes on with "at the origin".
+
+        Raises
+        ------
+        Problem
+            ``only-moments``, with the address of the origin.
+        """
+        if self.relay is not None and not self.has_images:
+            url = self.relay.url
+            raise Problem(
+                kinds.ONLY_MOMENTS,
+                f"{done} at the origin, {url}: only moments come from there.",
+                origin=url,
+            )
 
     def _happened(self, event: Event) -> None:
         for observer in self.observers:
@@ -343,6 +383,7 @@ class Service:
                 self.hub.notify("light-released", {})
             case OriginChanged():
                 self._adopt_calibration()
+                self._reconstruct_with(self._of_origin(self.pipeline.reconstruction.settings))
             case SequenceChanged(applied):
                 before, self.applied = self.applied, applied
                 self._notify_sequence_changed()
@@ -434,6 +475,11 @@ def _log_failure(stopped: Future[None]) -> None:
 def _calibration(camera: Camera, settings: Settings, kept: CalibrationStore) -> Calibration | None:
     """Load the calibration that is given, or was active last; refuse one of another camera."""
     path = settings.calibration
+    if path is not None and isinstance(camera, RelayCamera) and not camera.has_images:
+        raise CalibrationError(
+            f"moments are calibrated at {camera.url}: leave out the setting calibration, or relay "
+            "product=raw"
+        )
     if path is None and isinstance(camera, RelayCamera):
         if camera.origin.calibration is not None:
             kept.keep(camera.origin.calibration.capture)

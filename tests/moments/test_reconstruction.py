@@ -360,3 +360,32 @@ def test_a_pixel_without_light_has_neither_range_nor_deviation_by_the_likelihood
     for plane in (found.range_m, found.range_std_m, found.reduced_chi_square):
         assert np.isnan(plane[[3, 5], [4, 5]]).all()
         assert np.isfinite(plane).sum() == b[0].size - 2
+
+
+@pytest.mark.parametrize("estimator", ["pisarenko", "likelihood", "maximum-entropy"])
+def test_moments_as_measured_give_what_their_images_gave(estimator: str) -> None:
+    m, takes = 2, 3
+    rng = np.random.default_rng(1)
+    images = rng.integers(200, 3000, (takes * 4 * (m + 1), *SHAPE)).astype(np.uint16)
+    images[5, 2, 3] = 4095  # saturated
+    bad = np.zeros(SHAPE, bool)
+    bad[4, 4] = True
+    gains = rng.uniform(0.5, 1.0, (m + 1, *SHAPE)).astype(np.complex64)
+    settings = tm.Settings(
+        FREQUENCY_HZ,
+        zeroth="low-frequency",
+        takes=takes,
+        estimator=estimator,
+        full_scale=4095.0,
+        spoilt_images="keep",
+        sensor=tm.noise.Sensor(),
+    )
+    reconstructor = tm.Reconstructor(settings, calibration=gains, bad_pixels=bad)
+    ours = reconstructor(images)
+    saturated = np.asarray(ours.flags & tm.Flags.SATURATED, bool)
+    assert saturated[2, 3]
+
+    again = reconstructor.of_measured(np.array(ours.measured), saturated_pixels=saturated)
+
+    for name in ("measured", "smoothed", "moments", "flags", "validity", "range_m", "direct"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(ours, name), err_msg=name)

@@ -83,6 +83,13 @@ PRODUCTS: Final[dict[str, Product]] = {
             "E in DN, then Re and Im of a_1 to a_m (Eq. 2; a_0 is 1)",
         ),
         Product("moments", "DN", ("moment", *_IMAGE), "<c8", "calibrated moments b_0 to b_m"),
+        Product(
+            "measured_moments",
+            "DN",
+            ("moment", *_IMAGE),
+            "<c8",
+            "calibrated moments b_0 to b_m before smoothing and biasing",
+        ),
         Product("raw", "DN", ("image", *_IMAGE), "<u2", "images of the sensor, each labelled"),
         Product("transient", "DN/s", ("time", *_IMAGE), "<f4", "density over time of flight"),
         Product(

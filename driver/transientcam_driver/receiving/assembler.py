@@ -52,6 +52,11 @@ class RawFrame:
     hops: tuple[Hop, ...] = ()
 
     @property
+    def size_bytes(self) -> int:
+        """What a frame takes in memory, but for a few hundred bytes."""
+        return self.images.nbytes
+
+    @property
     def by_take(self) -> NDArray[np.uint16]:
         """The images as (takes, images a take, H, W), in whichever order they were captured."""
         takes = self.labels[-1].take + 1

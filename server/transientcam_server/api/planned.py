@@ -81,10 +81,22 @@ async def require_plannable(service: Service, address: str) -> None:
         raise
 
 
+def require_scene(service: Service) -> None:
+    """Refuse to look at the scene of a service that has no images to do it by.
+
+    Raises
+    ------
+    Problem
+        ``only-moments``.
+    """
+    if service.looks.needs_frame:
+        service.require_images("The scene is seen")
+
+
 async def _takes(service: Service, address: str) -> list[dict[str, Any]]:
     """Return what takes give; nothing where no frame or no noise is known."""
     frame = service.hub.latest
-    if frame is None or frame.recipe.sensor is None:
+    if frame is None or frame.recipe.sensor is None or not service.has_images:
         return []
     async with service.planning.place_of(address):
         predicted, _ = await service.workers.run_long(

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from transientcam.cli.findings import Reported, absent_in_words
 from transientcam_driver import DriverError, open_camera
 from transientcam_server.imaging.requirements import absent_products
+from transientcam_server.relay import RelayCamera
 
 
 def checks(spec: str) -> Iterator[Reported]:
@@ -15,10 +16,13 @@ def checks(spec: str) -> Iterator[Reported]:
     try:
         with open_camera(spec) as camera:
             capabilities, simulated = camera.capabilities, camera.simulation is not None
+            images_known = not isinstance(camera, RelayCamera) or camera.has_images
     except DriverError as error:
         yield "fault", "products", f"what the camera can do cannot be read: {error}", None
         return
     # a daemon has the sensor's figures from the simulation or from its settings, never none
-    absent = absent_products(capabilities, truth_known=simulated, noise_known=True)
+    absent = absent_products(
+        capabilities, truth_known=simulated, noise_known=True, images_known=images_known
+    )
     for message in absent_in_words(absent):
         yield "ok", "products", message, None

@@ -82,6 +82,14 @@ NOT_SIMULATED: Final = ProblemKind(
     "The request is about the simulated scene of a simulated camera, and this camera is a real "
     "one.",
 )
+ONLY_MOMENTS: Final = ProblemKind(
+    "only-moments",
+    409,
+    "Moments alone",
+    "This service relays the moments of another one, without the images they are of. What needs "
+    "images, or is done with them before there are moments, is to be requested at `origin`; or "
+    "relay it with `product=raw`.",
+)
 UNKNOWN_RECORDING: Final = ProblemKind(
     "unknown-recording",
     404,

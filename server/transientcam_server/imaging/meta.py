@@ -3,9 +3,11 @@
 from dataclasses import asdict
 from typing import Any
 
+import transientcam_moments as tm
 from transientcam_driver import RawFrame
 from transientcam_server.imaging.accuracy import RangeAccuracy
 from transientcam_server.imaging.calibration import calibration_id
+from transientcam_server.imaging.moment_frame import OF_IMAGES, MomentFrame
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.imaging.stages import Computed
 
@@ -41,14 +43,20 @@ def frame_meta(
         "temperature_c": raw.temperature_c,
         "lost_images": raw.lost_images,
         "hops": [asdict(hop) for hop in raw.hops],
-        "rejected_images": None if found is None else found.rejected_images,
-        "repaired_images": None if found is None else found.repaired_images,
-        "unrepaired_images": None if found is None else found.unrepaired_images,
-        "filled_images": None
-        if found is None
-        else [raw.index_of(take, place) for take, place in found.filled_images],
+        **_of_images(raw, found),
         "corrected_pixels": None if found is None else found.corrected_pixels,
         "pixels": computed.pixels,
         "predicted_range_std_m": computed.range_noise,
         "accuracy": None if accuracy is None else accuracy.to_document(),
     }
+
+
+def _of_images(raw: RawFrame, found: tm.Reconstruction | None) -> dict[str, Any]:
+    """Return what was done to the images before they became moments."""
+    if isinstance(raw, MomentFrame):
+        return dict(raw.treated)
+    if found is None:
+        return dict.fromkeys(OF_IMAGES)
+    filled = [raw.index_of(take, place) for take, place in found.filled_images]
+    counts = found.rejected_images, found.repaired_images, found.unrepaired_images, filled
+    return dict(zip(OF_IMAGES, counts, strict=True))

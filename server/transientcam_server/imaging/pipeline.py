@@ -48,7 +48,8 @@ class Pipeline:
     """Makes frames of the captures of one camera; on the event loop.
 
     From ``sensor``, where it is known, the deviation of each frame's range is predicted.
-    ``intrinsics`` returns where the pixels of the next frame look.
+    ``intrinsics`` returns where the pixels of the next frame look. ``images_known`` says whether
+    captures have images, and not their moments alone (`MomentFrame`).
 
     Attributes
     ----------
@@ -71,6 +72,7 @@ class Pipeline:
         sensor: tm.noise.Sensor | None = None,
         calibration: Calibration | None = None,
         intrinsics: Callable[[], Intrinsics] | None = None,
+        images_known: bool = True,
     ) -> None:
         self.workers = workers
         self.calibration = calibration
@@ -88,6 +90,7 @@ class Pipeline:
             camera.capabilities,
             truth_known=self._truth is not None,
             noise_known=sensor is not None,
+            images_known=images_known,
         )
         self.products: dict[str, Product] = {
             name: product for name, product in PRODUCTS.items() if name not in self.absent

@@ -321,6 +321,7 @@ PRODUCTS: Final[dict[str, Product]] = {
             of_toeplitz=True,
         ),
         Product(_WIRE["moments"], "moments", _property("moments"), fields=_frequencies),
+        Product(_WIRE["measured_moments"], "moments", _property("measured"), fields=_frequencies),
         Product(_WIRE["raw"], "raw", _images, fields=_labels, archive=_evaluation),
         Product(
             _WIRE["transient"],

@@ -16,6 +16,7 @@ from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.calibration import FACTORY_ID, Gains, nominal_gains
 from transientcam_server.imaging.lens import ASSUMED_FIELD_OF_VIEW_DEG, Intrinsics
+from transientcam_server.imaging.moment_frame import MomentFrame
 from transientcam_server.settings import ReconstructionSettings
 
 _log = logging.getLogger(__name__)
@@ -239,6 +240,10 @@ class Recipe:
         ``previous``, where it has the same sequence, is what spoilt images are filled in from;
         ``spread`` is how compiled lanes use several threads.
         """
+        if isinstance(raw, MomentFrame):
+            return self._reconstructor.of_measured(
+                raw.moments, saturated_pixels=raw.saturated, spread=spread
+            )
         before = None if previous is None or previous.epoch != raw.epoch else _in_turn(previous)
         return self._reconstructor(_in_turn(raw), previous=before, spread=spread)
 

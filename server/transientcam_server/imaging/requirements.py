@@ -8,7 +8,7 @@ from transientcam_server.imaging.recipe import listed
 
 
 def absent_products(
-    capabilities: Capabilities, *, truth_known: bool, noise_known: bool
+    capabilities: Capabilities, *, truth_known: bool, noise_known: bool, images_known: bool
 ) -> dict[str, str]:
     """Return the products that frames of a camera do not have, each with the reason.
 
@@ -18,11 +18,15 @@ def absent_products(
         Whether a simulation knows the true range.
     noise_known
         Whether the noise of the sensor is known.
+    images_known
+        Whether they have images, and not their moments alone.
     """
 
     def lacks(product: Product) -> str | None:
         if product.needs == "truth" and not truth_known:
             return "only a simulated camera knows the true range"
+        if product.needs == "raw" and not images_known:
+            return "this service relays moments alone, without the images they are of"
         if product.of_noise and not noise_known:
             return "the noise of this camera's sensor is not known"
         return unmet(product, capabilities.sampling, capabilities.zeroths)

@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any, Final
 
-import numpy as np
-
 import transientcam
 from transientcam_driver import (
     AppliedSequence,
@@ -23,6 +21,8 @@ from transientcam_driver import (
 )
 from transientcam_driver.clock import Clock, RealClock
 from transientcam_driver.host_camera import HostCamera
+from transientcam_server.imaging.calibration import NOMINAL_ID
+from transientcam_server.relay.frames import RAW, SUBSCRIBED, Collector, Parts, capture_of
 from transientcam_server.relay.origin import Described, Origin, require_same_camera
 from transientcam_server.relay.reports import RelayCounters, hops_of, status_of
 
@@ -55,7 +55,8 @@ class RelayCamera(HostCamera):
     Raises
     ------
     CameraLost
-        The origin does not answer, is too old, or relays this very service.
+        The origin does not answer, is too old, lacks what is to be relayed, or relays this very
+        service.
     """
 
     def __init__(
@@ -78,6 +79,7 @@ class RelayCamera(HostCamera):
         self._device_time_s = 0.0
         self._switched_on = False
         self._outdated = False
+        self._former_id: str | None = None
         self._gone: str | None = None
         self._heard_s = 0.0
         try:
@@ -97,6 +99,16 @@ class RelayCamera(HostCamera):
     def url(self) -> str:
         """Address of the origin."""
         return self._link.url
+
+    @property
+    def product(self) -> str:
+        """What is relayed: ``raw`` or ``measured_moments``."""
+        return self._link.product
+
+    @property
+    def has_images(self) -> bool:
+        """Whether frames have images, and not their moments alone."""
+        return self.product == RAW
 
     def device_time_s(self) -> float:
         """Time of the last frame, by the clock of the device."""
@@ -194,6 +206,7 @@ class RelayCamera(HostCamera):
         self._adopt(found.sequence)
         start = None if self._last is None else self._last + 1
         self._stream = self._link.stream(start=start, on_notice=self._noticed)
+        self._collector = Collector(SUBSCRIBED[self._link.product])
         self._state = CameraState.IDLE
         self._ask()
 
@@ -265,10 +278,16 @@ class RelayCamera(HostCamera):
         match notice.kind:
             case "camera-lost":
                 self._gone = f"the origin has lost its camera: {notice.details.get('reason')}"
-            case "calibration-changed" | "simulation-changed":
+            case "calibration-changed" | "simulation-changed" | "reconstruction-changed":
                 self._outdated = True
-            case "dropped":
+            case "dropped" if notice.details["channel"] == self._counted:
                 self.relayed.dropped_frames += int(notice.details["count"])
+
+    @property
+    def _counted(self) -> int | None:
+        """The channel whose frames are counted: all products of one are dropped together."""
+        hello = None if self._stream is None else self._stream.hello
+        return None if hello is None else hello.channels[0].channel
 
     def _receive(self, timeout_s: float) -> RawFrame | None:
         """Return the next frame of the sequence that is set, None if none came in time."""
@@ -287,38 +306,71 @@ class RelayCamera(HostCamera):
             if stream.hello.server.get("service_id") != self.origin.service_id:
                 raise self._lost("the origin was started anew")
             self._adopt(stream.sequence)
-        return None if frame is None else self._raw(frame)
-
-    def _raw(self, frame: transientcam.Frame) -> RawFrame | None:
-        meta, applied = frame.meta, self._applied
-        missed = 0 if self._last is None else max(0, frame.frame - self._last - 1)
-        self._last, self._heard_s = frame.frame, self._clock.now_s()
-        self.relayed.missed_frames += missed
-        if meta["sequence_id"] != self._sequence_id:  # of one that was replaced
+        if frame is None:
             return None
-        expected = applied.images, self._capabilities.height, self._capabilities.width
-        if frame.array.shape != expected or frame.array.dtype != np.uint16:
-            self._lost("")
-            raise ProtocolError(f"raw images {frame.array.shape}, {expected} expected")
-        self._device_time_s = meta["device_time_s"]
+        self._heard_s = self._clock.now_s()
+        parts = self._collector.add(frame)
+        return None if parts is None else self._capture(parts)
+
+    def _capture(self, parts: Parts) -> RawFrame | None:
+        frame = next(iter(parts.values()))
+        meta, applied = frame.meta, self._applied
+        replaced = meta["sequence_id"] != self._sequence_id
+        if not (replaced or self.has_images or self._calibrated_alike(meta["calibration_id"])):
+            return None  # counted as missed with the next one
+        missed = 0 if self._last is None else max(0, frame.frame - self._last - 1)
+        self._last = frame.frame
+        self.relayed.missed_frames += missed
+        if replaced:
+            return None
         lost = meta["lost_images"] + missed * applied.images
+        try:
+            capture = capture_of(
+                parts,
+                height=self._capabilities.height,
+                width=self._capabilities.width,
+                moments=1 + applied.sequence.harmonics,
+                number=self._added + frame.frame,
+                epoch=applied.epoch,
+                labels=applied.labels,
+                device_time_s=meta["device_time_s"],
+                host_time_s=meta["host_time_s"],
+                capture_s=meta["capture_s"],
+                temperature_c=meta["temperature_c"],
+                lost_images=lost,
+                hops=hops_of(
+                    meta,
+                    service_id=self.service_id,
+                    now_unix_s=self._unix_time_s(),
+                    missed_frames=self.relayed.missed_frames,
+                ),
+            )
+        except ProtocolError:
+            self._lost("")
+            raise
+        self._device_time_s = meta["device_time_s"]
         self.counters.frames += 1
         self.counters.images += applied.images
         self.counters.lost += lost
-        return RawFrame(
-            number=self._added + frame.frame,
-            epoch=applied.epoch,
-            images=frame.array,
-            labels=applied.labels,
-            device_time_s=meta["device_time_s"],
-            host_time_s=meta["host_time_s"],
-            capture_s=meta["capture_s"],
-            temperature_c=meta["temperature_c"],
-            lost_images=lost,
-            hops=hops_of(
-                meta,
-                service_id=self.service_id,
-                now_unix_s=self._unix_time_s(),
-                missed_frames=self.relayed.missed_frames,
-            ),
-        )
+        return capture
+
+    def _calibrated_alike(self, calibration_id: str) -> bool:
+        """Return whether moments have the calibration that is known here; another is asked for.
+
+        Those of a former one, which the origin still keeps, do not: their gains and bad pixels are
+        not known any more.
+        """
+        if calibration_id != self._calibration_id and (
+            self._outdated or calibration_id != self._former_id
+        ):
+            self._former_id = calibration_id  # unless it is the new one
+            self._refresh()
+        return calibration_id == self._calibration_id
+
+    @property
+    def _calibration_id(self) -> str:
+        """What frames of the origin say that they are calibrated by."""
+        calibration = self.origin.calibration
+        if calibration is None or calibration.capture.misfit(self._applied, self._capabilities):
+            return NOMINAL_ID
+        return calibration.gains.id

@@ -22,8 +22,11 @@ from transientcam_server.imaging.calibration import (
     Calibration,
     load_calibration,
 )
+from transientcam_server.relay.frames import RAW, SUBSCRIBED
+from transientcam_server.settings import SpoiltImages
 
 _CAPABILITIES: Final = TypeAdapter(Capabilities)
+_SPOILT_IMAGES: Final[TypeAdapter[SpoiltImages]] = TypeAdapter(SpoiltImages)
 _SENSOR: Final = TypeAdapter(tm.noise.Sensor)
 _CREDITS: Final = 2
 """One frame travels while another is taken: more would only make frames older."""
@@ -47,6 +50,8 @@ class Described:
         That is captured: the document of ``GET /sequence``.
     calibration
         That is active there; None for nominal gains.
+    spoilt_images
+        What becomes there of images that lost their synchronisation.
     """
 
     service_id: str
@@ -58,6 +63,7 @@ class Described:
     intrinsics: Mapping[str, Any]
     sequence: Mapping[str, Any]
     calibration: Calibration | None
+    spoilt_images: SpoiltImages
 
 
 class Origin:
@@ -74,9 +80,19 @@ class Origin:
         What authenticates this relay there; None where none is required.
     timeout_s
         For a connection, and for each answer.
+    product
+        What is relayed: a key of `SUBSCRIBED`.
+
+    Attributes
+    ----------
+    product
+        As given.
     """
 
-    def __init__(self, url: str, token: str | None, *, timeout_s: float) -> None:
+    def __init__(
+        self, url: str, token: str | None, *, timeout_s: float, product: str = RAW
+    ) -> None:
+        self.product = product
         self._client = transientcam.Camera(url, token=token, timeout_s=timeout_s)
         self._lease: Lease | None = None
 
@@ -90,7 +106,7 @@ class Origin:
         with self._answering():
             info, camera = self._client.info, self._client.camera
             try:
-                return Described(
+                described = Described(
                     service_id=str(info["service_id"]),
                     path=tuple(map(str, info["path"])),
                     version=str(info["version"]),
@@ -100,7 +116,11 @@ class Origin:
                     intrinsics=camera["intrinsics"],
                     sequence=self._client.sequence,
                     calibration=self._calibration(),
+                    spoilt_images=_SPOILT_IMAGES.validate_python(
+                        info["reconstruction"]["spoilt_images"]
+                    ),
                 )
+                self._require_products(info)
             except KeyError as error:
                 reason = (
                     f"{self.url} runs transientcam {info.get('version', 'of an unknown version')}, "
@@ -111,6 +131,7 @@ class Origin:
                 first = error.errors()[0]
                 place = ".".join(map(str, first["loc"]))
                 raise CameraLost(f"{self.url} states {place} = {first['input']!r}") from error
+            return described
 
     def camera(self) -> dict[str, Any]:
         """Return the document of its camera."""
@@ -118,8 +139,10 @@ class Origin:
             return self._client.camera
 
     def stream(self, *, start: int | None, on_notice: NoticeHandler) -> Stream:
-        """Return a stream of raw images, from the frame ``start`` on where that is kept."""
-        return self._client.stream("raw", credits=_CREDITS, start=start, on_notice=on_notice)
+        """Return a stream of what is relayed, from the frame ``start`` on where that is kept."""
+        return self._client.stream(
+            *SUBSCRIBED[self.product], credits=_CREDITS, start=start, on_notice=on_notice
+        )
 
     def configure(self, sequence: Mapping[str, Any]) -> dict[str, Any]:
         """Set a sequence, and return it as it was really set."""
@@ -155,6 +178,15 @@ class Origin:
         """Close every connection; the origin goes on."""
         self.release_lease()
         self._client.close()
+
+    def _require_products(self, info: Mapping[str, Any]) -> None:
+        """Refuse an origin whose frames lack what is to be relayed."""
+        there = {each["name"] for each in info["products"]}
+        absent = {each["name"]: each["reason"] for each in info["absent_products"]}
+        for name in SUBSCRIBED[self.product]:
+            if name not in there:
+                why = absent.get(name, "it is too old, update it")
+                raise CameraLost(f"{self.url} has no {name}: {why}")
 
     def _calibration(self) -> Calibration | None:
         active = self._client.calibrations.active()

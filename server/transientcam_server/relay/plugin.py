@@ -10,6 +10,7 @@ from transientcam.transport import parse_address
 from transientcam_driver import Camera, CameraName, CameraPlugin, SpecError
 from transientcam_driver.clock import Clock
 from transientcam_server.relay.camera import RelayCamera
+from transientcam_server.relay.frames import SUBSCRIBED
 from transientcam_server.relay.origin import Origin
 
 TOKEN_VARIABLE: Final = "TRANSIENTCAM_RELAY_TOKEN"  # noqa: S105 - the name of a variable
@@ -24,14 +25,15 @@ def _address(name: CameraName) -> str:
     SpecError
         Naming the part that is not valid.
     """
-    if name.options.get("product", "raw") == "coefficients":
+    if name.options.get("product") == "coefficients":
         reason = (
-            "product = 'coefficients': must be raw: calibration, noise and every other product are "
-            "computed of raw images, and cannot be of coefficients, which would take 88 % of the "
-            "bytes (m = 3), or half of them in 16 bits"
+            "product = 'coefficients': must be raw or measured_moments: coefficients come behind "
+            "smoothing and biasing, which the likelihood and the flags are computed without; "
+            "measured_moments takes about as many bytes, and everything but images is computed of "
+            "it"
         )
         raise SpecError(name.spec, reason)
-    name.choice("product", ("raw",))
+    name.choice("product", tuple(SUBSCRIBED))
     if not name.address:
         raise SpecError(name.spec, "it names no service, as in relay:http://lab:8000")
     try:
@@ -66,7 +68,10 @@ def _token(name: CameraName, environment: Mapping[str, str]) -> str | None:
 def _open(name: CameraName, clock: Clock) -> Camera:
     url, token = _address(name), _token(name, os.environ)
     origin = Origin(
-        url, token, timeout_s=name.number("timeout_s", TIMEOUT_S, least=0.1, most=600.0)
+        url,
+        token,
+        timeout_s=name.number("timeout_s", TIMEOUT_S, least=0.1, most=600.0),
+        product=name.choice("product", tuple(SUBSCRIBED)),
     )
     return RelayCamera(origin, clock=clock)
 
@@ -83,7 +88,7 @@ PLUGIN: Final = CameraPlugin(
     open=_open,
     check=_check,
     options={
-        "product": "raw, which all others are computed of",
+        "product": "raw, or measured_moments: fewer bytes of several takes, and no images",
         "token_file": f"a file with the origin's token; without it {TOKEN_VARIABLE}",
         "timeout_s": f"for each answer of the origin, {TIMEOUT_S:g} s without it",
     },

@@ -1,12 +1,5 @@
-"""Ctrl-C in a terminal while `transientcam ... --workers N` computes."""
+"""Ctrl-C in a terminal while `transientcam reconstruct ... --workers N` computes."""
 
-import os
-import signal
-import subprocess
-import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import distributed
@@ -14,6 +7,7 @@ import numpy as np
 import pytest
 import zarr
 
+from tests.interrupting import Hold, interrupt
 from tests.server.recording.made import record
 from transientcam_server.offline import BatchOptions, job, reconstruct_recording
 from transientcam_server.offline.cluster import COUNTING, MISSING, reconstruct_on
@@ -22,44 +16,12 @@ from transientcam_server.recording import Recording
 
 FRAMES = 2 * BLOCK_FRAMES + 4
 OPTIONS = BatchOptions(("range",))
-COMMAND = [sys.executable, "-c", "from transientcam.cli import main; main()"]
-HOLD = """
-import os, time
-from transientcam_server.offline import cluster
-
-real = cluster.computed
-
-def computed(job, first, last):
-    while first >= cluster.BLOCK_FRAMES:  # tasks behind the first never end by themselves
-        time.sleep(0.05)
-    return real(job, first, last)
-
-def dask_setup(worker):
-    cluster.computed = computed
-    print(os.getpid(), flush=True)
-"""
+HOLD = Hold(
+    "transientcam_server.offline.cluster",
+    "computed",
+    f"lambda job, first, last: first >= {BLOCK_FRAMES}",  # tasks behind the first
+)
 pytestmark = pytest.mark.usefixtures("zarr_clients")
-
-
-@contextmanager
-def in_a_terminal(
-    *arguments: str, environment: dict[str, str]
-) -> Iterator["subprocess.Popen[str]"]:
-    """Run a command in a process group of its own, as a shell does."""
-    process = subprocess.Popen(
-        [*COMMAND, *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment,
-        start_new_session=True,
-    )
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
 
 
 def there(store: Path) -> int:
@@ -77,24 +39,13 @@ def test_ctrl_c_ends_the_workers_and_leaves_a_store_to_go_on_with(
     monkeypatch.setenv("TRANSIENTCAM_KERNELS", "off")  # all is compared on NumPy
     monkeypatch.setattr(job, "_load_lanes", lambda *_: None)
     source, store = record(tmp_path / "a.h5", FRAMES), tmp_path / "a.zarr"
-    hold = tmp_path / "hold.py"
-    hold.write_text(HOLD)
-    environment = os.environ | {"DASK_DISTRIBUTED__WORKER__PRELOAD": str([str(hold)])}
-    reconstruct = ["reconstruct", str(source), "--product", "range"]
-    with in_a_terminal(
-        *reconstruct, "-o", str(store), "--workers", "2", environment=environment
-    ) as process:
-        while there(store) < BLOCK_FRAMES:
-            assert process.poll() is None, process.communicate()
-            time.sleep(0.05)
-        os.killpg(process.pid, signal.SIGINT)
-        said, _ = process.communicate()
-        assert process.returncode == 130
-    workers = [int(each) for each in said.split()]
+    interrupt(
+        tmp_path,
+        *("reconstruct", str(source), "--product", "range", "-o", str(store)),
+        hold=HOLD,
+        once=lambda: there(store) >= BLOCK_FRAMES,
+    )
 
-    assert len(workers) == 2
-    for worker in workers:
-        assert not Path(f"/proc/{worker}").exists()
     with (
         distributed.LocalCluster(
             n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"

@@ -18,8 +18,8 @@ from transientcam_server.relay.reports import hops_of
     [
         ("relay:", "names no service"),
         ("relay:ftp://lab:8000", "ftp"),
-        ("relay:http://lab:8000?product=coefficients", "computed of raw images"),
-        ("relay:http://lab:8000?product=range", "must be one of|raw"),
+        ("relay:http://lab:8000?product=coefficients", "measured_moments takes"),
+        ("relay:http://lab:8000?product=range", "raw, measured_moments"),
         ("relay:http://lab:8000?token_file=/nowhere/token", "token_file cannot be read"),
         ("relay:http://lab:8000?timeout_s=0", "timeout_s"),
     ],

@@ -48,6 +48,8 @@ class CameraDocument(Document):
         version: str
         role: Literal["viewer", "operator", "admin"]
         """What this relay may do there; a viewer's token changes nothing."""
+        product: Literal["raw", "measured_moments"]
+        """What comes from there: images, or their moments alone."""
         missed_frames: int
         """Frames that the origin captured and this relay never got, since it began; those across a
         restart of the origin are not known."""

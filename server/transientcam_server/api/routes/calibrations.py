@@ -37,6 +37,7 @@ from transientcam_server.service import Service
 router = APIRouter(tags=["calibrations"])
 
 IMPORT: Final = "/calibrations/import"
+_CALIBRATED: Final = "Moments are calibrated"
 _PIECE_BYTES: Final = 1024 * 1024
 NPZ: Final = "application/octet-stream"
 _Calibration = Annotated[
@@ -123,6 +124,7 @@ async def read_active_calibration(service: ServiceOf) -> ActiveDocument:
         kinds.UNKNOWN_CALIBRATION,
         kinds.CALIBRATION_MISFIT,
         kinds.CALIBRATION_DOUBTED,
+        kinds.ONLY_MOMENTS,
         kinds.INVALID_CALIBRATION,
     ),
 )
@@ -133,6 +135,7 @@ async def activate_calibration(service: ServiceOf, wanted: ActivationRequest) ->
     not measured on a diffusor, unless `force` is set. Streams are sent a
     `calibration-changed` notice, and each frame carries the id of its calibration.
     """
+    service.require_images(_CALIBRATED)
     await service.calibrations.activate(wanted.id, lambda: service.applied, force=wanted.force)
     return _active(service)
 
@@ -145,10 +148,12 @@ async def activate_calibration(service: ServiceOf, wanted: ActivationRequest) ->
         kinds.CALIBRATION_MISFIT,
         kinds.INVALID_CALIBRATION,
         kinds.NO_FORMER_CALIBRATION,
+        kinds.ONLY_MOMENTS,
     ),
 )
 async def restore_calibration(service: ServiceOf) -> ActiveDocument:
     """Calibrate frames by what was active before the present calibration; again, and it returns."""
+    service.require_images(_CALIBRATED)
     await service.calibrations.restore(lambda: service.applied)
     return _active(service)
 

@@ -47,6 +47,7 @@ def _origin(relay: RelayCamera | None) -> CameraDocument.OriginDocument | None:
             "service_id": found.service_id,
             "version": found.version,
             "role": found.role,
+            "product": relay.product,
             **asdict(relay.relayed),
         }
     )

@@ -26,6 +26,7 @@ _REFUSALS: Final = (
     kinds.INVALID_REQUEST,
     kinds.INVALID_SEQUENCE,
     kinds.TARGET_UNREACHABLE,
+    kinds.ONLY_MOMENTS,
     kinds.NO_FRAME_YET,
     kinds.SHUTTING_DOWN,
     kinds.PLANNING_BUSY,
@@ -75,6 +76,8 @@ async def _work(
 ) -> planned.Work[PlanDocument]:
     """Return what makes the plan; a goal that cannot be meant or planned is refused at once."""
     await planned.require_plannable(service, planned.address_of(http))
+    if request.scene is None:
+        planned.require_scene(service)
     return partial(_made, service, request, _goal(service, request), planned.address_of(http))
 
 

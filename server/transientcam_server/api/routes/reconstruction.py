@@ -59,6 +59,7 @@ async def read_reconstruction(
         kinds.BAD_REQUEST,
         kinds.INVALID_REQUEST,
         kinds.ESTIMATOR_MISFIT,
+        kinds.ONLY_MOMENTS,
         kinds.RECONSTRUCTION_CHANGED,
     )
     | etags.CHANGING,

@@ -61,6 +61,7 @@ async def read_recordings(service: ServiceOf) -> RecordingsDocument:
         kinds.BAD_REQUEST,
         kinds.RECORDING_RUNS,
         kinds.CAMERA_BUSY,
+        kinds.ONLY_MOMENTS,
         kinds.INVALID_REQUEST,
         kinds.RECORDING_NOT_STORED,
     ),

@@ -27,6 +27,7 @@ KIND: Final = "tradeoff"
 _REFUSALS: Final = (
     kinds.INVALID_REQUEST,
     kinds.TARGET_UNREACHABLE,
+    kinds.ONLY_MOMENTS,
     kinds.NO_FRAME_YET,
     kinds.SHUTTING_DOWN,
     kinds.PLANNING_BUSY,
@@ -75,6 +76,7 @@ async def start_tradeoff(
 
 async def _work(service: Service, by: str, http: Request) -> planned.Work[TradeoffDocument]:
     await planned.require_plannable(service, planned.address_of(http))
+    planned.require_scene(service)
     return partial(_made, service, by, planned.address_of(http))
 
 
