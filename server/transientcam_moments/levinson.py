@@ -26,7 +26,7 @@ from transientcam_moments._arrays import (
     squared,
 )
 from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import Spread, on_threads
+from transientcam_moments._lanes.parallel import on_threads
 from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 
@@ -115,14 +115,9 @@ def levinson(
     -----
     Theorem 1 and Eq. (2) of the paper; the recursion is Levinson's and Durbin's.
     """
-    return solved(b, brightness, on_threads(threads))
-
-
-def solved(b: Array, brightness: Array | None, spread: Spread) -> Coefficients:
-    """Do as `levinson` does; ``spread`` is how a compiled lane uses several threads."""
     planes, trailing = moment_planes(b)
     given = () if brightness is None else (_flat(brightness, trailing),)
-    error, polynomial, reflection = _coefficients(planes, *given, spread=spread)
+    error, polynomial, reflection = _coefficients(planes, *given, spread=on_threads(threads))
     return Coefficients(
         error.reshape(trailing),
         polynomial.reshape((polynomial.shape[0], *trailing)),

@@ -7,9 +7,9 @@ from transientcam_moments._arrays import (
     Array,
 )
 from transientcam_moments._kernels.one_pass import Planes
-from transientcam_moments._lanes.parallel import Spread, at_once, on_threads
+from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments.flags import Flags
-from transientcam_moments.levinson import Coefficients, solved
+from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.pisarenko import (
     Returns,
 )
@@ -77,9 +77,7 @@ class PassedReconstruction(Reconstruction):
     @cached_property
     def coefficients(self) -> Coefficients:
         """Coefficients of the maximum entropy density; no biased moments are made for them."""
-        # in one part where nothing else was asked for, this thread's own choice holds
-        spread = on_threads(None) if self._spread is at_once else self._spread
-        return solved(self.smoothed, self.brightness, spread)
+        return levinson(self.smoothed, brightness=self.brightness)
 
     @property
     def _shape(self) -> tuple[int, tuple[int, ...]]:
