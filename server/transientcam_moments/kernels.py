@@ -15,7 +15,7 @@ written to) not at all.
 
 `density`, `levinson`, `pisarenko` and `reconstruct` use all cores, or as many threads as their
 ``threads`` says. A program that makes such calls on threads of its own calls `use_one_thread` on
-each of these.
+each of these, and `use_all_cores` for what is urgent.
 """
 
 import threading
@@ -36,6 +36,7 @@ from transientcam_moments._lanes.parallel import (
     at_once,
     over,
     over_all_cores,
+    use_all_cores,
     use_one_thread,
 )
 from transientcam_moments._lanes.registry import PRECISION_NAMES, REGISTRY, Key, Lane
@@ -56,6 +57,7 @@ __all__ = [
     "over_all_cores",
     "ready",
     "state",
+    "use_all_cores",
     "use_one_thread",
 ]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import CACHE, lanes, without_lanes
-from transientcam_moments._lanes import automatic
+from transientcam_moments._lanes import automatic, parallel
 from transientcam_moments._lanes.helper import Helper
 from transientcam_moments._lanes.parallel import _cores, on_threads
 from transientcam_moments._lanes.registry import HEAVY_PIXELS, REGISTRY, Key
@@ -181,19 +181,25 @@ def test_less_than_one_thread_is_refused(call: Callable[[object], object], threa
         call(threads)
 
 
-def test_a_worker_uses_no_other_thread_unless_it_says_so() -> None:
+def test_a_worker_uses_no_other_thread_unless_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     found: list[object] = []
 
     def work() -> None:
         tm.kernels.use_one_thread()
         found.extend((on_threads(None), on_threads(3)))
+        with tm.kernels.use_all_cores():
+            monkeypatch.setattr(parallel, "_cores", lambda: 3)
+            found.append(on_threads(None))
+        found.append(on_threads(None))
 
     worker = threading.Thread(target=work)
     worker.start()
     worker.join()
 
-    assert found[0] is tm.kernels.at_once
-    assert found[1] is not tm.kernels.at_once
+    one, three, all_cores, after = found
+    assert one is after is tm.kernels.at_once
+    assert three is not tm.kernels.at_once
+    assert all_cores is not tm.kernels.at_once
 
 
 def test_a_lane_that_is_not_ready_is_made_ready_once_the_compiler_is_free(

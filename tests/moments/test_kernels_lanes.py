@@ -1,6 +1,7 @@
 """Compiled lanes against the planar statement beside them, and against LAPACK."""
 
 import itertools
+import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -14,7 +15,7 @@ from tests.moments import oracles
 from tests.moments.kernel_lanes import FEW, lanes, without_lanes
 from transientcam_moments import _lanes
 from transientcam_moments._kernels import density as density_module
-from transientcam_moments._lanes.parallel import blocks
+from transientcam_moments._lanes.parallel import BLOCK, LARGE, blocks
 from transientcam_moments.levinson import _levinson
 from transientcam_moments.polishing import residual, size
 
@@ -423,8 +424,20 @@ def test_parts_cover_every_pixel_once(total: int, parts: int) -> None:
     seen.sort()
     assert [begin for begin, _ in seen] == [0, *(end for _, end in seen[:-1])]
     assert seen[-1][1] == total
-    assert len(seen) <= max(parts, 1)
+    assert len(seen) <= (parts if total < LARGE else max(parts, -(-total // BLOCK)))
     assert all(end - begin >= min(total, 1024) for begin, end in seen)
+
+
+@pytest.mark.parametrize("total", [19560, 307200])
+def test_no_image_waits_for_threads_that_have_other_work(total: int) -> None:
+    seen: list[tuple[int, int]] = []
+    idle = threading.Event()
+    with ThreadPoolExecutor(1) as executor:
+        executor.submit(idle.wait)
+        tm.kernels.over(executor, 2)(lambda *part: seen.append(part), total)
+        idle.set()
+
+    assert sum(end - begin for begin, end in seen) == total
 
 
 @pytest.mark.parametrize("stop", [1, 64, 16384, 16385, 24576, 24577, 307200])

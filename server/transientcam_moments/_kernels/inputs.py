@@ -88,7 +88,7 @@ def smooth(
                 for k in range(low, high + 1):
                     total = total + taps[radius + k] * simd.load(one, plane, (y + k) * length + x)
                 simd.store(rows, margin + x, total)
-                poison = poison + simd.load(one, plane, y * length + x) * 0.0
+                poison = poison + total * 0.0
             for left in range(0, length, step):
                 x = min(left, length - step)
                 total = one * 0.0

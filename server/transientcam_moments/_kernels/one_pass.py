@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ if TYPE_CHECKING:  # it brings along the compiler
 
 _ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}
 _ROOM = 1024  # pixels that are redone in double precision at a time
+_ROWS = 8  # that are smoothed while the second cache holds them as they were measured
 _EPS = float(np.finfo(np.float32).eps)
 _SATURATED, _REPLACED = 4, 32  # transientcam_moments.Flags
 
@@ -133,32 +135,57 @@ class OnePass:
         raw = np.ascontiguousarray(images).reshape(len(images), self._pixels)
         smoothed = empty((len(s.order) + 1, self._pixels), np.complex64)
         with self._scratch() as scratch:
-            calibrated = smoothed if self._taps is None else scratch.calibrated
-
-            def measure(start: int, stop: int) -> None:
-                s.measure(
-                    s.order, raw, _ZEROTH[constants.settings.zeroth], self._inverse, self._stride,
-                    constants.settings.full_scale, calibrated, scratch.saturated, start, stop,
-                )  # fmt: skip
-
-            def smooth(start: int, stop: int) -> None:
-                s.smooth(
-                    calibrated.view(np.float32), self._taps, self._weight, scratch.row(start),
-                    smoothed.view(np.float32), self._shape[1], start, stop,
-                )  # fmt: skip
-
-            spread(measure, self._pixels)
-            if constants.replaced is not None:
-                moments = constants.replaced(raw)
-                inverse = self._inverse[:, constants.bad if self._stride else slice(1)]
-                calibrated[:, constants.bad] = moments * inverse
+            if self._taps is None or constants.replaced is not None:
+                calibrated = smoothed if self._taps is None else scratch.calibrated
+                spread(partial(self._measure, raw, calibrated, scratch), self._pixels)
+                if constants.replaced is not None:
+                    moments = constants.replaced(raw)
+                    inverse = self._inverse[:, constants.bad if self._stride else slice(1)]
+                    calibrated[:, constants.bad] = moments * inverse
+                if self._taps is not None:
+                    spread(partial(self._smooth, smoothed, scratch), self._shape[0], _ROWS)
+            else:
+                part = partial(self._measure_and_smooth, raw, smoothed, scratch)
+                spread(part, self._shape[0], _ROWS)
             if constants.bad is not None:
                 scratch.saturated[constants.bad] = 0
             if saturated is not None:
                 scratch.mark_saturated(saturated, self._shape)
-            if self._taps is not None:
-                spread(smooth, self._shape[0], 8)
             return self._analysed(smoothed, scratch, spread)
+
+    def _measure(
+        self, raw: Any, calibrated: Any, scratch: "_Scratch", start: int, stop: int
+    ) -> None:
+        """Write the calibrated moments of some pixels, and which of them are saturated."""
+        settings = self._constants.settings
+        self._stages.measure(
+            self._stages.order, raw, _ZEROTH[settings.zeroth], self._inverse, self._stride,
+            settings.full_scale, calibrated, scratch.saturated, start, stop,
+        )  # fmt: skip
+
+    def _smooth(self, smoothed: Any, scratch: "_Scratch", start: int, stop: int) -> None:
+        """Smooth rows of the calibrated moments."""
+        self._stages.smooth(
+            scratch.calibrated.view(np.float32), self._taps, self._weight, scratch.row(start),
+            smoothed.view(np.float32), self._shape[1], start, stop,
+        )  # fmt: skip
+
+    def _measure_and_smooth(
+        self, raw: Any, smoothed: Any, scratch: "_Scratch", start: int, stop: int
+    ) -> None:
+        """Write the smoothed moments of rows, each few of them as soon as they are measured.
+
+        The rows beside a part are measured by both of its threads, which write the same.
+        """
+        height, width = self._shape
+        radius = self._radius
+        measured = max(0, start - radius)
+        for top in range(start, stop, _ROWS):
+            bottom = min(stop, top + _ROWS)
+            needed = min(height, bottom + radius)
+            self._measure(raw, scratch.calibrated, scratch, measured * width, needed * width)
+            self._smooth(smoothed, scratch, top, bottom)
+            measured = needed
 
     def moments(self, smoothed: Any, saturated: Any, spread: Spread) -> Planes:
         """Reconstruct calibrated and smoothed moments (m + 1, ...), complex64.
@@ -181,7 +208,7 @@ class OnePass:
         redone: list[int] = []
 
         def analyse(start: int, stop: int) -> None:
-            room = scratch.wide(start)
+            room = scratch.take_wide()
             for left, right in blocks(start, stop):
                 s.eigenvalue(
                     s.order, smoothed, int(self._estimated), scratch.eigenvalue, left, right
@@ -198,11 +225,12 @@ class OnePass:
                 )  # fmt: skip
                 # by blocks, so that the same pixels are redone together for any number of parts
                 redone.append(s.wide(smoothed, planes.brightness, found, room, left, right))
-            s.separate(
-                s.order, planes.phase_rad, planes.weight, planes.flags, planes.direct,
-                planes.indirect, planes.range_m, settings.threshold, constants.range_per_rad_m,
-                start, stop,
-            )  # fmt: skip
+                s.separate(
+                    s.order, planes.phase_rad, planes.weight, planes.flags, planes.direct,
+                    planes.indirect, planes.range_m, settings.threshold, constants.range_per_rad_m,
+                    left, right,
+                )  # fmt: skip
+            scratch.give_wide(room)
 
         spread(analyse, self._pixels, BLOCK)
         if constants.bad is not None:
@@ -248,6 +276,7 @@ class OnePass:
         """
         taps = self._constants.taps
         self._taps = None if taps is None else taps.astype(np.float32)
+        self._radius = 0 if taps is None else taps.size // 2
         self._stride = 0 if inverse.ndim == 1 else 1
         length = self._pixels if self._stride else LEAST_PIXELS
         planes = inverse.reshape((len(inverse), -1)).astype(np.complex64)
@@ -269,25 +298,29 @@ class _Scratch:
         self.eigenvalue = np.empty(pixels, np.float32)
         self.residual = np.empty(pixels, np.float32)
         self._stages = stages
-        self._wide: dict[int, Any] = {}
+        self._wide: list[Any] = []
         if taps is not None:
             self.calibrated = np.empty((m + 1, pixels), np.complex64)
             self._row_length = row_length(shape[1], taps.size)
             self._rows: dict[int, Any] = {}
 
     def row(self, start: int) -> Any:
-        """Room for a row between two zero margins; each part of the image has its own."""
+        """Room for a row between two zero margins; those that begin at each row have their own."""
         row = self._rows.get(start)
         if row is None:
             row = self._rows[start] = np.zeros(self._row_length, np.float32)
         return row
 
-    def wide(self, start: int) -> Any:
-        """Room for pixels that are redone in double precision, for each part of the image."""
-        room = self._wide.get(start)
-        if room is None:
-            room = self._wide[start] = self._stages.wide.room(_ROOM)
-        return room
+    def take_wide(self) -> Any:
+        """Room for pixels that are redone in double precision, for one part of the image."""
+        try:
+            return self._wide.pop()
+        except IndexError:
+            return self._stages.wide.room(_ROOM)
+
+    def give_wide(self, room: Any) -> None:
+        """Keep such room for another part."""
+        self._wide.append(room)
 
     def mark_saturated(self, saturated: Any, shape: tuple[int, ...]) -> None:
         """Take the flags of saturated pixels from a boolean array, or from one for all."""

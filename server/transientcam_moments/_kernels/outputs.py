@@ -113,12 +113,18 @@ def gather(
     padded with the first one; returns their number.
     """
     room, found = where.shape[0], 0
-    for p in range(begin, residual.shape[0]):
-        if residual[p] > tolerance:
-            where[found] = p
-            found += 1
-            if found == room:
-                break
+    one = simd.ones(residual, _INTERLEAVE)
+    step, limit = simd.width(one), simd.spread(one, tolerance)
+    pixels = residual.shape[0]
+    for left in range(begin, pixels, step):
+        if found == room:
+            break
+        if left + step <= pixels and not simd.some(simd.load(one, residual, left) > limit):
+            continue
+        for p in range(left, min(left + step, pixels)):
+            if residual[p] > tolerance and found < room:
+                where[found] = p
+                found += 1
     for i in range(room if found else 0):
         p = where[i] if i < found else where[0]
         where[i] = p

@@ -3,14 +3,18 @@
 import itertools
 import os
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import Protocol
 
 from transientcam_moments.errors import ParameterError
 
 BLOCK = 1 << 14
 """Pixels that stay in the second cache from one kernel to the next."""
+LARGE = 1 << 16
+"""Pixels from which an image is cut into parts of `BLOCK`."""
 
 Part = Callable[[int, int], None]
 """Works on the pixels (or rows) from its first argument up to its second."""
@@ -29,19 +33,33 @@ def at_once(part: Part, total: int, /, unit: int = 1024) -> None:
 
 
 def over(executor: Executor, parts: int) -> Spread:
-    """Return a way to do an image in up to ``parts`` parts, on the threads of an executor.
+    """Return a way to do up to ``parts`` parts of an image at once, on the threads of an executor.
 
-    The calling thread does the first part itself and waits for the others. No part is smaller
-    than a unit.
+    The calling thread works, too, and waits for the others. Large images are cut into more parts,
+    of which each thread takes the next one when it has done one, so that none waits long for
+    another that is late or has other work. No part is smaller than a unit.
     """
 
     def spread(part: Part, total: int, /, unit: int = 1024) -> None:
         size = max(unit, -(-total // (parts * unit)) * unit)
+        if total >= LARGE:
+            size = min(size, max(unit, BLOCK // unit * unit))
         cuts = [0, *range(size, total - unit + 1, size), total]
-        futures = [executor.submit(part, *pair) for pair in itertools.pairwise(cuts[1:])]
-        part(cuts[0], cuts[1])
-        for future in futures:
-            future.result()
+        waiting = deque(itertools.pairwise(cuts))
+
+        def work() -> None:
+            while waiting:
+                try:
+                    pair = waiting.popleft()
+                except IndexError:  # another thread was quicker
+                    return
+                part(*pair)
+
+        others = [executor.submit(work) for _ in range(min(parts, len(waiting)) - 1)]
+        work()
+        for other in others:
+            if not other.cancel():  # it has begun
+                other.result()
 
     return spread
 
@@ -81,6 +99,16 @@ if hasattr(os, "register_at_fork"):
 def use_one_thread() -> None:
     """Let calls on this thread use no other, unless they say so: as on the workers of a pool."""
     _HERE.threads = 1
+
+
+@contextmanager
+def use_all_cores() -> Iterator[None]:
+    """Let calls on this thread use all cores inside the block, also after `use_one_thread`."""
+    before, _HERE.threads = _HERE.threads, None
+    try:
+        yield
+    finally:
+        _HERE.threads = before
 
 
 def on_threads(threads: int | None) -> Spread:

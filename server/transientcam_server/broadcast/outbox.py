@@ -5,6 +5,7 @@ Everything here lives on the event loop and never waits for a client.
 
 import asyncio
 from collections import deque
+from collections.abc import Coroutine
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
@@ -48,6 +49,10 @@ class Delivery:
 
     frame: Frame
     channels: tuple[Channel, ...]
+
+    def computed(self) -> Coroutine[Any, Any, None]:
+        """Return what waits until all is computed that its products follow from, or has failed."""
+        return self.frame.computed([channel.product for channel in self.channels])
 
 
 Message = wire.Hello | wire.Notice | wire.ErrorMessage | Close

@@ -9,7 +9,7 @@ import asyncio
 import math
 import time
 from collections import OrderedDict
-from collections.abc import AsyncIterator, Callable, Coroutine, Hashable, Iterator
+from collections.abc import AsyncIterator, Callable, Coroutine, Hashable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from types import SimpleNamespace
@@ -116,6 +116,11 @@ class Frame:
         """Whether stages of its reconstruction are being computed."""
         return self._computing is not None
 
+    @property
+    def reconstruct_s(self) -> float:
+        """How long its reconstruction was computed so far, in s."""
+        return self._reconstruct_s or 0.0
+
     def meta(self) -> dict[str, Any]:
         """Return what is known of the frame, as the wire contract has it."""
         return frame_meta(
@@ -138,6 +143,11 @@ class Frame:
             if self._computing is None:
                 self._computing = self._workers.start(self._compute_requested())
         return await _shared(future)
+
+    async def computed(self, products: Iterable[Product]) -> None:
+        """Return once all that products follow from is computed, or has failed."""
+        inputs = (self._input(product) for product in products)
+        await asyncio.gather(*inputs, return_exceptions=True)
 
     async def truth(self) -> Truth:
         """Return the ground truth of the simulated scene at the time of the capture."""

@@ -3,6 +3,7 @@
 import logging
 import math
 from collections.abc import Iterable
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -78,11 +79,12 @@ def compute(
         computed.reconstruction = None
         computed.failures = dict.fromkeys(requested, error)
         return computed
-    for stage in requested - {FIRST}:
-        try:
-            _read(found, stage)
-        except Exception as error:
-            computed.failures[stage] = error
+    with nullcontext() if spread is tm.kernels.at_once else tm.kernels.use_all_cores():
+        for stage in requested - {FIRST}:
+            try:
+                _read(found, stage)
+            except Exception as error:
+                computed.failures[stage] = error
     if recipe.sensor is not None and "returns" in requested and "returns" not in computed.failures:
         computed.range_noise = _range_noise(recipe, found, raw.number)
     return computed

@@ -9,7 +9,7 @@ from fastapi import WebSocket
 from transientcam import wire
 from transientcam_server.api.metrics import Metrics
 from transientcam_server.broadcast.channel import Channel
-from transientcam_server.broadcast.outbox import Close, Delivery, Outbox
+from transientcam_server.broadcast.outbox import Close, Delivery, Item, Outbox
 from transientcam_server.errors import Problem
 from transientcam_server.errors.translation import problem_document
 from transientcam_server.imaging.view import View
@@ -19,33 +19,58 @@ _AT_ONCE = 4
 
 
 class Sender:
-    """Empties an outbox into a WebSocket."""
+    """Empties an outbox into a WebSocket.
+
+    To a client that keeps up, the next frame is computed while the one before is encoded and sent,
+    so that all cores are at work. It is taken for that when the one before has been computed; a
+    client that is slow to receive gets what is newest when it has.
+    """
 
     def __init__(self, websocket: WebSocket, outbox: Outbox, metrics: Metrics) -> None:
         self._websocket = websocket
         self._metrics = metrics
         self._outbox = outbox
         self._failing: set[str] = set()
+        self._keeps_up, self._sending_s = True, 0.0
+        self._ahead: asyncio.Future[None] | None = None
 
     async def send_all(self) -> None:
         """Send until the client is gone or the stream was closed."""
         delivered = 0
-        while True:
-            item = await self._outbox.next()
-            if isinstance(item, Close):
-                await self._websocket.close(item.code, item.reason)
-                return
-            if isinstance(item, Delivery):
-                await self._deliver(item)
-                delivered += 1
-                if delivered % _AT_ONCE == 0:
-                    # nothing above has to wait where all is computed and the network takes it
-                    await asyncio.sleep(0)
-            else:
-                await self._websocket.send_bytes(wire.encode(item))
+        following: asyncio.Task[Item] | None = None
+        try:
+            while True:
+                item = await (self._outbox.next() if following is None else following)
+                following = None
+                if isinstance(item, Close):
+                    await self._websocket.close(item.code, item.reason)
+                    return
+                if isinstance(item, Delivery):
+                    if self._keeps_up:
+                        following = asyncio.ensure_future(self._next_after(item))
+                    await self._deliver(item)
+                    delivered += 1
+                    if delivered % _AT_ONCE == 0:
+                        # nothing above has to wait where all is computed and the network takes it
+                        await asyncio.sleep(0)
+                else:
+                    await self._websocket.send_bytes(wire.encode(item))
+        finally:
+            if following is not None:
+                following.cancel()
+                await asyncio.gather(following, return_exceptions=True)
+
+    async def _next_after(self, delivery: Delivery) -> Item:
+        """Return what is to be sent next, and have it computed once this one is."""
+        await delivery.computed()
+        item = await self._outbox.next()
+        if isinstance(item, Delivery):
+            self._ahead = asyncio.ensure_future(item.computed())  # nobody has to wait for it
+        return item
 
     async def _deliver(self, delivery: Delivery) -> None:
         first, *others = delivery.channels
+        self._sending_s = 0.0
         # all products of the frame are under way at once; each is sent as soon as those before
         tasks = [asyncio.ensure_future(self._encoded(delivery, each)) for each in others]
         try:
@@ -55,6 +80,7 @@ class Sender:
         finally:
             for task in tasks:
                 task.cancel()
+        self._keeps_up = self._sending_s <= delivery.frame.reconstruct_s
 
     async def _send(
         self, delivery: Delivery, channel: Channel, task: asyncio.Task[bytes] | None
@@ -67,7 +93,9 @@ class Sender:
             await self._report_failed(channel, problem)
             return
         self._failing.discard(channel.product.name)
+        begin_s = time.perf_counter()
         await self._websocket.send_bytes(data)
+        self._sending_s += time.perf_counter() - begin_s
         self._metrics.sent(time.time() - delivery.frame.raw.host_time_s)
 
     async def _encoded(self, delivery: Delivery, channel: Channel) -> bytes:
