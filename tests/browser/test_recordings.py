@@ -220,10 +220,10 @@ def test_an_address_shows_a_recorded_frame(page: Page, served: Served, watch: Wa
     shows_recorded(page, 3)
     page.get_by_role("button", name="One frame on").click()
     expect(page).to_have_url(
-        re.compile(rf"#map=direct&pixel=\d+,\d+&recording={recording}&frame=4$")
+        re.compile(rf"#map=direct&pixel=\d+,\d+&time_ns=[\d.]+&recording={recording}&frame=4$")
     )
     page.get_by_role("button", name="Back to live").click()
-    expect(page).to_have_url(re.compile(r"#map=direct&pixel=\d+,\d+$"))
+    expect(page).to_have_url(re.compile(r"#map=direct&pixel=\d+,\d+&time_ns=[\d.]+$"))
     watch.refusals_expected = True
     page.evaluate("() => { location.hash = '#recording=gone'; }")
     expect(page.locator("[data-banner=message]")).to_contain_text("cannot be shown")
