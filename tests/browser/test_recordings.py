@@ -136,6 +136,7 @@ def test_all_views_show_the_frame_that_is_scrubbed_to(page: Page, served: Served
     recording = record(served, frames=6)
     open_page(page)
     choose(page, "sequence", "Recordings")
+    page.locator(".panel-recordings").wait_for()  # the pictures beside it have their size then
     point_at(page, "map", 40, 50, click=True)
     page.get_by_role("button", name="Play corner").click()
     expect(page.locator("[data-field=state]")).to_have_text("Replay")
@@ -219,10 +220,10 @@ def test_an_address_shows_a_recorded_frame(page: Page, served: Served, watch: Wa
     shows_recorded(page, 3)
     page.get_by_role("button", name="One frame on").click()
     expect(page).to_have_url(
-        re.compile(rf"#map=direct&pixel=\d+,\d+&recording={recording}&frame=4$")
+        re.compile(rf"#map=direct&pixel=\d+,\d+&time_ns=[\d.]+&recording={recording}&frame=4$")
     )
     page.get_by_role("button", name="Back to live").click()
-    expect(page).to_have_url(re.compile(r"#map=direct&pixel=\d+,\d+$"))
+    expect(page).to_have_url(re.compile(r"#map=direct&pixel=\d+,\d+&time_ns=[\d.]+$"))
     watch.refusals_expected = True
     page.evaluate("() => { location.hash = '#recording=gone'; }")
     expect(page.locator("[data-banner=message]")).to_contain_text("cannot be shown")
