@@ -278,7 +278,9 @@ class RelayCamera(HostCamera):
         match notice.kind:
             case "camera-lost":
                 self._gone = f"the origin has lost its camera: {notice.details.get('reason')}"
-            case "calibration-changed" | "simulation-changed" | "reconstruction-changed":
+            case "calibration-changed" | "simulation-changed":
+                self._outdated = True
+            case "reconstruction-changed" if not self.has_images:  # of spoilt ones, it may be
                 self._outdated = True
             case "dropped" if notice.details["channel"] == self._counted:
                 self.relayed.dropped_frames += int(notice.details["count"])
@@ -327,16 +329,9 @@ class RelayCamera(HostCamera):
         try:
             capture = capture_of(
                 parts,
-                height=self._capabilities.height,
-                width=self._capabilities.width,
-                moments=1 + applied.sequence.harmonics,
+                applied,
+                self._capabilities,
                 number=self._added + frame.frame,
-                epoch=applied.epoch,
-                labels=applied.labels,
-                device_time_s=meta["device_time_s"],
-                host_time_s=meta["host_time_s"],
-                capture_s=meta["capture_s"],
-                temperature_c=meta["temperature_c"],
                 lost_images=lost,
                 hops=hops_of(
                     meta,

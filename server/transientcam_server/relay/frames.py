@@ -8,13 +8,15 @@ import numpy as np
 
 import transientcam_moments as tm
 from transientcam import Frame
-from transientcam_driver import ProtocolError, RawFrame
+from transientcam_driver import AppliedSequence, Capabilities, ProtocolError, RawFrame
+from transientcam_driver.receiving import Hop
 from transientcam_server.imaging.moment_frame import OF_IMAGES, MomentFrame
 
 RAW: Final = "raw"
 MOMENTS: Final = "measured_moments"
 SUBSCRIBED: Final[dict[str, tuple[str, ...]]] = {RAW: (RAW,), MOMENTS: (MOMENTS, "flags")}
 """What can be relayed, each with the products of the origin that it takes."""
+_AS_THERE: Final = ("device_time_s", "host_time_s", "capture_s", "temperature_c")
 Parts = Mapping[str, Frame]
 """Products of one frame by their names."""
 
@@ -44,32 +46,49 @@ class Collector:
         return self._parts if len(self._parts) == len(self.products) else None
 
 
-def capture_of(parts: Parts, *, height: int, width: int, moments: int, **given: Any) -> RawFrame:
+def capture_of(
+    parts: Parts,
+    applied: AppliedSequence,
+    capabilities: Capabilities,
+    *,
+    number: int,
+    lost_images: int,
+    hops: tuple[Hop, ...],
+) -> RawFrame:
     """Return the capture that products of a frame are of.
 
     Parameters
     ----------
-    height, width
-        Of the images.
-    moments
-        How many there are, b_0 included.
-    given
-        All other fields of the capture; `labels` of as many images as there are.
+    applied, capabilities
+        Sequence and camera, by which arrays have a shape.
+    number, lost_images, hops
+        Of the capture; the rest is as the origin states it.
 
     Raises
     ------
     ProtocolError
         An array has another shape or type.
     """
+    meta = next(iter(parts.values())).meta
+    pixels = capabilities.height, capabilities.width
+    as_there: dict[str, Any] = {name: meta[name] for name in _AS_THERE}
+    given = as_there | {
+        "number": number,
+        "epoch": applied.epoch,
+        "labels": applied.labels,
+        "lost_images": lost_images,
+        "hops": hops,
+    }
     if RAW in parts:
-        images = _checked(parts[RAW], (len(given["labels"]), height, width), np.uint16)
+        images = _checked(parts[RAW], (applied.images, *pixels), np.uint16)
         return RawFrame(images=images, **given)
-    flags = _checked(parts["flags"], (height, width), np.uint8)
+    moments = 1 + applied.sequence.harmonics
+    flags = _checked(parts["flags"], pixels, np.uint8)
     return MomentFrame(
-        images=np.empty((0, height, width), np.uint16),
-        moments=_checked(parts[MOMENTS], (moments, height, width), np.complex64),
+        images=np.empty((0, *pixels), np.uint16),
+        moments=_checked(parts[MOMENTS], (moments, *pixels), np.complex64),
         saturated=(flags & np.uint8(tm.Flags.SATURATED)) > 0,
-        treated={name: parts[MOMENTS].meta[name] for name in OF_IMAGES},
+        treated={name: meta[name] for name in OF_IMAGES},
         **given,
     )
 

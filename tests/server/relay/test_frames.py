@@ -1,5 +1,6 @@
 """What becomes of the messages of a stream: captures, or nothing where a part is missing."""
 
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -12,11 +13,12 @@ from transientcam_server.imaging.moment_frame import OF_IMAGES, MomentFrame
 from transientcam_server.relay.frames import MOMENTS, SUBSCRIBED, Collector, Parts, capture_of
 
 HEIGHT, WIDTH, M = 2, 3, 2
+TIMES = dict.fromkeys(("device_time_s", "host_time_s", "capture_s", "temperature_c"), 0.0)
 TREATED = {"rejected_images": 1, "repaired_images": 2, "unrepaired_images": 0, "filled_images": [5]}
 
 
 def message(product: str, number: int = 7, array: Any = None) -> transientcam.Frame:
-    meta = cast("Any", {"frame": number, **TREATED})
+    meta = cast("Any", {"frame": number, **TREATED, **TIMES})
     shown = np.zeros((HEIGHT, WIDTH), np.uint8) if array is None else array
     return transientcam.Frame(product, "1", ("y", "x"), meta, shown)
 
@@ -26,11 +28,11 @@ def moments(shape: tuple[int, ...] = (M + 1, HEIGHT, WIDTH)) -> Any:
 
 
 def captured(parts: Parts, images: int = 8) -> RawFrame:
-    given: dict[str, Any] = dict.fromkeys(
-        ("number", "epoch", "device_time_s", "host_time_s", "capture_s", "temperature_c"), 0
+    applied: Any = SimpleNamespace(
+        images=images, epoch=1, labels=(), sequence=SimpleNamespace(harmonics=M)
     )
-    given |= {"labels": (None,) * images, "lost_images": 0}
-    return capture_of(parts, height=HEIGHT, width=WIDTH, moments=M + 1, **given)
+    camera: Any = SimpleNamespace(height=HEIGHT, width=WIDTH)
+    return capture_of(parts, applied, camera, number=3, lost_images=0, hops=())
 
 
 def test_a_frame_is_complete_with_its_last_product() -> None:
