@@ -73,12 +73,12 @@ class _Turned:
             (m) moments of the tail at phase 0; None for a sharp return alone.
         """
         conjugate = phasors.conj().T
-        sharp = np.maximum((conjugate @ self.weighted).real, 0.0)
+        sharp = np.maximum(np.real(conjugate @ self.weighted), 0.0)
         ww = self.weight.sum(axis=0)
         if q is None:
             return np.asarray(sharp**2 / ww)
-        late = np.maximum((conjugate @ (q.conj()[:, None] * self.weighted)).real, 0.0)
-        wv = q.real @ self.weight
+        late = np.maximum(np.real(conjugate @ (q.conj()[:, None] * self.weighted)), 0.0)
+        wv = np.real(q) @ self.weight
         vv = np.abs(q) ** 2 @ self.weight
         w = vv * sharp - wv * late
         v = ww * late - wv * sharp
