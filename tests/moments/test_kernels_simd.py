@@ -188,7 +188,8 @@ def test_pixels_of_a_mask_are_packed_and_come_back_in_their_places(
     random = np.random.default_rng(interleave)
     x: Array = random.permutation(4 * size).astype(dtype)
     limit = 2 * size
-    packed, back = np.full(5 * size, -1, dtype), np.zeros_like(x)
+    packed: Array = np.full(5 * size, -1, dtype)
+    back = np.zeros_like(x)
 
     def single(x: Any, packed: Any, back: Any, limit: float) -> int:
         one = simd.ones(x, 1)

@@ -176,12 +176,12 @@ class SharpFit:
         data = self.data
 
         def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
-            banks = [list(part) for part in state[:5]]
+            pr, pi, w, rr, ri = (list(part) for part in state[:5])
             cost, damping = sharp.step(
                 self.order, self.returns, self.unknowns, data.re, data.im, data.weight,
-                *banks, state[5], state[6], bar,
+                pr, pi, w, rr, ri, state[5], state[6], bar,
             )  # fmt: skip
-            return *(tuple(part) for part in banks), cost, damping
+            return tuple(pr), tuple(pi), tuple(w), tuple(rr), tuple(ri), cost, damping
 
         banks = (tuple(part) for part in (self._pr, self._pi, self.w, self._rr, self._ri))
         damping = sharp.FIRST_DAMPING + 0 * self.cost
@@ -241,13 +241,13 @@ def _offer_tail(data: Data, two: SharpFit, shape: int, found: list[Array]) -> No
     cost = sharp.chi_square(order, data.weight, rr, ri) + PRIOR * t * t
 
     def step(state: Any) -> Any:
-        banks = [list(part) for part in state[:5]]
+        lag, qr, qi, rr, ri = (list(part) for part in state[:5])
         x, y, w, v, d, t, cost, damping = state[5:]
         new = tail.step(
             order, powers, unknowns, data.re, data.im, data.weight, PRIOR,
-            x, y, w, v, d, t, *banks, cost, damping, bar,
+            x, y, w, v, d, t, lag, qr, qi, rr, ri, cost, damping, bar,
         )  # fmt: skip
-        return *(tuple(part) for part in banks), *new
+        return tuple(lag), tuple(qr), tuple(qi), tuple(rr), tuple(ri), *new
 
     banks = (tuple(part) for part in (lag, qr, qi, rr, ri))
     damping = sharp.FIRST_DAMPING + 0 * cost
