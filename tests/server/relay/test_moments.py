@@ -94,11 +94,11 @@ def test_what_is_computed_of_moments_is_the_origins_to_the_bit(
         its = at_origin.frame(product, number=theirs)
         assert ours.array.tobytes() == its.array.tobytes(), product
     for product in ("transient", "bounds", "density_std"):
-        parts = (
+        first, second = (
             camera.frame(product, number=n, bins=3, region=(40, 40, 8, 8)).array
             for camera, n in ((at_relay, number), (at_origin, theirs))
         )
-        np.testing.assert_array_equal(*parts)
+        np.testing.assert_array_equal(first, second)
 
 
 def test_metadata_and_memory_are_those_of_moments(
