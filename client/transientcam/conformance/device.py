@@ -151,8 +151,12 @@ class Device:
 
     def require_product(self, name: str) -> None:
         """Skip the check unless frames of this camera have a product."""
-        products = [each["name"] for each in self.read(f"{API}/info")["products"]]
-        skip_unless(name in products, f"frames of this camera have no {name}")
+        skip_unless(self.offered(name), f"frames of this camera have no {name}")
+
+    def offered(self, *names: str) -> tuple[str, ...]:
+        """Return those products of these that frames of this camera have."""
+        products = {each["name"] for each in self.read(f"{API}/info")["products"]}
+        return tuple(name for name in names if name in products)
 
     @property
     def fixed_harmonics(self) -> int | None:

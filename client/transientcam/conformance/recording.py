@@ -134,6 +134,7 @@ def _start(device: Device, ids: list[str], *, frames: int | None) -> dict[str, A
 @contextmanager
 def _deletable(device: Device) -> Iterator[list[str]]:
     """Delete recordings at the end; without permission to do so, none is made."""
+    device.require_product("raw")  # without images there is nothing to record
     probe = device.send("DELETE", f"{_RECORDINGS}/none")
     skip_unless(probe.status_code == 404, "this token may not delete what would be recorded")
     ids: list[str] = []

@@ -65,6 +65,7 @@ def _expect_transient(device: Device, size_bytes: int) -> None:
 @contextmanager
 def _large(device: Device, size_bytes: int) -> Iterator[Conversation]:
     """Stream raw images at a sequence with so many that a frame is large."""
+    device.require_product("raw")
     with device.control(), device.capturing(), device.stream("flags") as stream:
         large = device.accepted(_sequence(device, size_bytes))
         applied = device.document(device.send("PUT", f"{API}/sequence", json=large))

@@ -63,7 +63,9 @@ def _keeps_to_credits(device: Device) -> None:
 def who_never_reads_delays_nobody(device: Device) -> None:
     """While one client reads nothing at all, another gets every single frame."""
     with device.capturing():
-        if not any(_gets_everything(device, beside=_LARGE) for _ in range(_ATTEMPTS)):
+        if not any(
+            _gets_everything(device, beside=device.offered(*_LARGE)) for _ in range(_ATTEMPTS)
+        ):
             alone = any(_gets_everything(device) for _ in range(_ATTEMPTS))
             skip_unless(alone, "a client misses frames without that other one, too")
             raise PromiseBroken("a healthy client misses frames while another one does not read")
@@ -95,7 +97,7 @@ def _loses_frames(device: Device, size_bytes: int) -> bool:
     """Leave so much unread, and return whether any of it was dropped."""
     with (
         device.capturing(),
-        device.stream(*_LARGE, unread=True) as stuck,
+        device.stream(*device.offered(*_LARGE), unread=True) as stuck,
         device.stream("flags") as healthy,
     ):
         frame_bytes = sum(_bytes(each) for each in stuck.channels)

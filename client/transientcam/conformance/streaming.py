@@ -26,7 +26,7 @@ def a_handshake_without_the_subprotocol_is_refused(device: Device) -> None:
 
 def the_greeting_says_what_frames_look_like(device: Device) -> None:
     """Every channel of the hello has product, unit, axes, dtype and shape, and frames agree."""
-    products = ("range", "flags", "moments", "raw")
+    products = device.offered("range", "flags", "moments", "raw")
     with device.capturing(), device.stream(*products) as stream:
         channels = {each.channel: each for each in stream.channels}
         equal([each.product for each in stream.channels], list(products), "the channels' products")
