@@ -516,22 +516,38 @@ def dim_behind(
         clear[i] = _ZERO if between & (one > _ZERO) & (other > _ZERO) else clear[i]
 
 
-@lane(WHOLE, LINE, LINE, LINE, float32, AROUND)
-def shown(plate: Any, x: Any, y: Any, z: Any, touching: Any, around: Any) -> Any:
-    """Return the points that a mirror shows the light to, its shares of their pixels, and its t."""
-    axes, count, met = _axes(plate), len(x), 0
+@inner
+def _show_points(first: Any, second: Any, at: Any, around: Any, kept: Any, share: Any) -> int:
+    """Put points that a mirror shows any light to, and its shares of their pixels; count them."""
+    found = 0
+    for i in range(len(at)):
+        part = _share_among(first, around, i) * _share_among(second, around, i)
+        if part != _ZERO:
+            share[found], kept[found] = part, i
+            found += 1
+    return found
+
+
+@lane(WHOLE, LINE, LINE, LINE, LINE, float32, AROUND)
+def shown(plate: Any, apex: Any, x: Any, y: Any, z: Any, touching: Any, around: Any) -> Any:
+    """Return the points that a mirror shows the light to, and its shares of their pixels.
+
+    Then ways to them from the light's image, the t where they meet the mirror, and points there.
+    """
+    axes, a, b, c, count, met = _axes(plate), apex[0], apex[1], apex[2], len(x), 0
     first, second = np.empty(count + 1, float32), np.empty(count + 1, float32)
-    at, kept, found = np.empty(count, float32), np.empty(count, int64), 0
+    at, kept, share = np.empty(count, float32), np.empty(count, int64), np.empty(count, float32)
     first[count] = second[count] = _NAN
     for i in range(count):
-        one, other, t, facing = _of_rectangle(axes, x[i], y[i], z[i])
+        one, other, t, facing = _of_rectangle(axes, x[i] - a, y[i] - b, z[i] - c)
         shows = (t > _ZERO + touching) & (t < _ONE - touching) & (facing > _ZERO)
         first[i], second[i], at[i] = one if shows else _NAN, other if shows else _NAN, t
         met += shows & (one > _ZERO) & (other > _ZERO)
-    share = np.empty(count, float32)
-    for i in range(count if met else 0):
-        part = _share_among(first, around, i) * _share_among(second, around, i)
-        if part != _ZERO:
-            share[found], at[found], kept[found] = part, at[i], i
-            found += 1
-    return kept[:found], share[:found], at[:found]
+    found = _show_points(first, second, at, around, kept, share) if met else 0
+    lines = np.empty((7, found), float32)
+    for k in range(found):
+        i = kept[k]
+        u, v, w, t = x[i] - a, y[i] - b, z[i] - c, at[i]
+        lines[0, k], lines[1, k], lines[2, k], lines[3, k] = u, v, w, t
+        lines[4, k], lines[5, k], lines[6, k] = u * t + a, v * t + b, w * t + c
+    return kept[:found], share[:found], lines

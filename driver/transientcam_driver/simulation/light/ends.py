@@ -61,6 +61,10 @@ class Segment:
         return self.apex + low, self.apex + high
 
 
+_Lines = tuple[tuple[Plane, Plane, Plane], Plane, tuple[Plane, Plane, Plane]]
+"""Ways to points, the t where they meet a mirror, and the points there."""
+
+
 @dataclass(frozen=True, slots=True)
 class Way:
     """Light by one chain of mirrors on some points, by index: times of flight, and weights."""
@@ -182,7 +186,7 @@ class Ends:
         """Share of the light that all surfaces let through on a segment of its way."""
         clear = np.ones(len(on), dtype=np.float32)
         low, high = segment.box
-        mine = self.index[on]
+        mine = self.index if len(on) == len(self.index) else self.index[on]
         near = ((self.boxes[:, 0] <= high) & (self.boxes[:, 1] >= low)).all(axis=1)
         for index in np.flatnonzero(near).tolist():
             surface = self.surfaces[index]
@@ -297,19 +301,16 @@ def _ways(
     segments: list[Segment] = []
     start, last = point, None
     for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
-        way = _from(image_m, start)
-        kept, part, at = _shown(mirror.mirror, image_m, way, around)
+        kept, part, (way, at, met) = _shown(mirror.mirror, image_m, start, around)
         if not kept.size:
             return kept, part, around, []
         if len(kept) < len(on):  # mostly few points, or all
             on, share = on[kept], share[kept]
             around = around if around is None else among(kept, around)
             segments = [each.of(kept) for each in segments]
-            way = way[0][kept], way[1][kept], way[2][kept]
         share = share * part
-        x, y, z = way
-        segments.append(Segment(image_m, (x, y, z), at, last))
-        start = _moved(image_m, (x * at, y * at, z * at))
+        segments.append(Segment(image_m, way, at, last))
+        start = met
         last = mirror
     lamp = light.positions_m[-1]
     none = np.zeros(len(on), dtype=np.float32)
@@ -319,14 +320,17 @@ def _ways(
 def _shown(
     mirror: Rectangle,
     image_m: Points,
-    way: tuple[Plane, Plane, Plane],
+    point: tuple[Plane, Plane, Plane],
     around: Around | None,
-) -> tuple[NDArray[np.intp], Plane, Plane]:
-    """Return the points that a mirror shows the light to, its shares of their pixels, and its t."""
+) -> tuple[NDArray[np.intp], Plane, _Lines]:
+    """Return the points that a mirror shows the light to, its shares of their pixels, and lines."""
     lane = LANES.find("shown")
     if lane is not None and around is not None:
-        kept, share, at = lane(plate_of(mirror, image_m), *way, TOUCHING, around)
-        return kept, share, at
+        apex = image_m.astype(np.float32)
+        kept, share, lines = lane(plate_of(mirror, image_m), apex, *point, TOUCHING, around)
+        x, y, z, at, *met = lines
+        return kept, share, ((x, y, z), at, (met[0], met[1], met[2]))
+    way = _from(image_m, point)
     cross = crossing(mirror, image_m, way)
     shows = cross.between(np.float32(0), np.float32(1))
     shows &= sum(w * np.float32(n) for w, n in zip(way, mirror.normal, strict=True)) > 0
@@ -334,7 +338,8 @@ def _shown(
         shows[:] = False
     share = share_around(cross, shows, around)
     kept = np.flatnonzero(share)
-    return kept, share[kept], cross.at[kept]
+    x, y, z, at = (each[kept] for each in (*way, cross.at))
+    return kept, share[kept], ((x, y, z), at, _moved(image_m, (x * at, y * at, z * at)))
 
 
 def _from(apex: Points, point: tuple[Plane, ...]) -> tuple[Plane, Plane, Plane]:
