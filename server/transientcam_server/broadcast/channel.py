@@ -20,6 +20,14 @@ _LONGEST_PERIOD_S = 1e9
 """Thirty years: after the first frame none is due. The inverse of the least rates is infinite."""
 
 
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """How many frames of a channel were dropped, and of these for want of an acknowledgement."""
+
+    count: int
+    unacknowledged: int
+
+
 @dataclass(slots=True)
 class Channel:
     """One product for one client: in which form and how often, and what of it was lost."""
@@ -51,6 +59,12 @@ class Channel:
             region=self.crop.region,
             decimation=self.crop.decimation,
         )
+
+    def take_lost(self) -> Lost:
+        """Return what was dropped since this was asked last, and count anew."""
+        lost = Lost(self.dropped, self.dropped_unacknowledged)
+        self.dropped = self.dropped_unacknowledged = 0
+        return lost
 
     def take(self, time_s: float) -> bool:
         """Return whether the frame captured at ``time_s`` is due, and count on from there."""

@@ -6,11 +6,11 @@ Everything here lives on the event loop and never waits for a client.
 import asyncio
 from collections import deque
 from collections.abc import Coroutine
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
 
 from transientcam import wire
-from transientcam_server.broadcast.channel import Channel
+from transientcam_server.broadcast.channel import Channel, Lost
 from transientcam_server.imaging.frame import Frame
 
 MAX_WAITING_MESSAGES: Final = 64
@@ -45,10 +45,14 @@ class Close:
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """A frame on its way to one client, for the channels it was due for."""
+    """A frame on its way to one client, for the channels it was due for.
+
+    ``lost`` has for each of them what was dropped before this frame was taken to be sent.
+    """
 
     frame: Frame
     channels: tuple[Channel, ...]
+    lost: tuple[Lost, ...] = ()
 
     def computed(self) -> Coroutine[Any, Any, None]:
         """Return what waits until all is computed that its products follow from, or has failed."""
@@ -178,7 +182,7 @@ class Outbox:
     def _under_way(self, delivery: Delivery) -> Delivery:
         if self._credits is not None:
             self._unacknowledged.append(delivery.frame.number)
-        return delivery
+        return replace(delivery, lost=tuple(channel.take_lost() for channel in delivery.channels))
 
     def _due(self, frame: Frame) -> tuple[Channel, ...]:
         return tuple(c for c in self._channels if c.take(frame.raw.device_time_s))

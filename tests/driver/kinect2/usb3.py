@@ -144,12 +144,7 @@ class Usb3Client(Client):
         if kind == _ISO_URB:
             (count,) = struct.unpack_from("<i", raw, _COUNT_AT)
             raw += self.read_memory(address + _URB_BYTES, count * _PACKET.size)
-            with self._device.changed:
-                held = length + sum(each.length for each in self.in_flight.values())
-                if self._mount.memory_bytes is not None and held > self._mount.memory_bytes:
-                    raise Refused(errno.ENOMEM)
-                self.in_flight[address] = Urb(address, raw, kind, buffer, length)
-                self._device.changed.notify_all()
+            self.send_out(Urb(address, raw, kind, buffer, length))
             return
         urb = Urb(address, raw, kind, buffer, length)
         sent = self.read_memory(buffer, length) if not endpoint & 0x80 else b""

@@ -107,7 +107,7 @@ class UsbfsMount:
         self.device = device
         self.clients: list[Client] = []
         self.owners: dict[int, Client] = {}
-        self.memory_bytes: int | None = None  # what usbfs_memory_mb leaves for a transfer
+        self.memory_bytes: int | None = None  # what usbfs_memory_mb leaves for transfers
         self._root = root
         self._events = 0
         self._closing = False
@@ -390,10 +390,17 @@ class Client:
         if kind == _CONTROL_URB:
             self._control(urb)
             return
-        if self._mount.memory_bytes is not None and length > self._mount.memory_bytes:
-            raise Refused(errno.ENOMEM)
+        self.send_out(urb)
+
+    def send_out(self, urb: Urb) -> None:
+        """Let a transfer wait for data; it takes memory until it is reaped."""
         with self._device.changed:
-            self.in_flight[address] = urb
+            if self.gone:  # since the call began
+                raise Refused(errno.ENODEV)
+            held = sum(each.length for each in (urb, *self.in_flight.values(), *self._completed))
+            if self._mount.memory_bytes is not None and held > self._mount.memory_bytes:
+                raise Refused(errno.ENOMEM)
+            self.in_flight[urb.address] = urb
             self._device.changed.notify_all()
 
     def _control(self, urb: Urb) -> None:

@@ -28,6 +28,12 @@ def numbers(items: list[Item]) -> list[int]:
     return [item.frame.number for item in items if isinstance(item, Delivery)]
 
 
+def lost(items: list[Item]) -> tuple[int, int]:
+    """Return how many frames the deliveries say were dropped, and how many unacknowledged."""
+    said = [each for item in items if isinstance(item, Delivery) for each in item.lost]
+    return sum(each.count for each in said), sum(each.unacknowledged for each in said)
+
+
 def subscribed(
     *, depth: int = 2, credit: int | None = None, rate_hz: float | None = None
 ) -> Outbox:

@@ -8,7 +8,7 @@ from fastapi import WebSocket
 
 from transientcam import wire
 from transientcam_server.api.metrics import Metrics
-from transientcam_server.broadcast.channel import Channel
+from transientcam_server.broadcast.channel import Channel, Lost
 from transientcam_server.broadcast.outbox import Close, Delivery, Item, Outbox
 from transientcam_server.errors import Problem
 from transientcam_server.errors.translation import problem_document
@@ -69,13 +69,16 @@ class Sender:
         return item
 
     async def _deliver(self, delivery: Delivery) -> None:
-        first, *others = delivery.channels
+        _, *others = delivery.channels
         self._sending_s = 0.0
         # all products of the frame are under way at once; each is sent as soon as those before
         tasks = [asyncio.ensure_future(self._encoded(delivery, each)) for each in others]
         try:
-            await self._send(delivery, first, None)
-            for channel, task in zip(others, tasks, strict=True):
+            for channel, lost, task in zip(
+                delivery.channels, delivery.lost, (None, *tasks), strict=True
+            ):
+                if lost.count:
+                    await self._report_dropped(channel, lost)
                 await self._send(delivery, channel, task)
         finally:
             for task in tasks:
@@ -85,8 +88,6 @@ class Sender:
     async def _send(
         self, delivery: Delivery, channel: Channel, task: asyncio.Task[bytes] | None
     ) -> None:
-        if channel.dropped:
-            await self._report_dropped(channel)
         try:
             data = await (self._encoded(delivery, channel) if task is None else task)
         except Problem as problem:
@@ -103,15 +104,13 @@ class Sender:
             channel.product, channel.encoding, View(crop=channel.crop), channel=channel.number
         )
 
-    async def _report_dropped(self, channel: Channel) -> None:
-        count, channel.dropped = channel.dropped, 0
-        unacknowledged, channel.dropped_unacknowledged = channel.dropped_unacknowledged, 0
-        channel.dropped_total += count
+    async def _report_dropped(self, channel: Channel, lost: Lost) -> None:
+        channel.dropped_total += lost.count
         details = {
             "channel": channel.number,
-            "count": count,
+            "count": lost.count,
             "total": channel.dropped_total,
-            "unacknowledged": unacknowledged,
+            "unacknowledged": lost.unacknowledged,
         }
         await self._websocket.send_bytes(wire.encode(wire.Notice("dropped", details)))
 

@@ -38,12 +38,16 @@ class _Socket:
     def __init__(self) -> None:
         self.free = asyncio.Event()
         self.taken: list[int] = []
+        self.notices: list[tuple[int, int]] = []
         self.closed: int | None = None
 
     async def send_bytes(self, data: bytes) -> None:
         await self.free.wait()
-        if len(data) == 1:  # else it is a notice
+        if len(data) == 1:
             self.taken.append(data[0])
+        else:  # how many were dropped, and before which frame that is said
+            notice = cast("wire.Notice", wire.parse_server_message(data))
+            self.notices.append((len(self.taken), notice.details["count"]))
 
     async def close(self, code: int, reason: str) -> None:
         self.closed = code
@@ -101,6 +105,7 @@ def test_a_client_that_takes_longer_to_receive_than_frames_to_compute_gets_the_n
         while len(socket.taken) < 3:
             await asyncio.sleep(0)
         assert socket.taken == [1, 2, 5]
+        assert socket.notices == [(2, 2)]  # frames 3 and 4, after the one that was taken ahead
         await _end(outbox, sending)
 
     run(test)
