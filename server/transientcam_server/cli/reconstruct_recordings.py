@@ -56,12 +56,18 @@ def settings_of(values: Mapping[str, Any]) -> "ReconstructionSettings":
 def reconstruct_recording(
     place: str, output: Path, wanted: Wanted, token: str | None, *, as_json: bool
 ) -> None:
-    """Reconstruct every frame of a recording, continuing an interrupted run."""
+    """Reconstruct every frame of a recording, continuing an interrupted run.
+
+    Kernels are compiled first, as on a cluster, so that each run gives the same bits.
+    """
     from transientcam_server import offline
+    from transientcam_server.offline.job import load_lanes
     from transientcam_server.offline.place import recording_at
+    from transientcam_server.offline.recording import BatchReconstructor
 
     with recording_at(place, token=token) as opened:
         options = wanted.options(opened.header)
+        load_lanes(BatchReconstructor(opened, options).recipe)
         with progress_bar("reconstructing") as advance:
             before = offline.reconstruct_recording(opened, output, options, progress=advance)
         _report(str(output), options.products, opened.frames, before, as_json=as_json)

@@ -123,14 +123,14 @@ def _opened(job: Job) -> tuple[Recording, BatchReconstructor]:
     recording = recording_at(job.place, token=job.token)
     try:
         reconstructor = BatchReconstructor(recording, job.options)
-        _load_lanes(reconstructor.recipe)
+        load_lanes(reconstructor.recipe)
     except BaseException:
         recording.close()
         raise
     return recording, reconstructor
 
 
-def _load_lanes(recipe: Recipe) -> None:
+def load_lanes(recipe: Recipe) -> None:
     """Make the compiled lanes ready: values of NumPy differ from theirs in the last digits."""
     if not tm.kernels.state()["enabled"]:
         return

@@ -7,8 +7,26 @@ import pytest
 import xarray
 from zarr.core.sync import cleanup_resources
 
-from tests.server.recording.made import record
+from tests.server.recording.made import APPLIED, record
 from transientcam.cli import run
+from transientcam_server.offline import job
+
+
+@pytest.fixture(autouse=True)
+def compiled_for(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Compile nothing, and return the orders that were to be compiled for."""
+    orders: list[int] = []
+    take = lambda recipe: orders.append(recipe.applied.sequence.harmonics)  # noqa: E731
+    monkeypatch.setattr(job, "load_lanes", take)
+    return orders
+
+
+def test_kernels_are_compiled_first_so_that_each_run_gives_the_same_bits(
+    tmp_path: Path, compiled_for: list[int]
+) -> None:
+    source = record(tmp_path / "a.h5", 1)
+    assert run(["reconstruct", str(source), "-o", str(tmp_path / "b.h5")]) == 0
+    assert compiled_for == [APPLIED.sequence.harmonics]
 
 
 def test_reconstruct_takes_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
