@@ -41,7 +41,7 @@ class Pixels:
     range_m
         Of the nearer and the further return (2, P).
     b, noise
-        Moments and what estimators are told of their noise.
+        Moments and the noise that is stated to estimators.
     """
 
     range_m: NDArray[Any]

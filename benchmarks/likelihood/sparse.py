@@ -16,7 +16,7 @@ CASES: Final = ((1, 3), (1, 4), (2, 4), (2, 6), (3, 4), (3, 6), (3, 8))
 PIXELS: Final = 4000
 SPLIT_PIXELS: Final = 100_000
 APART: Final = 4.4
-"""Over m: distance of neighbouring returns in radians; closer ones cannot be told apart."""
+"""Over m: distance of neighbouring returns in radians; closer ones cannot be resolved."""
 SEED: Final = 1
 
 

@@ -164,8 +164,8 @@ def test_all_views_show_the_frame_that_is_scrubbed_to(page: Page, served: Served
     url = f"{served.url}/api/v1/recordings/{recording}/frames/4/pixel"
     reported = httpx.get(url, params={"x": 40, "y": 50, "bins": 1}).json()
     page.wait_for_function(
-        "([range, brightness]) => { const told = transientcam.store.details.document.peek();"
-        " return told?.range_m === range && told.brightness === brightness; }",
+        "([range, brightness]) => { const document = transientcam.store.details.document.peek();"
+        " return document?.range_m === range && document.brightness === brightness; }",
         arg=[reported["range_m"], reported["brightness"]],
     )
     page.get_by_role("button", name="Back to live").click()

@@ -59,9 +59,9 @@ def test_a_lost_camera_and_a_lost_image_are_said_at_once(page: Page, served: Ser
     fault(served, "unplug")
     expect(banner).to_be_visible()
     expect(banner).to_have_attribute("role", "alert")
-    told = page.locator(".toast", has_text="was lost")
-    expect(told).to_be_visible()
-    assert str(told.text_content()).count("lost") == 1
+    toast = page.locator(".toast", has_text="was lost")
+    expect(toast).to_be_visible()
+    assert str(toast.text_content()).count("lost") == 1
     expect(page.locator("[data-field=state]")).to_have_text("Camera lost")
     last = int(text(page, ".bar", "frame").replace(" ", ""))
     fault(served, "replug")

@@ -60,8 +60,8 @@ def test_controls_name_another_holder_of_the_lease_and_wait(page: Page, served: 
     expect(page.locator("[data-field=control]")).to_have_text(
         re.compile(r"^the night shift \d+ s$")
     )
-    told = page.locator(".toast", has_text="the night shift has taken control.")
-    expect(told).to_be_visible()
+    toast = page.locator(".toast", has_text="the night shift has taken control.")
+    expect(toast).to_be_visible()
     lease(served, "DELETE", lease_id=granted["lease_id"])
     expect(edit).to_be_enabled()
 

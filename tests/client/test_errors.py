@@ -94,7 +94,7 @@ def test_an_error_shows_its_data_however_it_was_given() -> None:
     assert repr(_TREE[1]) == "ProblemError(404, '/problems/x', 'Title', 'Detail.')"
 
 
-def test_equal_errors_are_told_apart_and_can_be_kept_in_sets() -> None:
+def test_equal_errors_are_distinct_and_can_be_kept_in_sets() -> None:
     assert len({FrameTimeout(0.5), FrameTimeout(0.5)}) == 2
 
 

@@ -170,7 +170,7 @@ def _in_the_address(answer: Answer) -> Answer:
 BROKEN: list[tuple[str, Breaking, str]] = [
     # routes
     ("every-route-of-the-contract-is-described", Breaking(answer=_no_routes), "GET /lease"),
-    ("versions-are-told", answering("/api/versions", api=[]), "without v1"),
+    ("versions-are-stated", answering("/api/versions", api=[]), "without v1"),
     ("every-route-answers-as-documented", with_status(f"{API}/lease", 418), "418"),
     ("every-document-fits-its-schema", answering(f"{API}/camera", state=7), "state"),
     ("head-is-get-without-its-body", with_status("/livez", 405, "HEAD"), "HEAD /livez"),
@@ -232,12 +232,12 @@ BROKEN: list[tuple[str, Breaking, str]] = [
     ),
     # tags
     ("what-can-be-changed-has-a-tag", without_header("etag"), "no ETag"),
-    ("what-is-known-is-not-told-again", deaf_to("if-none-match"), "200"),
+    ("what-is-known-is-not-sent-again", deaf_to("if-none-match"), "200"),
     ("a-stale-tag-changes-nothing", deaf_to("if-match"), "200"),
     ("the-right-tag-changes-it", with_status(f"{API}/sequence", 412, "PUT"), "412"),
     # lease
     (
-        "a-second-writer-is-told-who-controls-it",
+        "a-second-writer-learns-who-holds-the-lease",
         answering(f"{API}/acquisition", "PUT", holder="x"),
         "holder",
     ),
@@ -250,13 +250,13 @@ BROKEN: list[tuple[str, Breaking, str]] = [
         "lease-lost",
     ),
     (
-        "a-lease-that-nobody-renews-lapses-and-the-light-goes-off",
+        "a-lease-that-is-not-renewed-lapses-and-the-light-goes-off",
         never_saying(kind="lease-changed", change="lapsed"),
         "within",
     ),
-    ("a-takeover-is-told", noticing("lease-changed", **{"from": None}), "former"),
+    ("a-takeover-is-notified", noticing("lease-changed", **{"from": None}), "former"),
     (
-        "the-light-can-be-switched-off-by-anybody",
+        "every-client-can-switch-the-light-off",
         with_status(f"{API}/acquisition/safe-off", 409, "POST"),
         "409",
     ),
@@ -264,21 +264,25 @@ BROKEN: list[tuple[str, Breaking, str]] = [
     ("a-handshake-without-the-subprotocol-is-refused", with_status(f"{API}/stream", 404), "404"),
     ("the-greeting-says-what-frames-look-like", saying("frame", unit="furlong"), "furlong"),
     ("the-products-of-a-frame-come-together", Breaking(said=Losing("range", 1)), "order"),
-    ("frames-are-counted-and-told-of", saying("frame", meta={"frame": 1}), "counted"),
+    ("frames-are-counted-and-announced", saying("frame", meta={"frame": 1}), "counted"),
     ("a-streamed-frame-is-the-one-that-is-asked-for", one_bit_wrong("range"), "differs"),
     ("a-bad-first-message-ends-the-stream", closing(1000), "close code"),
     ("a-bad-later-message-disturbs-nothing", never_saying(type="error"), "no problem"),
     ("a-subscription-can-be-replaced", Breaking(heard=_only_in_full), "no hello"),
-    ("a-change-of-the-sequence-is-told", never_saying(kind="sequence-changed"), "no notice"),
+    ("a-change-of-the-sequence-is-notified", never_saying(kind="sequence-changed"), "no notice"),
     ("a-rate-limit-is-kept", Breaking(heard=_unlimited), "quarter"),
     # slow readers
-    ("drops-are-told", never_saying(kind="dropped"), "reported as dropped"),
+    ("drops-are-reported", never_saying(kind="dropped"), "reported as dropped"),
     (
         "who-does-not-acknowledge-gets-no-more-than-its-credits",
         Breaking(heard=_never_behind),
         "beyond the credits",
     ),
-    ("who-never-reads-delays-nobody", Breaking(said=Losing("flags", 4)), "healthy client"),
+    (
+        "a-client-that-never-reads-delays-no-other",
+        Breaking(said=Losing("flags", 4)),
+        "healthy client",
+    ),
     ("who-never-reads-loses-frames", never_saying(kind="dropped"), "reported as dropped"),
     # resume
     ("a-stream-goes-on-where-it-stopped", Breaking(heard=_not_resuming), "resuming from"),
@@ -295,7 +299,7 @@ BROKEN: list[tuple[str, Breaking, str]] = [
     ),
     # recording
     (
-        "a-recording-is-told-and-described",
+        "a-recording-is-announced-and-described",
         noticing("recording-stopped", recording="another"),
         "another",
     ),
@@ -304,7 +308,7 @@ BROKEN: list[tuple[str, Breaking, str]] = [
     ("recorded-frames-are-those-that-were-streamed", one_bit_wrong("raw"), "differ"),
     ("a-replay-is-those-frames-again", one_bit_wrong("raw"), "replayed frame"),
     # unplug
-    ("an-unplugged-camera-is-told", with_status("/readyz", 200), "200"),
+    ("an-unplugged-camera-is-reported", with_status("/readyz", 200), "200"),
     ("a-lost-camera-refuses-and-remembers", plain(f"{API}/frames/latest", 503), "503"),
     ("a-camera-that-is-back-goes-on", never_saying(kind="camera-back"), "no notice"),
     ("spoilt-images-are-counted", noticing("lost-images", count=0), "no lost image"),
@@ -315,7 +319,7 @@ BROKEN: list[tuple[str, Breaking, str]] = [
 ]
 
 BROKEN_WITH_TOKENS: list[tuple[str, Breaking, str]] = [
-    ("nobody-gets-in-without-a-token", with_status("/metrics", 200), "200"),
+    ("no-request-is-served-without-a-token", with_status("/metrics", 200), "200"),
     ("a-token-in-the-address-is-none", Breaking(answer=_in_the_address), "200"),
     ("the-token-given-is-let-in", deaf_to("x-api-key"), "401"),
 ]

@@ -42,7 +42,7 @@ def test_one_return_has_its_range_over_the_whole_period_of_the_base_frequency() 
 
 
 @pytest.mark.parametrize("zeroth", ["estimated", "low-frequency"])
-def test_two_returns_are_told_apart(zeroth: str) -> None:
+def test_two_returns_are_resolved(zeroth: str) -> None:
     b = moments((PHASE, 500.0), (PHASE + 0.35, 300.0), zeroth=zeroth != "estimated")
 
     found = tm.reconstruct(b, settings(zeroth=zeroth))

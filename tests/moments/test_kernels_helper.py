@@ -138,7 +138,7 @@ def test_the_process_ends_with_one_that_is_killed(tmp_path: Path) -> None:
         parent.communicate()
 
         ended, _, _ = select.select([child], [], [], 600)
-        assert ended, "it goes on compiling for nobody"
+        assert ended, "it goes on compiling without a parent"
     finally:
         os.close(child)
 

@@ -496,8 +496,8 @@ def test_without_noise_a_share_of_the_light_is_assumed() -> None:
     assumed = tm.likelihood(b)
 
     std = np.broadcast_to(estimate.ASSUMED_NOISE * size, b.shape)
-    told = tm.likelihood(b, tm.noise.MomentNoise(std**2))
-    assert np.array_equal(assumed.chi_square, told.chi_square, equal_nan=True)
+    stated = tm.likelihood(b, tm.noise.MomentNoise(std**2))
+    assert np.array_equal(assumed.chi_square, stated.chi_square, equal_nan=True)
 
 
 # -- direct and indirect ----------------------------------------------------------------------

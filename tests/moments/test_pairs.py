@@ -158,7 +158,7 @@ def kinect(data_dir: Path) -> tuple[Array, Array]:
     return b[:, :, 1:511].reshape(3, -1)[:, ::249], path[:, 1:511].reshape(-1)[::249]
 
 
-def test_two_returns_of_a_kinect_are_told_apart(kinect: tuple[Array, Array]) -> None:
+def test_two_returns_of_a_kinect_are_resolved(kinect: tuple[Array, Array]) -> None:
     b, path_m = kinect
     companding = 0.5  # counts: what 11-bit codes leave of the samples
 

@@ -23,7 +23,7 @@ def foxglove(
     ] = None,
     host: Annotated[
         str,
-        typer.Option(help="Where to serve viewers; whoever reaches it sees the frames."),
+        typer.Option(help="Where to serve viewers; every machine that reaches it sees the frames."),
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 for any that is free.")] = 8765,
     max_rate_hz: Annotated[
@@ -33,8 +33,8 @@ def foxglove(
         bool,
         typer.Option(
             "--control",
-            help="Let viewers set parameters, and start a stopped camera for one capture; whoever "
-            "reaches the port can.",
+            help="Let viewers set parameters, and start a stopped camera for one capture; every "
+            "machine that reaches the port can.",
         ),
     ] = False,
     token: TokenOption = None,

@@ -34,7 +34,7 @@ def a_stream_with_a_wrong_token_is_closed(device: Device) -> None:
         equal(stream.close_code(), CloseCode.AUTHENTICATION_FAILED, "the close code")
 
 
-def nobody_gets_in_without_a_token(device: Device) -> None:
+def no_request_is_served_without_a_token(device: Device) -> None:
     """Where tokens are required, all of the camera is refused with 401 without one."""
     _require_tokens(device)
     for path in (f"{API}/camera", f"{API}/sequence", f"{API}/frames/latest/range", "/metrics"):
@@ -78,7 +78,7 @@ CHECKS = checks(
     health_is_open,
     a_wrong_token_is_refused,
     a_stream_with_a_wrong_token_is_closed,
-    nobody_gets_in_without_a_token,
+    no_request_is_served_without_a_token,
     a_token_in_the_address_is_none,
     the_token_given_is_let_in,
 )

@@ -10,7 +10,7 @@ _SHORT_S = 1.0
 _NEXT = "the next holder"
 
 
-def a_second_writer_is_told_who_controls_it(device: Device) -> None:
+def a_second_writer_learns_who_holds_the_lease(device: Device) -> None:
     """While a lease is held, changes without it are refused with 409, naming the holder."""
     with device.control(), device.as_another():
         change = {"running": device.read(_ACQUISITION)["running"]}
@@ -56,7 +56,7 @@ def a_lease_given_back_is_over(device: Device) -> None:
         device.document(device.send("PUT", _ACQUISITION, json=change))
 
 
-def a_lease_that_nobody_renews_lapses_and_the_light_goes_off(device: Device) -> None:
+def a_lease_that_is_not_renewed_lapses_and_the_light_goes_off(device: Device) -> None:
     """A lease that is not renewed lapses: capture and light stop, and streams get a notice."""
     with (
         device.control(),
@@ -78,7 +78,7 @@ def a_lease_that_nobody_renews_lapses_and_the_light_goes_off(device: Device) -> 
         _expect_dark(device, "after the lease lapsed")
 
 
-def a_takeover_is_told(device: Device) -> None:
+def a_takeover_is_notified(device: Device) -> None:
     """A client that takes the lease over gets it, and a notice names the former holder."""
     with device.control(), device.stream("flags") as watcher, device.as_another() as own:
         terms = {"holder": _NEXT, "takeover": True, "on_lapse": "keep"}
@@ -92,7 +92,7 @@ def a_takeover_is_told(device: Device) -> None:
         )
 
 
-def the_light_can_be_switched_off_by_anybody(device: Device) -> None:
+def every_client_can_switch_the_light_off(device: Device) -> None:
     """safe-off stops the capture and the light, whichever client holds the lease."""
     with device.control(), device.as_another():
         stopped = device.document(device.send("POST", f"{_ACQUISITION}/safe-off"))
@@ -107,12 +107,12 @@ def _expect_dark(device: Device, when: str) -> None:
 
 CHECKS = checks(
     "lease",
-    a_second_writer_is_told_who_controls_it,
+    a_second_writer_learns_who_holds_the_lease,
     watchers_are_never_blocked,
     the_holder_changes_things,
     a_renewed_lease_lasts_on,
     a_lease_given_back_is_over,
-    a_lease_that_nobody_renews_lapses_and_the_light_goes_off,
-    a_takeover_is_told,
-    the_light_can_be_switched_off_by_anybody,
+    a_lease_that_is_not_renewed_lapses_and_the_light_goes_off,
+    a_takeover_is_notified,
+    every_client_can_switch_the_light_off,
 )

@@ -20,7 +20,7 @@ _HDF5: Final = b"\x89HDF\r\n\x1a\n"
 _ANNOTATIONS: Final = {"of": "transientcam conformance"}
 
 
-def a_recording_is_told_and_described(device: Device) -> None:
+def a_recording_is_announced_and_described(device: Device) -> None:
     """Streams get notices when a recording begins and ends, and its description is complete."""
     with _recorded(device) as (recording, _):
         found = recording["state"], recording["frames"], recording["dropped_frames"]
@@ -151,7 +151,7 @@ def _deletable(device: Device) -> Iterator[list[str]]:
 
 CHECKS = checks(
     "recording",
-    a_recording_is_told_and_described,
+    a_recording_is_announced_and_described,
     one_recording_runs_at_a_time,
     a_file_can_be_fetched_in_parts,
     recorded_frames_are_those_that_were_streamed,

@@ -66,7 +66,7 @@ def every_route_of_the_contract_is_described(device: Device) -> None:
     expect(not missing, f"not described: {', '.join(missing)}")
 
 
-def versions_are_told(device: Device) -> None:
+def versions_are_stated(device: Device) -> None:
     """The unversioned /api/versions names the versions of the interface and where they are."""
     versions = device.read("/api/versions")
     paths = {each["name"]: each["path"] for each in versions.get("api", [])}
@@ -192,7 +192,7 @@ def _name(response: httpx.Response) -> str:
 CHECKS = checks(
     "routes",
     every_route_of_the_contract_is_described,
-    versions_are_told,
+    versions_are_stated,
     every_route_answers_as_documented,
     every_document_fits_its_schema,
     head_is_get_without_its_body,

@@ -24,7 +24,7 @@ _SMALL_BYTES: Final = 400 * 1024
 _LARGE: Final = ("raw", "moments", "direct", "indirect", "range")
 
 
-def drops_are_told(device: Device) -> None:
+def drops_are_reported(device: Device) -> None:
     """A late acknowledgement is answered with the newest frame and the number dropped before."""
     with (
         device.capturing(),
@@ -60,7 +60,7 @@ def _keeps_to_credits(device: Device) -> None:
         expect(first.frame < second.frame, "frames come twice")
 
 
-def who_never_reads_delays_nobody(device: Device) -> None:
+def a_client_that_never_reads_delays_no_other(device: Device) -> None:
     """While one client reads nothing at all, another gets every single frame."""
     with device.capturing():
         if not any(
@@ -131,8 +131,8 @@ def _channel(conversation: Conversation) -> int:
 
 CHECKS = checks(
     "slow-readers",
-    drops_are_told,
+    drops_are_reported,
     who_does_not_acknowledge_gets_no_more_than_its_credits,
-    who_never_reads_delays_nobody,
+    a_client_that_never_reads_delays_no_other,
     who_never_reads_loses_frames,
 )

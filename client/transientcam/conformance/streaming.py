@@ -51,7 +51,7 @@ def the_products_of_a_frame_come_together(device: Device) -> None:
             equal(len({each.frame for each in first}), 1, "the number of frames in one frame")
 
 
-def frames_are_counted_and_told_of(device: Device) -> None:
+def frames_are_counted_and_announced(device: Device) -> None:
     """Every frame has its number, sequence, times and lost images; numbers only grow."""
     with device.capturing(), device.stream("flags") as stream:
         frames = [stream.frame() for _ in range(4)]
@@ -109,7 +109,7 @@ def a_subscription_can_be_replaced(device: Device) -> None:
         equal(stream.frame().product, "range", "the product streamed afterwards")
 
 
-def a_change_of_the_sequence_is_told(device: Device) -> None:
+def a_change_of_the_sequence_is_notified(device: Device) -> None:
     """A changed sequence is announced to every stream, with the channels from then on."""
     with device.control(), device.capturing(), device.stream("moments") as stream:
         present = device.sequence
@@ -146,11 +146,11 @@ CHECKS = checks(
     a_handshake_without_the_subprotocol_is_refused,
     the_greeting_says_what_frames_look_like,
     the_products_of_a_frame_come_together,
-    frames_are_counted_and_told_of,
+    frames_are_counted_and_announced,
     a_streamed_frame_is_the_one_that_is_asked_for,
     a_bad_first_message_ends_the_stream,
     a_bad_later_message_disturbs_nothing,
     a_subscription_can_be_replaced,
-    a_change_of_the_sequence_is_told,
+    a_change_of_the_sequence_is_notified,
     a_rate_limit_is_kept,
 )

@@ -19,7 +19,7 @@ def what_can_be_changed_has_a_tag(device: Device) -> None:
         equal(second, first, f"the ETag of {path}, unchanged,")
 
 
-def what_is_known_is_not_told_again(device: Device) -> None:
+def what_is_known_is_not_sent_again(device: Device) -> None:
     """If-None-Match with the ETag is answered with 304 and no body, another with 200."""
     for path in _tagged(device):
         tag = _tag(device, path)
@@ -86,7 +86,7 @@ def _other(device: Device) -> dict[str, Any]:
 CHECKS = checks(
     "tags",
     what_can_be_changed_has_a_tag,
-    what_is_known_is_not_told_again,
+    what_is_known_is_not_sent_again,
     a_stale_tag_changes_nothing,
     the_right_tag_changes_it,
 )

@@ -9,7 +9,7 @@ from transientcam.conformance.device import API, Device
 from transientcam.conformance.expecting import equal, expect
 
 
-def an_unplugged_camera_is_told(device: Device) -> None:
+def an_unplugged_camera_is_reported(device: Device) -> None:
     """Streams get camera-lost with a reason; /readyz answers 503 with it, /livez still answers."""
     with _simulated(device) as stream, _unplugged(device):
         lost = stream.notice("camera-lost")
@@ -79,7 +79,7 @@ def _inject_fault(device: Device, fault: str) -> None:
 
 CHECKS = checks(
     "unplug",
-    an_unplugged_camera_is_told,
+    an_unplugged_camera_is_reported,
     a_lost_camera_refuses_and_remembers,
     a_camera_that_is_back_goes_on,
     spoilt_images_are_counted,

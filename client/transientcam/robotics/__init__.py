@@ -1,7 +1,7 @@
 """Frames as messages of robot software: images, points, lens and pose, for viewers and files.
 
-`messages` says what is sent, in nobody's format; `foxglove_messages` puts them into Foxglove's, and
-`foxglove_bridge` serves them live.
+`messages` says what is sent, independent of any format; `foxglove_messages` puts them into
+Foxglove's, and `foxglove_bridge` serves them live.
 """
 
 from transientcam.robotics.messages import (

@@ -1,7 +1,7 @@
 """A camera's frames, live, for viewers that speak Foxglove's WebSocket protocol.
 
-What nobody looks at is neither asked of the camera nor encoded. Viewers see the parameters; they
-set them only where the bridge was given control.
+What no viewer has subscribed to is neither asked of the camera nor encoded. Viewers see the
+parameters; they set them only where the bridge was given control.
 """
 
 import time
@@ -143,7 +143,7 @@ class FoxgloveBridge:
         return self._server.port
 
     def run(self) -> None:
-        """Send frames to whoever looks, until it is closed."""
+        """Send frames to the viewers that are subscribed, until it is closed."""
         topics: frozenset[str] = frozenset()
         while not self._source.closed:
             topics = self._watching.other_than(topics)
@@ -178,7 +178,9 @@ class FoxgloveBridge:
                 if now and now != wanted:
                     stream.subscribe(*now, max_rate_hz=self._max_rate_hz)
                 wanted = now
-        self._source.report(Report("info", "connection", "nobody looks: the stream is closed"))
+        self._source.report(
+            Report("info", "connection", "no viewer is subscribed: the stream is closed")
+        )
         return topics
 
     def _send_frame(self, frame: Frame, topics: frozenset[str]) -> None:

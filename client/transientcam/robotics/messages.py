@@ -1,4 +1,4 @@
-"""What robot programs are sent of one frame, in nobody's format.
+"""What robot programs are sent of one frame, independent of any format.
 
 Conventions are those of ROS, which Foxglove shares: REP 103 (frames and units) and REP 118 (depth
 images: metres along the optical axis, NaN without a return).

@@ -1,4 +1,4 @@
-"""What viewers are told beside frames: lost connections, dropped frames, a camera that is gone."""
+"""What viewers receive beside frames: lost connections, dropped frames, a camera that is gone."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass

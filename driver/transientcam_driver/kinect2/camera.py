@@ -272,7 +272,7 @@ class Kinect2Camera(HostCamera):
         self._lit = False
 
     def _unread(self) -> None:
-        """Switch the light off that nobody needs; the next `read_frame` needs it again."""
+        """Switch the light off without readers; the next `read_frame` needs it again."""
         with self._control:
             if self._lit:
                 with suppress(CameraError):  # the next request fails in the same way

@@ -20,7 +20,7 @@ from transientcam_driver.kinect2.packets import Footer
 PACKET_BYTES: Final = 33_792
 """Longest packet of the isochronous endpoint (`src/libfreenect2.cpp`, wBytesPerInterval)."""
 MAGIC: Final = int.from_bytes(b"2RIK", "little"), int.from_bytes(b"TPED", "little")
-"""Begin of our footers; what a camera writes there is not known, and nobody reads it."""
+"""Begin of our footers; what a camera writes there is not known, and no known program reads it."""
 
 
 def samples(

@@ -23,7 +23,7 @@ class ControlConnection:
     """Commands to one camera.
 
     Whatever comes in place of an answer, `exchange` ends within ``answer_s``, and closes the
-    connection: behind a broken answer the next could not be told apart from its rest.
+    connection: behind a broken answer the next could not be separated from its rest.
 
     Parameters
     ----------

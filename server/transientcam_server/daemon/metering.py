@@ -67,7 +67,7 @@ def in_turns(app: ASGIApp, account: Account) -> ASGIApp:
 
 
 class CountingExecutor(ThreadPoolExecutor):
-    """Runs what requests do on other threads, and counts that for whoever asked."""
+    """Runs what requests do on other threads, and counts that for the address that asked."""
 
     def submit(self, fn: Callable[..., _T], /, *arguments: Any, **keywords: Any) -> Future[_T]:
         """Run a function; called on the event loop."""

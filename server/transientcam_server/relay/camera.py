@@ -37,7 +37,7 @@ _CAPTURING: Final = frozenset(("starting", "streaming", "held"))
 class RelayCamera(HostCamera):
     """Frames of another service, numbered on across its restarts; changes are made there.
 
-    The camera is shared: it captures what and when the origin does, whoever changes that there.
+    The camera is shared: it captures what and when the origin does, whichever client sets that.
     ``start``, ``stop``, ``safe_off`` and ``configure`` are made at the origin and raise
     `OriginRefused` where it refuses; ``close`` switches off only what this relay has switched on.
 

@@ -36,10 +36,10 @@ def nothing_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kinect2, "list_kinects", lambda: ())
     monkeypatch.setattr(devices, "discover", lambda **_: ())
 
-    def nobody(address: str, *_: object, **__: object) -> None:
+    def no_device(address: str, *_: object, **__: object) -> None:
         raise CameraUnreachable(address)
 
-    monkeypatch.setattr(tofcam660, "ControlConnection", nobody)
+    monkeypatch.setattr(tofcam660, "ControlConnection", no_device)
 
 
 def plug(monkeypatch: pytest.MonkeyPatch, *cameras: Camera) -> None:

@@ -110,7 +110,7 @@ def test_only_what_is_looked_at_is_asked_of_the_camera(served: Served) -> None:
         viewer.subscribe("/brightness")
         viewer.message("/brightness")
         viewer.unsubscribe("/range", "/brightness")
-        said(reports, "nobody looks")
+        said(reports, "no viewer is subscribed")
         # of what the viewer no longer looks at, what was under way may still come
         viewer.subscribe("/indirect")
         assert said(reports, "streaming").text == "streaming indirect"
@@ -122,7 +122,7 @@ def test_a_viewer_that_leaves_without_a_word_is_no_longer_served(served: Served)
         with viewing(bridge.port) as viewer:
             viewer.subscribe("/range")
             viewer.message("/range")
-        said(reports, "nobody looks")
+        said(reports, "no viewer is subscribed")
 
 
 def test_viewers_see_the_parameters_and_cannot_set_them(served: Served) -> None:

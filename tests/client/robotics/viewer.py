@@ -1,4 +1,4 @@
-"""A viewer of Foxglove's WebSocket protocol that is nobody's library but the decoder of messages.
+"""A viewer of Foxglove's WebSocket protocol, written for tests; a library decodes messages.
 
 Its words are those of the protocol's specification: text frames are JSON with ``op``; a binary
 frame is 1, the subscription (u32), the time in ns (u64), all little-endian, and the message. A call

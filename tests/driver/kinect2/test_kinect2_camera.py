@@ -1,4 +1,4 @@
-"""A Kinect v2 as a camera: frames, takes, losses, and a light that nobody needs."""
+"""A Kinect v2 as a camera: frames, takes, losses, and a light that no reader needs."""
 
 import threading
 from collections.abc import Callable
@@ -74,7 +74,7 @@ def test_two_cameras_run_at_once() -> None:
         assert {one.capabilities.serial, other.capabilities.serial} == {"0001", "0002"}
 
 
-def test_the_light_goes_off_where_nobody_reads_and_on_again_where_somebody_does() -> None:
+def test_the_light_goes_off_without_a_reader_and_on_again_with_one() -> None:
     device = emulated()
     with camera_of(device, unread_s=0.2) as camera:
         camera.start()

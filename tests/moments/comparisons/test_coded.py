@@ -59,7 +59,7 @@ def test_two_returns_are_recovered_from_the_samples() -> None:
         assert found.weight[at, pixel] == pytest.approx(weight[:, pixel], rel=0.05)
 
 
-def test_returns_closer_than_a_chip_are_told_apart_by_more_shifts() -> None:
+def test_returns_closer_than_a_chip_are_resolved_by_more_shifts() -> None:
     chip = 2 * np.pi / 31
     phase = np.array([[2.0], [2.0 + 0.6 * chip]])
     shifts = equal_shifts_rad(31 * 8)

@@ -215,8 +215,8 @@ def test_what_they_cannot_give_is_absent_with_the_reason(
     assert "the multiples 2, 10 and 15 at 3" in problem["detail"]
     assert set(absent) == {*OF_CONSECUTIVE_MULTIPLES, "brightness", "uniform", "truth"}
     assert command(["doctor", fixed.url, "--seconds", "0.1", "--json"]) == 0
-    told = of_products(capsys.readouterr().out)
-    assert {name: why for names, why in told.items() for name in names.split(", ")} == absent
+    printed = of_products(capsys.readouterr().out)
+    assert {name: why for names, why in printed.items() for name in names.split(", ")} == absent
     assert "needs consecutive multiples of one frequency" in absent["transient"]
     assert "needs a zeroth moment" in absent["brightness"]
     assert estimator == "automatic"

@@ -268,7 +268,7 @@ def test_requests_sent_together_are_answered_one_after_the_other(
 
 
 @pytest.mark.parametrize("size", [1, 3, 7, 64])
-def test_requests_are_told_apart_wherever_packets_end(
+def test_requests_are_separated_wherever_packets_end(
     plain: Served, works: list[int], size: int
 ) -> None:
     body = b'{"holder": "x", "on_lapse": "\r\n\r\n"}'

@@ -60,10 +60,10 @@ def test_every_mistake_in_the_settings_is_a_fault_with_its_place(tmp_path: Path)
 
 def test_a_service_that_admits_every_client_is_warned_of(tmp_path: Path) -> None:
     everybody = found(settings(tmp_path, 'host = "0.0.0.0"\nport = 0\ninsecure = true\n'))
-    nobody = found(settings(tmp_path, "port = 0\ninsecure = true\n"))
+    local = found(settings(tmp_path, "port = 0\ninsecure = true\n"))
 
     assert everybody["access"][0] == "warning"
-    assert "access" not in nobody
+    assert "access" not in local
 
 
 def test_kernels_are_counted_where_they_are_kept(

@@ -152,7 +152,7 @@ def test_without_a_manager_nothing_is_sent_and_nothing_runs() -> None:
 
 
 def test_a_manager_that_is_gone_is_no_error(tmp_path: Path) -> None:
-    ServiceManager(str(tmp_path / "nobody")).notify(READY="1")
+    ServiceManager(str(tmp_path / "no-socket")).notify(READY="1")
 
 
 def test_a_name_in_the_abstract_namespace_is_a_socket_too() -> None:

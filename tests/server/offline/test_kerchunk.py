@@ -19,15 +19,15 @@ pytestmark = pytest.mark.usefixtures("zarr_clients")
 
 def test_xarray_reads_a_file_where_it_lies(tmp_path: Path) -> None:
     source, output = record(tmp_path / "a.h5", FRAMES), tmp_path / "a.json"
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
     with Recording(source) as recording:
         convert_recording(
-            recording, output, progress=lambda done, total: told.append((done, total))
+            recording, output, progress=lambda done, total: reported.append((done, total))
         )
 
     dataset = xarray.open_dataset(str(output), engine="kerchunk")
 
-    assert told == [(1, FRAMES), (2, FRAMES), (3, FRAMES)]
+    assert reported == [(1, FRAMES), (2, FRAMES), (3, FRAMES)]
     with h5py.File(source) as file:
         for name, variable in dataset.variables.items():
             np.testing.assert_array_equal(variable.to_numpy(), file[str(name)][()])

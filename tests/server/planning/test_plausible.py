@@ -45,7 +45,7 @@ def test_a_single_return_is_where_it_seems() -> None:
 
 @pytest.mark.parametrize("decay_ns", [0.4, 0.8, 1.2])
 def test_light_out_of_a_material_may_begin_where_it_does(decay_ns: float) -> None:
-    # where the estimate lies is not told: as late as light comes back on average
+    # where the estimate lies is not known: as late as light comes back on average
     moments = looked([13.0], [1.0], decay_ns)
     earliest_m, latest_m = bounds(moments, range_m(13.0 + decay_ns))
     true_m = range_m(13.0)

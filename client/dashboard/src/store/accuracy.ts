@@ -53,7 +53,7 @@ export class Accuracy {
 
   async cancel(): Promise<void> {
     const job = this.job.peek();
-    if (job !== null) await this.#told(() => this.#api.cancelJob(job.id));
+    if (job !== null) await this.#answer(() => this.#api.cancelJob(job.id));
   }
 
   /** The camera stands before another scene: what was predicted is of the one before. */
@@ -64,7 +64,7 @@ export class Accuracy {
   async #ask(start: () => Promise<JobDocument>, seen: (job: JobDocument) => void): Promise<void> {
     if (this.job.peek() !== null) return;
     this.problem.value = null;
-    const started = await this.#told(start);
+    const started = await this.#answer(start);
     if (started === null) return;
     const ended = await followed(this.#api, started, (job) => {
       this.job.value = job;
@@ -75,7 +75,7 @@ export class Accuracy {
   }
 
   /** What the service answers; null where it refuses, which is kept. */
-  async #told<T>(question: () => Promise<T>): Promise<T | null> {
+  async #answer<T>(question: () => Promise<T>): Promise<T | null> {
     try {
       return await question();
     } catch (error) {

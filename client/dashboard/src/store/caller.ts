@@ -9,8 +9,8 @@ export class Caller {
   readonly document = signal<CallerDocument | null>(null);
   /** Why this page may change nothing at all; null where it may. */
   readonly obstacle = computed(() => {
-    const told = this.document.value;
-    return told?.role === "viewer" ? `The token ${told.name} is a viewer's` : null;
+    const caller = this.document.value;
+    return caller?.role === "viewer" ? `The token ${caller.name} is a viewer's` : null;
   });
   readonly #api: Api;
 

@@ -59,8 +59,8 @@ export class Details {
     this.#asked_s = this.#now_s();
     this.#origin = newest.origin;
     try {
-      const told = await this.#ask(place, newest);
-      if (this.#place?.x === told.x && this.#place.y === told.y) this.document.value = told;
+      const answer = await this.#ask(place, newest);
+      if (this.#place?.x === answer.x && this.#place.y === answer.y) this.document.value = answer;
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;
       this.document.value = null; // asked again with the next frame

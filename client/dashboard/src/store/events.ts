@@ -19,7 +19,7 @@ export interface Happening {
   readonly at_s: number;
   readonly words: string;
   readonly tone: EventTone;
-  /** Names it where it may be told twice: by the service, and by this page. */
+  /** Names it where two may report it: the service and this page. */
   readonly key?: string;
   readonly remedy?: Remedy;
 }

@@ -6,7 +6,7 @@ import type { LeaseDocument } from "./documents";
 /** Who controls the camera; times are of this page's clock. */
 export type Control =
   | { readonly kind: "unknown" }
-  | { readonly kind: "nobody" }
+  | { readonly kind: "free" }
   | { readonly kind: "us"; readonly holder: string; readonly expires_s: number }
   | { readonly kind: "other"; readonly holder: string; readonly expires_s: number };
 
@@ -133,7 +133,7 @@ export class Lease {
     } else if (!held && this.control.peek().kind === "other") {
       this.lost.value = null; // the client that took control gave it back
     }
-    if (!held) this.control.value = { kind: "nobody" };
+    if (!held) this.control.value = { kind: "free" };
     else this.control.value = { kind: this.#api.credentials.leaseId.peek() === null ? "other" : "us", holder: holder ?? "Another client", expires_s };
   }
 

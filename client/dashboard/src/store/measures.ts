@@ -3,7 +3,7 @@ import { signal } from "@preact/signals";
 
 import type { Pixel } from "./pixel";
 
-/** The names of pins, and their colours in all views: told apart by colour-blind eyes too (after Okabe and Ito). */
+/** The names of pins, and their colours in all views: distinct for colour-blind eyes too (after Okabe and Ito). */
 export const PIN_NAMES = ["A", "B", "C"] as const;
 export const PIN_COLOURS: Readonly<Record<PinName, string>> = { A: "#e69f00", B: "#56b4e9", C: "#cc79a7" };
 export type PinName = (typeof PIN_NAMES)[number];

@@ -187,11 +187,11 @@ export class StreamClient {
 
   #notice(notice: Notice): void {
     const { status } = this.#store;
-    const told = inWords(notice);
+    const shown = inWords(notice);
     // A calibration sets the sequence anew although it stays as it is.
     const unchanged = notice.kind === "sequence-changed" && sameSequence(notice.sequence, this.#store.sequence.peek());
     const key = notice.kind === "sequence-changed" ? { key: sequenceKey(notice.sequence) } : {};
-    if (told !== null && !unchanged) this.#store.events.tell(told.words, told.tone, key);
+    if (shown !== null && !unchanged) this.#store.events.tell(shown.words, shown.tone, key);
     switch (notice.kind) {
       case "dropped":
         status.dropNotice(notice.channel, notice.total);

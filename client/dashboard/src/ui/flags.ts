@@ -6,7 +6,7 @@ export interface Flag {
   readonly name: string;
   readonly title: string;
   readonly words: string;
-  /** A colour that is told from the others' by colour-blind eyes too (after Okabe and Ito). */
+  /** A colour distinct from the others' for colour-blind eyes too (after Okabe and Ito). */
   readonly colour: string;
 }
 

@@ -72,7 +72,7 @@ test("a service that cannot be reached for a while loses no measurement; one sta
   expect(calibrations.job.value).toBeNull();
 });
 
-test("a measurement that somebody else began is shown", async () => {
+test("a measurement that another client began is shown", async () => {
   const end = calibrations.follow();
   await vi.advanceTimersByTimeAsync(1);
   expect(calibrations.job.value?.id).toBe("theirs");

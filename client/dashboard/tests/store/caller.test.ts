@@ -18,7 +18,7 @@ test.each([
   expect(caller.obstacle.value).toBe(obstacle);
 });
 
-test("who is let in no more is nobody", async () => {
+test("a caller that is refused from now on is forgotten", async () => {
   let refused = false;
   const caller = answering(() => (refused ? Response.json({ type: "/problems/token-refused", status: 401 }, { status: 401 }) : known("viewer")));
   await caller.look();

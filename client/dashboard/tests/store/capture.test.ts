@@ -3,41 +3,41 @@ import { expect, test } from "vitest";
 import { type Api, RequestError } from "../../src/store/api";
 import { captureOne } from "../../src/store/capture";
 
-function camera(answers: (number | RequestError)[]): { api: Api; told: string[] } {
-  const told: string[] = [];
+function camera(answers: (number | RequestError)[]): { api: Api; sent: string[] } {
+  const sent: string[] = [];
   const api = {
     setAcquisition: (running: boolean) => {
-      told.push(running ? "start" : "stop");
+      sent.push(running ? "start" : "stop");
       return Promise.resolve({});
     },
     newestFrame: () => Promise.resolve(7),
     frameAfter: (frame: number) => {
-      told.push(`wait after ${frame}`);
+      sent.push(`wait after ${frame}`);
       const answer = answers.shift();
       return answer instanceof RequestError ? Promise.reject(answer) : Promise.resolve(answer);
     },
   } as unknown as Api;
-  return { api, told };
+  return { api, sent };
 }
 
 const early = new RequestError({ type: "/problems/no-frame-yet", title: "No frame yet" });
 const lost = new RequestError({ type: "/problems/camera-lost", title: "Camera not connected" });
 
 test("a single capture is a frame that begins after it was asked for; the camera stands then", async () => {
-  const { api, told } = camera([8]);
+  const { api, sent } = camera([8]);
   expect(await captureOne(api, 0.1)).toBe(8);
-  expect(told).toEqual(["stop", "start", "wait after 7", "stop"]);
+  expect(sent).toEqual(["stop", "start", "wait after 7", "stop"]);
 });
 
 test("a capture that takes long is waited for, but not for ever", async () => {
-  const { api, told } = camera([early, early, 8]);
+  const { api, sent } = camera([early, early, 8]);
   expect(await captureOne(api, 12)).toBe(8);
-  expect(told.filter((each) => each.startsWith("wait"))).toHaveLength(3);
+  expect(sent.filter((each) => each.startsWith("wait"))).toHaveLength(3);
   await expect(captureOne(camera([early, early, early, early]).api, 0.1)).rejects.toThrow("No frame yet");
 });
 
-test("a camera that fails meanwhile is told to stop nevertheless", async () => {
-  const { api, told } = camera([lost]);
+test("a camera that fails meanwhile is stopped nevertheless", async () => {
+  const { api, sent } = camera([lost]);
   await expect(captureOne(api, 0.1)).rejects.toThrow(lost);
-  expect(told.at(-1)).toBe("stop");
+  expect(sent.at(-1)).toBe("stop");
 });

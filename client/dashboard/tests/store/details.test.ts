@@ -80,14 +80,14 @@ function keeping(): { api: Api; asked: string[] } {
 }
 
 test.each([
-  { held: 85, told: 85, addresses: ["/frames/85"] },
-  { held: 70, told: 90, addresses: ["/frames/70", LIVE] },
-])("a pixel of frame $held, held for a while, is told of frame $told", async ({ held, told, addresses }) => {
+  { held: 85, answered: 85, addresses: ["/frames/85"] },
+  { held: 70, answered: 90, addresses: ["/frames/70", LIVE] },
+])("a pixel of frame $held, held for a while, is answered of frame $answered", async ({ held, answered, addresses }) => {
   const { api, asked } = keeping();
   const details = new Details(api);
   const end = details.follow(signal<Pixel | null>({ x: 3, y: 4 }), signal<Frame | null>(frame(held)));
   await vi.waitFor(() => {
-    expect(details.document.value?.meta.frame).toBe(told);
+    expect(details.document.value?.meta.frame).toBe(answered);
   });
   expect(asked).toEqual(addresses);
   end();

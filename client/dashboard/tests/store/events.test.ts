@@ -52,14 +52,14 @@ describe("what happened", () => {
 });
 
 describe("images that were lost", () => {
-  test("are told of once a burst, with how many there were", () => {
+  test("are shown once a burst, with how many there were", () => {
     let now_s = 100;
     const events = new Events(() => now_s);
     events.tally("lost-images", 3, lossWords, "plain");
     now_s += 5;
     events.tell("something else");
     events.tally("lost-images", 2, lossWords, "plain");
-    expect(events.all.value.map(({ words: told }) => told)).toEqual([lossWords(5), "something else"]);
+    expect(events.all.value.map((happening) => happening.words)).toEqual([lossWords(5), "something else"]);
     expect(lossWords(5)).toMatch(/^5 images did not arrive intact/);
     now_s += 60;
     events.tally("lost-images", 1, lossWords, "plain");
@@ -68,7 +68,7 @@ describe("images that were lost", () => {
   });
 });
 
-test("a lost camera is told of once, although its reason says so too", () => {
+test("a lost camera is shown once, although its reason says so too", () => {
   const reason = "the camera was lost: HEARTBEAT: No such device";
   expect(words({ kind: "camera-lost", reason })).toBe("The camera was lost: HEARTBEAT: No such device");
   expect(words({ kind: "camera-lost", reason: "pulled" })).toBe("The camera was lost: pulled");

@@ -68,7 +68,7 @@ describe("the lease", () => {
     expect(desk.api.credentials.headers(true)).toEqual({ "Transientcam-Lease": desk.held?.id });
     expect(desk.api.credentials.headers(false)).toEqual({});
     await desk.lease.release();
-    expect(desk.lease.control.value).toEqual({ kind: "nobody" });
+    expect(desk.lease.control.value).toEqual({ kind: "free" });
     expect(desk.api.credentials.headers(true)).toEqual({});
   });
 
@@ -89,16 +89,16 @@ describe("the lease", () => {
     expect(desk.lease.control.value.kind).toBe("us");
   });
 
-  test("of somebody else is an obstacle, until it is over, which is noticed", async () => {
+  test("of another client is an obstacle, until it is over, which is noticed", async () => {
     desk.grant("the night shift", 12);
     await desk.lease.look();
     expect(desk.lease.obstacle.value).toBe("the night shift controls the camera");
     await desk.passes(14);
-    expect(desk.lease.control.value).toEqual({ kind: "nobody" });
+    expect(desk.lease.control.value).toEqual({ kind: "free" });
     expect(desk.lease.obstacle.value).toBeNull();
   });
 
-  test("of somebody else is refused, or taken over", async () => {
+  test("of another client is refused, or taken over", async () => {
     desk.grant("the night shift", 30);
     const refusal = await desk.lease.take("bench 2", false).catch((error: unknown) => error);
     expect((refusal as RequestError).kind).toBe("lease-held");
@@ -106,7 +106,7 @@ describe("the lease", () => {
     expect(desk.lease.control.value).toMatchObject({ kind: "us", holder: "bench 2" });
   });
 
-  test("that somebody takes over is lost, which is said with the name", async () => {
+  test("that another client takes over is lost, which is said with the name", async () => {
     await desk.lease.take("bench 2", false);
     desk.grant("the night shift", 30);
     await desk.lease.look();
@@ -121,7 +121,7 @@ describe("the lease", () => {
     await desk.lease.look();
     desk.held = null;
     await desk.lease.look();
-    expect(desk.lease.control.value).toEqual({ kind: "nobody" });
+    expect(desk.lease.control.value).toEqual({ kind: "free" });
     expect(desk.lease.lost.value).toBeNull();
   });
 
@@ -130,7 +130,7 @@ describe("the lease", () => {
     desk.held = null;
     desk.lease.refused("lease-lost");
     await vi.waitFor(() => {
-      expect(desk.lease.control.value).toEqual({ kind: "nobody" });
+      expect(desk.lease.control.value).toEqual({ kind: "free" });
     });
     expect(desk.lease.lost.value).toBe("This page's control has lapsed.");
   });

@@ -34,7 +34,7 @@ describe("noise over frames", () => {
     expect(variances.reduce((sum, value) => sum + value) / pixels).toBeCloseTo(1 / 12, 2);
   });
 
-  test("is not told before there are enough frames with a value", () => {
+  test("is not shown before there are enough frames with a value", () => {
     const noise = new Noise();
     for (let n = 1; n < FEWEST; n++) noise.take(frame([n, n]));
     expect(noise.std(0)).toBeNaN();

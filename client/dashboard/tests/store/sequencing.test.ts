@@ -31,7 +31,7 @@ function service() {
   return { state, current, events, sequencing: new Sequencing(api, events, current) };
 }
 
-test("a change is told of with the way back, and undone by it", async () => {
+test("a change is shown with the way back, and undone by it", async () => {
   const { current, events, sequencing } = service();
   expect(sequencing.undoable.value).toBe(false);
   await sequencing.set(sequence(4, 0));

@@ -23,7 +23,7 @@ describe("frames", () => {
     expect(frames.wanted.value).toEqual([]);
   });
 
-  test("only the newest of a product is kept, and nothing of what nobody wants", () => {
+  test("only the newest of a product is kept, and nothing of what no view wants", () => {
     const frames = new Frames();
     const giveBack = frames.claim(["range"]);
     frames.put(frame("range", 1));
@@ -38,12 +38,12 @@ describe("frames", () => {
   test("a claim that changes nothing does not subscribe anew", () => {
     const frames = new Frames();
     frames.claim(["range"]);
-    let told = 0;
+    let notified = 0;
     effect(() => {
-      told += frames.wanted.value.length;
+      notified += frames.wanted.value.length;
     });
     frames.claim(["range"]);
-    expect(told).toBe(1);
+    expect(notified).toBe(1);
   });
 });
 

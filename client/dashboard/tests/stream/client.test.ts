@@ -112,7 +112,7 @@ describe("between worker and store", () => {
     expect(page.acknowledged).toEqual([4]);
   });
 
-  test("a camera that is lost and comes back is told to the status", () => {
+  test("a camera that is lost and comes back is shown in the status", () => {
     page.receives({ type: "open" }, hello("streaming"));
     expect(page.store.status.stale.value).toBe(false);
     page.receives({ type: "message", message: { type: "notice", kind: "camera-lost", reason: "unplugged" } });
@@ -127,7 +127,7 @@ describe("between worker and store", () => {
     expect(page.store.status.cameraLoss.value).not.toBeNull();
   });
 
-  test("a camera that somebody else started is asked how it is when its first frame comes", async () => {
+  test("a camera that another client started is asked how it is when its first frame comes", async () => {
     page.receives({ type: "open" }, hello("stopped"));
     await expect.poll(() => page.store.status.running.value).toBe(true); // what the service answers on opening
     page.store.status.cameraIs("stopped", 1000);
@@ -136,7 +136,7 @@ describe("between worker and store", () => {
     await expect.poll(() => page.store.status.running.value).toBe(true);
   });
 
-  test("drops, lost images and what could not be read are counted and told", () => {
+  test("drops, lost images and what could not be read are counted and shown", () => {
     page.receives(
       { type: "message", message: { type: "notice", kind: "dropped", channel: 1, count: 2, total: 9 } },
       { type: "message", message: { type: "notice", kind: "lost-images", count: 3 } },
@@ -186,7 +186,7 @@ describe("between worker and store", () => {
     await expect(refused).rejects.toThrow("No such frame");
   });
 
-  test("a service that lets nobody in without a token makes the page ask for one, and hears of it", () => {
+  test("a service that requires a token makes the page ask for one, and hears of it", () => {
     const problem = { type: "/problems/token-required", title: "Authentication required", status: 401 };
     page.receives({ type: "message", message: { type: "error", problem } }, { type: "refused" });
     expect(page.store.status.unreadable.value).toBeNull();

@@ -35,7 +35,7 @@ class FakeSocket implements Socket {
 
 const camera = (state: CameraState): CameraDocument => ({ state, reason: null, simulated: true, capabilities: {} });
 
-/** A world in which time passes when told to. */
+/** A world in which time passes on command. */
 class World {
   readonly sockets: FakeSocket[] = [];
   readonly events: ConnectionEvent[] = [];
@@ -212,7 +212,7 @@ describe("a lost stream", () => {
     expect(world.sockets).toHaveLength(2); // the pause that was waited out is over
   });
 
-  test("an attempt that nobody answers is given up", async () => {
+  test("an attempt without an answer is given up", async () => {
     await world.passes(8);
     expect(world.socket.closed).toBe(true);
     expect(world.events.at(-1)).toMatchObject({ type: "waiting", reason: "The service does not answer." });

@@ -3,7 +3,7 @@ import { expect, test } from "vitest";
 
 import { AnimationLoop } from "../../src/ui/animation";
 
-/** A display that refreshes when told to. */
+/** A display that refreshes on command. */
 function display(): { loop: AnimationLoop; refresh: (now_ms: number) => void; waiting: () => number } {
   const requested: ((now_ms: number) => void)[] = [];
   const loop = new AnimationLoop((callback) => requested.push(callback));
@@ -27,7 +27,7 @@ test("it sleeps until it is woken, and again when no step wants more", () => {
   expect(waiting()).toBe(0);
 });
 
-test("steps are told the time that passed, but not that of a sleep", () => {
+test("steps receive the time that passed, but not that of a sleep", () => {
   const { loop, refresh } = display();
   const elapsed: number[] = [];
   loop.add((elapsed_s) => elapsed.push(elapsed_s) % 3 !== 0);

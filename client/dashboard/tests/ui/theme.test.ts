@@ -11,7 +11,7 @@ function system(matches: boolean) {
   return { list: list as unknown as MediaQueryList, change: (dark: boolean) => listener?.({ matches: dark }) };
 }
 
-test("the page is as dark as the system until somebody chooses", () => {
+test("the page is as dark as the system until the user chooses", () => {
   const { list, change } = system(true);
   const theme = new Theme(null, list);
   const root = { dataset: {} as Record<string, string> } as unknown as HTMLElement;

@@ -41,7 +41,7 @@ describe("where the camera stands", () => {
   const inUse = (sequence_id: number, takes = 3): AppliedSequence => ({ sequence_id, takes, capture_s: 0.2 }) as AppliedSequence;
   const tradeoff = { ...TRADEOFF, current: { capture_s: 0.09, meta: meta(1, 0.011) } } as Tradeoff;
 
-  test("is told by the newest frame of the sequence in use", () => {
+  test("is taken from the newest frame of the sequence in use", () => {
     expect(standingOf(meta(2, 0.005), inUse(2), tradeoff)).toEqual({ capture_s: 0.2, range_error_m: 0.005 });
   });
 
@@ -49,7 +49,7 @@ describe("where the camera stands", () => {
     for (const newest of [null, meta(1, null), meta(0, 0.005)]) expect(standingOf(newest, inUse(1), tradeoff)?.range_error_m).toBe(0.011);
   });
 
-  test("is never told by a frame of another sequence: it is as predicted, or not known", () => {
+  test("is never taken from a frame of another sequence: it is as predicted, or not known", () => {
     expect(standingOf(meta(1, 0.005), inUse(2, 5), tradeoff)).toEqual({ capture_s: 0.2, range_error_m: 0.0004 });
     expect(standingOf(meta(1, 0.005), inUse(2), tradeoff)).toBeNull();
   });

@@ -10,7 +10,7 @@ import { momentsOf, picture } from "../oracle";
 const look = (frame: number, flags: readonly string[], x = 4): PixelDocument => ({ x, y: 5, flags, meta: { frame, sequence_id: 1 } }) as unknown as PixelDocument;
 
 describe("flags of a pixel", () => {
-  test("that come and go are told by their share, and do not flicker", () => {
+  test("that come and go are shown by their share, and do not flicker", () => {
     const history = new FlagHistory();
     for (let frame = 0; frame < 10; frame++) history.take(look(frame, frame % 2 === 0 ? ["biased"] : []));
     expect(history.shares()).toEqual([{ name: "biased", share: 0.5 }]);
@@ -29,7 +29,7 @@ describe("flags of a pixel", () => {
 });
 
 describe("returns of a pixel", () => {
-  test("with hardly any light are told of together", () => {
+  test("with hardly any light are summed up", () => {
     const returns = [3, 1160, 400, 11].map((weight, n) => ({ time_s: n * 1e-9, weight }));
     const { strong, weak, weakShare } = sifted(returns);
     expect(strong.map(({ weight }) => weight)).toEqual([1160, 400]);
@@ -37,7 +37,7 @@ describe("returns of a pixel", () => {
     expect(weakShare).toBeCloseTo(14 / 1574, 12);
   });
 
-  test("are all told where there are few, and none where there is none", () => {
+  test("are all listed where there are few, and none where there is none", () => {
     expect(sifted([{ time_s: 0, weight: 5 }]).strong).toHaveLength(1);
     expect(sifted([])).toEqual({ strong: [], weak: 0, weakShare: 0 });
   });

@@ -29,7 +29,7 @@ class Principal:
     token_id: str | None = None
 
 
-ANYBODY: Final = Principal("anybody", Role.ADMIN)
+UNAUTHENTICATED: Final = Principal("anybody", Role.ADMIN)
 """Every client of a service that requires no token."""
 
 
@@ -60,7 +60,7 @@ class Guard:
         forwarded = any(name in headers for name in _FORWARDED)
         if self._required or (forwarded and not self._insecure):
             raise Problem(kinds.TOKEN_REQUIRED, "This service requires a token.")
-        return ANYBODY
+        return UNAUTHENTICATED
 
     def still_valid(self, principal: Principal) -> bool:
         """Return whether a client that was admitted still is."""

@@ -65,7 +65,7 @@ class Sender:
         await delivery.computed()
         item = await self._outbox.next()
         if isinstance(item, Delivery):
-            self._ahead = asyncio.ensure_future(item.computed())  # nobody has to wait for it
+            self._ahead = asyncio.ensure_future(item.computed())  # no client waits for it
         return item
 
     async def _deliver(self, delivery: Delivery) -> None:

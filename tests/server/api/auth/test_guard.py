@@ -16,7 +16,7 @@ from tests.serving import Served, serving
 from transientcam import Camera, wire
 from transientcam.errors import ProblemError
 from transientcam_server.api.auth import Role, TokenFile
-from transientcam_server.api.auth.guard import ANYBODY, Guard
+from transientcam_server.api.auth.guard import UNAUTHENTICATED, Guard
 from transientcam_server.errors import Problem
 from transientcam_server.settings import Settings
 
@@ -86,7 +86,7 @@ def test_a_token_that_was_not_made_is_refused(http: httpx.Client, headers: dict[
 
 
 def test_a_scheme_that_is_not_spoken_is_as_good_as_no_token(http: httpx.Client) -> None:
-    answer = http.get("/api/v1/info", auth=("somebody", "secret"))
+    answer = http.get("/api/v1/info", auth=("anna", "secret"))
 
     assert answer.json()["type"] == "/problems/token-required"
 
@@ -232,7 +232,7 @@ def guard(tmp_path: Path, **settings: Any) -> Guard:
 
 def asks(guard: Guard, headers: dict[str, str]) -> bool:
     try:
-        return guard.identify(Headers(headers)) != ANYBODY
+        return guard.identify(Headers(headers)) != UNAUTHENTICATED
     except Problem as problem:
         return problem.kind.slug == "token-required"
 
@@ -274,7 +274,7 @@ def test_a_broken_file_admits_and_keeps_no_client(
     _, text = here.tokens.create("a", Role.VIEWER, now=NOW)
     principal = here.identify(Headers(bearer(text)))
     assert here.still_valid(principal)
-    assert here.still_valid(ANYBODY)
+    assert here.still_valid(UNAUTHENTICATED)
 
     here.tokens.path.write_text("{")
 

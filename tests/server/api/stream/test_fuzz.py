@@ -199,7 +199,7 @@ def test_bytes_that_come_one_by_one_are_a_message(steady_stream: str) -> None:
 @pytest.mark.parametrize("payload", [b"", b"hello", bytes(range(125))])
 def test_every_ping_is_answered_with_what_it_carried(steady_stream: str, payload: bytes) -> None:
     with opened(steady_stream) as connection:
-        connection.send(frame(PONG, b"nobody asked"))
+        connection.send(frame(PONG, b"unsolicited"))
         connection.send(frame(PING, payload) * 10)
 
         assert [connection.until(PONG) for _ in range(10)] == [payload] * 10

@@ -29,8 +29,8 @@ export function commandsOf(store: Store): Command[] {
     ...VIEWS.map(({ name, title }) => ({ words: `Show alone: ${title}`, key: "", run: () => void (store.alone.value = name) })),
     ...Object.entries({ ...LAYOUTS, ...store.layouts.named.value }).map(([name, layout]) => ({ words: `Layout: ${name}`, key: "", run: () => store.showLayout(layout) })),
     { words: "Layout: save or remove…", key: "", run: () => void (store.asksForLayout.value = true) },
-    ...(steering && applied !== null ? PRESETS.map(({ name, sequence }) => ({ words: `Sequence: ${name}`, key: "", run: () => void told(store, () => store.sequencing.set({ ...applied, ...sequence })) })) : []),
-    ...scenes.map(({ name }) => ({ words: `Scene: ${name}`, key: "", run: () => void told(store, () => store.simulation.stage(name)) })),
+    ...(steering && applied !== null ? PRESETS.map(({ name, sequence }) => ({ words: `Sequence: ${name}`, key: "", run: () => void reported(store, () => store.sequencing.set({ ...applied, ...sequence })) })) : []),
+    ...scenes.map(({ name }) => ({ words: `Scene: ${name}`, key: "", run: () => void reported(store, () => store.simulation.stage(name)) })),
     ...THEMES.map((theme) => ({ words: `Colours: ${theme === "auto" ? "as the system" : theme}`, key: "", run: () => void (store.theme.choice.value = theme) })),
     ...recordingCommands(store),
     { words: "Open a file: scene, recording or calibration…", key: "", run: () => { chooseFile(store); } },
@@ -47,13 +47,13 @@ export function commandsOf(store: Store): Command[] {
 function recordingCommands(store: Store): Command[] {
   const { recordings } = store;
   const active = recordings.active.value;
-  const does = (what: string, work: () => Promise<unknown>): Command => ({ words: `Recording: ${what}`, key: "", run: () => void told(store, work) });
+  const does = (what: string, work: () => Promise<unknown>): Command => ({ words: `Recording: ${what}`, key: "", run: () => void reported(store, work) });
   if (active !== null) return [does("stop", () => recordings.stop(active.id))];
   return [does("start", () => recordings.start({})), does(`save the last ${PAST_S} s`, () => recordings.savePast())];
 }
 
 /** Runs a request of the service; says in the page's events why it was refused. */
-async function told(store: Store, work: () => Promise<unknown>): Promise<void> {
+async function reported(store: Store, work: () => Promise<unknown>): Promise<void> {
   try {
     await work();
   } catch (error) {

@@ -7,14 +7,14 @@ import { fillCloud, makeCloud, pinholeOf, type Pinhole } from "./cloud";
 
 /** What the service knows of the lens; null where it only assumes. */
 export function knownLens({ camera }: Store): Intrinsics | null {
-  const told = camera.value?.intrinsics;
-  return told === undefined || told.source === "assumed" ? null : told;
+  const lens = camera.value?.intrinsics;
+  return lens === undefined || lens.source === "assumed" ? null : lens;
 }
 
 /** The lens for pictures of a size. */
 export function lensOf(store: Store, width: number, height: number): Pinhole {
-  const told = knownLens(store);
-  return told !== null && told.width === width && told.height === height ? told : pinholeOf(width, height, store.field_deg.value * DEGREE);
+  const lens = knownLens(store);
+  return lens !== null && lens.width === width && lens.height === height ? lens : pinholeOf(width, height, store.field_deg.value * DEGREE);
 }
 
 /** A pixel with its range and the deviation of that, both in m. */

@@ -7,20 +7,20 @@ import type { FlagHistory } from "./flagShares";
 import { linesOf, sifted, type ReturnHistory, type ReturnLine } from "./returns";
 
 /** What the service found at the pixel: returns, the truth where it is known, and flags. `held` is the number of the frame that is held. */
-export function Found({ told, held, flags, returns }: { told: PixelDocument | null; held: number | null; flags: FlagHistory; returns: ReturnHistory }) {
+export function Found({ details, held, flags, returns }: { details: PixelDocument | null; held: number | null; flags: FlagHistory; returns: ReturnHistory }) {
   const { frames } = useStore();
-  if (told === null) return null;
-  const scene = frames.sceneOf(told.meta);
-  flags.take(told, scene);
-  returns.take(told, scene);
+  if (details === null) return null;
+  const scene = frames.sceneOf(details.meta);
+  flags.take(details, scene);
+  returns.take(details, scene);
   return (
     <>
-      {held !== null && held !== told.meta.frame && (
+      {held !== null && held !== details.meta.frame && (
         <p class="quiet">
-          These values are of frame {told.meta.frame}; the curves are of frame {held}, which is held.
+          These values are of frame {details.meta.frame}; the curves are of frame {held}, which is held.
         </p>
       )}
-      <ReturnTable told={told} history={returns} />
+      <ReturnTable details={details} history={returns} />
     </>
   );
 }
@@ -49,9 +49,9 @@ export function FlagWords({ flags, looked }: { flags: FlagHistory; looked: boole
 const LINES = 4;
 
 /** The returns of the pixel, each with its standard deviation, beside the true ones where these are known. */
-function ReturnTable({ told, history }: { told: PixelDocument; history: ReturnHistory }) {
-  const { strong, weak, weakShare } = sifted(told.returns);
-  const lines = linesOf(strong, sifted(told.truth?.returns ?? []).strong);
+function ReturnTable({ details, history }: { details: PixelDocument; history: ReturnHistory }) {
+  const { strong, weak, weakShare } = sifted(details.returns);
+  const lines = linesOf(strong, sifted(details.truth?.returns ?? []).strong);
   const beyond = Math.max(0, lines.length - LINES);
   const [found, truth, difference] = [lines.slice(0, LINES).map((line) => line.found), lines.map((line) => line.truth), lines.map(differenceOf)];
   const notes = [beyond > 0 ? `${beyond} more` : "", weak > 0 ? `${weak} weak, together ${fixed(100 * weakShare, 1, "%")} of the light` : ""];

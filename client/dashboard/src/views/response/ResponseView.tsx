@@ -96,7 +96,7 @@ export function ResponseView() {
         )}
         {place.value !== null && (
           <aside class="response-side" aria-label="What was found at the pixel" tabIndex={0}>
-            <Found flags={flags} returns={returns} told={store.details.document.value} held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null} />
+            <Found flags={flags} returns={returns} details={store.details.document.value} held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null} />
             {pixel.value !== null && <PixelFigures key={place.value} pixel={pixel.value} />}
             <FlagWords flags={flags} looked={store.details.document.value !== null} />
           </aside>
@@ -172,8 +172,8 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
 
   useDrawing(() => {
     const now = shown.value;
-    const told = store.details.document.value;
-    const truth = told?.truth ?? null;
+    const details = store.details.document.value;
+    const truth = details?.truth ?? null;
     if (plot.value === null || size.value.width === 0) return;
     if (now === null) {
       plot.value.show(null, NO_STEMS, new Map());
@@ -186,8 +186,8 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
     held.current = now.pixel === heldFor.current ? Math.max(highest, SHRINK * held.current) : highest;
     heldFor.current = now.pixel;
     top.current = autoLimits(top.current, { low: 0, high: held.current });
-    if (told !== null) returns.take(told, store.frames.sceneOf(told.meta));
-    plot.value.show(curves, told === null ? NO_STEMS : stemsOf(told, truth, returns), ofPins);
+    if (details !== null) returns.take(details, store.frames.sceneOf(details.meta));
+    plot.value.show(curves, details === null ? NO_STEMS : stemsOf(details, truth, returns), ofPins);
   }, [plot, shown, returns, aspect]);
 
   useDrawing(() => {

@@ -99,8 +99,8 @@ function curvesOf(aspect: Aspect, c: Coefficients, pixel: number, phases_rad: Fl
 
 function wholeOf(truth: Truth | null): Truth | null {
   if (truth === null) return null;
-  const told = truth.returns.reduce((sum, { weight }) => sum + weight, 0);
-  return told >= COMPLETE * truth.brightness ? truth : null;
+  const listed = truth.returns.reduce((sum, { weight }) => sum + weight, 0);
+  return listed >= COMPLETE * truth.brightness ? truth : null;
 }
 
 /** A table of the curves: comma-separated, one line a time, units in the names of the columns. */

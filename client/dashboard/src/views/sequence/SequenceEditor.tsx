@@ -63,8 +63,8 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
     }
   };
 
-  const told = verdict.value;
-  const wrong = told.kind === "refused" ? (DRAFT_FIELD[fieldOf(told.problem) ?? ""] ?? null) : null;
+  const judged = verdict.value;
+  const wrong = judged.kind === "refused" ? (DRAFT_FIELD[fieldOf(judged.problem) ?? ""] ?? null) : null;
   const field = (name: keyof Draft, label: string, unit: string) => (
     <label class="field">
       <span>{label}</span>
@@ -151,10 +151,10 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
       </div>
       <Obstacle />
       <div id="sequence-verdict" class="verdict" role="status">
-        {told.kind === "refused" && <p class="refusal">{told.words}</p>}
-        {told.kind === "valid" && (
+        {judged.kind === "refused" && <p class="refusal">{judged.words}</p>}
+        {judged.kind === "valid" && (
           <dl class="facts">
-            <Figures applied={told.applied} />
+            <Figures applied={judged.applied} />
           </dl>
         )}
       </div>
@@ -162,7 +162,7 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
         <button type="button" onClick={onDone}>
           Cancel
         </button>
-        <Steer submit primary disabled={sending.value || told.kind === "refused"}>
+        <Steer submit primary disabled={sending.value || judged.kind === "refused"}>
           {sending.value ? "Applying…" : "Apply"}
         </Steer>
       </div>

@@ -43,7 +43,7 @@ function Control({ onDone }: { onDone: () => void }) {
       <p data-field="control-words">
         {control.kind === "unknown" && "Who controls the camera is not known yet."}
         {barred !== null && `${barred}: this page can look, but not take control. `}
-        {control.kind === "nobody" && barred === null && "Control is free, so every client may change things. Take it, and only you may; others go on watching."}
+        {control.kind === "free" && barred === null && "Control is free, so every client may change things. Take it, and only you may; others go on watching."}
         {control.kind === "us" && (
           <>
             You have control, as <strong>{control.holder}</strong>. This page renews it; if it stops doing so, the camera stops and its light goes off after {left}.

@@ -73,11 +73,11 @@ function ControlButton() {
       </button>
     );
   }
-  const words = { unknown: "Take control", nobody: "Take control", us: "You have control", other: "" }[control.kind];
+  const words = { unknown: "Take control", free: "Take control", us: "You have control", other: "" }[control.kind];
   return (
     <button type="button" class={`control-button control-${control.kind}`} title="Who controls the camera" data-field="control" onClick={() => (asksForControl.value = true)}>
       <ControlIcon />
-      {control.kind === "other" ? <Other holder={control.holder} expires_s={control.expires_s} /> : <span class={control.kind === "nobody" ? "wide" : ""}>{words}</span>}
+      {control.kind === "other" ? <Other holder={control.holder} expires_s={control.expires_s} /> : <span class={control.kind === "free" ? "wide" : ""}>{words}</span>}
     </button>
   );
 }

@@ -19,7 +19,7 @@ function TokenForm({ onDone }: { onDone: () => void }) {
   const text = useSignal("");
   const known = credentials.token.value !== null;
   const problem = credentials.refused.value;
-  const told = caller.document.value;
+  const recognised = caller.document.value;
   return (
     <form
       class="control"
@@ -38,9 +38,9 @@ function TokenForm({ onDone }: { onDone: () => void }) {
         <span>Token</span>
         <input type="password" name="token" autocomplete="off" spellcheck={false} value={text.value} onInput={(event) => (text.value = event.currentTarget.value)} />
       </label>
-      {known && told !== null && (
+      {known && recognised !== null && (
         <p data-field="caller">
-          The service knows this page as <strong>{told.name}</strong>, {told.role}.
+          The service knows this page as <strong>{recognised.name}</strong>, {recognised.role}.
         </p>
       )}
       <p class="quiet">A token is kept until this tab is closed, and sent to this service only.</p>
