@@ -88,24 +88,12 @@ def test_several_registers_are_taken_as_one(interleave: int) -> None:
     x = np.arange(64, dtype=np.float32)
     out = np.zeros(65, np.float32)
 
-    def single(x: Any, out: Any) -> int:
-        one = simd.ones(x, 1)
+    def incremented(x: Any, out: Any) -> int:
+        one = simd.ones(x, interleave)
         simd.store(out, 1, simd.load(one, x, 0) + one)
         return simd.width(one)  # type: ignore[no-any-return]  # numba is untyped
 
-    def double(x: Any, out: Any) -> int:
-        one = simd.ones(x, 2)
-        simd.store(out, 1, simd.load(one, x, 0) + one)
-        return simd.width(one)  # type: ignore[no-any-return]  # numba is untyped
-
-    def fourfold(x: Any, out: Any) -> int:
-        one = simd.ones(x, 4)
-        simd.store(out, 1, simd.load(one, x, 0) + one)
-        return simd.width(one)  # type: ignore[no-any-return]  # numba is untyped
-
-    kernels: dict[int, Callable[..., Any]] = {1: single, 2: double, 4: fourfold}
-
-    width = run(kernels[interleave], x, out)
+    width = run(incremented, x, out)
 
     assert width == interleave * simd.REGISTER_BYTES // 4
     assert np.array_equal(out[1 : width + 1], x[:width] + 1)
@@ -191,8 +179,8 @@ def test_pixels_of_a_mask_are_packed_and_come_back_in_their_places(
     packed: Array = np.full(5 * size, -1, dtype)
     back = np.zeros_like(x)
 
-    def single(x: Any, packed: Any, back: Any, limit: float) -> int:
-        one = simd.ones(x, 1)
+    def through(x: Any, packed: Any, back: Any, limit: float) -> int:
+        one = simd.ones(x, interleave)
         count = 0
         for p in range(0, x.size, simd.width(one)):
             value = simd.load(one, x, p)
@@ -204,20 +192,7 @@ def test_pixels_of_a_mask_are_packed_and_come_back_in_their_places(
             done += simd.count(there)
         return count
 
-    def double(x: Any, packed: Any, back: Any, limit: float) -> int:
-        one = simd.ones(x, 2)
-        count = 0
-        for p in range(0, x.size, simd.width(one)):
-            value = simd.load(one, x, p)
-            count += simd.pack(packed, count, value < limit, value)
-        done = 0
-        for p in range(0, x.size, simd.width(one)):
-            there = simd.load(one, x, p) < limit
-            simd.store(back, p, simd.unpack(packed, done, there, -one))
-            done += simd.count(there)
-        return count
-
-    count = njit(single if interleave == 1 else double)(x, packed, back, limit)
+    count = njit(through)(x, packed, back, limit)
 
     assert count == limit
     assert np.array_equal(packed[:count], x[x < limit])
