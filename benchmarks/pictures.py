@@ -22,6 +22,7 @@ from typing import Any
 import httpx
 from playwright.sync_api import Page, ViewportSize, sync_playwright
 
+import transientcam_moments as tm
 from tests.browser.dashboard import choose, open_page, point_at
 from tests.serving import serving
 
@@ -57,12 +58,14 @@ SIZES: tuple[ViewportSize, ...] = (
 @contextmanager
 def _page(sequence: dict[str, Any]) -> Iterator[Page]:
     """Give the page of a daemon of its own that measures with a sequence."""
+    tm.kernels.compile([sequence["harmonics"]], ["float32"])  # "automatic" is as in a daemon then
+    usual: dict[str, Any] = {"reconstruction": {"estimator": "automatic"}}
     executable = shutil.which("chromium")
     if executable is None:
         sys.exit("this needs Debian's chromium: apt-get install chromium")
     with (
         TemporaryDirectory() as recordings,
-        serving("sim:mirrors", recordings={"directory": recordings}) as served,
+        serving("sim:mirrors", recordings={"directory": recordings}, **usual) as served,
         sync_playwright() as playwright,
     ):
         httpx.put(f"{served.url}/api/v1/sequence", json=sequence).raise_for_status()
