@@ -461,6 +461,20 @@ def test_parts_cover_every_pixel_once(total: int, parts: int) -> None:
     assert all(end - begin >= min(total, 1024) for begin, end in seen)
 
 
+@pytest.mark.parametrize("total", [64, 100, 19560, 307200])
+@pytest.mark.parametrize("each", [1, 4])
+def test_an_image_is_cut_into_as_many_parts_as_asked_for_each_thread(total: int, each: int) -> None:
+    seen: list[tuple[int, int]] = []
+    with ThreadPoolExecutor(1) as executor:
+        tm.kernels.over(executor, 2)(lambda *part: seen.append(part), total, 64, each)
+
+    seen.sort()
+    assert [begin for begin, _ in seen] == [0, *(end for _, end in seen[:-1])]
+    assert seen[-1][1] == total
+    assert min(end - begin for begin, end in seen) >= 64
+    assert total >= LARGE or len(seen) == min(2 * each, total // 64)
+
+
 @pytest.mark.parametrize("total", [19560, 307200])
 def test_no_image_waits_for_threads_that_have_other_work(total: int) -> None:
     seen: list[tuple[int, int]] = []

@@ -106,6 +106,30 @@ def _write(out: Any, place: int, value: Any, past_caches: bool) -> None:
         simd.store(out, place, value)
 
 
+@njit(forceinline=True, error_model="numpy")
+def _fill(
+    order: Any, polynomial: Any, reflection: Any, error: Any, centre: Any, turned: bool,
+    one: Any, q: Any, pitch: int, shift: int, left: int, held: int,
+) -> None:  # fmt: skip
+    """Put what Eq. (2) needs of pixels from ``left`` on into a bank, from ``shift`` on."""
+    m, step = len(order), simd.width(one)
+    for i in range(0, held, step):
+        p = min(i, held - step)
+        at = p + shift
+        simd.store_within(q, at, simd.load(one, error, left + p) * (0.5 / np.pi))
+        least = simd.eps(one)
+        for j in range(m):
+            re, im = simd.load_complex(one, polynomial[j + 1], left + p)
+            if turned:  # conj(a_j) exp(i j centre)
+                c, s = simd.spread(one, centre[j]), simd.spread(one, centre[m + j])
+                re, im = re * c + im * s, re * s - im * c
+            simd.store_within(q, (2 * j + 2) * pitch + at, re)
+            simd.store_within(q, (2 * j + 3) * pitch + at, im)
+            re, im = simd.load_complex(one, reflection[j], left + p)
+            least = least * toeplitz.below_one(re, im)  # eps E / b_0
+        simd.store_within(q, pitch + at, least)
+
+
 @njit(nogil=True, error_model="numpy")
 def _density(
     order: Any,
@@ -127,13 +151,15 @@ def _density(
     ``centre`` hold.
 
     ``past_caches``, whole lines of memory are written at a time: each row begins at its own first
-    line, where all of a group begin alike.
+    line, where all of a group begin alike. The bank is filled so that what is written to a line of
+    the first row lies in a line, too: loads across lines take twice as long.
     """
     m = len(order)
     one = simd.ones(error, 2)
     step = simd.width(one)
     pitch = _BANK // (2 * m + 2) * step
-    block = pitch - step  # rows that begin at a line of memory reach into the next block
+    # rows that begin at a line of memory reach into the next block, and begin within the first step
+    block = pitch - 2 * step if past_caches else pitch
     pixels = error.shape[0]
     q = simd.registers(one, (), _BANK)
     c0, s0 = simd.registers(one, order, 0), simd.registers(one, order, 0)
@@ -142,45 +168,40 @@ def _density(
     while left < stop:
         left = min(left, stop - step)
         size = min(block, stop - left)
-        held = min(size + step, stop - left)
-        for i in range(0, held, step):
-            p = min(i, held - step)
-            simd.store_within(q, p, simd.load(one, error, left + p) * (0.5 / np.pi))
-            least = simd.eps(one)
-            for j in range(m):
-                re, im = simd.load_complex(one, polynomial[j + 1], left + p)
-                if together != ANY:  # conj(a_j) exp(i j centre)
-                    c, s = simd.spread(one, centre[j]), simd.spread(one, centre[m + j])
-                    re, im = re * c + im * s, re * s - im * c
-                simd.store_within(q, (2 * j + 2) * pitch + p, re)
-                simd.store_within(q, (2 * j + 3) * pitch + p, im)
-                re, im = simd.load_complex(one, reflection[j], left + p)
-                least = least * toeplitz.below_one(re, im)  # eps E / b_0
-            simd.store_within(q, pitch + p, least)
+        held = min(size + step, stop - left) if past_caches else size
+        shift = 0
+        if past_caches:
+            shift = step - simd.before_boundary(out, rows[0, 0] * pixels + left)
+        _fill(
+            order, polynomial, reflection, error, centre, together != ANY,
+            one, q, pitch, shift, left, held,
+        )  # fmt: skip
         for group in range(waves.shape[0]):
             wave = waves[group]
             for j in range(m):
                 c0[j], s0[j] = simd.spread(one, wave[j]), simd.spread(one, wave[m + j])
-                c1[j], s1[j] = simd.spread(one, wave[2 * m + j]), simd.spread(one, wave[3 * m + j])
+                c1[j] = simd.spread(one, wave[2 * m + j])
+                s1[j] = simd.spread(one, wave[3 * m + j])
             r0, r1 = rows[group, 0] * pixels + left, rows[group, 1] * pixels + left
             r2, r3 = rows[group, 2] * pixels + left, rows[group, 3] * pixels + left
             begin, first, end = 0, 0, size
             if past_caches:
-                begin = min(simd.before_boundary(out, r0), size)
+                begin = simd.before_boundary(out, r0)
                 end = min(size + begin, held)
                 # what lies before the first line belongs to the block before
                 first = begin - step if left == start and begin > 0 else begin
             for i in range(first, end, step):
                 p = max(0, min(i, end - step))
+                at = p + shift
                 stream = past_caches and p == i
                 if together == TURN:
-                    h0, h1, h2, h3 = _four_of_a_turn(order, q, pitch, p, c0, s0)
+                    h0, h1, h2, h3 = _four_of_a_turn(order, q, pitch, at, c0, s0)
                     _write(out, r3 + p, h3, stream)
                     _write(out, r2 + p, h2, stream)
                 elif together == MIRRORED:
-                    h0, h1 = _mirrored_two(order, q, pitch, p, c0, s0)
+                    h0, h1 = _mirrored_two(order, q, pitch, at, c0, s0)
                 else:
-                    h0, h1 = _any_two(order, q, pitch, p, c0, s0, c1, s1)
+                    h0, h1 = _any_two(order, q, pitch, at, c0, s0, c1, s1)
                 _write(out, r1 + p, h1, stream)
                 _write(out, r0 + p, h0, stream)
         left += size
