@@ -16,7 +16,7 @@ from tests.moments.kernel_lanes import FEW, lanes, without_lanes
 from transientcam_moments import _lanes
 from transientcam_moments._kernels import density as density_module
 from transientcam_moments._kernels import phase_groups
-from transientcam_moments._lanes.parallel import BLOCK, LARGE, blocks
+from transientcam_moments._lanes.parallel import BLOCK, LARGE, Part, blocks
 from transientcam_moments.levinson import _levinson
 from transientcam_moments.polishing import residual, size
 
@@ -206,6 +206,12 @@ def test_densities_follow_the_planar_statement(m: int, dtype: type, phases: int,
     assert (np.abs(found / planar - 1) < 64 * m * eps(b) * depth).all()
 
 
+def last_part_first(part: Part, total: int, /, unit: int = 1024, each: int = 1) -> None:
+    cuts = [0, *range(unit, total - unit + 1, 5 * unit), total]
+    for start, stop in reversed(list(itertools.pairwise(cuts))):
+        part(start, stop)
+
+
 @pytest.mark.parametrize("phases", [1, 5, 9, 12, 19])
 @pytest.mark.parametrize("pixels", [64, 65, 72, 250, 2448, 2449])
 @pytest.mark.parametrize("past_caches", [False, True])
@@ -227,6 +233,12 @@ def test_densities_are_written_to_every_pixel_and_no_other_place(
 
         with without_lanes():
             assert np.allclose(out, tm.density(c, phase_rad), rtol=1e-3)
+        whole = out.copy()
+        out[:] = np.nan
+        lane("density", c.polynomial)(
+            c.polynomial, c.reflection, c.error, phase_rad, out, spread=last_part_first
+        )
+        assert np.array_equal(out, whole)
         out[:] = -1
         assert (room == -1).all(), "something was written outside"
 

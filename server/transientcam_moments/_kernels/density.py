@@ -158,7 +158,7 @@ def _density(
     one = simd.ones(error, 2)
     step = simd.width(one)
     pitch = _BANK // (2 * m + 2) * step
-    # rows that begin at a line of memory reach into the next block, and begin within the first step
+    # rows that begin at a line of memory reach into the next block or part, which begins at its own
     block = pitch - 2 * step if past_caches else pitch
     pixels = error.shape[0]
     q = simd.registers(one, (), _BANK)
@@ -168,7 +168,7 @@ def _density(
     while left < stop:
         left = min(left, stop - step)
         size = min(block, stop - left)
-        held = min(size + step, stop - left) if past_caches else size
+        held = min(size + step, pixels - left) if past_caches else size
         shift = 0
         if past_caches:
             shift = step - simd.before_boundary(out, rows[0, 0] * pixels + left)
@@ -188,8 +188,8 @@ def _density(
             if past_caches:
                 begin = simd.before_boundary(out, r0)
                 end = min(size + begin, held)
-                # what lies before the first line belongs to the block before
-                first = begin - step if left == start and begin > 0 else begin
+                # what lies before the first line belongs to the block or part before
+                first = begin - step if left == 0 and begin > 0 else begin
             for i in range(first, end, step):
                 p = max(0, min(i, end - step))
                 at = p + shift
