@@ -18,6 +18,7 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.phase_groups import ANY, MIRRORED, TURN, grouping
+from transientcam_moments._kernels.pool import empty
 from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments._lanes.registry import LEAST_PIXELS
 
@@ -235,7 +236,7 @@ def density_lane(m: int, precision: str) -> Callable[..., Any]:
         scale = np.ascontiguousarray(error).reshape(pixels)
         phases = np.asarray(phase_rad, np.float64)
         if out is None:
-            out = np.empty((phases.size, *polynomial.shape[1:]), precision)
+            out = empty((phases.size, *polynomial.shape[1:]), precision)
         flat = out.reshape(-1)
         past_caches = out.nbytes > _PAST_CACHES_BYTES
         row = pixels * out.itemsize
