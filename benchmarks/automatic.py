@@ -1,13 +1,15 @@
 """What a program gets that calls nothing but the functions it needs: first and later calls."""
 
 import json
+import math
 import os
 import subprocess
 import sys
 from collections.abc import Iterator
 from typing import Any
 
-from benchmarks.data import CORES
+from benchmarks.ceiling import measured
+from benchmarks.data import CORES, PAPER
 from benchmarks.tables import Table, verdict
 from benchmarks.timing import duration
 
@@ -67,6 +69,12 @@ def tables() -> Iterator[Table]:
             "of the same process; gain: NumPy over later calls. The first call computes with NumPy "
             "while the lane is loaded from the cache beside it.",
         ],
+    )
+    # processes compute in memory that has been written before, as does the ceiling
+    write_s = 4 * _FRAMES * math.prod(PAPER) / measured(CORES).stream_bytes_s
+    table.notes.append(
+        f"Writing a density's {4e-6 * _FRAMES * math.prod(PAPER):.0f} MB and nothing else, past "
+        f"the caches from all cores, takes {duration(write_s)}."
     )
     for m in _ORDERS:
         _fresh(m)  # warms the cache

@@ -2,7 +2,7 @@
 
 import itertools
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -15,7 +15,8 @@ from tests.moments import oracles
 from tests.moments.kernel_lanes import FEW, lanes, without_lanes
 from transientcam_moments import _lanes
 from transientcam_moments._kernels import density as density_module
-from transientcam_moments._lanes.parallel import BLOCK, LARGE, blocks
+from transientcam_moments._kernels import phase_groups
+from transientcam_moments._lanes.parallel import BLOCK, LARGE, Part, blocks
 from transientcam_moments.levinson import _levinson
 from transientcam_moments.polishing import residual, size
 
@@ -23,6 +24,12 @@ ORDERS = [3, 4, 8]
 LANES = tuple(name for name in FEW if name != "reconstruct")
 TYPES = [np.complex64, np.complex128]
 Array = NDArray[Any]
+PHASES: dict[str, Callable[[int], Array]] = {
+    "any": lambda count: np.random.default_rng(count).uniform(-10, 10, count),
+    "equidistant": lambda count: np.linspace(-3, 10, count),
+    "turn": lambda count: 0.5 + np.linspace(0, 2 * np.pi, count, endpoint=False),
+    "turn back": lambda count: 0.5 - np.linspace(0, 2 * np.pi, count, endpoint=False),
+}
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -177,18 +184,14 @@ def test_indefinite_moments_are_projected_as_by_the_planar_statement(m: int, dty
     assert np.abs(reflection - planar[2])[:, inside].max() < 1e5 * eps(b)
 
 
-@pytest.mark.parametrize("equidistant", [False, True])
+@pytest.mark.parametrize("kind", PHASES)
 @pytest.mark.parametrize("phases", [1, 2, 7, 8, 9, 64])
 @pytest.mark.parametrize("dtype", TYPES)
 @pytest.mark.parametrize("m", ORDERS)
-def test_densities_follow_the_planar_statement(
-    m: int, dtype: type, phases: int, equidistant: bool
-) -> None:
+def test_densities_follow_the_planar_statement(m: int, dtype: type, phases: int, kind: str) -> None:
     b = tm.bias(varied_moments(m, dtype)).moments
     coefficients = tm.levinson(b)
-    phase_rad = np.random.default_rng(phases).uniform(-10, 10, phases)
-    if equidistant:
-        phase_rad = np.linspace(-3, 10, phases)
+    phase_rad = PHASES[kind](phases)
 
     found = tm.density(coefficients, phase_rad)
 
@@ -203,17 +206,24 @@ def test_densities_follow_the_planar_statement(
     assert (np.abs(found / planar - 1) < 64 * m * eps(b) * depth).all()
 
 
+def last_part_first(part: Part, total: int, /, unit: int = 1024, each: int = 1) -> None:
+    cuts = [0, *range(unit, total - unit + 1, 5 * unit), total]
+    for start, stop in reversed(list(itertools.pairwise(cuts))):
+        part(start, stop)
+
+
 @pytest.mark.parametrize("phases", [1, 5, 9, 12, 19])
 @pytest.mark.parametrize("pixels", [64, 65, 72, 250, 2448, 2449])
 @pytest.mark.parametrize("past_caches", [False, True])
+@pytest.mark.parametrize("kind", ["equidistant", "turn"])
 def test_densities_are_written_to_every_pixel_and_no_other_place(
-    pixels: int, phases: int, past_caches: bool, monkeypatch: pytest.MonkeyPatch
+    pixels: int, phases: int, past_caches: bool, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if past_caches:
         monkeypatch.setattr(density_module, "_PAST_CACHES_BYTES", -1)
     b = oracles.random_moments(np.random.default_rng(pixels), 3, pixels).astype(np.complex64)
     c = tm.levinson(b)
-    phase_rad = np.linspace(0, 6, phases)
+    phase_rad = PHASES[kind](phases)
     room = np.full(phases * pixels + 128, -1, np.float32)
 
     for offset in (3, 16, 31):  # wherever memory begins
@@ -223,28 +233,63 @@ def test_densities_are_written_to_every_pixel_and_no_other_place(
 
         with without_lanes():
             assert np.allclose(out, tm.density(c, phase_rad), rtol=1e-3)
+        whole = out.copy()
+        out[:] = np.nan
+        lane("density", c.polynomial)(
+            c.polynomial, c.reflection, c.error, phase_rad, out, spread=last_part_first
+        )
+        assert np.array_equal(out, whole)
         out[:] = -1
         assert (room == -1).all(), "something was written outside"
 
 
 @pytest.mark.parametrize("alike", [1, 2, 4, 16])
-@pytest.mark.parametrize("phases", [1, 2, 3, 7, 8, 9, 31, 64])
-@pytest.mark.parametrize("equidistant", [False, True])
-def test_every_phase_is_in_one_pair_of_rows_that_begin_alike(
-    phases: int, alike: int, equidistant: bool
+@pytest.mark.parametrize("phases", [1, 2, 3, 7, 8, 9, 12, 31, 64])
+@pytest.mark.parametrize("kind", PHASES)
+def test_every_phase_is_in_a_group_of_rows_that_begin_alike(
+    phases: int, alike: int, kind: str
 ) -> None:
-    phase_rad = np.linspace(-1, 9, phases) ** (1 if equidistant else 3)
+    phase_rad = PHASES[kind](phases)
 
-    pairs = density_module.paired(phase_rad, 3, "d", alike)
+    groups = phase_groups.grouping(3, "d")(phase_rad, alike)
 
-    first, second = pairs.rows.reshape(2, -1)
-    assert sorted(np.unique(pairs.rows)) == list(range(phases))
-    assert len(first) <= phases // 2 + alike
-    assert ((second - first) % alike == 0).all()
-    assert pairs.mirrored == (equidistant and alike <= 2 and phases >= 8)
-    centre = np.angle(np.exp(1j * np.arctan2(pairs.centre[3], pairs.centre[0])))
-    angle = np.arctan2(pairs.waves[:, 3], pairs.waves[:, 0]) + centre
-    assert np.allclose(np.exp(1j * angle), np.exp(1j * phase_rad[first]))
+    size = 4 if groups.together == phase_groups.TURN else 2
+    rows = groups.rows[:, :size]
+    assert sorted(np.unique(rows)) == list(range(phases))
+    assert len(rows) <= phases // size + alike
+    assert ((rows - rows[:, :1]) % alike == 0).all()
+    centre = np.arctan2(groups.centre[3], groups.centre[0])
+    angle = np.arctan2(groups.waves[:, 3], groups.waves[:, 0]) + centre
+    assert np.allclose(np.exp(1j * angle), np.exp(1j * phase_rad[rows[:, 0]]))
+
+
+@pytest.mark.parametrize(
+    ("kind", "phases", "alike", "together"),
+    [
+        ("any", 64, 1, phase_groups.ANY),
+        ("equidistant", 7, 1, phase_groups.ANY),
+        ("equidistant", 64, 2, phase_groups.MIRRORED),
+        ("equidistant", 64, 4, phase_groups.ANY),
+        ("turn", 66, 2, phase_groups.MIRRORED),
+        ("turn", 64, 2, phase_groups.TURN),
+        ("turn back", 64, 1, phase_groups.TURN),
+    ],
+)
+def test_phases_are_evaluated_together_as_far_as_they_are_symmetric(
+    kind: str, phases: int, alike: int, together: int
+) -> None:
+    groups = phase_groups.grouping(3, "f")(PHASES[kind](phases), alike)
+
+    assert groups.together == together
+    rows, phase_rad = groups.rows, PHASES[kind](phases)
+    if together != phase_groups.ANY:
+        pair_rad = phase_rad[rows[:, :2]]
+        centre = np.exp(1j * np.arctan2(groups.centre[3], groups.centre[0]))
+        paired = rows[:, 0] != rows[:, 1]
+        assert np.allclose(np.exp(1j * pair_rad[paired].sum(axis=1)), centre**2, atol=1e-6)
+    if together == phase_groups.TURN:
+        opposite = np.exp(1j * phase_rad[rows[:, 2:]]) / np.exp(1j * phase_rad[rows[:, :2]])
+        assert np.allclose(opposite, -1)
 
 
 def test_no_phases_give_an_empty_density() -> None:
@@ -426,6 +471,20 @@ def test_parts_cover_every_pixel_once(total: int, parts: int) -> None:
     assert seen[-1][1] == total
     assert len(seen) <= (parts if total < LARGE else max(parts, -(-total // BLOCK)))
     assert all(end - begin >= min(total, 1024) for begin, end in seen)
+
+
+@pytest.mark.parametrize("total", [64, 100, 19560, 307200])
+@pytest.mark.parametrize("each", [1, 4])
+def test_an_image_is_cut_into_as_many_parts_as_asked_for_each_thread(total: int, each: int) -> None:
+    seen: list[tuple[int, int]] = []
+    with ThreadPoolExecutor(1) as executor:
+        tm.kernels.over(executor, 2)(lambda *part: seen.append(part), total, 64, each)
+
+    seen.sort()
+    assert [begin for begin, _ in seen] == [0, *(end for _, end in seen[:-1])]
+    assert seen[-1][1] == total
+    assert min(end - begin for begin, end in seen) >= 64
+    assert total >= LARGE or len(seen) == min(2 * each, total // 64)
 
 
 @pytest.mark.parametrize("total", [19560, 307200])

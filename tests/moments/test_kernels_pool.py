@@ -79,6 +79,16 @@ def test_what_is_larger_than_all_that_is_kept_goes_back() -> None:
     assert pool.size_bytes == 0
 
 
+def test_what_is_larger_than_all_that_is_kept_drives_nothing_out() -> None:
+    pool = Pool(most_bytes=2 * LEAST_BYTES)
+    before = address(pool.empty(LEAST_BYTES, np.uint8))
+
+    pool.empty(3 * LEAST_BYTES, np.uint8)
+
+    assert pool.size_bytes == LEAST_BYTES
+    assert address(pool.empty(LEAST_BYTES, np.uint8)) == before
+
+
 def test_small_arrays_are_left_to_numpy() -> None:
     pool = Pool()
     pool.empty(LEAST_BYTES - 1, np.uint8)

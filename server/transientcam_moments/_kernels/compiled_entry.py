@@ -32,6 +32,7 @@ REAL = _types.float64
 FLAG = _types.boolean
 COUNTS = _types.Array(_types.int32, 1, "C")
 PLACES = _types.Array(_types.int64, 1, "C")
+TABLE = _types.Array(_types.int64, 2, "C")
 BYTES = _types.Array(_types.uint8, 1, "C")
 IMAGES = _types.Array(_types.uint16, 2, "C")
 

@@ -52,7 +52,9 @@ class Pool:
         return np.asarray(_Owner(block, self)).view(kind).reshape(shape)
 
     def put(self, block: NDArray[np.uint8]) -> None:
-        """Keep memory that nothing refers to any more."""
+        """Keep memory that nothing refers to any more, unless it is more than may be kept."""
+        if block.nbytes > self._most_bytes:
+            return
         # never waiting: a collection of garbage may call this on the very thread that is in `_take`
         if not self._lock.acquire(blocking=False):
             return

@@ -23,11 +23,11 @@ Part = Callable[[int, int], None]
 class Spread(Protocol):
     """Has ``total`` pixels worked on, in parts that begin at multiples of ``unit``."""
 
-    def __call__(self, part: Part, total: int, /, unit: int = 1024) -> None:
-        """Return when all parts are done."""
+    def __call__(self, part: Part, total: int, /, unit: int = 1024, each: int = 1) -> None:
+        """Return when all parts are done, of which there are up to ``each`` for each thread."""
 
 
-def at_once(part: Part, total: int, /, unit: int = 1024) -> None:
+def at_once(part: Part, total: int, /, unit: int = 1024, each: int = 1) -> None:
     """Do everything in one part, on the calling thread."""
     part(0, total)
 
@@ -36,12 +36,13 @@ def over(executor: Executor, parts: int) -> Spread:
     """Return a way to do up to ``parts`` parts of an image at once, on the threads of an executor.
 
     The calling thread works, too, and waits for the others. Large images are cut into more parts,
-    of which each thread takes the next one when it has done one, so that none waits long for
-    another that is late or has other work. No part is smaller than a unit.
+    as are all where several are asked for each thread: it takes the next one when it has done one,
+    so that none waits long for another that is late or has other work. No part is smaller than a
+    unit.
     """
 
-    def spread(part: Part, total: int, /, unit: int = 1024) -> None:
-        size = max(unit, -(-total // (parts * unit)) * unit)
+    def spread(part: Part, total: int, /, unit: int = 1024, each: int = 1) -> None:
+        size = max(unit, -(-total // (parts * each * unit)) * unit)
         if total >= LARGE:
             size = min(size, max(unit, BLOCK // unit * unit))
         cuts = [0, *range(size, total - unit + 1, size), total]
