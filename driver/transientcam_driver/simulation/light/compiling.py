@@ -25,6 +25,7 @@ DOUBLES = float64[::1]
 ROWS = float64[:, ::1]
 PLANES = float64[:, :, ::1]
 TILES = _types.boolean[:, :, ::1]
+FLAGS = _types.boolean[::1]
 PLACES = int64[::1]
 AROUND = int64[:, ::1]
 REGION = _types.UniTuple(int64, 4)
