@@ -13,6 +13,7 @@ from transientcam_driver.simulation.light.compiling import (
     DOUBLES,
     FLAGS,
     LINE,
+    NUMBERS,
     PLACES,
     PLANE,
     PLANES,
@@ -374,7 +375,7 @@ def _shade(
     x, y, z, near, far = lines
     top, start, height, width = of
     inside, closest = np.empty((height, width), float32), np.empty((height, width), float32)
-    share, border = np.empty((height, width), float32), np.empty((height, width), np.bool_)
+    share, marks = np.empty((height, width), float32), np.empty(width, np.bool_)
     for run in _runs(tiles, side, of, 1):
         first, end = run[2], run[3]
         for row in range(run[0], run[1]):
@@ -383,37 +384,38 @@ def _shade(
                 ball, x[r, a:b], y[r, a:b], z[r, a:b], inside[row, first:end],
                 closest[row, first:end], share[row, first:end],
             )  # fmt: skip
-    found, runs = False, _runs(tiles, side, of, 0)
+    found, runs, count = False, _runs(tiles, side, of, 0), 0
+    border = np.empty((height * width, 2), np.int32)
     for run in runs:
         first, end = run[2], run[3]
         for row in range(run[0], run[1]):
             r, a, b = top + row, start + first, start + end
-            _mark(inside, row, first, end, border[row])
+            _mark(inside, row, first, end, marks)
             found |= _block(
                 inside[row, first:end], closest[row, first:end], near[r, a:b], far[r, a:b],
                 touching, share[row, first:end],
             )  # fmt: skip
             for column in range(first, end):
-                if border[row, column]:
+                if marks[column]:
                     at, c = closest[row, column], start + column
                     part = _share(inside, row, column)[0]
                     between = at > near[r, c] + touching and at < far[r, c] * (_ONE - touching)
                     share[row, column] = part if between else _ZERO
                     found |= share[row, column] > _ZERO
+                    border[count, 0], border[count, 1] = row, column
+                    count += 1
     if found:
-        _take(left, share, border, inside, runs, of)
+        _take(left, share, border[:count], runs, of)
     return found
 
 
 @inner
-def _take(left: Plane, share: Plane, border: Any, kept: Plane, runs: Any, of: Any) -> None:
+def _take(left: Plane, share: Plane, border: Any, runs: Any, of: Any) -> None:
     """Take shares of pixels from what is left of light, as `coverage.overlapped`."""
     top, start, _height, _width = of
-    for run in runs:  # before anything is taken that others are compared with
-        for row in range(run[0], run[1]):
-            for column in range(run[2], run[3]):
-                if border[row, column]:
-                    kept[row, column] = _overlap(left, share, row, column, of, -_ONE)
+    kept = np.empty(len(border), float32)
+    for k in range(len(border)):  # before anything is taken that others are compared with
+        kept[k] = _overlap(left, share, border[k, 0], border[k, 1], of, -_ONE)
     for run in runs:
         for row in range(run[0], run[1]):
             light, dark = (
@@ -422,12 +424,11 @@ def _take(left: Plane, share: Plane, border: Any, kept: Plane, runs: Any, of: An
             )
             for i in range(len(light)):
                 light[i] *= _ONE - dark[i]
-            for column in range(run[2], run[3]):
-                if border[row, column]:
-                    left[top + row, start + column] = kept[row, column]
+    for k in range(len(border)):
+        left[top + border[k, 0], start + border[k, 1]] = kept[k]
 
 
-@lane(PLANES, DOUBLES, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, TILES, int64, AROUND, float32, WHOLE)
+@lane(PLANES, DOUBLES, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, TILES, int64, NUMBERS, float32, WHOLE)
 def shade(
     axes: Any, apex: Any, x: Plane, y: Plane, z: Plane, near: Plane, far: Plane, tiles: Any, side: int,
     of: Any, touching: Any, left: Plane,
@@ -576,7 +577,7 @@ def _above(values: Any) -> Any:
     return count
 
 
-@lane(PLANES, DOUBLES, PLACES, LINE, LINE, LINE, LINE, float32, PLACES, AROUND, AROUND, LINE)
+@lane(PLANES, DOUBLES, PLACES, LINE, LINE, LINE, LINE, float32, PLACES, AROUND, NUMBERS, LINE)
 def dim_softly(
     axes: Any, apex: Any, owns: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any,
     around: Any, reach: Any, clear: Any,
@@ -671,7 +672,7 @@ def _lines_to(x: Any, y: Any, z: Any, at: Any, apex: Any, lines: Any) -> None:
         lines[4, k], lines[5, k], lines[6, k] = u * t + a, v * t + b, w * t + c
 
 
-@lane(WHOLE, LINE, LINE, LINE, LINE, float32, AROUND, AROUND, FLAGS)
+@lane(WHOLE, LINE, LINE, LINE, LINE, float32, AROUND, NUMBERS, FLAGS)
 def shown(
     plate: Any, apex: Any, x: Any, y: Any, z: Any, touching: Any, around: Any, reach: Any, rim: Any
 ) -> Any:

@@ -11,6 +11,7 @@ from transientcam_driver.simulation.light.compiling import (
     AROUND,
     DOUBLES,
     LINE,
+    NUMBERS,
     PLACES,
     PLANES,
     REGION,
@@ -19,6 +20,7 @@ from transientcam_driver.simulation.light.compiling import (
     float32,
     float64,
     inner,
+    int32,
     int64,
     lane,
 )
@@ -129,10 +131,14 @@ def points(
 def around(rows: Any, columns: Any, top: int, left: int, height: int, width: int) -> Any:
     """Return what is around points in a region of an image."""
     count = len(rows)
-    place = np.full((height + 2, width + 2), count, np.int32)  # half as much to go through
+    place = np.empty((height + 2, width + 2), int32)
+    for row in range(height + 2):
+        line = place[row]
+        for i in range(width + 2):
+            line[i] = count
     for i in range(count):
         place[rows[i] - top + 1, columns[i] - left + 1] = i
-    beside = np.empty((4, count), int64)
+    beside = np.empty((4, count), int32)
     for i in range(count):
         row, column = rows[i] - top + 1, columns[i] - left + 1
         beside[0, i], beside[1, i] = place[row - 1, column], place[row + 1, column]
@@ -143,10 +149,12 @@ def around(rows: Any, columns: Any, top: int, left: int, height: int, width: int
 @lane(PLACES, AROUND)
 def among(on: Any, beside: Any) -> Any:
     """Return what is beside some of the points, by their own indices."""
-    place = np.full(beside.shape[1] + 1, len(on), int64)
+    place = np.empty(beside.shape[1] + 1, int32)
+    for k in range(len(place)):
+        place[k] = len(on)
     for k in range(len(on)):
         place[on[k]] = k
-    found = np.empty((4, len(on)), int64)
+    found = np.empty((4, len(on)), int32)
     for side in range(4):
         for k in range(len(on)):
             found[side, k] = place[beside[side, on[k]]]
@@ -185,7 +193,7 @@ def received(
     return length_m, irradiance, cosine
 
 
-@lane(WHOLE, WHOLE, AROUND, LINE, int64, int64)
+@lane(WHOLE, WHOLE, NUMBERS, LINE, int64, int64)
 def darkened(moments: Plane, each: Plane, places: Any, left: Any, top: int, start: int) -> None:
     """Take from moments the part that a shadow leaves out of those by one chain of mirrors.
 
@@ -267,7 +275,7 @@ def arrived(
     return delay_s, weight
 
 
-@lane(WHOLE, WHOLE, AROUND, WHOLE, LINE, int64, int64)
+@lane(WHOLE, WHOLE, NUMBERS, WHOLE, LINE, int64, int64)
 def layered(
     moments: Plane, uncovered: Plane, places: Any, of_rays: Any, share: Any, top: int, left: int
 ) -> None:
@@ -285,7 +293,7 @@ def layered(
         moments[row, column + 1] += of_rays[k, 1] * share[k]
 
 
-@lane(WHOLE, AROUND, LINE)
+@lane(WHOLE, NUMBERS, LINE)
 def uncover(uncovered: Plane, places: Any, share: Any) -> None:
     """Take from pixels what layers cover of them, one after the other; at most all is covered."""
     rows, columns = places[0], places[1]

@@ -147,7 +147,7 @@ def covered(inside: Plane, *, rooted: bool = True) -> tuple[Plane, Plane]:
     return share, root
 
 
-def covered_among(inside: Plane, around: NDArray[np.intp]) -> Plane:
+def covered_among(inside: Plane, around: NDArray[np.int32]) -> Plane:
     """Share of each of some pixels (P) where a function is above 0; NaN is nowhere.
 
     ``around`` (4, P) are the pixels above, below, left and right of each, by index; P is none.

@@ -25,7 +25,7 @@ from transientcam_driver.simulation.scene.geometry import Ellipsoid, Shape
 class Around:
     """Which points are above, below, left and right of each, by index (4, P); P is none."""
 
-    def __init__(self, beside: NDArray[np.intp]) -> None:
+    def __init__(self, beside: NDArray[np.int32]) -> None:
         self.beside = beside
 
     @cached_property
@@ -110,7 +110,7 @@ def around(rows: NDArray[np.intp], columns: NDArray[np.intp], region: Region) ->
     lane = LANES.find("around")
     if lane is not None:
         return Around(lane(rows, columns, top, left, height, width))
-    place = np.full((height + 2, width + 2), len(rows))
+    place = np.full((height + 2, width + 2), len(rows), dtype=np.int32)
     rows, columns = rows - top + 1, columns - left + 1
     place[rows, columns] = np.arange(len(rows))
     steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
@@ -125,7 +125,7 @@ def among(on: NDArray[np.intp], around: Around) -> Around:
     lane = LANES.find("among")
     if lane is not None:
         return Around(lane(on, beside))
-    place = np.full(beside.shape[1] + 1, len(on))
+    place = np.full(beside.shape[1] + 1, len(on), dtype=np.int32)
     place[on] = np.arange(len(on))
     return Around(place[beside.take(on, axis=1)])
 
