@@ -93,38 +93,25 @@ def met(axes: Any, apex: Any, frame: Any, low: Any, high: Any, lowest: Any, high
     return tiles, spans
 
 
-@inner
-def _shown(share: Any) -> Any:
-    """Return how many pixels show something."""
-    count = 0
-    for i in range(len(share)):
-        count += share[i] != _ZERO
-    return count
-
-
-@lane(WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, int64, int64, LINE)
+@lane(WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, int64, int64, LINE, int64, NUMBERS, WHOLE)
 def points(
-    share: Plane, at: Plane, x: Plane, y: Plane, z: Plane, top: int, left: int, apex: Any
-) -> Any:
-    """Return rows, columns, shares, t, points and ways of the pixels that show a surface."""
-    count = _shown(share.ravel())
-    a, b, c, k = apex[0], apex[1], apex[2], 0
-    places, lines = np.empty((2, count), int64), np.empty((8, count), float32)
+    share: Plane, at: Plane, x: Plane, y: Plane, z: Plane, top: int, left: int, apex: Any,
+    start: int, places: Any, lines: Any,
+) -> None:  # fmt: skip
+    """Put rows, columns, shares, t, points and ways of the pixels that show a surface."""
+    a, b, c, k = apex[0], apex[1], apex[2], start
     for row in range(share.shape[0]):
-        shown, start = share[row], 0
-        while start < len(shown) and shown[start] == _ZERO:
-            start += 1
-        for column in range(start, len(shown)):
+        shown, r = share[row], row + top
+        for column in range(len(shown)):
             if shown[column] == _ZERO:
                 continue
-            r, s, t = row + top, column + left, at[row, column]
+            s, t = column + left, at[row, column]
             u, v, w = x[r, s], y[r, s], z[r, s]
             places[0, k], places[1, k] = r, s
             lines[0, k], lines[1, k] = shown[column], t
             lines[2, k], lines[3, k], lines[4, k] = u * t + a, v * t + b, w * t + c
             lines[5, k], lines[6, k], lines[7, k] = u, v, w
             k += 1
-    return places, lines
 
 
 @lane(PLACES, PLACES, int64, int64, int64, int64)
