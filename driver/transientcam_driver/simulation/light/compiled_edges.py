@@ -33,7 +33,7 @@ _ZERO, _ONE, _TWO = np.float32(0), np.float32(1), np.float32(2)
 _MEAN_BEND, _CUBE = np.float32(24), np.float32(1.5)
 _LEAST, _GENTLEST = np.float32(1e-9), np.float32(1e-2)
 _NAN, _TINY = np.float32(np.nan), np.float32(1e-12)
-CHUNK = 128
+CHUNK = 64
 """Points at a time, which are mostly beside each other in a row."""
 
 
@@ -177,10 +177,13 @@ def _of_rectangle(plate: Any, x: Any, y: Any, z: Any) -> Any:
 @inner
 def _ball(axes: Any, apex: Any) -> Any:
     """Return the numbers of an ellipsoid, as `coverage.ball_of`, of its centre and its radii."""
-    (a, b, c), (u, v, w) = (axes[0, 0], axes[0, 1], axes[0, 2]), (axes[1, 0], axes[1, 1], axes[1, 2])
-    x, y, z = (apex[0] - a) / u, (apex[1] - b) / v, (apex[2] - c) / w
+    centre, radii = axes[0], axes[1]
+    x = (apex[0] - centre[0]) / radii[0]
+    y = (apex[1] - centre[1]) / radii[1]
+    z = (apex[2] - centre[2]) / radii[2]
     return (
-        float32(1 / u), float32(1 / v), float32(1 / w), float32(x), float32(y), float32(z),
+        float32(1 / radii[0]), float32(1 / radii[1]), float32(1 / radii[2]),
+        float32(x), float32(y), float32(z),
         float32(1 - (x * x + y * y + z * z)), _TINY,
     )  # fmt: skip
 
@@ -246,8 +249,9 @@ def _show(at: Any, inside: Any, near: Any, far: Any, fills: Any, share: Any) -> 
 
 @lane(ROWS, DOUBLES, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, REGION)
 def seen(
-    axes: Any, apex: Any, x: Plane, y: Plane, z: Plane, near: Plane, far: Plane, fills: Plane, of: Any
-) -> Any:
+    axes: Any, apex: Any, x: Plane, y: Plane, z: Plane, near: Plane, far: Plane, fills: Plane,
+    of: Any,
+) -> Any:  # fmt: skip
     """Return shares of pixels that show an ellipsoid, and where their lines enter it."""
     top, left, height, width = of
     ball, right = _ball(axes, apex), left + width
@@ -430,8 +434,8 @@ def _take(left: Plane, share: Plane, border: Any, runs: Any, of: Any) -> None:
 
 @lane(PLANES, DOUBLES, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, TILES, int64, NUMBERS, float32, WHOLE)
 def shade(
-    axes: Any, apex: Any, x: Plane, y: Plane, z: Plane, near: Plane, far: Plane, tiles: Any, side: int,
-    of: Any, touching: Any, left: Plane,
+    axes: Any, apex: Any, x: Plane, y: Plane, z: Plane, near: Plane, far: Plane, tiles: Any,
+    side: int, of: Any, touching: Any, left: Plane,
 ) -> Any:  # fmt: skip
     """Take from the shares of light that are left what ellipsoids block; return which block any."""
     blocks = np.zeros(len(axes), np.bool_)
@@ -521,7 +525,7 @@ def _reaches(counts: Any, reach: Any, c: int) -> Any:
 
 
 @inner
-def _reaches_none_but(counts: Any, reach: Any, c: int) -> bool:
+def _reaches_none_but(counts: Any, reach: Any, c: int) -> Any:
     """Whether all of them do."""
     all_of = 1
     for k in range(0, 8, 2):
@@ -691,7 +695,7 @@ def shown(
     if found == count:
         _lines_to(x, y, z, at, corner, lines)
         return np.arange(count), share, lines
-    kept = np.empty(found, int64)
+    kept = np.empty(found, np.int64)
     if found:
         _gather(share, kept)
         _lines_to(x[kept], y[kept], z[kept], at[kept], corner, lines)

@@ -73,8 +73,8 @@ def ball_of(shape: Ellipsoid, apex: Points) -> Plane:
     origin = (apex - shape.centre) / shape.radii
     ball = np.empty(8, dtype=np.float32)
     x, y, z = origin
-    # no dot product, whose last digit depends on the machine's library
-    ball[:3], ball[3:6], ball[6], ball[7] = 1 / shape.radii, origin, 1 - (x * x + y * y + z * z), _TINY
+    squared = x * x + y * y + z * z  # a dot product's last digit depends on the machine's library
+    ball[:3], ball[3:6], ball[6], ball[7] = 1 / shape.radii, origin, 1 - squared, _TINY
     return ball
 
 

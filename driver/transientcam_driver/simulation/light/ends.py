@@ -159,8 +159,10 @@ class Ends:
         if lane is not None:
             light = length_m, self.distance_m, irradiance
             return Way(on, *lane(*light, on, sent, SPEED_OF_LIGHT_M_S))
-        delay_s = (length_m + self.distance_m[on].astype(np.float64)) / SPEED_OF_LIGHT_M_S
-        return Way(on, delay_s, np.multiply(sent[on], irradiance, dtype=np.float64))
+        whole_m = length_m.astype(np.float64) + self.distance_m[on]
+        return Way(
+            on, whole_m / SPEED_OF_LIGHT_M_S, np.multiply(sent[on], irradiance, dtype=np.float64)
+        )
 
     def _highlight(
         self, light: ImageLight, normal: tuple[Plane, ...], facing: NDArray[np.float64]
@@ -311,9 +313,7 @@ def _dim(
     clear *= 1 - share_around(cross, between & ~cross.holds(1.0), around)
 
 
-def _dimmed(
-    shape: Shape, segment: Segment, of: tuple[NDArray[np.intp], int], clear: Plane
-) -> bool:
+def _dimmed(shape: Shape, segment: Segment, of: tuple[NDArray[np.intp], int], clear: Plane) -> bool:
     """Do the same at hard edges by a lane; ``of`` are the points' surfaces and the shape's."""
     lane = LANES.find("dim_behind")
     if lane is None or not isinstance(shape, Rectangle):

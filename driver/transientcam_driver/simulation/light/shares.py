@@ -22,6 +22,7 @@ from transientcam_driver.simulation.light.coverage import (
 from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.scene.geometry import Ellipsoid, Shape
 
+
 class Around:
     """Which points are above, below, left and right of each, by index (4, P); P is none."""
 
