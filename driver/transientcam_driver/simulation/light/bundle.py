@@ -8,9 +8,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.light.coverage import Plane
+from transientcam_driver.simulation.light.coverage import Plane, axes_of
 from transientcam_driver.simulation.light.lanes import LANES
-from transientcam_driver.simulation.scene.geometry import Ellipsoid, Points, Shape
+from transientcam_driver.simulation.scene.geometry import Points, Shape
 
 Region = tuple[slice, slice]
 NOWHERE: Final[Region] = (slice(0, 0), slice(0, 0))
@@ -81,9 +81,8 @@ class Bundle:
         A region is None if there are none.
         """
         lane = LANES.find("met")
-        balls = [each for each in shapes if isinstance(each, Ellipsoid)]
-        if lane is not None and len(balls) == len(shapes):
-            axes = np.array([(each.centre, each.radii) for each in balls])
+        axes = axes_of(shapes)
+        if lane is not None and len(axes) == len(shapes):
             tiles, spans = lane(axes, self.apex, self.frame, self.low, self.high, *self.rows)
             return tiles, self._regions(spans.tolist())
         middle, *across = self.frame

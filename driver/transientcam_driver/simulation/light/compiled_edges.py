@@ -10,10 +10,15 @@ import numpy as np
 
 from transientcam_driver.simulation.light.compiling import (
     AROUND,
+    DOUBLES,
+    FLAGS,
     LINE,
+    NUMBERS,
     PLACES,
     PLANE,
+    PLANES,
     REGION,
+    ROWS,
     TILES,
     WHOLE,
     float32,
@@ -27,7 +32,9 @@ Plane = Any
 _ZERO, _ONE, _TWO = np.float32(0), np.float32(1), np.float32(2)
 _MEAN_BEND, _CUBE = np.float32(24), np.float32(1.5)
 _LEAST, _GENTLEST = np.float32(1e-9), np.float32(1e-2)
-_NAN = np.float32(np.nan)
+_NAN, _TINY = np.float32(np.nan), np.float32(1e-12)
+CHUNK = 64
+"""Points at a time, which are mostly beside each other in a row."""
 
 
 @inner
@@ -168,9 +175,17 @@ def _of_rectangle(plate: Any, x: Any, y: Any, z: Any) -> Any:
 
 
 @inner
-def _eight(ball: Any) -> Any:
-    """Return its numbers, which a loop then need not load anew."""
-    return ball[0], ball[1], ball[2], ball[3], ball[4], ball[5], ball[6], ball[7]
+def _ball(axes: Any, apex: Any) -> Any:
+    """Return the numbers of an ellipsoid, as `coverage.ball_of`, of its centre and its radii."""
+    centre, radii = axes[0], axes[1]
+    x = (apex[0] - centre[0]) / radii[0]
+    y = (apex[1] - centre[1]) / radii[1]
+    z = (apex[2] - centre[2]) / radii[2]
+    return (
+        float32(1 / radii[0]), float32(1 / radii[1]), float32(1 / radii[2]),
+        float32(x), float32(y), float32(z),
+        float32(1 - (x * x + y * y + z * z)), _TINY,
+    )  # fmt: skip
 
 
 @inner
@@ -232,13 +247,14 @@ def _show(at: Any, inside: Any, near: Any, far: Any, fills: Any, share: Any) -> 
         share[i] = fills[i] if shows else _ZERO
 
 
-@lane(LINE, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, REGION)
+@lane(ROWS, DOUBLES, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, REGION)
 def seen(
-    numbers: Any, x: Plane, y: Plane, z: Plane, near: Plane, far: Plane, fills: Plane, of: Any
-) -> Any:
+    axes: Any, apex: Any, x: Plane, y: Plane, z: Plane, near: Plane, far: Plane, fills: Plane,
+    of: Any,
+) -> Any:  # fmt: skip
     """Return shares of pixels that show an ellipsoid, and where their lines enter it."""
     top, left, height, width = of
-    ball, right = _eight(numbers), left + width
+    ball, right = _ball(axes, apex), left + width
     inside, at = np.empty((height, width), float32), np.empty((height, width), float32)
     share, spans = np.zeros((height, width), float32), np.empty((height, 2), int64)
     border = np.zeros(width, np.bool_)
@@ -363,7 +379,7 @@ def _shade(
     x, y, z, near, far = lines
     top, start, height, width = of
     inside, closest = np.empty((height, width), float32), np.empty((height, width), float32)
-    share, border = np.empty((height, width), float32), np.empty((height, width), np.bool_)
+    share, marks = np.empty((height, width), float32), np.empty(width, np.bool_)
     for run in _runs(tiles, side, of, 1):
         first, end = run[2], run[3]
         for row in range(run[0], run[1]):
@@ -372,37 +388,38 @@ def _shade(
                 ball, x[r, a:b], y[r, a:b], z[r, a:b], inside[row, first:end],
                 closest[row, first:end], share[row, first:end],
             )  # fmt: skip
-    found, runs = False, _runs(tiles, side, of, 0)
+    found, runs, count = False, _runs(tiles, side, of, 0), 0
+    border = np.empty((height * width, 2), np.int32)
     for run in runs:
         first, end = run[2], run[3]
         for row in range(run[0], run[1]):
             r, a, b = top + row, start + first, start + end
-            _mark(inside, row, first, end, border[row])
+            _mark(inside, row, first, end, marks)
             found |= _block(
                 inside[row, first:end], closest[row, first:end], near[r, a:b], far[r, a:b],
                 touching, share[row, first:end],
             )  # fmt: skip
             for column in range(first, end):
-                if border[row, column]:
+                if marks[column]:
                     at, c = closest[row, column], start + column
                     part = _share(inside, row, column)[0]
                     between = at > near[r, c] + touching and at < far[r, c] * (_ONE - touching)
                     share[row, column] = part if between else _ZERO
                     found |= share[row, column] > _ZERO
+                    border[count, 0], border[count, 1] = row, column
+                    count += 1
     if found:
-        _take(left, share, border, inside, runs, of)
+        _take(left, share, border[:count], runs, of)
     return found
 
 
 @inner
-def _take(left: Plane, share: Plane, border: Any, kept: Plane, runs: Any, of: Any) -> None:
+def _take(left: Plane, share: Plane, border: Any, runs: Any, of: Any) -> None:
     """Take shares of pixels from what is left of light, as `coverage.overlapped`."""
     top, start, _height, _width = of
-    for run in runs:  # before anything is taken that others are compared with
-        for row in range(run[0], run[1]):
-            for column in range(run[2], run[3]):
-                if border[row, column]:
-                    kept[row, column] = _overlap(left, share, row, column, of, -_ONE)
+    kept = np.empty(len(border), float32)
+    for k in range(len(border)):  # before anything is taken that others are compared with
+        kept[k] = _overlap(left, share, border[k, 0], border[k, 1], of, -_ONE)
     for run in runs:
         for row in range(run[0], run[1]):
             light, dark = (
@@ -411,24 +428,32 @@ def _take(left: Plane, share: Plane, border: Any, kept: Plane, runs: Any, of: An
             )
             for i in range(len(light)):
                 light[i] *= _ONE - dark[i]
-            for column in range(run[2], run[3]):
-                if border[row, column]:
-                    left[top + row, start + column] = kept[row, column]
+    for k in range(len(border)):
+        left[top + border[k, 0], start + border[k, 1]] = kept[k]
 
 
-@lane(WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, TILES, int64, AROUND, float32, WHOLE)
+@lane(PLANES, DOUBLES, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, TILES, int64, NUMBERS, float32, WHOLE)
 def shade(
-    balls: Any, x: Plane, y: Plane, z: Plane, near: Plane, far: Plane, tiles: Any, side: int,
-    of: Any, touching: Any, left: Plane,
+    axes: Any, apex: Any, x: Plane, y: Plane, z: Plane, near: Plane, far: Plane, tiles: Any,
+    side: int, of: Any, touching: Any, left: Plane,
 ) -> Any:  # fmt: skip
     """Take from the shares of light that are left what ellipsoids block; return which block any."""
-    blocks = np.zeros(len(balls), np.bool_)
-    for k in range(len(balls)):
+    blocks = np.zeros(len(axes), np.bool_)
+    for k in range(len(axes)):
         region = of[k, 0], of[k, 1], of[k, 2], of[k, 3]
         if region[2] > 0:
             lines = x, y, z, near, far
-            blocks[k] = _shade(_eight(balls[k]), lines, tiles[k], side, region, touching, left)
+            blocks[k] = _shade(_ball(axes[k], apex), lines, tiles[k], side, region, touching, left)
     return blocks
+
+
+@inner
+def _in_shadow(left: Any, shown: Any) -> Any:
+    """Return how many pixels of a row are seen in shadow."""
+    count = 0
+    for i in range(len(left)):
+        count += (left[i] < _ONE) & (shown[i] > _ZERO)
+    return count
 
 
 @lane(WHOLE, WHOLE, REGION)
@@ -439,22 +464,26 @@ def dimmed(seen: Plane, left: Plane, of: Any) -> Any:
     """
     top, start, height, width = of
     part = left[top : top + height, start : start + width]
-    count = 0
+    found, count = np.zeros((height, width // CHUNK + 1), int64), 0
     for row in range(height):
         line, shown = part[row], seen[top + row, start : start + width]
-        for column in range(len(line)):
-            count += (line[column] < _ONE) & (shown[column] > _ZERO)
+        for a in range(0, width, CHUNK):
+            found[row, a // CHUNK] = _in_shadow(line[a : a + CHUNK], shown[a : a + CHUNK])
+            count += found[row, a // CHUNK]
     places, light, k = np.empty((2, count), int64), np.empty(count, float32), 0
     for row in range(height):
         line, shown = part[row], seen[top + row, start : start + width]
-        for column in range(len(line)):
-            if not (line[column] < _ONE and shown[column] > _ZERO):
+        for c in range(width // CHUNK + 1):
+            if not found[row, c]:
                 continue
-            places[0, k], places[1, k], light[k] = top + row, start + column, _ZERO
-            if line[column] > _ZERO:
-                both = _overlap(seen, part, row, column, of, _ONE)
-                light[k] = both / max(shown[column], _LEAST)
-            k += 1
+            for column in range(c * CHUNK, min((c + 1) * CHUNK, width)):
+                if not (line[column] < _ONE and shown[column] > _ZERO):
+                    continue
+                places[0, k], places[1, k], light[k] = top + row, start + column, _ZERO
+                if line[column] > _ZERO:
+                    both = _overlap(seen, part, row, column, of, _ONE)
+                    light[k] = both / max(shown[column], _LEAST)
+                k += 1
     return places, light
 
 
@@ -483,25 +512,97 @@ def overlapped(one: Plane, other: Plane) -> Any:
     return both
 
 
-@lane(LINE, LINE, LINE, LINE, LINE, float32, PLACES, int64, AROUND, LINE)
-def dim_softly(
-    numbers: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any, own: int,
-    around: Any, clear: Any,
-) -> Any:  # fmt: skip
-    """Take from the light at points what an ellipsoid covers of the pixels around them."""
-    ball, count, met = _eight(numbers), len(x), 0
-    values = np.empty(count + 1, float32)
-    values[count] = _NAN
-    for i in range(count):
+@inner
+def _reaches(counts: Any, reach: Any, c: int) -> Any:
+    """Return how many of a chunk and of those that its points' neighbours are in count.
+
+    ``counts`` are of all chunks before each.
+    """
+    found = counts[c + 1] - counts[c]
+    for k in range(0, 8, 2):
+        found += counts[reach[c, k + 1]] - counts[reach[c, k]]
+    return found
+
+
+@inner
+def _reaches_none_but(counts: Any, reach: Any, c: int) -> Any:
+    """Whether all of them do."""
+    all_of = 1
+    for k in range(0, 8, 2):
+        all_of += reach[c, k + 1] - reach[c, k]
+    return _reaches(counts, reach, c) == all_of
+
+
+@lane(AROUND)
+def reach(beside: Any) -> Any:
+    """Return chunks of the points beside those of each chunk, and which points lack neighbours.
+
+    Of those above, below, left and right, the first chunk, and the one after the last.
+    """
+    count = beside.shape[1]
+    chunks = (count + CHUNK - 1) // CHUNK
+    reached, rim = np.zeros((chunks, 8), int64), np.zeros(count, np.bool_)
+    for c in range(chunks):
+        start, stop = c * CHUNK, min((c + 1) * CHUNK, count)
+        alone = rim[start:stop]
+        for k in range(4):
+            places, first, last = beside[k, start:stop], count, -1
+            for i in range(len(places)):
+                none = places[i] == count
+                first, last = min(first, places[i]), max(last, -1 if none else places[i])
+                alone[i] |= none
+            if last >= 0:
+                reached[c, 2 * k], reached[c, 2 * k + 1] = first // CHUNK, last // CHUNK + 1
+    return reached, rim
+
+
+@inner
+def _cross_points(
+    ball: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any, own: Any, values: Any
+) -> bool:
+    """Put where lines to points of other surfaces meet an ellipsoid; whether any does."""
+    met = 0
+    for i in range(len(x)):
         squared, along = _squared(ball, x[i], y[i], z[i]), _along(ball, x[i], y[i], z[i])
         value, at = along * (along / squared) + ball[6], -(along / squared)
         counts = (at > near[i] + touching) & (at < _ONE - touching) & (index[i] != own)
         met += counts & (value > _ZERO)
         away = (at - _ONE) * np.sqrt(squared)
         values[i] = value if counts & (not away * away < value) else _NAN
-    if met:
-        for i in range(count):
-            clear[i] *= _ONE - _share_among(values, around, i)
+    return met > 0
+
+
+@inner
+def _above(values: Any) -> Any:
+    """Return how many are above 0."""
+    count = 0
+    for i in range(len(values)):
+        count += values[i] > _ZERO
+    return count
+
+
+@lane(PLANES, DOUBLES, PLACES, LINE, LINE, LINE, LINE, float32, PLACES, AROUND, NUMBERS, LINE)
+def dim_softly(
+    axes: Any, apex: Any, owns: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any,
+    around: Any, reach: Any, clear: Any,
+) -> None:  # fmt: skip
+    """Take from the light at points what ellipsoids cover of the pixels around them.
+
+    Only chunks of points in and beside which a line meets an ellipsoid have any share.
+    """
+    count, chunks = len(x), len(reach)
+    values, counts = np.empty(count + 1, float32), np.zeros(chunks + 1, int64)
+    values[count] = _NAN
+    for n in range(len(axes)):
+        ball = _ball(axes[n], apex)
+        if not _cross_points(ball, x, y, z, near, touching, index, owns[n], values):
+            continue
+        for c in range(chunks):
+            counts[c + 1] = counts[c] + _above(values[c * CHUNK : min((c + 1) * CHUNK, count)])
+        for c in range(chunks):
+            if _reaches(counts, reach, c):
+                for i in range(c * CHUNK, min((c + 1) * CHUNK, count)):
+                    clear[i] *= _ONE - _share_among(values, around, i)
 
 
 @lane(WHOLE, LINE, LINE, LINE, LINE, float32, PLACES, int64, LINE)
@@ -517,37 +618,85 @@ def dim_behind(
 
 
 @inner
-def _show_points(first: Any, second: Any, at: Any, around: Any, kept: Any, share: Any) -> int:
-    """Put points that a mirror shows any light to, and its shares of their pixels; count them."""
-    found = 0
-    for i in range(len(at)):
-        part = _share_among(first, around, i) * _share_among(second, around, i)
-        if part != _ZERO:
-            share[found], kept[found] = part, i
-            found += 1
+def _meet(axes: Any, apex: Any, x: Any, y: Any, z: Any, touching: Any, put: Any) -> bool:
+    """Put both functions, and the t, where ways to points meet a rectangle; whether any does."""
+    first, second, at = put
+    met = 0
+    for i in range(len(x)):
+        one, other, t, facing = _of_rectangle(axes, x[i] - apex[0], y[i] - apex[1], z[i] - apex[2])
+        shows = (t > _ZERO + touching) & (t < _ONE - touching) & (facing > _ZERO)
+        first[i], second[i], at[i] = one if shows else _NAN, other if shows else _NAN, t
+        met += shows & (one > _ZERO) & (other > _ZERO)
+    return met > 0
+
+
+@inner
+def _show_points(values: Any, around: Any, reach: Any, rim: Any, share: Any) -> Any:
+    """Put shares of the pixels around points that a mirror shows the light to; count them."""
+    first, second = values
+    found, count, chunks = 0, len(rim), len(reach)
+    along, across = np.zeros(chunks + 1, int64), np.zeros(chunks + 1, int64)
+    both = np.zeros(chunks + 1, int64)
+    for c in range(chunks):
+        a, b = c * CHUNK, min((c + 1) * CHUNK, count)
+        on, beside = _above(first[a:b]), _above(second[a:b])
+        along[c + 1], across[c + 1] = along[c] + (on > 0), across[c] + (beside > 0)
+        both[c + 1] = both[c] + (on == b - a and beside == b - a)
+    for c in range(chunks):
+        a, b = c * CHUNK, min((c + 1) * CHUNK, count)
+        if not (_reaches(along, reach, c) and _reaches(across, reach, c)):
+            share[a:b] = _ZERO
+            continue
+        amid = _reaches_none_but(both, reach, c)
+        share[a:b] = _ONE
+        for i in range(a, b):
+            if rim[i] or not amid:
+                share[i] = _share_among(first, around, i) * _share_among(second, around, i)
+        found += _above(share[a:b])
     return found
 
 
-@lane(WHOLE, LINE, LINE, LINE, LINE, float32, AROUND)
-def shown(plate: Any, apex: Any, x: Any, y: Any, z: Any, touching: Any, around: Any) -> Any:
+@inner
+def _gather(share: Any, kept: Any) -> None:
+    """Put the places where shares are above 0."""
+    k = 0
+    for i in range(len(share)):
+        if share[i] > _ZERO:
+            kept[k] = i
+            k += 1
+
+
+@inner
+def _lines_to(x: Any, y: Any, z: Any, at: Any, apex: Any, lines: Any) -> None:
+    """Put ways from an apex to points, the t where they meet a mirror, and points there."""
+    a, b, c = apex[0], apex[1], apex[2]
+    for k in range(len(x)):
+        u, v, w, t = x[k] - a, y[k] - b, z[k] - c, at[k]
+        lines[0, k], lines[1, k], lines[2, k], lines[3, k] = u, v, w, t
+        lines[4, k], lines[5, k], lines[6, k] = u * t + a, v * t + b, w * t + c
+
+
+@lane(WHOLE, LINE, LINE, LINE, LINE, float32, AROUND, NUMBERS, FLAGS)
+def shown(
+    plate: Any, apex: Any, x: Any, y: Any, z: Any, touching: Any, around: Any, reach: Any, rim: Any
+) -> Any:
     """Return the points that a mirror shows the light to, and its shares of their pixels.
 
     Then ways to them from the light's image, the t where they meet the mirror, and points there.
     """
-    axes, a, b, c, count, met = _axes(plate), apex[0], apex[1], apex[2], len(x), 0
+    axes, corner, count = _axes(plate), (apex[0], apex[1], apex[2]), len(x)
     first, second = np.empty(count + 1, float32), np.empty(count + 1, float32)
-    at, kept, share = np.empty(count, float32), np.empty(count, int64), np.empty(count, float32)
+    at, share = np.empty(count, float32), np.empty(count, float32)
     first[count] = second[count] = _NAN
-    for i in range(count):
-        one, other, t, facing = _of_rectangle(axes, x[i] - a, y[i] - b, z[i] - c)
-        shows = (t > _ZERO + touching) & (t < _ONE - touching) & (facing > _ZERO)
-        first[i], second[i], at[i] = one if shows else _NAN, other if shows else _NAN, t
-        met += shows & (one > _ZERO) & (other > _ZERO)
-    found = _show_points(first, second, at, around, kept, share) if met else 0
+    found = 0
+    if _meet(axes, corner, x, y, z, touching, (first[:count], second[:count], at)):
+        found = _show_points((first, second), around, reach, rim, share)
     lines = np.empty((7, found), float32)
-    for k in range(found):
-        i = kept[k]
-        u, v, w, t = x[i] - a, y[i] - b, z[i] - c, at[i]
-        lines[0, k], lines[1, k], lines[2, k], lines[3, k] = u, v, w, t
-        lines[4, k], lines[5, k], lines[6, k] = u * t + a, v * t + b, w * t + c
-    return kept[:found], share[:found], lines
+    if found == count:
+        _lines_to(x, y, z, at, corner, lines)
+        return np.arange(count), share, lines
+    kept = np.empty(found, np.int64)
+    if found:
+        _gather(share, kept)
+        _lines_to(x[kept], y[kept], z[kept], at[kept], corner, lines)
+    return kept, share[kept], lines

@@ -11,14 +11,16 @@ from transientcam_driver.simulation.light.compiling import (
     AROUND,
     DOUBLES,
     LINE,
+    NUMBERS,
     PLACES,
-    PLANE,
     PLANES,
     REGION,
     ROWS,
     WHOLE,
     float32,
+    float64,
     inner,
+    int32,
     int64,
     lane,
 )
@@ -91,43 +93,39 @@ def met(axes: Any, apex: Any, frame: Any, low: Any, high: Any, lowest: Any, high
     return tiles, spans
 
 
-@lane(PLANE, PLANE, PLANE, PLANE, PLANE, int64, int64, LINE)
+@lane(WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, int64, int64, LINE, int64, NUMBERS, WHOLE)
 def points(
-    share: Plane, at: Plane, x: Plane, y: Plane, z: Plane, top: int, left: int, apex: Any
-) -> Any:
-    """Return rows, columns, shares, t, points and ways of the pixels that show a surface."""
-    count = 0
+    share: Plane, at: Plane, x: Plane, y: Plane, z: Plane, top: int, left: int, apex: Any,
+    start: int, places: Any, lines: Any,
+) -> None:  # fmt: skip
+    """Put rows, columns, shares, t, points and ways of the pixels that show a surface."""
+    a, b, c, k = apex[0], apex[1], apex[2], start
     for row in range(share.shape[0]):
-        for column in range(share.shape[1]):
-            count += share[row, column] != _ZERO
-    places, lines, k = np.empty((2, count), int64), np.empty((8, count), float32), 0
-    for row in range(share.shape[0]):
-        for column in range(share.shape[1]):
-            if share[row, column] == _ZERO:
+        shown, r = share[row], row + top
+        for column in range(len(shown)):
+            if shown[column] == _ZERO:
                 continue
-            places[0, k], places[1, k] = row + top, column + left
-            t = at[row, column]
-            lines[0, k], lines[1, k] = share[row, column], t
-            way = (
-                x[row + top, column + left],
-                y[row + top, column + left],
-                z[row + top, column + left],
-            )
-            for axis in range(3):
-                lines[2 + axis, k] = way[axis] * t + apex[axis]
-                lines[5 + axis, k] = way[axis]
+            s, t = column + left, at[row, column]
+            u, v, w = x[r, s], y[r, s], z[r, s]
+            places[0, k], places[1, k] = r, s
+            lines[0, k], lines[1, k] = shown[column], t
+            lines[2, k], lines[3, k], lines[4, k] = u * t + a, v * t + b, w * t + c
+            lines[5, k], lines[6, k], lines[7, k] = u, v, w
             k += 1
-    return places, lines
 
 
 @lane(PLACES, PLACES, int64, int64, int64, int64)
 def around(rows: Any, columns: Any, top: int, left: int, height: int, width: int) -> Any:
     """Return what is around points in a region of an image."""
     count = len(rows)
-    place = np.full((height + 2, width + 2), count, int64)
+    place = np.empty((height + 2, width + 2), int32)
+    for row in range(height + 2):
+        line = place[row]
+        for i in range(width + 2):
+            line[i] = count
     for i in range(count):
         place[rows[i] - top + 1, columns[i] - left + 1] = i
-    beside = np.empty((4, count), int64)
+    beside = np.empty((4, count), int32)
     for i in range(count):
         row, column = rows[i] - top + 1, columns[i] - left + 1
         beside[0, i], beside[1, i] = place[row - 1, column], place[row + 1, column]
@@ -135,26 +133,54 @@ def around(rows: Any, columns: Any, top: int, left: int, height: int, width: int
     return beside
 
 
+@lane(PLACES, AROUND)
+def among(on: Any, beside: Any) -> Any:
+    """Return what is beside some of the points, by their own indices."""
+    place = np.empty(beside.shape[1] + 1, int32)
+    for k in range(len(place)):
+        place[k] = len(on)
+    for k in range(len(on)):
+        place[on[k]] = k
+    found = np.empty((4, len(on)), int32)
+    for side in range(4):
+        for k in range(len(on)):
+            found[side, k] = place[beside[side, on[k]]]
+    return found
+
+
+@inner
+def _receive(lamp: Any, axis: Any, point: Any, normal: Any, put: Any) -> None:
+    """Put lengths of the ways to a lamp, irradiance, and cosines to its axis, of points."""
+    x, y, z = point
+    across, along, up = normal
+    length_m, irradiance, cosine = put
+    for i in range(len(x)):
+        a, b, c = lamp[0] - x[i], lamp[1] - y[i], lamp[2] - z[i]
+        length = np.sqrt(a * a + b * b + c * c)
+        facing = a * across[i] + b * along[i] + c * up[i]
+        length_m[i] = length
+        irradiance[i] = max(facing, _ZERO) / (length * length * length)
+        cosine[i] = -(a * axis[0] + b * axis[1] + c * axis[2]) / length
+
+
 @lane(LINE, LINE, LINE, LINE, LINE, LINE, LINE, LINE, PLACES)
 def received(
     lamp: Any, axis: Any, x: Any, y: Any, z: Any, across: Any, along: Any, up: Any, on: Any
 ) -> Any:
-    """Return lengths of the ways to a lamp, irradiance, and cosines to its axis, of points."""
+    """Return lengths of the ways to a lamp, irradiance, and cosines to its axis, of some points."""
     count = len(on)
     length_m, irradiance = np.empty(count, float32), np.empty(count, float32)
     cosine = np.empty(count, float32)
-    for k in range(count):
-        i = on[k]
-        a, b, c = lamp[0] - x[i], lamp[1] - y[i], lamp[2] - z[i]
-        length = np.sqrt(a * a + b * b + c * c)
-        facing = a * across[i] + b * along[i] + c * up[i]
-        length_m[k] = length
-        irradiance[k] = max(facing, _ZERO) / (length * length * length)
-        cosine[k] = -(a * axis[0] + b * axis[1] + c * axis[2]) / length
+    of = (lamp[0], lamp[1], lamp[2]), (axis[0], axis[1], axis[2])
+    put = length_m, irradiance, cosine
+    if count == len(x):
+        _receive(*of, (x, y, z), (across, along, up), put)
+    else:
+        _receive(*of, (x[on], y[on], z[on]), (across[on], along[on], up[on]), put)
     return length_m, irradiance, cosine
 
 
-@lane(WHOLE, WHOLE, AROUND, LINE, int64, int64)
+@lane(WHOLE, WHOLE, NUMBERS, LINE, int64, int64)
 def darkened(moments: Plane, each: Plane, places: Any, left: Any, top: int, start: int) -> None:
     """Take from moments the part that a shadow leaves out of those by one chain of mirrors.
 
@@ -179,24 +205,64 @@ def turned(of_rays: Any, on: Any, weight: Any, cosine: Any, sine: Any) -> None:
         of_rays[i, 1] = of_rays[i, 1] + weight[k] * sine[k]
 
 
+@inner
+def _upright(x: Any, y: Any, z: Any, ball: Any, normal: Any) -> None:
+    """Put unit normals of one ellipsoid."""
+    across, along, up = normal
+    for i in range(len(x)):
+        a, b, c = (x[i] - ball[0]) / ball[3], (y[i] - ball[1]) / ball[4], (z[i] - ball[2]) / ball[5]
+        length = np.sqrt(a * a + b * b + c * c)
+        across[i], along[i], up[i] = a / length, b / length, c / length
+
+
 @lane(LINE, LINE, LINE, WHOLE, PLACES)
 def upright(x: Any, y: Any, z: Any, balls: Any, ends: Any) -> Any:
     """Return unit normals of ellipsoids, each with some of the points."""
     normal = np.empty((3, len(x)), float32)
     for n in range(len(balls)):
         ball = balls[n, 0], balls[n, 1], balls[n, 2], balls[n, 3], balls[n, 4], balls[n, 5]
-        for i in range(ends[n], ends[n + 1]):
-            a, b, c = (
-                (x[i] - ball[0]) / ball[3],
-                (y[i] - ball[1]) / ball[4],
-                (z[i] - ball[2]) / ball[5],
-            )
-            length = np.sqrt(a * a + b * b + c * c)
-            normal[0, i], normal[1, i], normal[2, i] = a / length, b / length, c / length
+        a, b = ends[n], ends[n + 1]
+        _upright(
+            x[a:b], y[a:b], z[a:b], ball, (normal[0, a:b], normal[1, a:b], normal[2, a:b])
+        )  # fmt: skip
     return normal
 
 
-@lane(WHOLE, WHOLE, AROUND, WHOLE, LINE, int64, int64)
+@lane(LINE, LINE, LINE, LINE, LINE, LINE, DOUBLES, DOUBLES, PLACES)
+def returned(
+    across: Any, along: Any, up: Any, x: Any, y: Any, z: Any, throughput: Any, albedos: Any,
+    index: Any,
+) -> Any:  # fmt: skip
+    """Return throughput and reflectance of points that are seen from in front, of others 0."""
+    facing, reflectance = np.empty(len(x), float64), np.empty(len(x), float64)
+    for i in range(len(x)):
+        towards = _ZERO + across[i] * x[i] + along[i] * y[i] + up[i] * z[i]
+        facing[i] = throughput[i] if towards < _ZERO else 0.0
+    for i in range(len(x)):
+        reflectance[i] = albedos[index[i]] * facing[i]
+    return facing, reflectance
+
+
+@lane(LINE, LINE, LINE, PLACES, DOUBLES, float64)
+def arrived(
+    length_m: Any, distance_m: Any, irradiance: Any, on: Any, sent: Any, metres_per_s: Any
+) -> Any:
+    """Return times of flight and weights of the light on some points."""
+    count = len(on)
+    delay_s, weight = np.empty(count, float64), np.empty(count, float64)
+    if count == len(sent):
+        for i in range(count):
+            delay_s[i] = (float64(length_m[i]) + float64(distance_m[i])) / metres_per_s
+            weight[i] = sent[i] * float64(irradiance[i])
+        return delay_s, weight
+    for k in range(count):
+        i = on[k]
+        delay_s[k] = (float64(length_m[k]) + float64(distance_m[i])) / metres_per_s
+        weight[k] = sent[i] * float64(irradiance[k])
+    return delay_s, weight
+
+
+@lane(WHOLE, WHOLE, NUMBERS, WHOLE, LINE, int64, int64)
 def layered(
     moments: Plane, uncovered: Plane, places: Any, of_rays: Any, share: Any, top: int, left: int
 ) -> None:
@@ -214,7 +280,7 @@ def layered(
         moments[row, column + 1] += of_rays[k, 1] * share[k]
 
 
-@lane(WHOLE, AROUND, LINE)
+@lane(WHOLE, NUMBERS, LINE)
 def uncover(uncovered: Plane, places: Any, share: Any) -> None:
     """Take from pixels what layers cover of them, one after the other; at most all is covered."""
     rows, columns = places[0], places[1]

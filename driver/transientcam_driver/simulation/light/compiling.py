@@ -6,6 +6,7 @@ from typing import Any
 
 from numba import float32 as numba_float32
 from numba import float64 as numba_float64
+from numba import int32 as numba_int32
 from numba import int64 as numba_int64
 from numba import njit
 from numba import types as numba_types
@@ -16,6 +17,7 @@ LANES: dict[str, Callable[..., Any]] = {}
 # numba is only partly annotated
 float32: Any = numba_float32
 float64: Any = numba_float64
+int32: Any = numba_int32
 int64: Any = numba_int64
 _types: Any = numba_types
 LINE = float32[::1]
@@ -25,8 +27,10 @@ DOUBLES = float64[::1]
 ROWS = float64[:, ::1]
 PLANES = float64[:, :, ::1]
 TILES = _types.boolean[:, :, ::1]
+FLAGS = _types.boolean[::1]
 PLACES = int64[::1]
-AROUND = int64[:, ::1]
+NUMBERS = int64[:, ::1]
+AROUND = int32[:, ::1]
 REGION = _types.UniTuple(int64, 4)
 """First row and column, numbers of rows and columns."""
 

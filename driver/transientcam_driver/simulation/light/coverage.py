@@ -5,6 +5,7 @@ the silhouette and is smooth across it, so that its differences between neighbou
 far the silhouette is from the pixel's centre.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,11 +62,19 @@ def crossing(shape: Shape, apex: Points, way: tuple[Plane, ...]) -> Crossing:
     return _rectangle(shape, apex, way)
 
 
+def axes_of(shapes: Iterable[Shape]) -> NDArray[np.float64]:
+    """Return (N, 2, 3) centres and radii of the ellipsoids among shapes."""
+    axes = [(each.centre, each.radii) for each in shapes if isinstance(each, Ellipsoid)]
+    return np.array(axes, dtype=np.float64).reshape(-1, 2, 3)
+
+
 def ball_of(shape: Ellipsoid, apex: Points) -> Plane:
     """Return what lines from an apex are crossed with: 1 / radii, origin, 1 - its square, tiny."""
     origin = (apex - shape.centre) / shape.radii
     ball = np.empty(8, dtype=np.float32)
-    ball[:3], ball[3:6], ball[6], ball[7] = 1 / shape.radii, origin, 1 - origin @ origin, _TINY
+    x, y, z = origin
+    squared = x * x + y * y + z * z  # a dot product's last digit depends on the machine's library
+    ball[:3], ball[3:6], ball[6], ball[7] = 1 / shape.radii, origin, 1 - squared, _TINY
     return ball
 
 
@@ -138,7 +147,7 @@ def covered(inside: Plane, *, rooted: bool = True) -> tuple[Plane, Plane]:
     return share, root
 
 
-def covered_among(inside: Plane, around: NDArray[np.intp]) -> Plane:
+def covered_among(inside: Plane, around: NDArray[np.int32]) -> Plane:
     """Share of each of some pixels (P) where a function is above 0; NaN is nowhere.
 
     ``around`` (4, P) are the pixels above, below, left and right of each, by index; P is none.

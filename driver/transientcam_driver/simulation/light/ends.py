@@ -12,7 +12,7 @@ from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_driver.simulation.light.coverage import (
     TOUCHING,
     Plane,
-    ball_of,
+    axes_of,
     crossing,
     plate_of,
     single,
@@ -114,10 +114,7 @@ class Ends:
         points, unless it is not known what is ``around`` these.
         """
         normal = self._normals()
-        along = sum(n * d for n, d in zip(normal, self.direction, strict=True))
-        facing = np.where(along < 0, self.throughput, 0.0)
-        albedo = np.array([surface.reflectivity for surface in self.surfaces])
-        distance_m, reflectance = self.distance_m.astype(np.float64), albedo[self.index] * facing
+        facing, reflectance = self._returned(normal)
         glossy = any(surface.gloss for surface in self.surfaces)
         ways: list[tuple[int, Way]] = []
         for k, light in enumerate(lights):
@@ -133,15 +130,39 @@ class Ends:
                 irradiance *= np.float32(mirror.reflectivity)
             for segment in segments:
                 irradiance *= self._clear(segment, on, movers, beside)
-            if len(on) < len(distance_m):
-                delay_s = (length_m + distance_m[on]) / SPEED_OF_LIGHT_M_S
-                ways.append(
-                    (k, Way(on, delay_s, np.multiply(sent[on], irradiance, dtype=np.float64)))
-                )
-            elif irradiance.any():
-                delay_s = (length_m + distance_m) / SPEED_OF_LIGHT_M_S
-                ways.append((k, Way(on, delay_s, np.multiply(sent, irradiance, dtype=np.float64))))
+            if len(on) < len(sent) or irradiance.any():
+                ways.append((k, self._way(on, length_m, irradiance, sent)))
         return LitEnds(self, reflectance, len(lights), tuple(ways))
+
+    def _returned(
+        self, normal: tuple[Plane, Plane, Plane]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Share of light that takes the way to the camera, by mirrors, and by points and mirrors.
+
+        None does from the back of a rectangle.
+        """
+        albedos = np.array([surface.reflectivity for surface in self.surfaces])
+        lane = LANES.find("returned")
+        if lane is not None:
+            seen = *normal, *self.direction, self.throughput
+            facing, reflectance = lane(*seen, albedos, self.index)
+            return facing, reflectance
+        along = sum(n * d for n, d in zip(normal, self.direction, strict=True))
+        facing = np.where(along < 0, self.throughput, 0.0)
+        return facing, albedos[self.index] * facing
+
+    def _way(
+        self, on: NDArray[np.intp], length_m: Plane, irradiance: Plane, sent: NDArray[np.float64]
+    ) -> Way:
+        """Return light on some points that all ``sent`` on to the camera."""
+        lane = LANES.find("arrived")
+        if lane is not None:
+            light = length_m, self.distance_m, irradiance
+            return Way(on, *lane(*light, on, sent, SPEED_OF_LIGHT_M_S))
+        whole_m = length_m.astype(np.float64) + self.distance_m[on]
+        return Way(
+            on, whole_m / SPEED_OF_LIGHT_M_S, np.multiply(sent[on], irradiance, dtype=np.float64)
+        )
 
     def _highlight(
         self, light: ImageLight, normal: tuple[Plane, ...], facing: NDArray[np.float64]
@@ -188,7 +209,10 @@ class Ends:
         low, high = segment.box
         mine = self.index if len(on) == len(self.index) else self.index[on]
         near = ((self.boxes[:, 0] <= high) & (self.boxes[:, 1] >= low)).all(axis=1)
-        for index in np.flatnonzero(near).tolist():
+        left = np.flatnonzero(near).tolist()
+        if around is not None:
+            left = self._not_dimmed(segment, left, movers, (mine, around), clear)
+        for index in left:
             surface = self.surfaces[index]
             if surface is segment.mirror:
                 continue
@@ -198,9 +222,31 @@ class Ends:
                 clear[blocked_by_mask(surface.shape, surface.opaque, start, end)] = 0
                 continue
             soft = around if index in movers else None
-            if not _dimmed(surface.shape, segment, (mine, index), soft, clear):
+            if soft is not None or not _dimmed(surface.shape, segment, (mine, index), clear):
                 _dim(surface.shape, segment, mine != index, soft, clear)
         return clear
+
+    def _not_dimmed(
+        self,
+        segment: Segment,
+        near: list[int],
+        movers: tuple[int, ...],
+        of: tuple[NDArray[np.intp], Around],
+        clear: Plane,
+    ) -> list[int]:
+        """Have a lane do it for all surfaces with soft edges, if it can; return those left.
+
+        The others leave all or nothing, so that their order does not matter.
+        """
+        index, around = of
+        soft = [k for k in near if k in movers and self.surfaces[k] is not segment.mirror]
+        axes, lane = axes_of(self.surfaces[k].shape for k in soft), LANES.find("dim_softly")
+        if lane is None or len(axes) != len(soft):
+            return near
+        if soft:
+            line = *segment.way, segment.near, TOUCHING, index
+            lane(axes, segment.apex, np.array(soft), *line, around.beside, around.reach[0], clear)
+        return [k for k in near if k not in movers]
 
     def _normals(self) -> tuple[Plane, Plane, Plane]:
         starts = np.flatnonzero(np.diff(self.index, prepend=-1))
@@ -267,24 +313,12 @@ def _dim(
     clear *= 1 - share_around(cross, between & ~cross.holds(1.0), around)
 
 
-def _dimmed(
-    shape: Shape,
-    segment: Segment,
-    of: tuple[NDArray[np.intp], int],
-    around: Around | None,
-    clear: Plane,
-) -> bool:
-    """Do the same by a lane, if there is one; ``of`` are the points' surfaces and the shape's."""
-    line = *segment.way, segment.near, TOUCHING, *of
-    if isinstance(shape, Ellipsoid):
-        lane = LANES.find("dim_softly")
-        if lane is None or around is None:
-            return False
-        lane(ball_of(shape, segment.apex), *line, around, clear)
-        return True
+def _dimmed(shape: Shape, segment: Segment, of: tuple[NDArray[np.intp], int], clear: Plane) -> bool:
+    """Do the same at hard edges by a lane; ``of`` are the points' surfaces and the shape's."""
     lane = LANES.find("dim_behind")
-    if lane is None or around is not None:
+    if lane is None or not isinstance(shape, Rectangle):
         return False
+    line = *segment.way, segment.near, TOUCHING, *of
     lane(plate_of(shape, segment.apex), *line, clear)
     return True
 
@@ -327,7 +361,8 @@ def _shown(
     lane = LANES.find("shown")
     if lane is not None and around is not None:
         apex = image_m.astype(np.float32)
-        kept, share, lines = lane(plate_of(mirror, image_m), apex, *point, TOUCHING, around)
+        beside = around.beside, *around.reach
+        kept, share, lines = lane(plate_of(mirror, image_m), apex, *point, TOUCHING, *beside)
         x, y, z, at, *met = lines
         return kept, share, ((x, y, z), at, (met[0], met[1], met[2]))
     way = _from(image_m, point)

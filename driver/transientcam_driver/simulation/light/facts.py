@@ -59,16 +59,17 @@ class SceneFacts:
         self._scene = scene
         self._size = width, height
         pixels = _PIXELS_MOVING if scene.moves else _PIXELS
-        stride = max(1, math.floor(math.sqrt(width * height / pixels)))
+        self._stride = stride = max(1, math.floor(math.sqrt(width * height / pixels)))
         columns, rows = np.meshgrid(
             np.arange(stride // 2, width, stride), np.arange(stride // 2, height, stride)
         )
         self._shape = rows.shape
         self._rows, self._columns = rows.ravel(), columns.ravel()
         self._times_s: tuple[float, ...] = (0.0,)
+        motions = [each for surface in scene.surfaces for each in surface.motions]
+        self._period_s = max((each.period_s for each in motions), default=0.0)
         if scene.moves:
-            period_s = max(each.period_s for surface in scene.surfaces for each in surface.motions)
-            self._times_s = tuple((k + 0.5) / _TIMES * period_s for k in range(_TIMES))
+            self._times_s = tuple((k + 0.5) / _TIMES * self._period_s for k in range(_TIMES))
         self._found: Recent[tuple[str, tuple[float, ...], float], tuple[Values, ...]]
         self._found = Recent(_KEPT)
         self._left_out: dict[str, list[list[_Seen]]] = {}
@@ -126,22 +127,46 @@ class SceneFacts:
                 camera.lens.bends,
                 lambda: [[self._look(each.scene, replace(camera, lens=PINHOLE)) for each in there]],
             ),
-            "motion": (
-                self._scene.moves,
-                lambda: [
-                    [self._look(self._scene.at(t + part * during_s), camera) for t in self._times_s]
-                    for part in (0.5, 1.0)
-                ],
-            ),
         }
+        if effect == "motion":  # which depends on the sequence
+            return self._moved(frequencies_hz, during_s) if self._scene.moves else ()
         happens, others = variants[effect]
         if not happens:
             return ()
-        if effect == "motion":  # which depends on the sequence
-            return self._apart(others(), frequencies_hz)
         if effect not in self._left_out:
             self._left_out[effect] = others()
         return self._apart(self._left_out[effect], frequencies_hz)
+
+    def _moved(self, frequencies_hz: tuple[float, ...], during_s: float) -> tuple[Values, ...]:
+        """Return how far moments of each pixel change within a time, at most.
+
+        An edge that moves by less than judged pixels are apart may pass none of their centres. Its
+        contrast is then found over a longer time, and counts by the part of a pixel that it moves.
+        """
+        apart = self._apart([self._later(part * during_s) for part in (0.5, 1.0)], frequencies_hz)
+        moved = self._fastest_pixels_per_s * during_s
+        if not 0 < moved < self._stride:
+            return apart
+        longer_s = min(during_s * self._stride / moved, self._period_s / _TIMES)
+        swept = self._apart([self._later(longer_s)], frequencies_hz)
+        return tuple(
+            np.maximum(one, min(1.0, moved) * other)
+            for one, other in zip(apart, swept, strict=True)
+        )
+
+    def _later(self, by_s: float) -> list[_Seen]:
+        return [self._look(self._scene.at(t + by_s), self._camera) for t in self._times_s]
+
+    @cached_property
+    def _fastest_pixels_per_s(self) -> float:
+        """Highest speed of any surface, at the place where it stands, in pixels."""
+        pixel_rad = math.radians(self._camera.field_of_view_deg) / self._size[0]
+        speeds = [0.0]
+        for each in self._scene.surfaces:
+            away_m = np.linalg.norm(each.shape.extent() - self._camera.position_m, axis=-1).min()
+            speed_m_s = sum(motion.speed_m_s for motion in each.motions)
+            speeds.append(speed_m_s / (pixel_rad * max(float(away_m), 1e-3)))
+        return max(speeds)
 
     @cached_property
     def _seen(self) -> list[_Seen]:

@@ -8,7 +8,6 @@ it blocks. Everything follows the device's time without steps.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,20 +43,31 @@ class _Seen:
     share: Plane
     at_m: Plane
 
-    def points(self) -> tuple[NDArray[Any], ...]:
-        """Return its pixels: rows, columns, shares, distances, and points and ways by component."""
+    @property
+    def count(self) -> int:
+        """How many pixels show it."""
+        return int(np.count_nonzero(self.share != 0))
+
+    def put_points(self, start: int, places: NDArray[np.intp], lines: NDArray[np.float32]) -> None:
+        """Put what is known of its pixels into the columns from one on.
+
+        Rows and columns (2, P); shares, distances, and points and ways by component (8, P).
+        """
         bundle = self.sight.bundle
         lane = LANES.find("points")
         if lane is not None:
             corner, apex = (of.start for of in self.region), bundle.apex.astype(np.float32)
-            places, lines = lane(self.share, self.at_m, *bundle.way, *corner, apex)
-            return *places, *lines
+            lane(self.share, self.at_m, *bundle.way, *corner, apex, start, places, lines)
+            return
         place = np.nonzero(self.share)
-        at_m = self.at_m[place]
+        mine = slice(start, start + len(place[0]))
         rows, columns = (on + of.start for on, of in zip(place, self.region, strict=True))
-        way = [each[rows, columns] for each in bundle.way]
-        point = [w * at_m + np.float32(a) for w, a in zip(way, bundle.apex, strict=True)]
-        return rows, columns, self.share[place], at_m, *point, *way
+        places[:, mine] = rows, columns
+        lines[0, mine], at_m = self.share[place], self.at_m[place]
+        lines[1, mine] = at_m
+        for axis, (each, start_m) in enumerate(zip(bundle.way, bundle.apex, strict=True)):
+            way = each[rows, columns]
+            lines[2 + axis, mine], lines[5 + axis, mine] = way * at_m + np.float32(start_m), way
 
 
 class MovingLight:
@@ -129,9 +139,12 @@ class MovingLight:
 
     def _lit(self, scene: Scene, visible: list[_Seen]) -> Layers:
         """Light the parts of surfaces that are seen, all at once."""
-        points = [each.points() for each in visible]
-        counts = [len(each[0]) for each in points]
-        rows, columns, share, at_m, *components = map(np.concatenate, zip(*points, strict=True))
+        counts = [each.count for each in visible]
+        ends = np.cumsum([0, *counts]).tolist()
+        places, lines = np.empty((2, ends[-1]), np.intp), np.empty((8, ends[-1]), np.float32)
+        for start, each in zip(ends, visible, strict=False):
+            each.put_points(start, places, lines)
+        share, at_m, *components = lines
         region = union([each.region for each in visible])
         lit = Ends(
             self.still.scene,
@@ -145,11 +158,10 @@ class MovingLight:
         ).lit(
             self._lights,
             movers=self._movers,
-            around=around(rows, columns, region) if self._soft else None,
+            around=around(places[0], places[1], region) if self._soft else None,
         )
-        ends = np.cumsum([0, *counts]).tolist()
         parts = tuple(slice(*pair) for pair in pairwise(ends))
-        return Layers(np.stack([rows, columns]), share, lit, parts)
+        return Layers(places, share, lit, parts)
 
     def _shadow(self, shapes: list[Shape], chain: int) -> Shadow | None:
         """Share of the light by a chain of mirrors that is left on what stands still."""

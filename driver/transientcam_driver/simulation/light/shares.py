@@ -3,6 +3,8 @@
 ``soft`` edges take shares of the pixels that they cross; others run between pixels.
 """
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +13,7 @@ from transientcam_driver.simulation.light.coverage import (
     TOUCHING,
     Crossing,
     Plane,
-    ball_of,
+    axes_of,
     covered,
     covered_among,
     crossing,
@@ -20,8 +22,20 @@ from transientcam_driver.simulation.light.coverage import (
 from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.scene.geometry import Ellipsoid, Shape
 
-Around = NDArray[np.intp]
-"""(4, P): the points above, below, left and right of each, by index; P is none."""
+
+class Around:
+    """Which points are above, below, left and right of each, by index (4, P); P is none."""
+
+    def __init__(self, beside: NDArray[np.int32]) -> None:
+        self.beside = beside
+
+    @cached_property
+    def reach(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        """Where the neighbours of successive points are, for lanes: see `compiled_edges.reach`."""
+        lane = LANES.find("reach")
+        assert lane is not None  # noqa: S101  (lanes are made ready together)
+        reach, rim = lane(self.beside)
+        return reach, rim
 
 
 def seen(
@@ -34,7 +48,7 @@ def seen(
     lane = LANES.find("seen")
     if lane is not None and soft and isinstance(shape, Ellipsoid):
         lines = *bundle.way, bundle.near, bundle.far
-        share, at = lane(ball_of(shape, bundle.apex), *lines, fills, numbers(region))
+        share, at = lane(axes_of([shape])[0], bundle.apex, *lines, fills, numbers(region))
         return share, at
     way, near, far = bundle.within(region)
     cross = crossing(shape, bundle.apex, way)
@@ -52,11 +66,11 @@ def shade(shapes: list[Shape], bundle: Bundle, left: Plane, *, soft: bool) -> li
     """
     tiles, regions = bundle.meeting(shapes)
     lane = LANES.find("shade")
-    balls = [ball_of(each, bundle.apex) for each in shapes if isinstance(each, Ellipsoid)]
-    if lane is not None and soft and len(balls) == len(shapes):
+    axes = axes_of(shapes)
+    if lane is not None and soft and len(axes) == len(shapes):
         of = np.array([numbers(each or NOWHERE) for each in regions])
         lines = *bundle.way, bundle.near, bundle.far
-        blocks = lane(np.array(balls), *lines, tiles, TILE, of, TOUCHING, left)
+        blocks = lane(axes, bundle.apex, *lines, tiles, TILE, of, TOUCHING, left)
         return [each for each, does in zip(regions, blocks, strict=True) if each and does]
     blocking: list[Region] = []
     for shape, region in zip(shapes, regions, strict=True):
@@ -88,7 +102,7 @@ def share_around(cross: Crossing, counts: NDArray[np.bool_], around: Around | No
     values = [np.where(counts, each, np.float32(np.nan)) for each in cross.inside]
     if around is None:
         return _product([(each > 0).astype(np.float32) for each in values])
-    return _product([covered_among(each, around) for each in values])
+    return _product([covered_among(each, around.beside) for each in values])
 
 
 def around(rows: NDArray[np.intp], columns: NDArray[np.intp], region: Region) -> Around:
@@ -96,22 +110,25 @@ def around(rows: NDArray[np.intp], columns: NDArray[np.intp], region: Region) ->
     top, left, height, width = numbers(region)
     lane = LANES.find("around")
     if lane is not None:
-        beside: Around = lane(rows, columns, top, left, height, width)
-        return beside
-    place = np.full((height + 2, width + 2), len(rows))
+        return Around(lane(rows, columns, top, left, height, width))
+    place = np.full((height + 2, width + 2), len(rows), dtype=np.int32)
     rows, columns = rows - top + 1, columns - left + 1
     place[rows, columns] = np.arange(len(rows))
     steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
-    return np.array([place[rows + down, columns + right] for down, right in steps])
+    return Around(np.array([place[rows + down, columns + right] for down, right in steps]))
 
 
 def among(on: NDArray[np.intp], around: Around) -> Around:
     """Return what is around some of the points, by their own indices."""
-    if len(on) == around.shape[1]:
+    beside = around.beside
+    if len(on) == beside.shape[1]:
         return around
-    place = np.full(around.shape[1] + 1, len(on))
+    lane = LANES.find("among")
+    if lane is not None:
+        return Around(lane(on, beside))
+    place = np.full(beside.shape[1] + 1, len(on), dtype=np.int32)
     place[on] = np.arange(len(on))
-    return place[around.take(on, axis=1)]
+    return Around(place[beside.take(on, axis=1)])
 
 
 def _share(cross: Crossing, *, soft: bool, rooted: bool = False) -> tuple[Plane, Plane]:

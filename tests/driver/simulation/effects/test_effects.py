@@ -34,7 +34,9 @@ from transientcam_driver.simulation.imperfections import (
 )
 from transientcam_driver.simulation.light.transport import GivenScenery
 from transientcam_driver.simulation.responses import SparseResponses
+from transientcam_driver.simulation.scene.geometry import Rectangle
 from transientcam_driver.simulation.scene.motion import Motion
+from transientcam_driver.simulation.scene.scene import Surface
 from transientcam_driver.simulation.world import World
 
 SHAPE = (12, 16)
@@ -516,3 +518,19 @@ def test_motion_counts_from_the_first_image_of_a_sequence_to_the_last() -> None:
     # 256 takes: 16 times less noise, and 256 times as far
     assert long.relative > 16 * short.relative
     assert long.called
+
+
+@pytest.mark.parametrize("place_m", [0.0, 0.004, 0.009, 0.013])
+def test_an_upright_edge_that_moves_between_the_pixels_judged_is_called_for(place_m: float) -> None:
+    """A bar that moves by 0.08 pixels within a sequence, while every third pixel is judged."""
+    scene = find_scene("wall")
+    bar = Rectangle.facing(np.array([place_m, 1.2, 0]), np.array([0, -1.0, 0]), size=(0.06, 0.5))
+    creep = Motion(np.array([[0.0, 0, 0], [0.02, 0, 0]]), 4.0, "back")
+    moving = replace(
+        scene, surfaces=(*scene.surfaces, Surface("bar", "diffuse", bar, 0.9, motions=(creep,)))
+    )
+    of = world_of(moving, width=163, height=120, readout_s=4e-3)
+
+    call = of.calls(Sequence(harmonics=3, zeroth="estimated", exposure_s=0.5e-3))["motion"]
+
+    assert call.called

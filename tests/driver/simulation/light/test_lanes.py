@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from transientcam_driver import Sequence
 from transientcam_driver.simulation.build import find_scene, world_of
 from transientcam_driver.simulation.light.coverage import covered, overlapped
+from transientcam_driver.simulation.light.ends import Ends
 from transientcam_driver.simulation.light.lanes import LANES, THREAD, Lanes
-from transientcam_driver.simulation.light.shares import above
-from transientcam_driver.simulation.scene.geometry import Rectangle
+from transientcam_driver.simulation.light.paths import image_lights
+from transientcam_driver.simulation.light.shares import Around, above
+from transientcam_driver.simulation.scene.geometry import Ellipsoid, Rectangle
 from transientcam_driver.simulation.scene.motion import Motion
 from transientcam_driver.simulation.scene.scene import Scene, Surface
 
@@ -95,6 +97,49 @@ def test_images_are_the_same_with_and_without_lanes(board: bool, mixed: str) -> 
     assert used >= {"points", "received", "darkened", "blended", "overlapped", "layered"}
     if mixed == "on":
         assert used == set(LANES._ready)
+
+
+@pytest.mark.parametrize(
+    ("count", "side"), [(1, 0), (63, 1), (64, 2), (65, 3), *((4000, side) for side in range(4))]
+)
+def test_light_on_points_is_the_same_whatever_is_beside_them(count: int, side: int) -> None:
+    # few neighbours are far away: lanes that look only near hits must follow these on each side
+    scene = find_scene("visitor").at(9.0)
+    balls = {k: s.shape for k, s in enumerate(scene.surfaces) if isinstance(s.shape, Ellipsoid)}
+    movers = tuple(balls)
+    random = np.random.default_rng(count)
+    index = np.sort(random.choice(movers, count))
+    away = random.normal(size=(count, 3))
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    away = away[np.lexsort((away[:, 2], index))]  # of each surface from below: hits are together
+    centre, radii = (np.array([getattr(balls[k], of) for k in index]) for of in ("centre", "radii"))
+    point = (centre + radii * away).astype(np.float32)
+    distance_m = np.linalg.norm(point, axis=1).astype(np.float32)
+    beside = np.clip(np.arange(count) + random.integers(-3, 4, (4, count)), 0, count)
+    far = np.flatnonzero(random.random(count) < 0.02)
+    beside[side, far] = random.integers(0, count + 1, len(far))
+    x, y, z = np.ascontiguousarray(point.T)
+    ends = Ends(
+        scene,
+        scene.surfaces,
+        index,
+        (x, y, z),
+        distance_m,
+        (x / distance_m, y / distance_m, z / distance_m),
+        random.choice([1.0, 0.95], count),
+        np.array([each.shape.box for each in scene.surfaces]),
+    )
+    lights = tuple(image_lights(scene))
+
+    around = Around(beside.astype(np.int32))
+    lit = ends.lit(lights, movers=movers, around=around).all()
+    with numpy_alone():
+        expected = ends.lit(lights, movers=movers, around=around).all()
+
+    assert lit.weight.tobytes() == expected.weight.tobytes()
+    assert lit.delay_s.tobytes() == expected.delay_s.tobytes()
+    assert lit.reflectance.tobytes() == expected.reflectance.tobytes()
+    assert count < 4000 or (expected.weight > 0).any(axis=1).sum() > 1
 
 
 def planes(shape: tuple[int, int]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
