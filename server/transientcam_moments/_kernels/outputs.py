@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from transientcam_moments._kernels import simd
+from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 _INTERLEAVE = 2
 # transientcam_moments.Flags
@@ -104,28 +105,33 @@ def separate(
 
 @njit(nogil=True, error_model="numpy")
 def gather(
-    order: Any, b: Any, brightness: Any, residual: Any, tolerance: float, wide: Any, where: Any,
-    begin: int,
+    order: Any, b: Any, brightness: Any, residual: Any, tolerance: float, ramp: Any, packed: Any,
+    wide: Any, where: Any, begin: int,
 ) -> int:  # fmt: skip
     """Collect pixels from ``begin`` on whose residual is above the tolerance, until room ends.
 
     Fills moments ``wide`` (m + 1, n) in double precision and their places ``where`` (n), both
-    padded with the first one; returns their number.
+    padded with the first one to as many as a lane takes; returns the number of pixels. ``ramp``
+    counts from 0, ``packed`` is room for as many.
     """
     room, found = where.shape[0], 0
     one = simd.ones(residual, _INTERLEAVE)
     step, limit = simd.width(one), simd.spread(one, tolerance)
     pixels = residual.shape[0]
-    for left in range(begin, pixels, step):
-        if found == room:
-            break
-        if left + step <= pixels and not simd.some(simd.load(one, residual, left) > limit):
-            continue
-        for p in range(left, min(left + step, pixels)):
-            if residual[p] > tolerance and found < room:
-                where[found] = p
+    left = begin
+    while left + step <= pixels and found + step <= room:
+        chosen = simd.load(one, residual, left) > limit
+        if simd.some(chosen):
+            for i in range(simd.pack(packed, 0, chosen, simd.load(one, ramp, 0))):
+                where[found] = left + int(packed[i])
                 found += 1
-    for i in range(room if found else 0):
+        left += step
+    while left < pixels and found < room and pixels - left < step:
+        if residual[left] > tolerance:
+            where[found] = left
+            found += 1
+        left += 1
+    for i in range(-(-found // LEAST_PIXELS) * LEAST_PIXELS):
         p = where[i] if i < found else where[0]
         where[i] = p
         wide[0, i] = brightness[p]

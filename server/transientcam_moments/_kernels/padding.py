@@ -1,4 +1,4 @@
-"""What smoothing needs at the borders of an image."""
+"""What kernels need at the borders of an image and of their vectors."""
 
 from functools import lru_cache
 from typing import Any
@@ -8,6 +8,8 @@ import numpy as np
 from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 LEAST_WIDTH = LEAST_PIXELS // 2  # of an image: its rows hold real and imaginary parts
+RAMP = np.arange(LEAST_PIXELS, dtype=np.float32)
+"""Places within a vector."""
 
 
 def row_length(width: int, taps: int) -> int:

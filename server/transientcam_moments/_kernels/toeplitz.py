@@ -192,10 +192,10 @@ def smallest_eigenvalue(order: Any, re: Any, im: Any, h: Any, d: Any, e: Any) ->
         g = q1 / p1
         root = (n - 1.0) * ((n - 1.0) * g * g - n * r1 / p1)
         climb = n / (simd.sqrt(simd.maximum(root, x * 0.0)) - g)
-        # rounding may carry the last step past the root: from there Newton's comes back
-        back = simd.maximum(-1.0 / g, -0.25 * last)
-        left = (p1 > 0.0) & (q1 < 0.0)
-        step = simd.select(left, climb, simd.select((p1 < 0.0) & (q1 < 0.0), back, 0.0))
+        left, past = (p1 > 0.0) & (q1 < 0.0), (p1 < 0.0) & (q1 < 0.0)
+        step = simd.select(left, climb, 0.0)
+        if simd.some(past):  # rounding may carry the last step past the root: Newton's comes back
+            step = simd.select(past, simd.maximum(-1.0 / g, -0.25 * last), step)
         # a pixel that has arrived stays, however long its neighbours take
         x = simd.select(moving, x + step, x)
         last = simd.absolute(step)

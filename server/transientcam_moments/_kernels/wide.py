@@ -16,6 +16,7 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
+from transientcam_moments._kernels.padding import RAMP
 from transientcam_moments._kernels.refine import Found, redo
 from transientcam_moments._kernels.returns import half_turns, returns_entry
 from transientcam_moments._lanes.registry import LEAST_PIXELS
@@ -36,8 +37,8 @@ class WideReturns:
         self._turns = half_turns(m, "d")
         self._gather = entry(
             outputs.gather,
-            order, complex_arrays("f")[2], plane, plane, REAL, complex_arrays("d")[2], PLACES,
-            PIXELS,
+            order, complex_arrays("f")[2], plane, plane, REAL, plane, plane,
+            complex_arrays("d")[2], PLACES, PIXELS,
         )  # fmt: skip
         self._scatter = entry(
             outputs.scatter,
@@ -57,6 +58,7 @@ class WideReturns:
             np.empty((m, pixels)),
             np.empty(pixels, np.int32),
             np.empty(pixels),
+            np.empty(LEAST_PIXELS, np.float32),
         )
 
     def __call__(
@@ -67,12 +69,13 @@ class WideReturns:
         ``b`` (m + 1, P) are the moments, but for ``brightness`` (P) in place of b_0.
         """
         tolerance = 16 * (len(self._order) + 1) * _EPS
-        places, moments, uniform, phase, weight, count, residual = room
+        places, moments, uniform, phase, weight, count, residual, packed = room
         redone = 0
         while True:
             number = self._gather(
-                self._order, b, brightness, found.residual[:stop], tolerance, moments, places, start
-            )
+                self._order, b, brightness, found.residual[:stop], tolerance, RAMP, packed,
+                moments, places, start,
+            )  # fmt: skip
             if not number:
                 return redone
             end = -(-number // LEAST_PIXELS) * LEAST_PIXELS

@@ -10,7 +10,7 @@ import math
 import time
 from collections import OrderedDict
 from collections.abc import AsyncIterator, Callable, Coroutine, Hashable, Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import partial
 from types import SimpleNamespace
 from typing import Any, Final, TypeVar, cast
@@ -89,6 +89,7 @@ class Frame:
         self._stages: dict[str, asyncio.Future[tm.Reconstruction]] = {}
         self._requested: set[str] = set()
         self._computing: asyncio.Task[None] | None = None
+        self._cores_free = asyncio.Event()
         self._whole: _Memory = OrderedDict()
         self._over_time: _Memory = OrderedDict()
         self._crops: _Memory = OrderedDict()
@@ -136,17 +137,21 @@ class Frame:
 
     async def reconstruction(self, stage: str) -> tm.Reconstruction:
         """Return the reconstruction with at least this stage computed (`STAGES`)."""
-        future = self._stages.get(stage)
-        if future is None:
-            future = self._stages[stage] = asyncio.get_running_loop().create_future()
-            self._requested.add(stage)
-            if self._computing is None:
-                self._computing = self._workers.start(self._compute_requested())
-        return await _shared(future)
+        return await _shared(self._request(stage))
 
-    async def computed(self, products: Iterable[Product]) -> None:
-        """Return once all that products follow from is computed, or has failed."""
-        inputs = (self._input(product) for product in products)
+    async def cores_free(self, products: Iterable[Product]) -> None:
+        """Have all computed that products follow from; return once what is left takes one core.
+
+        Another frame that takes all cores may be begun then.
+        """
+        inputs: list[Coroutine[Any, Any, Any]] = []
+        for product in products:
+            if product.needs in STAGES:
+                self._request(product.needs)
+            else:
+                inputs.append(self._input(product))
+        if self._stages:
+            inputs.append(self._cores_free.wait())
         await asyncio.gather(*inputs, return_exceptions=True)
 
     async def truth(self) -> Truth:
@@ -173,9 +178,20 @@ class Frame:
             value, _ = await self._run(compute, self.recipe, found, self.meta(), *arguments)
         return value
 
+    def _request(self, stage: str) -> "asyncio.Future[tm.Reconstruction]":
+        """Have a stage computed, with those that are requested in the same turn of the loop."""
+        future = self._stages.get(stage)
+        if future is None:
+            future = self._stages[stage] = asyncio.get_running_loop().create_future()
+            self._requested.add(stage)
+            if self._computing is None:
+                self._computing = self._workers.start(self._compute_requested())
+        return future
+
     async def _compute_requested(self) -> None:
         """Compute the stages requested in this turn of the loop in one go, then later ones."""
         await asyncio.sleep(0)
+        loop = asyncio.get_running_loop()
         requested: set[str] = set()
         try:
             while self._requested:
@@ -188,12 +204,14 @@ class Frame:
                     self.previous,
                     requested,
                     self._spread,
+                    partial(_call_on, loop, self._cores_free.set),
                 )
                 self._reconstruct_s = (self._reconstruct_s or 0.0) + elapsed_s
                 for stage in requested:
                     self._settle(self._stages[stage], self._computed, stage)
         finally:
             self._computing = None
+            self._cores_free.set()
             for stage in requested | self._requested:
                 self._stages[stage].cancel()  # nothing to those that are done
 
@@ -426,6 +444,12 @@ def _failure_of(workers: Workers, number: int, name: str) -> Iterator[None]:
             product=name,
             frame=number,
         ) from error
+
+
+def _call_on(loop: asyncio.AbstractEventLoop, callback: Callable[[], object]) -> None:
+    """Call back on a loop, from any thread; not on one that has been closed meanwhile."""
+    with suppress(RuntimeError):
+        loop.call_soon_threadsafe(callback)
 
 
 def _size(value: object) -> int:

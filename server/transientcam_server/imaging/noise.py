@@ -21,7 +21,7 @@ MEDIAN_OF_NORMAL: Final = 0.674490
 EXPLAINED_DEVIATIONS: Final = 4.0
 """Standard deviations of a negative eigenvalue that noise explains."""
 _UNLIT: Final = np.uint8(tm.Flags.NO_SIGNAL | tm.Flags.NON_FINITE | tm.Flags.SATURATED)
-_BLOCK_PIXELS: Final = 1 << 14
+_BLOCK_PIXELS: Final = 1 << 16
 _FEW: Final = 1 / 16
 """Share of the pixels up to which their neighbourhoods are quicker to average one by one."""
 

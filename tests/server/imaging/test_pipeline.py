@@ -409,3 +409,51 @@ def technique_of(sequence: Sequence) -> str:
     """Return the estimator of recorded frames of a sequence with the usual settings."""
     applied = AppliedSequence(sequence, 0, 12, 1.0, 1.0, 18.7, 1.0, 8e6)
     return Recipe(applied, ReconstructionSettings(), 4095.0, sensor=tm.noise.Sensor()).technique
+
+
+def test_cores_are_free_while_what_takes_one_is_computed(
+    camera: Camera, raw: RawFrame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    may_count = threading.Event()
+    count = stages.pixel_counts
+
+    def waiting(found: tm.Reconstruction) -> dict[str, int]:
+        assert may_count.wait(10)
+        return count(found)
+
+    monkeypatch.setattr(stages, "pixel_counts", waiting)
+
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        await frame.cores_free([pipeline.product("range"), pipeline.product("coefficients")])
+        assert frame.computing
+        may_count.set()
+        found = await frame.reconstruction("coefficients")
+        assert found.range_m.shape == frame.shape
+
+    with_frame(camera, raw, test)
+
+
+def test_cores_are_free_where_the_reconstruction_fails(
+    camera: Camera, raw: RawFrame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise ArithmeticError
+
+    monkeypatch.setattr(Recipe, "reconstruct", fail)
+
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        await frame.cores_free([pipeline.product("range")])
+        with pytest.raises(ArithmeticError):
+            await frame.reconstruction("returns")
+
+    with_frame(camera, raw, test)
+
+
+def test_images_leave_cores_free_and_are_not_reconstructed(
+    camera: Camera, raw: RawFrame, calls: list[str]
+) -> None:
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        await frame.cores_free([pipeline.product("raw")])
+
+    with_frame(camera, raw, test)
+    assert calls == []

@@ -22,8 +22,8 @@ class Sender:
     """Empties an outbox into a WebSocket.
 
     To a client that keeps up, the next frame is computed while the one before is encoded and sent,
-    so that all cores are at work. It is taken for that when the one before has been computed; a
-    client that is slow to receive gets what is newest when it has.
+    so that all cores are at work. It is taken for that when what is left of the one before takes
+    one core; a client that is slow to receive gets what is newest when it has.
     """
 
     def __init__(self, websocket: WebSocket, outbox: Outbox, metrics: Metrics) -> None:
@@ -61,11 +61,11 @@ class Sender:
                 await asyncio.gather(following, return_exceptions=True)
 
     async def _next_after(self, delivery: Delivery) -> Item:
-        """Return what is to be sent next, and have it computed once this one is."""
-        await delivery.computed()
+        """Return what is to be sent next, and have it computed once this one needs one core."""
+        await delivery.cores_free()
         item = await self._outbox.next()
         if isinstance(item, Delivery):
-            self._ahead = asyncio.ensure_future(item.computed())  # no client waits for it
+            self._ahead = asyncio.ensure_future(item.cores_free())  # no client waits
         return item
 
     async def _deliver(self, delivery: Delivery) -> None:

@@ -17,18 +17,20 @@ COMPUTED_S = 0.5
 
 
 class _Frame:
-    """Is computed and encoded at once, and tells when."""
+    """Leaves cores free when it is begun, and tells when; is computed at once where not held."""
 
     def __init__(self, number: int, *, reconstruct_s: float) -> None:
         self.number, self.reconstruct_s = number, reconstruct_s
         self.raw = SimpleNamespace(device_time_s=float(number), host_time_s=time.time())
-        self.is_computed = asyncio.Event()
+        self.is_begun, self.may_end = asyncio.Event(), asyncio.Event()
+        self.may_end.set()
 
-    async def computed(self, products: Iterable[object]) -> None:
+    async def cores_free(self, products: Iterable[object]) -> None:
         assert list(products)
-        self.is_computed.set()
+        self.is_begun.set()
 
     async def encoded(self, *_: object, **__: object) -> bytes:
+        await self.may_end.wait()
         return self.number.to_bytes(1, "big")
 
 
@@ -69,19 +71,37 @@ async def _end(outbox: Outbox, sending: "asyncio.Task[None]") -> None:
     await sending
 
 
-def test_the_next_frame_is_computed_while_one_is_sent() -> None:
+def test_the_next_frame_is_begun_while_one_is_sent() -> None:
     async def test() -> None:
         outbox, socket = subscribed(), _Socket()
         _put(outbox, 1)
         second = _put(outbox, 2)
         sending = _sending(outbox, socket)
-        await second.is_computed.wait()
+        await second.is_begun.wait()
 
         assert socket.taken == []
         socket.free.set()
         await _end(outbox, sending)
         assert socket.taken == [1, 2]
         assert socket.closed == wire.CloseCode.GOING_AWAY
+
+    run(test)
+
+
+def test_the_next_frame_is_begun_when_the_one_before_leaves_cores_free() -> None:
+    async def test() -> None:
+        outbox, socket = subscribed(), _Socket()
+        first = _put(outbox, 1)
+        first.may_end.clear()
+        second = _put(outbox, 2)
+        sending = _sending(outbox, socket)
+        socket.free.set()
+        await second.is_begun.wait()
+
+        assert socket.taken == []
+        first.may_end.set()
+        await _end(outbox, sending)
+        assert socket.taken == [1, 2]
 
     run(test)
 
@@ -99,7 +119,7 @@ def test_a_client_that_takes_longer_to_receive_than_frames_to_compute_gets_the_n
         for number in (3, 4, 5):
             await asyncio.sleep(0)
             skipped = _put(outbox, number)
-            assert not skipped.is_computed.is_set()
+            assert not skipped.is_begun.is_set()
 
         socket.free.set()
         while len(socket.taken) < 3:
@@ -116,7 +136,7 @@ def test_nothing_of_a_stream_is_left_behind_when_its_client_is_gone() -> None:
         outbox, socket = subscribed(), _Socket()
         frame = _put(outbox, 1)
         sending = _sending(outbox, socket)
-        await frame.is_computed.wait()
+        await frame.is_begun.wait()
 
         sending.cancel()
         await asyncio.gather(sending, return_exceptions=True)
