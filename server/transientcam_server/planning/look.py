@@ -76,6 +76,12 @@ class _Seeing:
     def __init__(self, recipe: Recipe, sensor: tm.noise.Sensor) -> None:
         self._recipe, self._sensor = recipe, sensor
         self._frames = self._images = 0
+        self._first: _Array
+        self._last: _Array
+        self._single: _Array
+        self._moments: _Array
+        self._sum_dn: _Array
+        self._highest_dn: _Array
 
     def add(self, raw: RawFrame, found: tm.Reconstruction | None = None) -> None:
         """Add a frame, and its reconstruction where there is one."""
