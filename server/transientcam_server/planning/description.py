@@ -18,6 +18,8 @@ from transientcam_server.settings import ReconstructionSettings
 _Array = NDArray[Any]
 LIT_DEVIATIONS: Final = 5.0
 """Standard deviations that the light of a lit pixel stands clear of noise by."""
+LIT_FRAMES: Final = 8
+"""Frames whose noise it is, at most."""
 MOVED_DEVIATIONS: Final = 5.0
 _EARLY: Final = 0.9
 """Share of a period by which a direct return may come before the mean of all light."""
@@ -35,8 +37,12 @@ class Seen:
     ----------
     recipe, sensor
         How they were captured.
+    frames
+        How many.
     moments
-        (F, m + 1, H, W) smoothed moments of each frame.
+        (m + 1, H, W) smoothed moments, averaged over the frames.
+    moved
+        (m + 1, H, W) smoothed moments of the last frame less those of the first.
     single
         (m + 1, H, W) moments that are not smoothed, averaged over the frames.
     mean_dn
@@ -49,7 +55,9 @@ class Seen:
 
     recipe: Recipe
     sensor: tm.noise.Sensor
+    frames: int
     moments: _Array
+    moved: _Array
     single: _Array
     mean_dn: _Array
     brightest_dn: float
@@ -62,8 +70,8 @@ class Seen:
 
     def at(self, pixels: _Array) -> tuple[_Array, _Array]:
         """Return the moments (m + 1, P), averaged over frames, and the mean of the images (P)."""
-        mean = self.moments.mean(axis=0)
-        return mean.reshape((len(mean), -1))[:, pixels], self.mean_dn.ravel()[pixels]
+        b = self.moments
+        return b.reshape((len(b), -1))[:, pixels], self.mean_dn.ravel()[pixels]
 
     def variance(self, signal_dn: _Array) -> _Array:
         """Return the variance (m + 1, ...) of a frame's smoothed moments.
@@ -118,7 +126,7 @@ def describe(
     there = np.flatnonzero(lit)
     pixels = there[typical_pixels(seen.at(there)[0], PIXELS)]
     b, mean_dn = seen.at(pixels)
-    variance = seen.variance(mean_dn) / len(seen.moments)
+    variance = seen.variance(mean_dn) / seen.frames
     base_hz = seen.recipe.base_frequency_hz
     direct_m, uncertainty_m = direct_range(b, variance, base_hz, settings)
     earliest_m, latest_m = plausible_ranges(b, variance, base_hz, direct_m, uncertainty_m)
@@ -152,7 +160,7 @@ def describe(
         relative_noise=np.sqrt(variance[1]) / light_dn,
         lit_share=float(lit.mean()),
         dim_share=dim_share(light_dn, direct_m),
-        moving_share=_moving_share(seen, lit),
+        moving_share=moving_share(seen, lit),
         ambiguity_checked=checked,
     )
 
@@ -162,12 +170,13 @@ def lit_pixels(seen: Seen) -> _Array:
 
     The sum of squares of 2 m independent parts over their variance is chi-square; it must be above
     its mean by `LIT_DEVIATIONS` of its standard deviations, 2 sqrt(m) each. Smoothing would leak
-    the light of neighbours into unlit pixels.
+    the light of neighbours into unlit pixels. A longer look lights no more of them: what a plan is
+    for does not depend on how long the scene was looked at.
     """
     b = seen.single[1:]
     m = len(b)
     left = tm.noise.smoothing_factor(seen.recipe.settings.smoothing_px)
-    variance = seen.variance(seen.mean_dn)[1:] / (left * len(seen.moments))
+    variance = seen.variance(seen.mean_dn)[1:] / (left * min(seen.frames, LIT_FRAMES))
     with np.errstate(invalid="ignore"):  # of pixels that are not finite
         power = (np.abs(b) ** 2 / variance).sum(axis=0)
         lit: _Array = seen.usable & (power > 2 * m + LIT_DEVIATIONS * 2 * np.sqrt(m))
@@ -206,11 +215,11 @@ def _unwrapped(direct_m: _Array, b: _Array, coarse: Seen, pixels: _Array, base_h
     return np.asarray(np.maximum(mean_m - before_m, 0.0))
 
 
-def _moving_share(seen: Seen, lit: _Array) -> float:
-    """Return the share of lit pixels whose first and last frame differ by more than noise."""
-    if len(seen.moments) < 2:
+def moving_share(seen: Seen, lit: _Array) -> float:
+    """Return the share of lit pixels (H, W) whose first and last frame differ beyond noise."""
+    if seen.frames < 2:
         return 0.0
-    apart = np.abs(seen.moments[-1, 1:] - seen.moments[0, 1:]) ** 2
+    apart = np.abs(seen.moved[1:]) ** 2
     m = len(apart)
     with np.errstate(invalid="ignore"):
         power = (apart / (2 * seen.variance(seen.mean_dn)[1:])).sum(axis=0)

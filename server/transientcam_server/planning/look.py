@@ -1,7 +1,7 @@
 """A look at a scene before a plan: few images at many frequencies, as quick as the scene allows."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -12,15 +12,19 @@ from transientcam_driver import AppliedSequence, Capabilities, RawFrame, Sequenc
 from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.planning.description import Seen, describe
+from transientcam_server.planning.description import Seen, describe, lit_pixels, moving_share
 from transientcam_server.planning.scene import SceneStatistics
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
 FRAMES: Final = 8
-"""Frames of the look; what differs between them is motion."""
-STEPS: Final = FRAMES + 3
-"""Of a look, where the first exposure does not saturate."""
+"""Frames of the look at least; what differs between them is motion."""
+STILL_FRAMES: Final = 32
+"""And of a scene where nothing moves: what a plan calls bias is in part the noise of the look."""
+STILL_SHARE: Final = 0.01
+"""Share of the lit pixels that may seem to move there."""
+STEPS: Final = STILL_FRAMES + 3
+"""Of a look, at most, where the first exposure does not saturate."""
 COARSE_HZ: Final = 2e6
 """Base frequency of the coarse frame, unambiguous to 75 m."""
 COARSE_TAKES: Final = 4
@@ -60,12 +64,59 @@ class LookedThrough(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Looked:
-    """Frames of one sequence, and how they are reconstructed."""
+class _Seeing:
+    """Frames of one sequence, summed up as they come: no more than one of them is kept.
 
-    recipe: Recipe
-    frames: list[RawFrame]
+    Parameters
+    ----------
+    recipe, sensor
+        How they are captured.
+    """
+
+    def __init__(self, recipe: Recipe, sensor: tm.noise.Sensor) -> None:
+        self._recipe, self._sensor = recipe, sensor
+        self._frames = self._images = 0
+        self._first: _Array
+        self._last: _Array
+        self._single: _Array
+        self._moments: _Array
+        self._sum_dn: _Array
+        self._highest_dn: _Array
+
+    def add(self, raw: RawFrame, found: tm.Reconstruction | None = None) -> None:
+        """Add a frame, and its reconstruction where there is one."""
+        single = np.asarray((found or self._recipe.reconstruct(raw)).measured)
+        smoothing_px = self._recipe.settings.smoothing_px
+        moments = tm.smooth(single, smoothing_px) if smoothing_px else single
+        images = _modulated(raw)
+        sum_dn, highest_dn = images.sum(axis=0, dtype=float), images.max(axis=0)
+        if self._frames:
+            self._single += single
+            self._moments += moments
+            self._sum_dn += sum_dn
+            self._highest_dn = np.maximum(self._highest_dn, highest_dn)
+        else:
+            self._first = moments
+            self._single, self._moments = single.copy(), moments.copy()
+            self._sum_dn, self._highest_dn = sum_dn, highest_dn
+        self._last = moments
+        self._frames += 1
+        self._images += len(images)
+
+    def seen(self) -> Seen:
+        """Return what the frames show so far, one at least."""
+        sensor = self._sensor
+        return Seen(
+            recipe=self._recipe,
+            sensor=sensor,
+            frames=self._frames,
+            moments=self._moments / self._frames,
+            moved=self._last - self._first,
+            single=self._single / self._frames,
+            mean_dn=self._sum_dn / self._images - sensor.dark_dn,
+            brightest_dn=float(np.quantile(self._highest_dn, BRIGHT_SHARE)) - sensor.dark_dn,
+            usable=self._highest_dn < sensor.highest_dn,
+        )
 
 
 def look_at(
@@ -108,18 +159,26 @@ def look_at(
     base = base or Sequence()
     capabilities = camera.capabilities
 
-    def captured(sequence: Sequence, frames: int, stage: str) -> Looked:
+    def captured(sequence: Sequence, frames: int, stage: str, *, still_frames: int = 0) -> Seen:
         applied = camera.configure(capabilities.nearest(sequence))
         recipe = Recipe(applied, settings, float(sensor.highest_dn), sensor=sensor)
+        seeing = _Seeing(recipe, sensor)
+        spare_s = _SPARE_S + 4 / applied.frame_rate_hz
+
+        def take(count: int) -> Seen:
+            for _ in range(count):
+                go_on(stage)
+                seeing.add(camera.read_frame(timeout_s=spare_s))
+            return seeing.seen()
+
         camera.start()
         try:
-            taken = []
-            for _ in range(frames):
-                go_on(stage)
-                taken.append(camera.read_frame(timeout_s=_SPARE_S + 4 / applied.frame_rate_hz))
+            seen = take(frames)
+            if still_frames and _still(seen):
+                seen = take(still_frames - frames)
         finally:
             camera.stop()
-        return Looked(recipe, taken)
+        return seen
 
     coarse_sequence = replace(
         base, base_frequency_hz=COARSE_HZ, harmonics=1, zeroth="estimated", takes=1
@@ -127,7 +186,7 @@ def look_at(
     exposure_s = max(FIRST_EXPOSURE_S, capabilities.min_exposure_s)
     while True:
         first = captured(replace(coarse_sequence, exposure_s=exposure_s), 1, "exposure")
-        brightest_dn = brightest(first.frames[0].images, sensor)
+        brightest_dn = first.brightest_dn
         if brightest_dn < sensor.brightest:
             break
         if exposure_s <= capabilities.min_exposure_s:
@@ -155,12 +214,12 @@ def look_at(
         takes=1,
         exposure_s=exposure_s,
     )
-    fine = captured(fine_sequence, FRAMES, "all frequencies")
+    fine = captured(fine_sequence, FRAMES, "all frequencies", still_frames=STILL_FRAMES)
     go_on("direct range")
     scene = describe(
-        _seen(fine, sensor),
+        fine,
         settings,
-        coarse=_seen(coarse, sensor),
+        coarse=coarse,
         ambient_dn_per_s=ambient_dn_per_s,
     )
     if scene is None:
@@ -199,42 +258,18 @@ def look_of_frame(
         ``target-unreachable`` where no pixel has light.
     """
     assert recipe.sensor is not None  # noqa: S101 - a planner has one
-    seen = _seen(Looked(recipe, [raw]), recipe.sensor, reconstructions=[found])
-    scene = describe(seen, recipe.settings, ambient_dn_per_s=ambient_dn_per_s)
+    seeing = _Seeing(recipe, recipe.sensor)
+    seeing.add(raw, found)
+    scene = describe(seeing.seen(), recipe.settings, ambient_dn_per_s=ambient_dn_per_s)
     if scene is None:
         raise no_light()
     return scene
 
 
-def brightest(images: _Array, sensor: tm.noise.Sensor) -> float:
-    """Return what the brightest pixels hold above the dark level, in DN.
-
-    All but `BRIGHT_SHARE` of the pixels, each at the brightest of its images (N, H, W).
-    """
-    highest = images.max(axis=0).astype(float)
-    return float(np.quantile(highest, BRIGHT_SHARE)) - sensor.dark_dn
-
-
-def _seen(
-    looked: Looked,
-    sensor: tm.noise.Sensor,
-    *,
-    reconstructions: list[tm.Reconstruction] | None = None,
-) -> Seen:
-    recipe = looked.recipe
-    found = reconstructions or [recipe.reconstruct(frame) for frame in looked.frames]
-    images = np.concatenate([_modulated(frame) for frame in looked.frames])
-    smoothing_px = recipe.settings.smoothing_px
-    measured = [np.asarray(each.measured) for each in found]
-    return Seen(
-        recipe=recipe,
-        sensor=sensor,
-        moments=np.stack([tm.smooth(b, smoothing_px) if smoothing_px else b for b in measured]),
-        single=np.mean(measured, axis=0),
-        mean_dn=images.mean(axis=0) - sensor.dark_dn,
-        brightest_dn=brightest(images, sensor),
-        usable=images.max(axis=0) < sensor.highest_dn,
-    )
+def _still(seen: Seen) -> bool:
+    """Whether nothing moves that frames show."""
+    lit = lit_pixels(seen)
+    return bool(lit.any()) and moving_share(seen, lit) <= STILL_SHARE
 
 
 def _modulated(frame: RawFrame) -> _Array:

@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from benchmarks.accuracy.promises import measured
-from transientcam_driver import Capabilities, Sequence, SequenceError, open_camera
+from transientcam_driver import (
+    Camera,
+    Capabilities,
+    RawFrame,
+    Sequence,
+    SequenceError,
+    open_camera,
+)
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.camera.source import sensor_of
 from transientcam_server.cli import plan as plan_verb
@@ -28,6 +35,7 @@ from transientcam_server.planning import (
 )
 from transientcam_server.planning.families import EXPOSURES, HARMONICS, TAKES, families
 from transientcam_server.planning.intervals import Figure
+from transientcam_server.planning.look import FRAMES, STILL_FRAMES, STILL_SHARE
 from transientcam_server.planning.measures import pixel_errors
 from transientcam_server.planning.plan import plan
 from transientcam_server.planning.prediction import Prediction, Predictor
@@ -537,6 +545,41 @@ def test_a_look_can_be_ended() -> None:
 
     assert shares == sorted(shares)
     assert 0 < shares[-1] < 0.5
+
+
+class Carried:
+    """A camera that is turned by so many pixels from frame to frame."""
+
+    def __init__(self, camera: Camera, pixels: int) -> None:
+        self.capabilities = camera.capabilities
+        self.configure, self.start, self.stop = camera.configure, camera.start, camera.stop
+        self._camera, self._pixels, self._read = camera, pixels, 0
+
+    def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
+        raw = self._camera.read_frame(timeout_s=timeout_s)
+        self._read += 1
+        images = np.roll(np.asarray(raw.images), self._pixels * self._read, axis=2)
+        return dataclasses.replace(raw, images=images)
+
+
+@pytest.mark.parametrize(("pixels", "frames"), [(0, STILL_FRAMES), (2, FRAMES)])
+def test_only_what_stands_still_is_looked_at_for_long(
+    pixels: int, frames: int, tmp_path: Any
+) -> None:
+    path = tmp_path / "panel.toml"
+    path.write_text(SCENE.format(light=5e7, ambient=0.0, away_m=2.0, width_m=0.6))
+    steps = []
+
+    with open_camera(f"sim:{path}?seed=7", clock=VirtualClock()) as camera:
+        planner = Planner(camera.capabilities, sensor_of(camera, SensorSettings()), SETTINGS)
+        scene = planner.look(
+            Carried(camera, pixels),
+            Sequence(),
+            progress=Progress(lambda share, step: steps.append(step)),
+        )
+
+    assert steps.count("all frequencies") == frames
+    assert (scene.moving_share > STILL_SHARE) == (frames == FRAMES)
 
 
 # -- prediction ---------------------------------------------------------------------------------
