@@ -54,12 +54,9 @@ class Delivery:
     channels: tuple[Channel, ...]
     lost: tuple[Lost, ...] = ()
 
-    def cores_free(self) -> Coroutine[Any, Any, None]:
-        """Return what has all computed that its products follow from.
-
-        It waits until the rest of that takes one core, or has failed.
-        """
-        return self.frame.cores_free([channel.product for channel in self.channels])
+    def computed(self) -> Coroutine[Any, Any, None]:
+        """Return what waits until all is computed that its products follow from, or has failed."""
+        return self.frame.computed([channel.product for channel in self.channels])
 
 
 Message = wire.Hello | wire.Notice | wire.ErrorMessage | Close

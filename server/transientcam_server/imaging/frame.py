@@ -10,7 +10,7 @@ import math
 import time
 from collections import OrderedDict
 from collections.abc import AsyncIterator, Callable, Coroutine, Hashable, Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from types import SimpleNamespace
 from typing import Any, Final, TypeVar, cast
@@ -89,7 +89,6 @@ class Frame:
         self._stages: dict[str, asyncio.Future[tm.Reconstruction]] = {}
         self._requested: set[str] = set()
         self._computing: asyncio.Task[None] | None = None
-        self._cores_free = asyncio.Event()
         self._whole: _Memory = OrderedDict()
         self._over_time: _Memory = OrderedDict()
         self._crops: _Memory = OrderedDict()
@@ -137,21 +136,17 @@ class Frame:
 
     async def reconstruction(self, stage: str) -> tm.Reconstruction:
         """Return the reconstruction with at least this stage computed (`STAGES`)."""
-        return await _shared(self._request(stage))
+        future = self._stages.get(stage)
+        if future is None:
+            future = self._stages[stage] = asyncio.get_running_loop().create_future()
+            self._requested.add(stage)
+            if self._computing is None:
+                self._computing = self._workers.start(self._compute_requested())
+        return await _shared(future)
 
-    async def cores_free(self, products: Iterable[Product]) -> None:
-        """Have all computed that products follow from; return once what is left takes one core.
-
-        Another frame that takes all cores may be begun then.
-        """
-        inputs: list[Coroutine[Any, Any, Any]] = []
-        for product in products:
-            if product.needs in STAGES:
-                self._request(product.needs)
-            else:
-                inputs.append(self._input(product))
-        if self._stages:
-            inputs.append(self._cores_free.wait())
+    async def computed(self, products: Iterable[Product]) -> None:
+        """Return once all that products follow from is computed, or has failed."""
+        inputs = (self._input(product) for product in products)
         await asyncio.gather(*inputs, return_exceptions=True)
 
     async def truth(self) -> Truth:
@@ -178,40 +173,29 @@ class Frame:
             value, _ = await self._run(compute, self.recipe, found, self.meta(), *arguments)
         return value
 
-    def _request(self, stage: str) -> "asyncio.Future[tm.Reconstruction]":
-        """Have a stage computed, with those that are requested in the same turn of the loop."""
-        future = self._stages.get(stage)
-        if future is None:
-            future = self._stages[stage] = asyncio.get_running_loop().create_future()
-            self._requested.add(stage)
-            if self._computing is None:
-                self._computing = self._workers.start(self._compute_requested())
-        return future
-
     async def _compute_requested(self) -> None:
         """Compute the stages requested in this turn of the loop in one go, then later ones."""
         await asyncio.sleep(0)
-        loop = asyncio.get_running_loop()
         requested: set[str] = set()
         try:
             while self._requested:
                 requested, self._requested = self._requested, set()
-                self._computed, elapsed_s = await self._run(
-                    compute,
-                    self._computed,
-                    self.recipe,
-                    self.raw,
-                    self.previous,
-                    requested,
-                    self._spread,
-                    partial(_call_on, loop, self._cores_free.set),
-                )
+                with self._workers.one_more_frame() as alone:
+                    self._computed, elapsed_s = await self._run(
+                        compute,
+                        self._computed,
+                        self.recipe,
+                        self.raw,
+                        self.previous,
+                        requested,
+                        # frames at once take a core each, which is less work than sharing all
+                        self._spread if alone else tm.kernels.at_once,
+                    )
                 self._reconstruct_s = (self._reconstruct_s or 0.0) + elapsed_s
                 for stage in requested:
                     self._settle(self._stages[stage], self._computed, stage)
         finally:
             self._computing = None
-            self._cores_free.set()
             for stage in requested | self._requested:
                 self._stages[stage].cancel()  # nothing to those that are done
 
@@ -444,12 +428,6 @@ def _failure_of(workers: Workers, number: int, name: str) -> Iterator[None]:
             product=name,
             frame=number,
         ) from error
-
-
-def _call_on(loop: asyncio.AbstractEventLoop, callback: Callable[[], object]) -> None:
-    """Call back on a loop, from any thread; not on one that has been closed meanwhile."""
-    with suppress(RuntimeError):
-        loop.call_soon_threadsafe(callback)
 
 
 def _size(value: object) -> int:

@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Final
@@ -60,22 +60,23 @@ def compute(
     previous: RawFrame | None,
     stages: Iterable[str],
     spread: tm.kernels.Spread = tm.kernels.at_once,
-    cores_free: Callable[[], None] = lambda: None,
 ) -> Computed:
     """Compute stages of a frame; one that fails leaves the others as they are. Never raises.
 
-    ``spread`` is how compiled lanes use several threads. ``cores_free`` is called once what is left
-    takes this thread alone.
+    ``spread`` is how compiled lanes use several threads.
     """
     requested = set(stages)
     computed = Computed(before.reconstruction, {}, before.pixels, before.range_noise)
     try:
         if computed.reconstruction is None:
-            found = recipe.reconstruct(raw, previous, spread=spread)
+            computed.reconstruction = found = recipe.reconstruct(raw, previous, spread=spread)
             _read(found, FIRST)
+            _flag_contradictions(recipe, found)
+            computed.pixels = pixel_counts(found)
         else:
             found = computed.reconstruction
     except Exception as error:
+        computed.reconstruction = None
         computed.failures = dict.fromkeys(requested, error)
         return computed
     with nullcontext() if spread is tm.kernels.at_once else tm.kernels.use_all_cores():
@@ -84,15 +85,6 @@ def compute(
                 _read(found, stage)
             except Exception as error:
                 computed.failures[stage] = error
-    cores_free()
-    try:
-        if computed.reconstruction is None:
-            _flag_contradictions(recipe, found)
-            computed.pixels = pixel_counts(found)
-            computed.reconstruction = found
-    except Exception as error:
-        computed.failures = dict.fromkeys(requested, error)
-        return computed
     if recipe.sensor is not None and "returns" in requested and "returns" not in computed.failures:
         computed.range_noise = _range_noise(recipe, found, raw.number)
     return computed

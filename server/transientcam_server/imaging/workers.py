@@ -6,8 +6,9 @@ Everything here lives on the event loop and computes nothing there.
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import Executor, Future, wait
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 _log = logging.getLogger(__name__)
@@ -26,6 +27,7 @@ class Workers:
         self._tasks: set[asyncio.Task[Any]] = set()
         self._running: set[Future[Any]] = set()
         self._failing: set[str] = set()
+        self._frames = 0
 
     async def run(self, compute: Callable[..., _T], *arguments: Any) -> tuple[_T, float]:
         """Return the result of ``compute`` on a worker, and the seconds it took there."""
@@ -38,6 +40,15 @@ class Workers:
         """Do as `run` does, but never on the last free worker."""
         async with self._long:
             return await self.run(compute, *arguments)
+
+    @contextmanager
+    def one_more_frame(self) -> Iterator[bool]:
+        """Count a frame as being reconstructed; give whether it is the only one."""
+        self._frames += 1
+        try:
+            yield self._frames == 1
+        finally:
+            self._frames -= 1
 
     def start(self, work: Coroutine[Any, Any, _T]) -> "asyncio.Task[_T]":
         """Start a task that several callers may wait for; `close` cancels it."""

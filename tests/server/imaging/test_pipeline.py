@@ -4,9 +4,9 @@ import asyncio
 import io
 import threading
 from collections.abc import Awaitable, Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -411,49 +411,27 @@ def technique_of(sequence: Sequence) -> str:
     return Recipe(applied, ReconstructionSettings(), 4095.0, sensor=tm.noise.Sensor()).technique
 
 
-def test_cores_are_free_while_what_takes_one_is_computed(
+def test_a_large_frame_takes_all_cores_unless_another_is_computed(
     camera: Camera, raw: RawFrame, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    may_count = threading.Event()
-    count = stages.pixel_counts
+    all_cores = tm.kernels.over(cast("Executor", None), 2)
+    spreads: list[tm.kernels.Spread] = []
+    two_at_once = threading.Barrier(2)
+    reconstruct = Recipe.reconstruct
 
-    def waiting(found: tm.Reconstruction) -> dict[str, int]:
-        assert may_count.wait(10)
-        return count(found)
+    def noting(*arguments: Any, spread: tm.kernels.Spread) -> tm.Reconstruction:
+        spreads.append(spread)
+        if len(spreads) <= 2:
+            two_at_once.wait(10)
+        return reconstruct(*arguments)
 
-    monkeypatch.setattr(stages, "pixel_counts", waiting)
-
-    async def test(pipeline: Pipeline, frame: Frame) -> None:
-        await frame.cores_free([pipeline.product("range"), pipeline.product("coefficients")])
-        assert frame.computing
-        may_count.set()
-        found = await frame.reconstruction("coefficients")
-        assert found.range_m.shape == frame.shape
-
-    with_frame(camera, raw, test)
-
-
-def test_cores_are_free_where_the_reconstruction_fails(
-    camera: Camera, raw: RawFrame, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail(*_: object, **__: object) -> None:
-        raise ArithmeticError
-
-    monkeypatch.setattr(Recipe, "reconstruct", fail)
+    monkeypatch.setattr(module, "spread_of", lambda raw: all_cores)
+    monkeypatch.setattr(Recipe, "reconstruct", noting)
 
     async def test(pipeline: Pipeline, frame: Frame) -> None:
-        await frame.cores_free([pipeline.product("range")])
-        with pytest.raises(ArithmeticError):
-            await frame.reconstruction("returns")
+        second, third = (pipeline.frame(raw, camera.applied) for _ in range(2))
+        await asyncio.gather(frame.reconstruction("returns"), second.reconstruction("returns"))
+        await third.reconstruction("returns")
 
     with_frame(camera, raw, test)
-
-
-def test_images_leave_cores_free_and_are_not_reconstructed(
-    camera: Camera, raw: RawFrame, calls: list[str]
-) -> None:
-    async def test(pipeline: Pipeline, frame: Frame) -> None:
-        await frame.cores_free([pipeline.product("raw")])
-
-    with_frame(camera, raw, test)
-    assert calls == []
+    assert spreads == [all_cores, tm.kernels.at_once, all_cores]

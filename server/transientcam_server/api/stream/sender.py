@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from collections import deque
 from typing import Any
 
 from fastapi import WebSocket
@@ -16,14 +17,18 @@ from transientcam_server.imaging.view import View
 
 _AT_ONCE = 4
 """Deliveries after which other tasks run."""
+_AHEAD = 2
+"""Frames that are taken at most before the one before them has been sent."""
+_COMPUTED_AT_ONCE = 2
+"""Frames that are computed at once for one client, each on a core; one alone takes all cores."""
 
 
 class Sender:
     """Empties an outbox into a WebSocket.
 
-    To a client that keeps up, the next frame is computed while the one before is encoded and sent,
-    so that all cores are at work. It is taken for that when what is left of the one before takes
-    one core; a client that is slow to receive gets what is newest when it has.
+    To a client that keeps up, frames are taken and computed while others are encoded and sent, so
+    that all cores are at work: two at once at most, and two at most wait to be sent. A client that
+    is slow to receive gets what is newest when it has.
     """
 
     def __init__(self, websocket: WebSocket, outbox: Outbox, metrics: Metrics) -> None:
@@ -32,22 +37,21 @@ class Sender:
         self._outbox = outbox
         self._failing: set[str] = set()
         self._keeps_up, self._sending_s = True, 0.0
-        self._ahead: asyncio.Future[None] | None = None
+        self._computing: set[asyncio.Future[None]] = set()
 
     async def send_all(self) -> None:
         """Send until the client is gone or the stream was closed."""
         delivered = 0
-        following: asyncio.Task[Item] | None = None
+        ahead: deque[asyncio.Task[Item]] = deque()
         try:
             while True:
-                item = await (self._outbox.next() if following is None else following)
-                following = None
+                item = await (ahead.popleft() if ahead else self._take())
                 if isinstance(item, Close):
                     await self._websocket.close(item.code, item.reason)
                     return
                 if isinstance(item, Delivery):
-                    if self._keeps_up:
-                        following = asyncio.ensure_future(self._next_after(item))
+                    while self._keeps_up and len(ahead) < _AHEAD:
+                        ahead.append(asyncio.ensure_future(self._take(*list(ahead)[-1:])))
                     await self._deliver(item)
                     delivered += 1
                     if delivered % _AT_ONCE == 0:
@@ -56,16 +60,20 @@ class Sender:
                 else:
                     await self._websocket.send_bytes(wire.encode(item))
         finally:
-            if following is not None:
-                following.cancel()
-                await asyncio.gather(following, return_exceptions=True)
+            for task in ahead:
+                task.cancel()
+            await asyncio.gather(*ahead, return_exceptions=True)
 
-    async def _next_after(self, delivery: Delivery) -> Item:
-        """Return what is to be sent next, and have it computed once this one needs one core."""
-        await delivery.cores_free()
+    async def _take(self, *before: asyncio.Task[Item]) -> Item:
+        """Return what is to be sent after another, and begin to compute it, two at once at most."""
+        await asyncio.gather(*before)
+        while len(self._computing) >= _COMPUTED_AT_ONCE:
+            await asyncio.wait(self._computing, return_when=asyncio.FIRST_COMPLETED)
         item = await self._outbox.next()
         if isinstance(item, Delivery):
-            self._ahead = asyncio.ensure_future(item.cores_free())  # no client waits
+            computing = asyncio.ensure_future(item.computed())
+            self._computing.add(computing)
+            computing.add_done_callback(self._computing.discard)
         return item
 
     async def _deliver(self, delivery: Delivery) -> None:

@@ -17,7 +17,7 @@ COMPUTED_S = 0.5
 
 
 class _Frame:
-    """Leaves cores free when it is begun, and tells when; is computed at once where not held."""
+    """Is computed when the test lets it, and reports that it was begun."""
 
     def __init__(self, number: int, *, reconstruct_s: float) -> None:
         self.number, self.reconstruct_s = number, reconstruct_s
@@ -25,9 +25,10 @@ class _Frame:
         self.is_begun, self.may_end = asyncio.Event(), asyncio.Event()
         self.may_end.set()
 
-    async def cores_free(self, products: Iterable[object]) -> None:
+    async def computed(self, products: Iterable[object]) -> None:
         assert list(products)
         self.is_begun.set()
+        await self.may_end.wait()
 
     async def encoded(self, *_: object, **__: object) -> bytes:
         await self.may_end.wait()
@@ -71,37 +72,50 @@ async def _end(outbox: Outbox, sending: "asyncio.Task[None]") -> None:
     await sending
 
 
-def test_the_next_frame_is_begun_while_one_is_sent() -> None:
+async def _idle() -> None:
+    """Let everything run that can."""
+    for _ in range(50):
+        await asyncio.sleep(0)
+
+
+def test_frames_are_computed_while_one_is_sent_and_sent_in_order() -> None:
     async def test() -> None:
-        outbox, socket = subscribed(), _Socket()
-        _put(outbox, 1)
-        second = _put(outbox, 2)
+        outbox, socket = subscribed(depth=3), _Socket()
+        frames = [_put(outbox, number) for number in (1, 2, 3)]
+        frames[1].may_end.clear()
         sending = _sending(outbox, socket)
-        await second.is_begun.wait()
+        await frames[2].is_begun.wait()
 
         assert socket.taken == []
         socket.free.set()
+        await _idle()
+        assert socket.taken == [1]
+        frames[1].may_end.set()
         await _end(outbox, sending)
-        assert socket.taken == [1, 2]
+        assert socket.taken == [1, 2, 3]
         assert socket.closed == wire.CloseCode.GOING_AWAY
 
     run(test)
 
 
-def test_the_next_frame_is_begun_when_the_one_before_leaves_cores_free() -> None:
+def test_two_frames_are_computed_at_once_and_a_third_when_one_of_them_is() -> None:
     async def test() -> None:
-        outbox, socket = subscribed(), _Socket()
-        first = _put(outbox, 1)
-        first.may_end.clear()
-        second = _put(outbox, 2)
+        outbox, socket = subscribed(depth=3), _Socket()
+        frames = [_put(outbox, number) for number in (1, 2, 3)]
+        for frame in frames:
+            frame.may_end.clear()
         sending = _sending(outbox, socket)
-        socket.free.set()
-        await second.is_begun.wait()
+        await frames[1].is_begun.wait()
+        await _idle()
+        assert not frames[2].is_begun.is_set()
 
-        assert socket.taken == []
-        first.may_end.set()
+        frames[1].may_end.set()  # whichever it is
+        await frames[2].is_begun.wait()
+        socket.free.set()
+        for frame in frames:
+            frame.may_end.set()
         await _end(outbox, sending)
-        assert socket.taken == [1, 2]
+        assert socket.taken == [1, 2, 3]
 
     run(test)
 
@@ -115,17 +129,18 @@ def test_a_client_that_takes_longer_to_receive_than_frames_to_compute_gets_the_n
         while socket.taken != [1]:
             await asyncio.sleep(0)
         socket.free.clear()
-        _put(outbox, 2)  # taken for the client that kept up so far
-        for number in (3, 4, 5):
-            await asyncio.sleep(0)
+        for number in (2, 3):  # taken for the client that kept up so far
+            await _put(outbox, number).is_begun.wait()
+        for number in (4, 5, 6):
             skipped = _put(outbox, number)
+            await _idle()
             assert not skipped.is_begun.is_set()
 
         socket.free.set()
-        while len(socket.taken) < 3:
+        while len(socket.taken) < 4:
             await asyncio.sleep(0)
-        assert socket.taken == [1, 2, 5]
-        assert socket.notices == [(2, 2)]  # frames 3 and 4, after the one that was taken ahead
+        assert socket.taken == [1, 2, 3, 6]
+        assert socket.notices == [(3, 2)]  # frames 4 and 5, after those that were taken ahead
         await _end(outbox, sending)
 
     run(test)
