@@ -17,18 +17,18 @@ from transientcam_server.imaging.view import View
 
 _AT_ONCE = 4
 """Deliveries after which other tasks run."""
-_AHEAD = 2
-"""Frames that are taken at most before the one before them has been sent."""
 _COMPUTED_AT_ONCE = 2
 """Frames that are computed at once for one client, each on a core; one alone takes all cores."""
+_SHORT_S = 0.1
+"""Longer ones are computed one after another: requests of other clients would wait for both."""
 
 
 class Sender:
     """Empties an outbox into a WebSocket.
 
     To a client that keeps up, frames are taken and computed while others are encoded and sent, so
-    that all cores are at work: two at once at most, and two at most wait to be sent. A client that
-    is slow to receive gets what is newest when it has.
+    that all cores are at work: two short ones at once, and as many wait to be sent at most. A
+    client that is slow to receive gets what is newest when it has.
     """
 
     def __init__(self, websocket: WebSocket, outbox: Outbox, metrics: Metrics) -> None:
@@ -37,6 +37,7 @@ class Sender:
         self._outbox = outbox
         self._failing: set[str] = set()
         self._keeps_up, self._sending_s = True, 0.0
+        self._at_once = _COMPUTED_AT_ONCE
         self._computing: set[asyncio.Future[None]] = set()
 
     async def send_all(self) -> None:
@@ -50,7 +51,7 @@ class Sender:
                     await self._websocket.close(item.code, item.reason)
                     return
                 if isinstance(item, Delivery):
-                    while self._keeps_up and len(ahead) < _AHEAD:
+                    while self._keeps_up and len(ahead) < self._at_once:
                         ahead.append(asyncio.ensure_future(self._take(*list(ahead)[-1:])))
                     await self._deliver(item)
                     delivered += 1
@@ -65,9 +66,9 @@ class Sender:
             await asyncio.gather(*ahead, return_exceptions=True)
 
     async def _take(self, *before: asyncio.Task[Item]) -> Item:
-        """Return what is to be sent after another, and begin to compute it, two at once at most."""
+        """Return what is to be sent after another, and begin to compute it where few enough are."""
         await asyncio.gather(*before)
-        while len(self._computing) >= _COMPUTED_AT_ONCE:
+        while len(self._computing) >= self._at_once:
             await asyncio.wait(self._computing, return_when=asyncio.FIRST_COMPLETED)
         item = await self._outbox.next()
         if isinstance(item, Delivery):
@@ -91,7 +92,9 @@ class Sender:
         finally:
             for task in tasks:
                 task.cancel()
-        self._keeps_up = self._sending_s <= delivery.frame.reconstruct_s
+        reconstruct_s = delivery.frame.reconstruct_s
+        self._keeps_up = self._sending_s <= reconstruct_s
+        self._at_once = _COMPUTED_AT_ONCE if reconstruct_s <= _SHORT_S else 1
 
     async def _send(
         self, delivery: Delivery, channel: Channel, task: asyncio.Task[bytes] | None

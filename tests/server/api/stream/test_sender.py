@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Iterable
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -116,6 +117,29 @@ def test_two_frames_are_computed_at_once_and_a_third_when_one_of_them_is() -> No
             frame.may_end.set()
         await _end(outbox, sending)
         assert socket.taken == [1, 2, 3]
+
+    run(test)
+
+
+def test_frames_that_take_long_are_computed_one_after_another() -> None:
+    async def test() -> None:
+        outbox, socket = subscribed(depth=3), _Socket()
+        _put(outbox, 1, reconstruct_s=COMPUTED_S)
+        sending = _sending(outbox, socket)
+        socket.free.set()
+        while socket.taken != [1]:
+            await asyncio.sleep(0)
+        await _idle()
+        frames = [_put(outbox, number) for number in (2, 3, 4)]
+        for frame in frames:
+            frame.may_end.clear()
+        for frame, following in pairwise([*frames, None]):
+            await cast("_Frame", frame).is_begun.wait()
+            await _idle()
+            assert following is None or not following.is_begun.is_set()
+            cast("_Frame", frame).may_end.set()
+        await _end(outbox, sending)
+        assert socket.taken == [1, 2, 3, 4]
 
     run(test)
 
