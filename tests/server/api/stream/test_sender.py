@@ -133,11 +133,12 @@ def test_frames_that_take_long_are_computed_one_after_another() -> None:
         frames = [_put(outbox, number) for number in (2, 3, 4)]
         for frame in frames:
             frame.may_end.clear()
-        for frame, following in pairwise([*frames, None]):
-            await cast("_Frame", frame).is_begun.wait()
+        for frame, following in pairwise(frames):
+            await frame.is_begun.wait()
             await _idle()
-            assert following is None or not following.is_begun.is_set()
-            cast("_Frame", frame).may_end.set()
+            assert not following.is_begun.is_set()
+            frame.may_end.set()
+        frames[-1].may_end.set()
         await _end(outbox, sending)
         assert socket.taken == [1, 2, 3, 4]
 
