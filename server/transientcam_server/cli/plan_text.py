@@ -97,5 +97,7 @@ def _print_neighbour(what: str, other: Mapping[str, Any] | None) -> None:
         typer.echo(f"{what}: no sequence does")
         return
     errors = "" if other["error_factor"] is None else f"{other['error_factor']:.2g} x the error, "
-    sequence = json.dumps(other["sequence"])
-    typer.echo(f"{what}: {errors}{other['time_factor']:.2g} x the time: {sequence}")
+    typer.echo(
+        f"{what}: {errors}{other['time_factor']:.2g} x the time, estimator {other['estimator']}: "
+        f"{json.dumps(other['sequence'])}"
+    )
