@@ -8,6 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from transientcam_server.planning.pareto import flat_from
+
 
 def error_picture(
     tradeoff: Mapping[str, Any], title: str, present: tuple[float, float] | None = None
@@ -74,23 +76,25 @@ def _label(line: Mapping[str, Any]) -> str:
 
 
 def _shade(panel: Axes, front: list[Mapping[str, Any]]) -> None:
-    """Shade the times from which on the best choices are off by more than their noise."""
-    ruled_s = None
-    for choice in reversed(front):
-        predicted = choice["predicted"]
-        if predicted["range_bias_m"] <= predicted["range_std_m"]["median"]:
-            break
-        ruled_s = choice["capture_s"]
-    if ruled_s is None:
+    """Shade the times from which on bias rules and more time buys little."""
+    each = [choice["predicted"] for choice in front]
+    flat = flat_from(
+        [
+            (one["range_std_m"]["median"], one["range_bias_m"], one["range_error_m"]["median"])
+            for one in each
+        ]
+    )
+    if flat is None:
         return
+    ruled_s = front[flat]["capture_s"]
     left, right = panel.get_xlim()
     panel.axvspan(ruled_s, right, color="0.85", zorder=0)
     panel.set_xlim(left, right)
     panel.text(
         ruled_s,
-        0.02,
-        " bias rules: more time\n does not help",
+        0.98,
+        " bias rules: more time\n buys little",
         transform=panel.get_xaxis_transform(),
         fontsize="small",
-        va="bottom",
+        va="top",
     )

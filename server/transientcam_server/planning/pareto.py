@@ -1,10 +1,12 @@
-"""The Pareto front: points that no other beats in both cost and error."""
+"""The Pareto front: points that no other beats in both cost and error, and where it gets flat."""
 
 import math
-from collections.abc import Callable, Iterable
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Sequence
+from typing import Final, TypeVar
 
 _T = TypeVar("_T")
+LITTLE: Final = 2.0
+"""More time buys little where it leaves more than one over this of the error."""
 
 
 def front(
@@ -24,3 +26,25 @@ def front(
             best = error(point)
             chosen.append(point)
     return chosen
+
+
+def flat_from(errors: Sequence[tuple[float, float, float]]) -> int | None:
+    """Return the first place of a front from which on bias rules and more time buys little.
+
+    Parameters
+    ----------
+    errors
+        Noise, bias, and both together, by rising time.
+
+    Returns
+    -------
+    int or None
+        None where noise rules the last one.
+    """
+    place = None
+    for k in reversed(range(len(errors))):
+        noise, bias, error = errors[k]
+        if bias <= noise or error > LITTLE * errors[-1][2]:
+            break
+        place = k
+    return place

@@ -7,7 +7,6 @@ the margin. Beside the recommended one stand what half the time gives, and what 
 costs.
 """
 
-import itertools
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -16,6 +15,7 @@ from transientcam_driver import Capabilities
 from transientcam_server.planning.choice import Choice
 from transientcam_server.planning.families import families
 from transientcam_server.planning.goal import Goal
+from transientcam_server.planning.pareto import flat_from
 from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.refusal import too_small, unreachable
@@ -151,17 +151,13 @@ def _as_good(quicker: Choice, best: Choice, goal: Goal) -> bool:
     """
     return (
         "range_error_m" in goal.targets
-        and _bias_rules(best)
+        and best.predicted.range_bias.median > best.predicted.range_std.median
         and all(
             quicker.error(target) <= goal.limit(target)
             and quicker.error_with_margin(target) <= HARDLY_MORE * best.error_with_margin(target)
             for target in goal.targets
         )
     )
-
-
-def _bias_rules(choice: Choice) -> bool:
-    return choice.predicted.range_bias.median > choice.predicted.range_std.median
 
 
 def doubt(choice: Choice, scene: SceneStatistics) -> str:
@@ -180,7 +176,7 @@ def doubt(choice: Choice, scene: SceneStatistics) -> str:
 
 
 def in_a_sentence(front: list[Choice], scene: SceneStatistics) -> str:
-    """State from where on bias rules, of choices by rising time, and whether it is known."""
+    """State from where on more time buys little, of choices by rising time; and any doubt."""
     if not front:
         return "Nothing reaches any accuracy on this scene."
     finest = front[-1]
@@ -188,10 +184,19 @@ def in_a_sentence(front: list[Choice], scene: SceneStatistics) -> str:
         f"the best is {finest.predicted.range_error.median * 1e3:.3g} mm in "
         f"{_time_in_words(finest.applied.capture_s)} ({finest.in_words()})"
     )
-    ruled = list(itertools.takewhile(_bias_rules, reversed(front)))
-    if not ruled:
+    flat = flat_from(
+        [
+            (
+                each.predicted.range_std.median,
+                each.predicted.range_bias.median,
+                each.predicted.range_error.median,
+            )
+            for each in front
+        ]
+    )
+    if flat is None:
         return f"Noise rules everywhere: more time buys accuracy; {best}." + doubt(finest, scene)
-    since = _time_in_words(ruled[-1].applied.capture_s)
+    since = _time_in_words(front[flat].applied.capture_s)
     rules = f"From {since} on bias rules and more time buys little; {best}."
     return rules + doubt(finest, scene)
 

@@ -248,4 +248,4 @@ class TradeoffDocument(Document):
     lines: list[LineDocument]
     """Of every estimator and set of frequencies on the front: noise falls onto the bias."""
     summary: str
-    """From where on bias rules, and the best there is, in a sentence."""
+    """From where on bias rules and time buys little, and the best there is, in a sentence."""
