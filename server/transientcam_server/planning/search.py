@@ -263,25 +263,49 @@ class Search:
         self, family: Family, first: int, targets: dict[str, float], within_s: float
     ) -> int | None:
         last = self._longest(family, within_s)
-        if last is None or last < first or not self._reaches(family, last, targets):
+        if last is None:
             return None
-        while first < last:  # the longer a capture, the less its noise
-            middle = (first + last) // 2
-            if self._reaches(family, middle, targets) and self._affords(
-                family, family.members[middle]
-            ):
-                last = middle
-            else:
-                first = middle + 1
-        return last
+        place = self._first_within(family, self._hoped(targets), first, last)
+        if place is None or self._goal.computing_share is None:
+            return place
+        affords = (k for k in range(place, last + 1) if self._affords(family, family.members[k]))
+        return next(affords, None)
+
+    def _first_within(
+        self, family: Family, limits: dict[str, float], first: int, last: int
+    ) -> int | None:
+        """Return the first place of these that few draws find within limits.
+
+        The longer a capture, the less its noise; its bias may grow, as where the likelihood finds
+        more returns the less noise there is. So errors fall to a least one, and may rise again.
+        """
+        if first > last:
+            return None
+        if not self._within(family, limits, last):
+            if "range_error_m" not in limits:
+                return None
+            last = self._place_of_least_error(family, first, last)
+            if not self._within(family, limits, last):
+                return None
+        places = range(first, last + 1)
+        return first + bisect.bisect_left(
+            places, x=True, key=partial(self._within, family, limits)
+        )
+
+    def _place_of_least_error(self, family: Family, first: int, last: int) -> int:
+        return min(
+            range(first, last + 1), key=lambda place: self._quick(family, place, "range_error_m")
+        )
 
     def _reaches(self, family: Family, place: int, targets: dict[str, float]) -> bool:
-        hoped = {name: limit * self._hope(name) for name, limit in targets.items()}
-        return self._within(family, hoped, place)
+        return self._within(family, self._hoped(targets), place)
 
     @staticmethod
-    def _hope(target: str) -> float:
-        return HOPE if target.startswith("range") else 1.0
+    def _hoped(targets: dict[str, float]) -> dict[str, float]:
+        return {
+            name: limit * (HOPE if name.startswith("range") else 1.0)
+            for name, limit in targets.items()
+        }
 
     def _least(self, family: Family, place: int, target: str) -> float:
         """Return what the noise of a member is at least; 0 where no bound is known."""
@@ -322,11 +346,13 @@ class Search:
                 best, last = choice, place - 1
             else:
                 failed = place
-            reaches = partial(self._within, family, wanted)
-            between = range(failed + 1, last + 1)
-            place = failed + 1 + bisect.bisect_left(between, x=True, key=reaches)
-            if place > last:
+            further = self._first_within(family, wanted, failed + 1, last)
+            if further is None and best is None and failed < last:
+                # few draws are not wrong about all by the same factor: the best by them is left
+                further = last = self._place_of_least_error(family, failed + 1, last)
+            if further is None:
                 break
+            place = further
         return best
 
     def _within(self, family: Family, limits: dict[str, float], place: int) -> bool:

@@ -75,6 +75,8 @@ def test_a_daemon_plans_for_the_scene_before_its_camera(
     first, *words = capsys.readouterr().out.splitlines()
     assert json.loads(first) == plan["sequence"]
     assert plan["summary"] in words
+    half_time = next(line for line in words if line.startswith("half the time"))
+    assert f"estimator {plan['half_time']['estimator']}:" in half_time
 
 
 @pytest.mark.usefixtures("kept", "few_families")
