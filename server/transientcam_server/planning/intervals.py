@@ -45,7 +45,7 @@ class Figure:
     low, high
         `COVERAGE` of the captures measure a value between them.
     p90
-        90 % of the pixels are better.
+        90 % of the pixels are predicted to be better.
     with_margin
         What 80 % of the captures measure less than: what a target is held against.
     """

@@ -288,9 +288,7 @@ class Search:
             if not self._within(family, limits, last):
                 return None
         places = range(first, last + 1)
-        return first + bisect.bisect_left(
-            places, x=True, key=partial(self._within, family, limits)
-        )
+        return first + bisect.bisect_left(places, x=True, key=partial(self._within, family, limits))
 
     def _place_of_least_error(self, family: Family, first: int, last: int) -> int:
         return min(

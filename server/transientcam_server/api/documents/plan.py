@@ -97,7 +97,8 @@ class FigureDocument(Document):
     high: float
     """And below this."""
     p90: float
-    """90 % of the pixels are better."""
+    """90 % of the pixels are predicted to be better; fewer are where much light comes back close
+    behind the direct one, as near the edge of a corner, and no frequency resolves it."""
 
 
 class PredictedDocument(Document):
