@@ -1,13 +1,14 @@
 """How docs/accuracy.md opens: what 5 mm cost on each scene, in one picture and a sentence each."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from transientcam_experiments.tradeoff.picture import saved
+from transientcam_experiments.tradeoff.picture import errors_m, saved
+from transientcam_server.planning.pareto import flat_from
 
 TARGET_M: Final = 5e-3
 PICTURE: Final = "accuracy-price.png"
@@ -28,9 +29,10 @@ def opening(documents: Documents, machine: str) -> str:
         *[f"- **{name}**: {price(document)}" for name, document in documents.items()],
         "",
         "Each line is the best that `transientcam plan` predicts for the time, noise and bias "
-        "together, of the median lit pixel; planned with margin, so that 80 % of the captures stay "
-        "below, a plan takes longer. Light that none of the frequencies of the look resolves moves "
-        "a range without any sign of it: neither the error nor `outlier_share` has that.",
+        "together, of the median lit pixel; planned with margin, so that four of five plans reach "
+        "their target ([plans](plans.md)), a plan takes longer. Light that none of the frequencies "
+        "of the look resolves moves a range without any sign of it: neither the error nor "
+        "`outlier_share` has that.",
         "",
         *[
             f"![Range error against capture time on {name}](figures/accuracy-{name}-error.png)\n"
@@ -49,20 +51,20 @@ def opening(documents: Documents, machine: str) -> str:
 def price(document: Mapping[str, Any]) -> str:
     """State the time from which on the error is below `TARGET_M`, and what rules there."""
     front = document["front"]
-    reached = [each for each in front if _error_m(each) <= TARGET_M]
+    reached = [place for place, each in enumerate(front) if _error_m(each) <= TARGET_M]
     if not reached:
         if not front:
             return "nothing is predicted to reach any accuracy."
         best = front[-1]
         return (
             f"5 mm are out of reach; the best is {_error_m(best) * 1e3:.3g} mm in "
-            f"{best['capture_s'] * 1e3:.3g} ms, {_ruled_by(best)}."
+            f"{best['capture_s'] * 1e3:.3g} ms, {_ruled_by(front, len(front) - 1)}."
         )
-    first = reached[0]
+    first = front[reached[0]]
     sequence = first["sequence"]
     return (
         f"at most {first['capture_s'] * 1e3:.3g} ms, for {_error_m(first) * 1e3:.3g} mm, "
-        f"{_ruled_by(first)} "
+        f"{_ruled_by(front, reached[0])} "
         f"(m = {sequence['harmonics']} at {sequence['base_frequency_hz'] / 1e6:g} MHz, "
         f"{first['estimator']})."
     )
@@ -100,10 +102,14 @@ def replaced(page: str, text: str) -> str:
 
 
 def _error_m(choice: Mapping[str, Any]) -> float:
-    return float(choice["predicted"]["range_error_m"]["median"])
+    return errors_m(choice)[2]
 
 
-def _ruled_by(choice: Mapping[str, Any]) -> str:
-    predicted = choice["predicted"]
-    biased = predicted["range_bias_m"] > predicted["range_std_m"]["median"]
-    return "bias rules: more time buys little" if biased else "noise rules: more time buys accuracy"
+def _ruled_by(front: Sequence[Mapping[str, Any]], place: int) -> str:
+    noise_m, bias_m, _ = errors_m(front[place])
+    if bias_m <= noise_m:
+        return "noise rules: more time buys accuracy"
+    flat = flat_from([errors_m(each) for each in front])
+    if flat is not None and place >= flat:
+        return "bias rules: more time buys little"
+    return "bias rules these frequencies: others take longer, and err less"

@@ -69,6 +69,13 @@ def saved(figure: Figure, suffix: str) -> bytes:
     return stream.getvalue()
 
 
+def errors_m(choice: Mapping[str, Any]) -> tuple[float, float, float]:
+    """Return noise, bias, and both together, that are predicted of a choice."""
+    predicted = choice["predicted"]
+    std_m, error_m = (predicted[name]["median"] for name in ("range_std_m", "range_error_m"))
+    return std_m, predicted["range_bias_m"], error_m
+
+
 def _label(line: Mapping[str, Any]) -> str:
     return (
         f"m = {line['harmonics']} at {line['base_frequency_hz'] / 1e6:g} MHz, {line['estimator']}"
@@ -77,13 +84,7 @@ def _label(line: Mapping[str, Any]) -> str:
 
 def _shade(panel: Axes, front: list[Mapping[str, Any]]) -> None:
     """Shade the times from which on bias rules and more time buys little."""
-    each = [choice["predicted"] for choice in front]
-    flat = flat_from(
-        [
-            (one["range_std_m"]["median"], one["range_bias_m"], one["range_error_m"]["median"])
-            for one in each
-        ]
-    )
+    flat = flat_from([errors_m(choice) for choice in front])
     if flat is None:
         return
     ruled_s = front[flat]["capture_s"]
@@ -97,4 +98,5 @@ def _shade(panel: Axes, front: list[Mapping[str, Any]]) -> None:
         transform=panel.get_xaxis_transform(),
         fontsize="small",
         va="top",
+        bbox={"facecolor": "0.85", "edgecolor": "none", "pad": 1},
     )
