@@ -1,6 +1,7 @@
 """How docs/accuracy.md opens: what 5 mm cost on each scene, in one picture and a sentence each."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,8 +15,24 @@ TARGET_M: Final = 5e-3
 PICTURE: Final = "accuracy-price.png"
 BEGIN: Final = "<!-- opening: python -m benchmarks.accuracy.pictures --write -->"
 END: Final = "<!-- end of the opening -->"
-Documents = Mapping[str, Mapping[str, Any]]
-"""Answers of `GET /api/v1/tradeoff` by the name of the scene."""
+Front = Sequence[Mapping[str, Any]]
+"""That of the answer of `GET /api/v1/tradeoff`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """What is predicted of a scene, and the measured error of the choice that is stated.
+
+    ``summary`` says from where on more time buys little.
+    """
+
+    front: Front
+    summary: str
+    measured_m: float
+
+
+Documents = Mapping[str, Drawn]
+"""By the name of the scene."""
 
 
 def opening(documents: Documents, machine: str) -> str:
@@ -26,13 +43,17 @@ def opening(documents: Documents, machine: str) -> str:
         "",
         f"![Range error against the time of a capture, by scene](figures/{PICTURE})",
         "",
-        *[f"- **{name}**: {price(document)}" for name, document in documents.items()],
+        *[
+            f"- **{name}**: {price(each.front, each.measured_m)}"
+            for name, each in documents.items()
+        ],
         "",
         "Each line is the best that `transientcam plan` predicts for the time, noise and bias "
-        "together, of the median lit pixel; planned with margin, so that four of five plans reach "
-        "their target ([plans](plans.md)), a plan takes longer. Light that none of the frequencies "
-        "of the look resolves moves a range without any sign of it: neither the error nor "
-        "`outlier_share` has that.",
+        "together, of the median lit pixel; measured is what captures with another specimen of "
+        "noise err by. Planned with margin, by which four of five plans are to reach their target "
+        "([plans](plans.md)), a plan takes longer. Light that none of the frequencies of the look "
+        "resolves moves a range without any sign of it: neither the error nor `outlier_share` has "
+        "that.",
         "",
         *[
             f"![Range error against capture time on {name}](figures/accuracy-{name}-error.png)\n"
@@ -48,23 +69,28 @@ def opening(documents: Documents, machine: str) -> str:
     return "\n".join(lines)
 
 
-def price(document: Mapping[str, Any]) -> str:
-    """State the time from which on the error is below `TARGET_M`, and what rules there."""
-    front = document["front"]
-    reached = [place for place, each in enumerate(front) if _error_m(each) <= TARGET_M]
-    if not reached:
-        if not front:
-            return "nothing is predicted to reach any accuracy."
-        best = front[-1]
-        return (
-            f"5 mm are out of reach; the best is {_error_m(best) * 1e3:.3g} mm in "
-            f"{best['capture_s'] * 1e3:.3g} ms, {_ruled_by(front, len(front) - 1)}."
-        )
-    first = front[reached[0]]
+def priced(front: Front) -> int:
+    """Return the first place of a front with an error below `TARGET_M`, or else the last."""
+    reached = (place for place, each in enumerate(front) if _error_m(each) <= TARGET_M)
+    return next(reached, len(front) - 1)
+
+
+def price(front: Front, measured_m: float) -> str:
+    """State the time from which on the error is below `TARGET_M`, and what rules there.
+
+    Parameters
+    ----------
+    measured_m
+        Error of captures with the choice at `priced`.
+    """
+    place = priced(front)
+    first = front[place]
     sequence = first["sequence"]
+    reached = _error_m(first) <= TARGET_M
+    cost = "at most" if reached else "5 mm are out of reach; the best takes"
     return (
-        f"at most {first['capture_s'] * 1e3:.3g} ms, for {_error_m(first) * 1e3:.3g} mm, "
-        f"{_ruled_by(front, reached[0])} "
+        f"{cost} {first['capture_s'] * 1e3:.3g} ms, for {_error_m(first) * 1e3:.3g} mm "
+        f"(measured {measured_m * 1e3:.3g} mm), {_ruled_by(front, place)} "
         f"(m = {sequence['harmonics']} at {sequence['base_frequency_hz'] / 1e6:g} MHz, "
         f"{first['estimator']})."
     )
@@ -75,8 +101,8 @@ def draw_prices(documents: Documents, folder: Path) -> None:
     figure = Figure(figsize=(7.2, 4.6), layout="constrained")
     FigureCanvasAgg(figure)
     panel = figure.subplots()
-    for name, document in documents.items():
-        front = document["front"]
+    for name, drawn in documents.items():
+        front = drawn.front
         time_s = [each["capture_s"] for each in front]
         panel.plot(time_s, [_error_m(each) for each in front], "o-", label=name)
     panel.axhline(TARGET_M, color="black", linestyle="--", linewidth=1)
@@ -105,7 +131,7 @@ def _error_m(choice: Mapping[str, Any]) -> float:
     return errors_m(choice)[2]
 
 
-def _ruled_by(front: Sequence[Mapping[str, Any]], place: int) -> str:
+def _ruled_by(front: Front, place: int) -> str:
     noise_m, bias_m, _ = errors_m(front[place])
     if bias_m <= noise_m:
         return "noise rules: more time buys accuracy"

@@ -6,10 +6,17 @@ to the folder of ``-o``.
 
 import argparse
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from benchmarks.accuracy.opening import draw_prices, opening, price, replaced
-from benchmarks.accuracy.promises import BUILT_IN, ROOT, SETTINGS, looked, measured
+from benchmarks.accuracy.opening import Drawn, draw_prices, opening, price, priced, replaced
+from benchmarks.accuracy.promises import (
+    BUILT_IN,
+    ROOT,
+    SETTINGS,
+    dimmest_dn_per_s,
+    looked,
+    measured,
+)
 from benchmarks.machine import machine
 from transientcam_driver import Sequence
 from transientcam_experiments.tradeoff.picture import error_picture, saved
@@ -19,17 +26,22 @@ FIGURES = ROOT / "docs" / "figures"
 PAGE = ROOT / "docs" / "accuracy.md"
 PRESENT: Final = Sequence(harmonics=4, zeroth="estimated")
 """The default sequence of the daemon."""
+CAPTURES: Final = 10
 
 
-def drawn(scene: str, folder: Path) -> tuple[str, dict[str, Any]]:
+def drawn(scene: str, folder: Path) -> tuple[str, Drawn]:
     """Draw a scene's picture into a folder; return its name and the figures it shows."""
     name = Path(scene).stem
     planner, statistics = looked(scene)
     document = planner.tradeoff_document(Goal(), statistics)
-    values, device_s, _ = measured(scene, PRESENT, SETTINGS.technique(noise_known=True), 10)
+    values, device_s, _ = measured(scene, PRESENT, SETTINGS.technique(noise_known=True), CAPTURES)
     figure = error_picture(document, name, (device_s, values["error"]))
     (folder / f"accuracy-{name}-error.png").write_bytes(saved(figure, "png"))
-    return name, document
+    front = document["front"]
+    first = front[priced(front)]
+    sequence, dimmest = Sequence.from_document(first["sequence"]), dimmest_dn_per_s(statistics)
+    captured, _, _ = measured(scene, sequence, first["estimator"], CAPTURES, dimmest)
+    return name, Drawn(front, document["summary"], captured["error"])
 
 
 def main() -> None:
@@ -43,9 +55,9 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     documents = {}
     for scene in arguments.scenes or BUILT_IN:
-        name, document = drawn(scene, folder)
-        documents[name] = document
-        print(f"{name}: {price(document)} {document['summary']}", flush=True)
+        name, found = drawn(scene, folder)
+        documents[name] = found
+        print(f"{name}: {price(found.front, found.measured_m)} {found.summary}", flush=True)
     draw_prices(documents, folder)
     if arguments.write:
         text = opening(documents, machine())
