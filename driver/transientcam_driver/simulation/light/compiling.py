@@ -10,6 +10,7 @@ from numba import int32 as numba_int32
 from numba import int64 as numba_int64
 from numba import njit
 from numba import types as numba_types
+from numba import uint16 as numba_uint16
 
 LANES: dict[str, Callable[..., Any]] = {}
 """All lanes that are compiled, by their names."""
@@ -29,6 +30,7 @@ PLANES = float64[:, :, ::1]
 TILES = _types.boolean[:, :, ::1]
 FLAGS = _types.boolean[::1]
 PLACES = int64[::1]
+CODES = _types.Array(numba_uint16, 1, "C")
 NUMBERS = int64[:, ::1]
 AROUND = int32[:, ::1]
 REGION = _types.UniTuple(int64, 4)

@@ -51,8 +51,8 @@ class Lanes:
         ImportError
             Where there is no compiler.
         """
-        for name in ("compiled_edges", "compiled_light"):
-            import_module(f"transientcam_driver.simulation.light.{name}")
+        for name in ("light.compiled_edges", "light.compiled_light", "compiled_images"):
+            import_module(f"transientcam_driver.simulation.{name}")
         from transientcam_driver.simulation.light.compiling import LANES as COMPILED
 
         self._ready = dict(COMPILED)
