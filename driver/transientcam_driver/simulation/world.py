@@ -276,14 +276,14 @@ class World:
             (slice(None), slice(None)) if region is None else region,
             np.float32(0),
             view.reflectance,
-            (scale_e * view.moments(0.0, region).real).astype(np.float32),
+            (scale_e * view.moments(0.0, region).real).astype(np.float32, copy=False),
         )
         if frequency_hz:
             contents = plan.waveform.harmonics(frequency_hz) if plan.waveform else {1: 1.0}
             for k, content in contents.items():
                 factor = scale_e * content * plan.conditions.sub_phase_gain(k)
                 moments = view.moments(k * frequency_hz, region)
-                planes.terms[k] = (factor * moments).astype(np.complex64)
+                planes.terms[k] = (factor * moments).astype(np.complex64, copy=False)
         for effect in plan.on_light:
             effect.on_light(planes)
         return planes

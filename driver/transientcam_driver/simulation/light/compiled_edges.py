@@ -10,9 +10,11 @@ import numpy as np
 
 from transientcam_driver.simulation.light.compiling import (
     AROUND,
+    CHUNK,
     DOUBLES,
     FLAGS,
     LINE,
+    MARKS,
     NUMBERS,
     PLACES,
     PLANE,
@@ -33,8 +35,6 @@ _ZERO, _ONE, _TWO = np.float32(0), np.float32(1), np.float32(2)
 _MEAN_BEND, _CUBE = np.float32(24), np.float32(1.5)
 _LEAST, _GENTLEST = np.float32(1e-9), np.float32(1e-2)
 _NAN, _TINY = np.float32(np.nan), np.float32(1e-12)
-CHUNK = 64
-"""Points at a time, which are mostly beside each other in a row."""
 
 
 @inner
@@ -447,44 +447,92 @@ def shade(
     return blocks
 
 
+@lane(WHOLE, int64)
+def shown_tiles(shown: Plane, side: int) -> Any:
+    """Return tiles (R, C) of pixels whose shares are not all 0."""
+    height, width = shown.shape
+    rows, columns = (height + side - 1) // side, (width + side - 1) // side
+    line, tiles = np.empty(columns * side, float32), np.zeros((rows, columns), np.bool_)
+    for row in range(rows):
+        line[:] = _ZERO
+        for r in range(row * side, min((row + 1) * side, height)):
+            part = shown[r]
+            for i in range(width):
+                line[i] = max(line[i], part[i])
+        put = tiles[row]
+        for c in range(columns):
+            for i in range(c * side, (c + 1) * side):
+                put[c] |= line[i] > _ZERO
+    return tiles
+
+
+@lane(MARKS, int64)
+def grown(tiles: Any, beside: int) -> Any:
+    """Return tiles that are marked, and those up to so many rows and columns beside one."""
+    rows, columns = tiles.shape
+    tall, wide = np.zeros(tiles.shape, np.bool_), np.zeros(tiles.shape, np.bool_)
+    for row in range(rows):
+        put = tall[row]
+        for r in range(max(row - beside, 0), min(row + beside + 1, rows)):
+            part = tiles[r]
+            for c in range(columns):
+                put[c] |= part[c]
+    for row in range(rows):
+        for step in range(-beside, beside + 1):
+            first, after = max(-step, 0), min(columns, columns - step)
+            put, part = wide[row, first:after], tall[row, first + step : after + step]
+            for c in range(len(put)):
+                put[c] |= part[c]
+    return wide
+
+
 @inner
-def _in_shadow(left: Any, shown: Any) -> Any:
-    """Return how many pixels of a row are seen in shadow."""
-    count = 0
+def _shadowed(left: Any, shown: Any) -> Any:
+    """Whether any pixel is seen in shadow, and any such in part."""
+    dark, part = False, False
     for i in range(len(left)):
-        count += (left[i] < _ONE) & (shown[i] > _ZERO)
-    return count
+        dims = (left[i] < _ONE) & (shown[i] > _ZERO)
+        dark |= dims
+        part |= dims & (shown[i] < _ONE)
+    return dark, part
+
+
+@inner
+def _leave(left: Any, shown: Any, light: Any) -> None:
+    """Put the light that is left in pixels that are seen as a whole."""
+    for i in range(len(left)):
+        light[i] = left[i] if shown[i] > _ZERO else _ONE
 
 
 @lane(WHOLE, WHOLE, REGION)
 def dimmed(seen: Plane, left: Plane, of: Any) -> Any:
-    """Return rows and columns of pixels in a region that are seen in shadow, and the light left.
+    """Return the shares of light left in pixels of a region that are seen in shadow, of others 1.
 
-    ``seen`` and ``left`` are shares of all pixels.
+    And whether there are any in successive chunks of each row. ``seen`` and ``left`` are shares of
+    all pixels.
     """
     top, start, height, width = of
     part = left[top : top + height, start : start + width]
-    found, count = np.zeros((height, width // CHUNK + 1), int64), 0
+    light, chunks = np.empty((height, width), float32), (width + CHUNK - 1) // CHUNK
+    dark = np.zeros((height, chunks), np.bool_)
     for row in range(height):
-        line, shown = part[row], seen[top + row, start : start + width]
-        for a in range(0, width, CHUNK):
-            found[row, a // CHUNK] = _in_shadow(line[a : a + CHUNK], shown[a : a + CHUNK])
-            count += found[row, a // CHUNK]
-    places, light, k = np.empty((2, count), int64), np.empty(count, float32), 0
-    for row in range(height):
-        line, shown = part[row], seen[top + row, start : start + width]
-        for c in range(width // CHUNK + 1):
-            if not found[row, c]:
+        # of rows of ``part`` numba does not know that they are contiguous
+        line, shown = left[top + row, start : start + width], seen[top + row, start : start + width]
+        for c in range(chunks):
+            a, b = c * CHUNK, min((c + 1) * CHUNK, width)
+            dark[row, c], mixed = _shadowed(line[a:b], shown[a:b])
+            _leave(line[a:b], shown[a:b], light[row, a:b])
+            if not mixed:
                 continue
-            for column in range(c * CHUNK, min((c + 1) * CHUNK, width)):
-                if not (line[column] < _ONE and shown[column] > _ZERO):
+            for column in range(a, b):
+                share = shown[column]
+                if not (line[column] < _ONE and _ZERO < share < _ONE):
                     continue
-                places[0, k], places[1, k], light[k] = top + row, start + column, _ZERO
+                light[row, column] = _ZERO
                 if line[column] > _ZERO:
                     both = _overlap(seen, part, row, column, of, _ONE)
-                    light[k] = both / max(shown[column], _LEAST)
-                k += 1
-    return places, light
+                    light[row, column] = both / max(share, _LEAST)
+    return light, dark
 
 
 @lane(PLANE)

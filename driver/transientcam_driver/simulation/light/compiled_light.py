@@ -9,8 +9,10 @@ import numpy as np
 
 from transientcam_driver.simulation.light.compiling import (
     AROUND,
+    CHUNK,
     DOUBLES,
     LINE,
+    MARKS,
     NUMBERS,
     PLACES,
     PLANES,
@@ -180,20 +182,40 @@ def received(
     return length_m, irradiance, cosine
 
 
-@lane(WHOLE, WHOLE, NUMBERS, LINE, int64, int64)
-def darkened(moments: Plane, each: Plane, places: Any, left: Any, top: int, start: int) -> None:
+@inner
+def _darken(moments: Any, each: Any, light: Any) -> None:
+    """Do it for a chunk of pixels with one number, or two, each."""
+    if len(moments) == len(light):
+        for i in range(len(light)):
+            moments[i] -= (_ONE - light[i]) * each[i]
+        return
+    for i in range(len(light)):
+        dark = _ONE - light[i]
+        moments[2 * i] -= dark * each[2 * i]
+        moments[2 * i + 1] -= dark * each[2 * i + 1]
+
+
+@lane(WHOLE, WHOLE, WHOLE, MARKS, int64, int64, int64, int64, int64)
+def darkened(
+    moments: Plane, each: Plane, light: Plane, dark: Any, parts: int, top: int, left: int,
+    first: int, start: int,
+) -> None:  # fmt: skip
     """Take from moments the part that a shadow leaves out of those by one chain of mirrors.
 
-    Planes of moments hold real and imaginary parts in turn; the moments begin at a row and a column
-    of all pixels.
+    A moment has so many parts: a real number, or a real and an imaginary one. Shares of light begin
+    at a row and a column of all pixels, and so do the moments.
     """
-    rows, columns = places[0], places[1]
-    for k in range(len(rows)):
-        dark = _ONE - left[k]
-        row, column = rows[k], 2 * columns[k]
-        at = column - 2 * start
-        moments[row - top, at] -= dark * each[row, column]
-        moments[row - top, at + 1] -= dark * each[row, column + 1]
+    width = light.shape[1]
+    for row in range(len(light)):
+        line, of_chain = moments[top + row - first], each[top + row]
+        for c in range(dark.shape[1]):
+            if dark[row, c]:
+                a, b = c * CHUNK, min((c + 1) * CHUNK, width)
+                _darken(
+                    line[parts * (left + a - start) : parts * (left + b - start)],
+                    of_chain[parts * (left + a) : parts * (left + b)],
+                    light[row, a:b],
+                )
 
 
 @lane(WHOLE, PLACES, DOUBLES, LINE, LINE)
@@ -262,18 +284,32 @@ def arrived(
     return delay_s, weight
 
 
+@inner
+def _leave(moments: Any, rest: Any) -> None:
+    """Leave a share of the moments in a row of pixels."""
+    if len(moments) == len(rest):
+        for c in range(len(rest)):
+            moments[c] *= rest[c]
+        return
+    for c in range(len(rest)):
+        moments[2 * c] *= rest[c]
+        moments[2 * c + 1] *= rest[c]
+
+
 @lane(WHOLE, WHOLE, NUMBERS, WHOLE, LINE, int64, int64)
 def layered(
     moments: Plane, uncovered: Plane, places: Any, of_rays: Any, share: Any, top: int, left: int
 ) -> None:
     """Leave of moments what is not covered, and add those of what covers it, by its share."""
-    width = moments.shape[1] // 2
+    parts = of_rays.shape[1]
+    width = moments.shape[1] // parts
     for row in range(moments.shape[0]):
-        line, rest = moments[row], uncovered[top + row, left : left + width]
-        for c in range(len(rest)):
-            line[2 * c] *= rest[c]
-            line[2 * c + 1] *= rest[c]
+        _leave(moments[row], uncovered[top + row, left : left + width])
     rows, columns = places[0], places[1]
+    if parts == 1:
+        for k in range(len(rows)):
+            moments[rows[k] - top, columns[k] - left] += of_rays[k, 0] * share[k]
+        return
     for k in range(len(rows)):
         row, column = rows[k] - top, 2 * (columns[k] - left)
         moments[row, column] += of_rays[k, 0] * share[k]
@@ -291,27 +327,30 @@ def uncover(uncovered: Plane, places: Any, share: Any) -> None:
         uncovered[rows[k], columns[k]] = max(left, _ZERO)
 
 
-@lane(WHOLE, REGION, float32, WHOLE, REGION, float32, WHOLE, REGION)
+@lane(WHOLE, int64, REGION, float32, WHOLE, REGION, float32, WHOLE, REGION)
 def blended(
-    total: Plane, of: Any, one: Any, first: Plane, of_first: Any, other: Any, second: Plane,
-    of_second: Any,
+    total: Plane, parts: int, of: Any, one: Any, first: Plane, of_first: Any, other: Any,
+    second: Plane, of_second: Any,
 ) -> Any:  # fmt: skip
-    """Return moments of a region between two times, from those of the regions that differ then."""
+    """Return moments of a region between two times, from those of the regions that differ then.
+
+    A moment has so many parts.
+    """
     top, left, height, width = of
-    mixed = np.empty((height, 2 * width), float32)
-    then, later = np.empty(2 * width, float32), np.empty(2 * width, float32)
+    mixed = np.empty((height, parts * width), float32)
+    then, later = np.empty(parts * width, float32), np.empty(parts * width, float32)
     for row in range(height):
         r = top + row
-        still = total[r, 2 * left : 2 * (left + width)]
+        still = total[r, parts * left : parts * (left + width)]
         then[:], later[:] = still, still
         place = r - of_first[0]
         if 0 <= place < of_first[2]:
-            shift = 2 * (of_first[1] - left)
-            then[shift : shift + 2 * of_first[3]] = first[place]
+            shift = parts * (of_first[1] - left)
+            then[shift : shift + parts * of_first[3]] = first[place]
         place = r - of_second[0]
         if 0 <= place < of_second[2]:
-            shift = 2 * (of_second[1] - left)
-            later[shift : shift + 2 * of_second[3]] = second[place]
+            shift = parts * (of_second[1] - left)
+            later[shift : shift + parts * of_second[3]] = second[place]
         line = mixed[row]
         for c in range(len(line)):
             line[c] = one * then[c] + other * later[c]

@@ -12,6 +12,8 @@ from numba import njit
 from numba import types as numba_types
 from numba import uint16 as numba_uint16
 
+CHUNK = 64
+"""Points at a time, which are mostly beside each other in a row."""
 LANES: dict[str, Callable[..., Any]] = {}
 """All lanes that are compiled, by their names."""
 
@@ -28,6 +30,7 @@ DOUBLES = float64[::1]
 ROWS = float64[:, ::1]
 PLANES = float64[:, :, ::1]
 TILES = _types.boolean[:, :, ::1]
+MARKS = _types.boolean[:, ::1]
 FLAGS = _types.boolean[::1]
 PLACES = int64[::1]
 CODES = _types.Array(numba_uint16, 1, "C")

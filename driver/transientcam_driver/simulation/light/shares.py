@@ -59,12 +59,40 @@ def seen(
     return share, at
 
 
-def shade(shapes: list[Shape], bundle: Bundle, left: Plane, *, soft: bool) -> list[Region]:
+def shown_tiles(shown: Plane) -> NDArray[np.bool_] | None:
+    """Return tiles (R, C) in which anything is shown, given shares of all pixels; None for all."""
+    lane = LANES.find("shown_tiles")
+    if lane is None:
+        return None
+    tiles: NDArray[np.bool_] = lane(shown, TILE)
+    return tiles
+
+
+def grown_tiles(tiles: NDArray[np.bool_] | None, pixels: int) -> NDArray[np.bool_] | None:
+    """Return tiles, and those up to so many pixels from one."""
+    lane = LANES.find("grown")
+    if tiles is None or lane is None:
+        return None
+    grown: NDArray[np.bool_] = lane(tiles, -(-pixels // TILE))
+    return grown
+
+
+def shade(
+    shapes: list[Shape],
+    bundle: Bundle,
+    left: Plane,
+    shows: NDArray[np.bool_] | None,
+    *,
+    soft: bool,
+) -> list[Region]:
     """Take from shares (H, W) of light what shapes block; return the regions of those that do.
 
-    Light is blocked on a bundle's lines between two of their points.
+    Light is blocked on a bundle's lines between two of their points. It matters in tiles (R, C)
+    that show it.
     """
     tiles, regions = bundle.meeting(shapes)
+    if shows is not None:
+        tiles &= shows
     lane = LANES.find("shade")
     axes = axes_of(shapes)
     if lane is not None and soft and len(axes) == len(shapes):

@@ -18,7 +18,7 @@ from transientcam_driver.simulation.light.paths import (
     sparse_image,
 )
 from transientcam_driver.simulation.light.rays import rays_within
-from transientcam_driver.simulation.responses import Scatter, SparseResponses
+from transientcam_driver.simulation.responses import Moments, Scatter, SparseResponses
 from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene
 
@@ -75,7 +75,7 @@ class StillLight:
         """Pixels, by index, that are the mean over several rays."""
         if noise is not None:
             self.mixed = np.flatnonzero(self._differs(noise, highest_hz))
-        self._phasors: dict[float, tuple[NDArray[np.complex64], NDArray[np.complex64]]] = {}
+        self._phasors: dict[float, tuple[Moments, Moments]] = {}
 
     @property
     def pixel_rad(self) -> float:
@@ -116,7 +116,7 @@ class StillLight:
             point[self.mixed[more]] = self.fine.point[of_ray]
         return on, point
 
-    def phasors(self, frequency_hz: float) -> tuple[NDArray[np.complex64], NDArray[np.complex64]]:
+    def phasors(self, frequency_hz: float) -> tuple[Moments, Moments]:
         """Moments (K, H, W) by chain of mirrors, and (H, W) in all."""
         if frequency_hz not in self._phasors:
             each = self.lit.phasors(frequency_hz, self.lit.scatter(self.scene))
@@ -125,7 +125,11 @@ class StillLight:
                 each[:, self.mixed] = fine.reshape(len(each), -1, len(self.mixed)).mean(axis=1)
             each = each.reshape(-1, self.height, self.width)
             total = each.sum(axis=0)
-            self._phasors[frequency_hz] = each.astype(np.complex64), total.astype(np.complex64)
+            self._phasors[frequency_hz] = (
+                (each.astype(np.complex64), total.astype(np.complex64))
+                if frequency_hz
+                else (each.real.astype(np.float32), total.real.astype(np.float32))
+            )
         return self._phasors[frequency_hz]
 
     @cached_property
