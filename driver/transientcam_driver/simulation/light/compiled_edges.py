@@ -24,9 +24,11 @@ from transientcam_driver.simulation.light.compiling import (
     TILES,
     WHOLE,
     float32,
+    float64,
     inner,
     int64,
     lane,
+    without_nan,
 )
 
 Plane = Any
@@ -34,6 +36,7 @@ Plane = Any
 _ZERO, _ONE, _TWO = np.float32(0), np.float32(1), np.float32(2)
 _MEAN_BEND, _CUBE = np.float32(24), np.float32(1.5)
 _LEAST, _GENTLEST = np.float32(1e-9), np.float32(1e-2)
+_HALF, _SURELY, _ROUNDED = np.float32(0.5), np.float32(1.001), np.float32(1e-5)
 _NAN, _TINY = np.float32(np.nan), np.float32(1e-12)
 
 
@@ -604,20 +607,62 @@ def reach(beside: Any) -> Any:
     return reached, rim
 
 
+@without_nan
+def _bounds(values: Any) -> Any:
+    """Return the least and the greatest of a chunk."""
+    least = greatest = values[0]
+    for i in range(len(values)):
+        least, greatest = min(least, values[i]), max(greatest, values[i])
+    return least, greatest
+
+
+@lane(LINE, LINE, LINE)
+def boxes(x: Any, y: Any, z: Any) -> Any:
+    """Return boxes (6, C) around successive chunks of points: lowest coordinates, then highest."""
+    count = len(x)
+    chunks = (count + CHUNK - 1) // CHUNK
+    found = np.empty((6, chunks), float32)
+    for c in range(chunks):
+        a, b = c * CHUNK, min((c + 1) * CHUNK, count)
+        found[0, c], found[3, c] = _bounds(x[a:b])
+        found[1, c], found[4, c] = _bounds(y[a:b])
+        found[2, c], found[5, c] = _bounds(z[a:b])
+    return found
+
+
+@inner
+def _may_meet(ball: Any, low: Any, high: Any, may: Any) -> None:
+    """Put whether any line from an apex up to a point in a box may meet an ellipsoid.
+
+    Where the ellipsoid is a unit sphere, the box is within a sphere: lines to all its points are
+    no farther from the one to the middle than its radius.
+    """
+    x, y, z = low
+    u, v, w = high
+    away = ball[3] * ball[3] + ball[4] * ball[4] + ball[5] * ball[5]
+    for c in range(len(may)):
+        a, b, d = _HALF * ball[0] * (x[c] + u[c]), _HALF * ball[1] * (y[c] + v[c]), _HALF * ball[2] * (z[c] + w[c])
+        e, f, g = _HALF * ball[0] * (u[c] - x[c]), _HALF * ball[1] * (v[c] - y[c]), _HALF * ball[2] * (w[c] - z[c])
+        middle = a * a + b * b + d * d
+        along = -(a * ball[3] + b * ball[4] + d * ball[5])
+        t = min(max(along / (middle + _TINY), _ZERO), _ONE)
+        squared = away - _TWO * t * along + t * t * middle
+        limit = _ONE + np.sqrt(e * e + f * f + g * g)
+        may[c] = squared < _SURELY * limit * limit + _ROUNDED * (away + middle)
+
+
 @inner
 def _cross_points(
     ball: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any, own: Any, values: Any
-) -> bool:
-    """Put where lines to points of other surfaces meet an ellipsoid; whether any does."""
-    met = 0
+) -> Any:
+    """Put where lines to points of other surfaces meet an ellipsoid; return how many do."""
     for i in range(len(x)):
         squared, along = _squared(ball, x[i], y[i], z[i]), _along(ball, x[i], y[i], z[i])
         value, at = along * (along / squared) + ball[6], -(along / squared)
         counts = (at > near[i] + touching) & (at < _ONE - touching) & (index[i] != own)
-        met += counts & (value > _ZERO)
         away = (at - _ONE) * np.sqrt(squared)
         values[i] = value if counts & (not away * away < value) else _NAN
-    return met > 0
+    return _above(values)
 
 
 @inner
@@ -629,28 +674,91 @@ def _above(values: Any) -> Any:
     return count
 
 
-@lane(PLANES, DOUBLES, PLACES, LINE, LINE, LINE, LINE, float32, PLACES, AROUND, NUMBERS, LINE)
+@inner
+def _cross_chunk(ball: Any, c: int, lines: Any, own: Any, values: Any) -> Any:
+    """Do it for a chunk of them."""
+    x, y, z, near, touching, index = lines
+    a, b = c * CHUNK, min((c + 1) * CHUNK, len(x))
+    return _cross_points(
+        ball, x[a:b], y[a:b], z[a:b], near[a:b], touching, index[a:b], own, values[a:b]
+    )
+
+
+@inner
+def _cross_beside(
+    ball: Any, c: int, around: Any, lines: Any, own: Any, values: Any, known: Any
+) -> None:
+    """Do it for a chunk, and for those with neighbours of its points, where it is not done yet."""
+    if not known[c]:
+        _cross_chunk(ball, c, lines, own, values)
+        known[c] = True
+    for side in range(4):
+        for i in range(c * CHUNK, min((c + 1) * CHUNK, len(values) - 1)):
+            beside = around[side, i] // CHUNK
+            if not known[beside]:
+                _cross_chunk(ball, beside, lines, own, values)
+                known[beside] = True
+
+
+@inner
+def _any_other(index: Any, own: Any) -> bool:
+    """Whether any point is on another surface."""
+    if index[0] != own:
+        return True
+    found = False
+    for i in range(len(index)):
+        found |= index[i] != own
+    return found
+
+
+@inner
+def _any_beside(values: Any, around: Any, a: int, b: int) -> bool:
+    """Whether any neighbour of points is above 0."""
+    found = False
+    for side in range(4):
+        places = around[side, a:b]
+        for i in range(len(places)):
+            found |= values[places[i]] > _ZERO
+    return found
+
+
+@lane(
+    PLANES, DOUBLES, PLACES, LINE, LINE, LINE, LINE, float32, PLACES, AROUND, NUMBERS, WHOLE, LINE
+)
 def dim_softly(
     axes: Any, apex: Any, owns: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any,
-    around: Any, reach: Any, clear: Any,
+    around: Any, reach: Any, boxes: Any, clear: Any,
 ) -> None:  # fmt: skip
     """Take from the light at points what ellipsoids cover of the pixels around them.
 
-    Only chunks of points in and beside which a line meets an ellipsoid have any share.
+    Only chunks of points in and beside which a line meets an ellipsoid have any share, and only
+    those with a box that lines may meet one before are looked at. Boxes are of the ways (x, y, z).
     """
     count, chunks = len(x), len(reach)
-    values, counts = np.empty(count + 1, float32), np.zeros(chunks + 1, int64)
-    values[count] = _NAN
+    values, counts = np.full(count + 1, _NAN, float32), np.zeros(chunks + 1, int64)
+    known, stale = np.ones(chunks + 1, np.bool_), np.zeros(chunks, np.bool_)
+    lines = x, y, z, near, touching, index
+    low, high = (boxes[0], boxes[1], boxes[2]), (boxes[3], boxes[4], boxes[5])
     for n in range(len(axes)):
         ball = _ball(axes[n], apex)
-        if not _cross_points(ball, x, y, z, near, touching, index, owns[n], values):
-            continue
+        _may_meet(ball, low, high, known[:chunks])
         for c in range(chunks):
-            counts[c + 1] = counts[c] + _above(values[c * CHUNK : min((c + 1) * CHUNK, count)])
+            a, b = c * CHUNK, min((c + 1) * CHUNK, count)
+            counts[c + 1] = counts[c]
+            known[c] = known[c] and _any_other(index[a:b], owns[n])
+            if known[c]:
+                counts[c + 1] += _cross_chunk(ball, c, lines, owns[n], values)
+            elif stale[c]:
+                values[a:b] = _NAN
         for c in range(chunks):
-            if _reaches(counts, reach, c):
-                for i in range(c * CHUNK, min((c + 1) * CHUNK, count)):
+            a, b = c * CHUNK, min((c + 1) * CHUNK, count)
+            if not _reaches(counts, reach, c):
+                continue
+            if counts[c + 1] > counts[c] or _any_beside(values, around, a, b):
+                _cross_beside(ball, c, around, lines, owns[n], values, known)
+                for i in range(a, b):
                     clear[i] *= _ONE - _share_among(values, around, i)
+        stale[:] = known[:chunks]
 
 
 @lane(WHOLE, LINE, LINE, LINE, LINE, float32, PLACES, int64, LINE)

@@ -4,6 +4,7 @@ The same as ``paths.light_on_ends``, for the many points that are lit anew for e
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ from transientcam_driver.simulation.scene.geometry import (
 from transientcam_driver.simulation.scene.scene import Scene, Surface
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Segment:
     """Lines ``apex + t way`` that light comes along to points at t = 1, from ``near`` on.
 
@@ -53,12 +54,21 @@ class Segment:
         way = np.stack(self.way, axis=-1).astype(np.float64)
         return self.apex + way, self.apex + self.near[:, None] * way
 
+    @cached_property
+    def boxes(self) -> NDArray[np.float32]:
+        """Lowest and highest coordinates (6, C) of ways of successive chunks of points, or all."""
+        lane = LANES.find("boxes")
+        if lane is None:
+            ends = *(w.min() for w in self.way), *(w.max() for w in self.way)
+            return np.array(ends, dtype=np.float32)[:, None]
+        boxes: NDArray[np.float32] = lane(*self.way)
+        return boxes
+
     @property
     def box(self) -> tuple[Points, Points]:
         """Lowest and highest coordinates, up to the apex."""
-        low = np.array([min(float(w.min()), 0.0) for w in self.way])
-        high = np.array([max(float(w.max()), 0.0) for w in self.way])
-        return self.apex + low, self.apex + high
+        low, high = self.boxes[:3].min(axis=1), self.boxes[3:].max(axis=1)
+        return self.apex + np.minimum(low, 0.0), self.apex + np.maximum(high, 0.0)
 
 
 _Lines = tuple[tuple[Plane, Plane, Plane], Plane, tuple[Plane, Plane, Plane]]
@@ -244,8 +254,8 @@ class Ends:
         if lane is None or len(axes) != len(soft):
             return near
         if soft:
-            line = *segment.way, segment.near, TOUCHING, index
-            lane(axes, segment.apex, np.array(soft), *line, around.beside, around.reach[0], clear)
+            line = *segment.way, segment.near, TOUCHING, index, around.beside, around.reach[0]
+            lane(axes, segment.apex, np.array(soft), *line, segment.boxes, clear)
         return [k for k in near if k not in movers]
 
     def _normals(self) -> tuple[Plane, Plane, Plane]:
