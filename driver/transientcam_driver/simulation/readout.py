@@ -77,13 +77,15 @@ class _OnePass:
     ) -> None:
         """Put the codes of pixels with few electrons, and of those with noise from the tails."""
         bins, outermost = of
-        rare = np.union1d(few, outermost)
-        signal = exposure.signal.reshape(-1)[rare]
+        light = np.full(outermost.size, self._of_light, np.float32)
+        if few.size:
+            place = np.minimum(np.searchsorted(few, outermost), few.size - 1)
+            light[few[place] == outermost] = 0
+        rare = np.concatenate([few, outermost])  # of places that are in both, the latter count
         noise = quantiles()[bins[rare]]
-        tails = np.searchsorted(rare, outermost)
-        noise[tails] = drawn_tails(exposure.random, noise[tails])
-        variance_e2 = signal * np.float32(self._of_light)
-        variance_e2[np.searchsorted(rare, few)] = 0
+        noise[few.size :] = drawn_tails(exposure.random, noise[few.size :])
+        signal = exposure.signal.reshape(-1)[rare]
+        variance_e2 = signal * np.concatenate([np.zeros(few.size, np.float32), light])
         part = Exposure(signal + noise * np.sqrt(variance_e2 + self._variance_e2), exposure.random)
         self._quantisation.apply(part)
         codes[rare] = part.signal

@@ -202,11 +202,23 @@ def _axes(plate: Any) -> Any:
 
 
 @inner
-def _inside_row(ball: Any, x: Any, y: Any, z: Any, inside: Any) -> Any:
-    """Cross a row of lines with an ellipsoid; return the span of those that meet it."""
+def _row(plane: Plane, row: int) -> Any:
+    """Return a row of a plane; of one that holds a single row, that one stands for all."""
+    return plane[min(row, len(plane) - 1)]
+
+
+@inner
+def _cross_row(ball: Any, x: Any, y: Any, z: Any, inside: Any, at: Any) -> Any:
+    """Cross a row of lines with an ellipsoid; return the span of those that meet it.
+
+    Put the t at which they enter it, but for pixels at its border.
+    """
     for i in range(len(x)):
-        along = _along(ball, x[i], y[i], z[i])
-        inside[i] = along * (along / _squared(ball, x[i], y[i], z[i])) + ball[6]
+        squared, along = _squared(ball, x[i], y[i], z[i]), _along(ball, x[i], y[i], z[i])
+        closest = along / squared
+        value = along * closest + ball[6]
+        inside[i] = value
+        at[i] = -closest - np.sqrt(max(value, _ZERO)) / np.sqrt(squared)
     first, after = 0, len(x)
     while first < after and not inside[first] > _ZERO:
         first += 1
@@ -216,24 +228,17 @@ def _inside_row(ball: Any, x: Any, y: Any, z: Any, inside: Any) -> Any:
 
 
 @inner
-def _entered_row(ball: Any, x: Any, y: Any, z: Any, inside: Any, at: Any) -> None:
-    """Put the t at which lines enter an ellipsoid in a row, but for pixels at its border."""
-    for i in range(len(x)):
-        squared = _squared(ball, x[i], y[i], z[i])
-        root = np.sqrt(max(inside[i], _ZERO))
-        at[i] = -(_along(ball, x[i], y[i], z[i]) / squared) - root / np.sqrt(squared)
-
-
-@inner
-def _cross(ball: Any, x: Plane, y: Plane, z: Plane, of: Any, inside: Plane, spans: Any) -> None:
+def _cross(
+    ball: Any, x: Plane, y: Plane, z: Plane, of: Any, inside: Plane, at: Plane, spans: Any
+) -> None:
     """Cross the lines of a region; row by row, put where pixels may be covered in ``spans``."""
     top, left, height, width = of
     right = left + width
     met = np.empty((height, 2), int64)
     for row in range(height):
         r = top + row
-        met[row, 0], met[row, 1] = _inside_row(
-            ball, x[r, left:right], y[r, left:right], z[r, left:right], inside[row]
+        met[row, 0], met[row, 1] = _cross_row(
+            ball, x[r, left:right], y[r, left:right], z[r, left:right], inside[row], at[row]
         )
     for row in range(height):
         first, after = met[row, 0] - 1, met[row, 1] + 1
@@ -255,24 +260,25 @@ def seen(
     axes: Any, apex: Any, x: Plane, y: Plane, z: Plane, near: Plane, far: Plane, fills: Plane,
     of: Any,
 ) -> Any:  # fmt: skip
-    """Return shares of pixels that show an ellipsoid, and where their lines enter it."""
+    """Return shares of pixels that show an ellipsoid, and where their lines enter it.
+
+    Of planes of one row, all rows are alike.
+    """
     top, left, height, width = of
-    ball, right = _ball(axes, apex), left + width
+    ball = _ball(axes, apex)
     inside, at = np.empty((height, width), float32), np.empty((height, width), float32)
     share, spans = np.zeros((height, width), float32), np.empty((height, 2), int64)
     border = np.zeros(width, np.bool_)
-    _cross(ball, x, y, z, of, inside, spans)
+    _cross(ball, x, y, z, of, inside, at, spans)
     for row in range(height):
         r, start, end = top + row, spans[row, 0], spans[row, 1]
-        _entered_row(
-            ball, x[r, left:right], y[r, left:right], z[r, left:right], inside[row], at[row]
-        )
         if start >= end:
             continue
         _mark(inside, row, start, end, border)
+        since, until, full = _row(near, r), _row(far, r), _row(fills, r)
+        a, b = left + start, left + end
         _show(
-            at[row, start:end], inside[row, start:end], near[r, left + start : left + end],
-            far[r, left + start : left + end], fills[r, left + start : left + end],
+            at[row, start:end], inside[row, start:end], since[a:b], until[a:b], full[a:b],
             share[row, start:end],
         )  # fmt: skip
         for column in range(start, end):
@@ -282,8 +288,8 @@ def seen(
                 squared = _squared(ball, x[r, c], y[r, c], z[r, c])
                 closest = -(_along(ball, x[r, c], y[r, c], z[r, c]) / squared)
                 at[row, column] = closest - root / np.sqrt(squared)
-                shows = at[row, column] > near[r, c] and at[row, column] < far[r, c]
-                share[row, column] = part * fills[r, c] if shows else _ZERO
+                shows = at[row, column] > since[c] and at[row, column] < until[c]
+                share[row, column] = part * full[c] if shows else _ZERO
     return share, at
 
 
@@ -396,17 +402,18 @@ def _shade(
     for run in runs:
         first, end = run[2], run[3]
         for row in range(run[0], run[1]):
-            r, a, b = top + row, start + first, start + end
+            since, until = _row(near, top + row), _row(far, top + row)
             _mark(inside, row, first, end, marks)
             found |= _block(
-                inside[row, first:end], closest[row, first:end], near[r, a:b], far[r, a:b],
+                inside[row, first:end], closest[row, first:end],
+                since[start + first : start + end], until[start + first : start + end],
                 touching, share[row, first:end],
             )  # fmt: skip
             for column in range(first, end):
                 if marks[column]:
                     at, c = closest[row, column], start + column
                     part = _share(inside, row, column)[0]
-                    between = at > near[r, c] + touching and at < far[r, c] * (_ONE - touching)
+                    between = at > since[c] + touching and at < until[c] * (_ONE - touching)
                     share[row, column] = part if between else _ZERO
                     found |= share[row, column] > _ZERO
                     border[count, 0], border[count, 1] = row, column

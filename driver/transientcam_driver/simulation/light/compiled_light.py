@@ -119,19 +119,18 @@ def points(
 @lane(PLACES, PLACES, int64, int64, int64, int64)
 def around(rows: Any, columns: Any, top: int, left: int, height: int, width: int) -> Any:
     """Return what is around points in a region of an image."""
-    count = len(rows)
-    place = np.empty((height + 2, width + 2), int32)
-    for row in range(height + 2):
-        line = place[row]
-        for i in range(width + 2):
-            line[i] = count
+    count, wide = len(rows), width + 2
+    place = np.full((height + 2) * wide, count, int32)
+    at, beside = np.empty(count, int32), np.empty((4, count), int32)
     for i in range(count):
-        place[rows[i] - top + 1, columns[i] - left + 1] = i
-    beside = np.empty((4, count), int32)
+        at[i] = (rows[i] - top + 1) * wide + columns[i] - left + 1
     for i in range(count):
-        row, column = rows[i] - top + 1, columns[i] - left + 1
-        beside[0, i], beside[1, i] = place[row - 1, column], place[row + 1, column]
-        beside[2, i], beside[3, i] = place[row, column - 1], place[row, column + 1]
+        place[at[i]] = i
+    above, below, before, after = beside[0], beside[1], beside[2], beside[3]
+    for i in range(count):
+        middle = at[i]
+        above[i], below[i] = place[middle - wide], place[middle + wide]
+        before[i], after[i] = place[middle - 1], place[middle + 1]
     return beside
 
 

@@ -58,7 +58,7 @@ class _Seen:
     @property
     def count(self) -> int:
         """How many pixels show it."""
-        return int(np.count_nonzero(self.share != 0))
+        return int(np.count_nonzero(self.share))
 
     def put_points(self, start: int, places: NDArray[np.intp], lines: NDArray[np.float32]) -> None:
         """Put what is known of its pixels into the columns from one on.

@@ -43,7 +43,7 @@ def seen(
 ) -> tuple[Plane, Plane]:
     """Return shares (h, w) of what ``fills`` pixels that show a shape, and the t of its front.
 
-    ``fills`` (H, W) are shares of all pixels.
+    ``fills`` are shares of all pixels, (H, W), or (1, W) where all are the same.
     """
     lane = LANES.find("seen")
     if lane is not None and soft and isinstance(shape, Ellipsoid):
@@ -54,7 +54,7 @@ def seen(
     cross = crossing(shape, bundle.apex, way)
     share, root = _share(cross, soft=soft, rooted=True)
     at = cross.entered(root)
-    share *= fills[region]
+    share *= np.broadcast_to(fills, bundle.way[0].shape)[region]
     share[~((at > near) & (at < far))] = 0
     return share, at
 

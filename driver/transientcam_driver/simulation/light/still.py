@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.effects.glimpses import Noise
-from transientcam_driver.simulation.light.bundle import Bundle
+from transientcam_driver.simulation.light.bundle import Bundle, plane_of
 from transientcam_driver.simulation.light.coverage import Plane, covered, crossing
 from transientcam_driver.simulation.light.followed import FollowedRays
 from transientcam_driver.simulation.light.paths import (
@@ -32,7 +32,7 @@ class Sight:
     Attributes
     ----------
     fills
-        (H, W) share of each pixel that the last mirror fills.
+        (H, W) share of each pixel that the last mirror fills; (1, W) where all are the same.
     throughput
         Share of the light that the mirrors leave.
     """
@@ -193,7 +193,7 @@ class StillLight:
                 near=near.reshape(shape),
                 far=far.reshape(shape),
             )
-            sights.append(Sight(bundle, fills, throughput))
+            sights.append(Sight(bundle, plane_of(fills, shape), throughput))
             if bounces == self.scene.mirror_bounces:
                 continue
             for k in np.unique(which[np.isfinite(nearest)]):
