@@ -26,7 +26,8 @@ class Quadratures:
     def of(cls, planes: LightPlanes) -> "Quadratures":
         """Take planes apart; a copy of it has contiguous ones."""
         terms = tuple((k, term.real, term.imag) for k, term in planes.terms.items())
-        return cls(planes.constant, planes.mean + planes.constant, terms)
+        dark = isinstance(planes.constant, np.float32) and not planes.constant
+        return cls(planes.constant, planes.mean if dark else planes.mean + planes.constant, terms)
 
     def at(self, phasors: dict[int, complex], *, illumination: bool) -> Plane:
         """Electrons of an image, given exp(i k theta) of each harmonic."""

@@ -95,25 +95,44 @@ def met(axes: Any, apex: Any, frame: Any, low: Any, high: Any, lowest: Any, high
     return tiles, spans
 
 
+@inner
+def _put_run(share: Any, at: Any, way: Any, apex: Any, k: int, lines: Any) -> None:
+    """Put what is known of successive pixels of a row into columns from one on."""
+    for axis in range(3):
+        each, start = way[axis], apex[axis]
+        points, ways = lines[2 + axis, k : k + len(at)], lines[5 + axis, k : k + len(at)]
+        for i in range(len(at)):
+            points[i], ways[i] = each[i] * at[i] + start, each[i]
+    shares, t = lines[0, k : k + len(at)], lines[1, k : k + len(at)]
+    for i in range(len(at)):
+        shares[i], t[i] = share[i], at[i]
+
+
 @lane(WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, int64, int64, LINE, int64, NUMBERS, WHOLE)
 def points(
     share: Plane, at: Plane, x: Plane, y: Plane, z: Plane, top: int, left: int, apex: Any,
     start: int, places: Any, lines: Any,
 ) -> None:  # fmt: skip
     """Put rows, columns, shares, t, points and ways of the pixels that show a surface."""
-    a, b, c, k = apex[0], apex[1], apex[2], start
+    k, width = start, share.shape[1]
     for row in range(share.shape[0]):
-        shown, r = share[row], row + top
-        for column in range(len(shown)):
+        shown, r, column = share[row], row + top, 0
+        while column < width:
             if shown[column] == _ZERO:
+                column += 1
                 continue
-            s, t = column + left, at[row, column]
-            u, v, w = x[r, s], y[r, s], z[r, s]
-            places[0, k], places[1, k] = r, s
-            lines[0, k], lines[1, k] = shown[column], t
-            lines[2, k], lines[3, k], lines[4, k] = u * t + a, v * t + b, w * t + c
-            lines[5, k], lines[6, k], lines[7, k] = u, v, w
-            k += 1
+            first = column
+            while column < width and shown[column] != _ZERO:
+                column += 1
+            a, b, after = first + left, column + left, k + column - first
+            rows, columns = places[0, k:after], places[1, k:after]
+            for i in range(len(rows)):
+                rows[i], columns[i] = r, a + i
+            _put_run(
+                shown[first:column], at[row, first:column], (x[r, a:b], y[r, a:b], z[r, a:b]),
+                apex, k, lines,
+            )  # fmt: skip
+            k = after
 
 
 @lane(PLACES, PLACES, int64, int64, int64, int64)
@@ -215,6 +234,15 @@ def darkened(
                     of_chain[parts * (left + a) : parts * (left + b)],
                     light[row, a:b],
                 )
+
+
+@lane(DOUBLES, float64)
+def phases(delay_s: Any, angular_hz: Any) -> Any:
+    """Return phases of light with some times of flight."""
+    phase_rad = np.empty(len(delay_s), float32)
+    for i in range(len(delay_s)):
+        phase_rad[i] = angular_hz * delay_s[i]
+    return phase_rad
 
 
 @lane(WHOLE, PLACES, DOUBLES, LINE, LINE)

@@ -126,9 +126,10 @@ class Ends:
         normal = self._normals()
         facing, reflectance = self._returned(normal)
         glossy = any(surface.gloss for surface in self.surfaces)
+        every, whole = np.arange(len(self.index)), np.ones(len(self.index), dtype=np.float32)
         ways: list[tuple[int, Way]] = []
         for k, light in enumerate(lights):
-            on, shown, beside, segments = _ways(light, self.point, around)
+            on, shown, beside, segments = _ways(light, (every, whole), self.point, around)
             if not on.size:
                 continue
             sent = reflectance
@@ -204,7 +205,7 @@ class Ends:
             irradiance = np.maximum(facing, 0) / (length_m * length_m * length_m)
             cosine = -(way[0] * axis[0] + way[1] * axis[1] + way[2] * axis[2]) / length_m
         if self.still.light.beam_exponent:
-            irradiance *= beam(self.still.light, cosine).astype(np.float32)
+            irradiance *= beam(self.still.light, cosine).astype(np.float32, copy=False)
         return single(length_m), single(irradiance)
 
     def _clear(
@@ -259,7 +260,7 @@ class Ends:
         return [k for k in near if k not in movers]
 
     def _normals(self) -> tuple[Plane, Plane, Plane]:
-        starts = np.flatnonzero(np.diff(self.index, prepend=-1))
+        starts = np.append(0, np.flatnonzero(self.index[1:] != self.index[:-1]) + 1)
         shapes = [self.surfaces[self.index[start]].shape for start in starts]
         lane = LANES.find("upright")
         balls = [(*each.centre, *each.radii**2) for each in shapes if isinstance(each, Ellipsoid)]
@@ -334,14 +335,17 @@ def _dimmed(shape: Shape, segment: Segment, of: tuple[NDArray[np.intp], int], cl
 
 
 def _ways(
-    light: ImageLight, point: tuple[Plane, Plane, Plane], around: Around | None
+    light: ImageLight,
+    every: tuple[NDArray[np.intp], Plane],
+    point: tuple[Plane, Plane, Plane],
+    around: Around | None,
 ) -> tuple[NDArray[np.intp], Plane, Around | None, list[Segment]]:
     """Return the points that a chain of mirrors shows the light to, and its ways to them.
 
     Between the two, the share of the pixel around each point to which it does, and what is around.
+    ``every``: all points, and all of the pixels around them.
     """
-    on = np.arange(len(point[0]))
-    share = np.ones(len(on), dtype=np.float32)
+    on, share = every
     segments: list[Segment] = []
     start, last = point, None
     for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):

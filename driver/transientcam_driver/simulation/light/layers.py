@@ -169,7 +169,7 @@ class MovingResponses:
         of_rays = np.zeros(layers.places.shape[1], dtype=np.complex64)
         lane = LANES.find("turned")
         for _chain, way in layers.lit.ways:
-            phase_rad = (2 * np.pi * frequency_hz * way.delay_s).astype(np.float32)
+            phase_rad = _phases(way.delay_s, 2 * np.pi * frequency_hz)
             cosine, sine = np.cos(phase_rad), np.sin(phase_rad)
             if lane is not None:
                 pairs = of_rays.view(np.float32).reshape(-1, 2)
@@ -275,6 +275,14 @@ def uncovered_by(layers: Layers | None, shape: tuple[int, int]) -> Plane:
         uncovered[rows, columns] -= layers.share[part]
     np.maximum(uncovered, 0, out=uncovered)  # what rounding leaves
     return uncovered
+
+
+def _phases(delay_s: NDArray[np.float64], angular_hz: float) -> NDArray[np.float32]:
+    lane = LANES.find("phases")
+    if lane is None:
+        return (angular_hz * delay_s).astype(np.float32)
+    phase_rad: NDArray[np.float32] = lane(delay_s, angular_hz)
+    return phase_rad
 
 
 def _darken(moments: Moments, region: Region, dimmed: _Dimmed, each: Moments) -> None:
