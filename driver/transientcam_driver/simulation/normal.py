@@ -33,9 +33,7 @@ def drawn_bins(random: np.random.Generator, count: int) -> NDArray[np.uint16]:
     return words.view(np.uint16)[:count]
 
 
-def drawn_tails(
-    random: np.random.Generator, outermost: NDArray[np.float32]
-) -> NDArray[np.float32]:
+def drawn_tails(random: np.random.Generator, outermost: NDArray[np.float32]) -> NDArray[np.float32]:
     """Draw numbers from the tails that the quantiles of outermost bins are in."""
     numbers = [math.copysign(_from_tail(random), each) for each in outermost]
     return np.array(numbers, dtype=np.float32)

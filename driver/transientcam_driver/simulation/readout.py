@@ -102,7 +102,7 @@ def _stages(effects: list[ImageEffect]) -> tuple[Stage, ...]:
 
 
 def _split(stages: tuple[Stage, ...]) -> tuple[tuple[Stage, ...], _OnePass | None]:
-    """Return the stages before noise, and what draws and rounds it at once if nothing is between."""
+    """Return the stages before noise, and what draws it and rounds at once, if it can."""
     noisy = [k for k, stage in enumerate(stages) if stage.adds_variance]
     last = stages[-1] if stages else None
     if not noisy or noisy[-1] != len(stages) - 3 or not isinstance(last, Quantisation):

@@ -16,6 +16,7 @@ from transientcam_driver.handle import Response
 Moments = NDArray[np.complex64] | NDArray[np.float32]
 """In single precision; at 0 Hz they are real numbers."""
 
+
 class Responses(Protocol):
     """Impulse responses g(tau) of H x W pixels."""
 

@@ -14,7 +14,6 @@ from transientcam_driver.simulation.light.compiling import (
     DOUBLES,
     FLAGS,
     LINE,
-    MARKS,
     NUMBERS,
     PLACES,
     PLANE,
@@ -24,11 +23,9 @@ from transientcam_driver.simulation.light.compiling import (
     TILES,
     WHOLE,
     float32,
-    float64,
     inner,
     int64,
     lane,
-    without_nan,
 )
 
 Plane = Any
@@ -457,45 +454,6 @@ def shade(
     return blocks
 
 
-@lane(WHOLE, int64)
-def shown_tiles(shown: Plane, side: int) -> Any:
-    """Return tiles (R, C) of pixels whose shares are not all 0."""
-    height, width = shown.shape
-    rows, columns = (height + side - 1) // side, (width + side - 1) // side
-    line, tiles = np.empty(columns * side, float32), np.zeros((rows, columns), np.bool_)
-    for row in range(rows):
-        line[:] = _ZERO
-        for r in range(row * side, min((row + 1) * side, height)):
-            part = shown[r]
-            for i in range(width):
-                line[i] = max(line[i], part[i])
-        put = tiles[row]
-        for c in range(columns):
-            for i in range(c * side, (c + 1) * side):
-                put[c] |= line[i] > _ZERO
-    return tiles
-
-
-@lane(MARKS, int64)
-def grown(tiles: Any, beside: int) -> Any:
-    """Return tiles that are marked, and those up to so many rows and columns beside one."""
-    rows, columns = tiles.shape
-    tall, wide = np.zeros(tiles.shape, np.bool_), np.zeros(tiles.shape, np.bool_)
-    for row in range(rows):
-        put = tall[row]
-        for r in range(max(row - beside, 0), min(row + beside + 1, rows)):
-            part = tiles[r]
-            for c in range(columns):
-                put[c] |= part[c]
-    for row in range(rows):
-        for step in range(-beside, beside + 1):
-            first, after = max(-step, 0), min(columns, columns - step)
-            put, part = wide[row, first:after], tall[row, first + step : after + step]
-            for c in range(len(put)):
-                put[c] |= part[c]
-    return wide
-
-
 @inner
 def _shadowed(left: Any, shown: Any) -> Any:
     """Whether any pixel is seen in shadow, and any such in part."""
@@ -591,52 +549,6 @@ def _reaches_none_but(counts: Any, reach: Any, c: int) -> Any:
     return _reaches(counts, reach, c) == all_of
 
 
-@lane(AROUND)
-def reach(beside: Any) -> Any:
-    """Return chunks of the points beside those of each chunk, and which points lack neighbours.
-
-    Of those above, below, left and right, the first chunk, and the one after the last.
-    """
-    count = beside.shape[1]
-    chunks = (count + CHUNK - 1) // CHUNK
-    reached, rim = np.zeros((chunks, 8), int64), np.zeros(count, np.bool_)
-    for c in range(chunks):
-        start, stop = c * CHUNK, min((c + 1) * CHUNK, count)
-        alone = rim[start:stop]
-        for k in range(4):
-            places, first, last = beside[k, start:stop], count, -1
-            for i in range(len(places)):
-                none = places[i] == count
-                first, last = min(first, places[i]), max(last, -1 if none else places[i])
-                alone[i] |= none
-            if last >= 0:
-                reached[c, 2 * k], reached[c, 2 * k + 1] = first // CHUNK, last // CHUNK + 1
-    return reached, rim
-
-
-@without_nan
-def _bounds(values: Any) -> Any:
-    """Return the least and the greatest of a chunk."""
-    least = greatest = values[0]
-    for i in range(len(values)):
-        least, greatest = min(least, values[i]), max(greatest, values[i])
-    return least, greatest
-
-
-@lane(LINE, LINE, LINE)
-def boxes(x: Any, y: Any, z: Any) -> Any:
-    """Return boxes (6, C) around successive chunks of points: lowest coordinates, then highest."""
-    count = len(x)
-    chunks = (count + CHUNK - 1) // CHUNK
-    found = np.empty((6, chunks), float32)
-    for c in range(chunks):
-        a, b = c * CHUNK, min((c + 1) * CHUNK, count)
-        found[0, c], found[3, c] = _bounds(x[a:b])
-        found[1, c], found[4, c] = _bounds(y[a:b])
-        found[2, c], found[5, c] = _bounds(z[a:b])
-    return found
-
-
 @inner
 def _may_meet(ball: Any, low: Any, high: Any, may: Any) -> None:
     """Put whether any line from an apex up to a point in a box may meet an ellipsoid.
@@ -648,8 +560,16 @@ def _may_meet(ball: Any, low: Any, high: Any, may: Any) -> None:
     u, v, w = high
     away = ball[3] * ball[3] + ball[4] * ball[4] + ball[5] * ball[5]
     for c in range(len(may)):
-        a, b, d = _HALF * ball[0] * (x[c] + u[c]), _HALF * ball[1] * (y[c] + v[c]), _HALF * ball[2] * (z[c] + w[c])
-        e, f, g = _HALF * ball[0] * (u[c] - x[c]), _HALF * ball[1] * (v[c] - y[c]), _HALF * ball[2] * (w[c] - z[c])
+        a, b, d = (
+            _HALF * ball[0] * (x[c] + u[c]),
+            _HALF * ball[1] * (y[c] + v[c]),
+            _HALF * ball[2] * (z[c] + w[c]),
+        )
+        e, f, g = (
+            _HALF * ball[0] * (u[c] - x[c]),
+            _HALF * ball[1] * (v[c] - y[c]),
+            _HALF * ball[2] * (w[c] - z[c]),
+        )
         middle = a * a + b * b + d * d
         along = -(a * ball[3] + b * ball[4] + d * ball[5])
         t = min(max(along / (middle + _TINY), _ZERO), _ONE)
@@ -719,11 +639,15 @@ def _any_other(index: Any, own: Any) -> bool:
 
 
 @inner
-def _any_beside(values: Any, around: Any, a: int, b: int) -> bool:
-    """Whether any neighbour of points is above 0."""
+def _any_beside(values: Any, around: Any, counts: Any, reach: Any, c: int) -> bool:
+    """Whether any point of a chunk, or any neighbour of such, is above 0."""
+    if counts[c + 1] > counts[c]:
+        return True
     found = False
     for side in range(4):
-        places = around[side, a:b]
+        if counts[reach[c, 2 * side + 1]] == counts[reach[c, 2 * side]]:
+            continue
+        places = around[side, c * CHUNK : min((c + 1) * CHUNK, len(values) - 1)]
         for i in range(len(places)):
             found |= values[places[i]] > _ZERO
     return found
@@ -761,7 +685,7 @@ def dim_softly(
             a, b = c * CHUNK, min((c + 1) * CHUNK, count)
             if not _reaches(counts, reach, c):
                 continue
-            if counts[c + 1] > counts[c] or _any_beside(values, around, a, b):
+            if _any_beside(values, around, counts, reach, c):
                 _cross_beside(ball, c, around, lines, owns[n], values, known)
                 for i in range(a, b):
                     clear[i] *= _ONE - _share_among(values, around, i)
@@ -807,7 +731,12 @@ def _show_points(values: Any, around: Any, reach: Any, rim: Any, share: Any) -> 
         both[c + 1] = both[c] + (on == b - a and beside == b - a)
     for c in range(chunks):
         a, b = c * CHUNK, min((c + 1) * CHUNK, count)
-        if not (_reaches(along, reach, c) and _reaches(across, reach, c)):
+        if not (
+            _reaches(along, reach, c)
+            and _reaches(across, reach, c)
+            and _any_beside(first, around, along, reach, c)
+            and _any_beside(second, around, across, reach, c)
+        ):
             share[a:b] = _ZERO
             continue
         amid = _reaches_none_but(both, reach, c)

@@ -1,4 +1,4 @@
-"""Points that are seen, the light on them, and moments: compiled arithmetic without edges.
+"""The light on points, and moments: compiled arithmetic without edges.
 
 Bytes are those of the statements in NumPy, as in `compiled_edges`.
 """
@@ -8,21 +8,17 @@ from typing import Any
 import numpy as np
 
 from transientcam_driver.simulation.light.compiling import (
-    AROUND,
     CHUNK,
     DOUBLES,
     LINE,
     MARKS,
     NUMBERS,
     PLACES,
-    PLANES,
     REGION,
-    ROWS,
     WHOLE,
     float32,
     float64,
     inner,
-    int32,
     int64,
     lane,
 )
@@ -30,142 +26,6 @@ from transientcam_driver.simulation.light.compiling import (
 Plane = Any
 """A float32 array as numba compiles it."""
 _ZERO, _ONE = np.float32(0), np.float32(1)
-_CLEAR = 1e-9  # as in Ellipsoid.tangents
-
-
-@inner
-def _times(one: Any, other: Any) -> Any:
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
-
-
-@inner
-def _tangents(away: Any, radii: Any, middle: Any, across: Any) -> Any:
-    """Return what `Ellipsoid.tangents` does, of one that is so far away."""
-    along, aside = _times(away, middle), _times(away, across)
-    along_m, across_m = radii * middle, radii * across
-    a = along * along - _times(along_m, along_m)
-    if along <= 0 or a <= _CLEAR:
-        return -np.inf, np.inf
-    b = along * aside - _times(along_m, across_m)
-    c = aside * aside - _times(across_m, across_m)
-    root = np.sqrt(max(b * b - a * c, 0.0))
-    return (b - root) / a, (b + root) / a
-
-
-@inner
-def _met_row(tiles: Any, low: Any, high: Any, down: Any, up: Any, of: Any) -> Any:
-    """Mark the tiles of a row; return the first, and the one after the last."""
-    width = len(tiles)
-    for k in range(width):
-        across = (low[k] <= of[1]) & (high[k] >= of[0])
-        tiles[k] = across & (down[k] <= of[3]) & (up[k] >= of[2])
-    first, after = 0, width
-    while first < after and not tiles[first]:
-        first += 1
-    while after > first and not tiles[after - 1]:
-        after -= 1
-    return first, after
-
-
-@lane(PLANES, DOUBLES, ROWS, PLANES, PLANES, ROWS, ROWS)
-def met(axes: Any, apex: Any, frame: Any, low: Any, high: Any, lowest: Any, highest: Any) -> Any:
-    """Return tiles whose lines may meet ellipsoids, and their spans of rows and of columns."""
-    count, height, width = len(axes), low.shape[1], low.shape[2]
-    tiles = np.zeros((count, height, width), np.bool_)
-    spans = np.zeros((count, 4), int64)
-    for n in range(count):
-        away, radii = axes[n, 0] - apex, axes[n, 1]
-        first, last = _tangents(away, radii, frame[0], frame[1])
-        start, end = _tangents(away, radii, frame[0], frame[2])
-        top, bottom, left, right = height, 0, width, 0
-        for row in range(height):
-            if lowest[0, row] > last or highest[0, row] < first:
-                continue
-            if lowest[1, row] > end or highest[1, row] < start:
-                continue
-            found = _met_row(
-                tiles[n, row], low[0, row], high[0, row], low[1, row], high[1, row],
-                (first, last, start, end),
-            )  # fmt: skip
-            if found[0] < found[1]:
-                top, bottom = min(top, row), row + 1
-                left, right = min(left, found[0]), max(right, found[1])
-        if bottom:
-            spans[n, 0], spans[n, 1], spans[n, 2], spans[n, 3] = top, bottom, left, right
-    return tiles, spans
-
-
-@inner
-def _put_run(share: Any, at: Any, way: Any, apex: Any, k: int, lines: Any) -> None:
-    """Put what is known of successive pixels of a row into columns from one on."""
-    for axis in range(3):
-        each, start = way[axis], apex[axis]
-        points, ways = lines[2 + axis, k : k + len(at)], lines[5 + axis, k : k + len(at)]
-        for i in range(len(at)):
-            points[i], ways[i] = each[i] * at[i] + start, each[i]
-    shares, t = lines[0, k : k + len(at)], lines[1, k : k + len(at)]
-    for i in range(len(at)):
-        shares[i], t[i] = share[i], at[i]
-
-
-@lane(WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, int64, int64, LINE, int64, NUMBERS, WHOLE)
-def points(
-    share: Plane, at: Plane, x: Plane, y: Plane, z: Plane, top: int, left: int, apex: Any,
-    start: int, places: Any, lines: Any,
-) -> None:  # fmt: skip
-    """Put rows, columns, shares, t, points and ways of the pixels that show a surface."""
-    k, width = start, share.shape[1]
-    for row in range(share.shape[0]):
-        shown, r, column = share[row], row + top, 0
-        while column < width:
-            if shown[column] == _ZERO:
-                column += 1
-                continue
-            first = column
-            while column < width and shown[column] != _ZERO:
-                column += 1
-            a, b, after = first + left, column + left, k + column - first
-            rows, columns = places[0, k:after], places[1, k:after]
-            for i in range(len(rows)):
-                rows[i], columns[i] = r, a + i
-            _put_run(
-                shown[first:column], at[row, first:column], (x[r, a:b], y[r, a:b], z[r, a:b]),
-                apex, k, lines,
-            )  # fmt: skip
-            k = after
-
-
-@lane(PLACES, PLACES, int64, int64, int64, int64)
-def around(rows: Any, columns: Any, top: int, left: int, height: int, width: int) -> Any:
-    """Return what is around points in a region of an image."""
-    count, wide = len(rows), width + 2
-    place = np.full((height + 2) * wide, count, int32)
-    at, beside = np.empty(count, int32), np.empty((4, count), int32)
-    for i in range(count):
-        at[i] = (rows[i] - top + 1) * wide + columns[i] - left + 1
-    for i in range(count):
-        place[at[i]] = i
-    above, below, before, after = beside[0], beside[1], beside[2], beside[3]
-    for i in range(count):
-        middle = at[i]
-        above[i], below[i] = place[middle - wide], place[middle + wide]
-        before[i], after[i] = place[middle - 1], place[middle + 1]
-    return beside
-
-
-@lane(PLACES, AROUND)
-def among(on: Any, beside: Any) -> Any:
-    """Return what is beside some of the points, by their own indices."""
-    place = np.empty(beside.shape[1] + 1, int32)
-    for k in range(len(place)):
-        place[k] = len(on)
-    for k in range(len(on)):
-        place[on[k]] = k
-    found = np.empty((4, len(on)), int32)
-    for side in range(4):
-        for k in range(len(on)):
-            found[side, k] = place[beside[side, on[k]]]
-    return found
 
 
 @inner

@@ -35,13 +35,14 @@ from transientcam_driver.simulation.scene.scene import Scene, Surface
 class Segment:
     """Lines ``apex + t way`` that light comes along to points at t = 1, from ``near`` on.
 
-    ``mirror`` is the one that the points lie on, if they do.
+    ``mirror`` is the one that the points lie on, if they do, and ``known`` the boxes if they are.
     """
 
     apex: Points
     way: tuple[Plane, Plane, Plane]
     near: Plane
     mirror: Surface | None
+    known: NDArray[np.float32] | None = None
 
     def of(self, kept: NDArray[np.intp]) -> "Segment":
         """Return the lines of some of the points."""
@@ -57,12 +58,7 @@ class Segment:
     @cached_property
     def boxes(self) -> NDArray[np.float32]:
         """Lowest and highest coordinates (6, C) of ways of successive chunks of points, or all."""
-        lane = LANES.find("boxes")
-        if lane is None:
-            ends = *(w.min() for w in self.way), *(w.max() for w in self.way)
-            return np.array(ends, dtype=np.float32)[:, None]
-        boxes: NDArray[np.float32] = lane(*self.way)
-        return boxes
+        return _boxes(self.way) if self.known is None else self.known
 
     @property
     def box(self) -> tuple[Points, Points]:
@@ -127,9 +123,10 @@ class Ends:
         facing, reflectance = self._returned(normal)
         glossy = any(surface.gloss for surface in self.surfaces)
         every, whole = np.arange(len(self.index)), np.ones(len(self.index), dtype=np.float32)
+        boxes = _boxes(self.point)
         ways: list[tuple[int, Way]] = []
         for k, light in enumerate(lights):
-            on, shown, beside, segments = _ways(light, (every, whole), self.point, around)
+            on, shown, beside, segments = _ways(light, (every, whole, boxes), self.point, around)
             if not on.size:
                 continue
             sent = reflectance
@@ -336,16 +333,17 @@ def _dimmed(shape: Shape, segment: Segment, of: tuple[NDArray[np.intp], int], cl
 
 def _ways(
     light: ImageLight,
-    every: tuple[NDArray[np.intp], Plane],
+    every: tuple[NDArray[np.intp], Plane, NDArray[np.float32]],
     point: tuple[Plane, Plane, Plane],
     around: Around | None,
 ) -> tuple[NDArray[np.intp], Plane, Around | None, list[Segment]]:
     """Return the points that a chain of mirrors shows the light to, and its ways to them.
 
     Between the two, the share of the pixel around each point to which it does, and what is around.
-    ``every``: all points, and all of the pixels around them.
+    ``every``: all points, all of the pixels around them, and boxes around chunks of them.
     """
-    on, share = every
+    on, share, boxes = every
+    known: NDArray[np.float32] | None = boxes
     segments: list[Segment] = []
     start, last = point, None
     for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
@@ -353,16 +351,19 @@ def _ways(
         if not kept.size:
             return kept, part, around, []
         if len(kept) < len(on):  # mostly few points, or all
+            known = None
             on, share = on[kept], share[kept]
             around = around if around is None else among(kept, around)
             segments = [each.of(kept) for each in segments]
         share = share * part
-        segments.append(Segment(image_m, way, at, last))
+        segments.append(Segment(image_m, way, at, last, _boxes_from(image_m, known)))
+        known = None
         start = met
         last = mirror
     lamp = light.positions_m[-1]
     none = np.zeros(len(on), dtype=np.float32)
-    return on, share, around, [*segments, Segment(lamp, _from(lamp, start), none, last)]
+    straight = Segment(lamp, _from(lamp, start), none, last, _boxes_from(lamp, known))
+    return on, share, around, [*segments, straight]
 
 
 def _shown(
@@ -394,6 +395,23 @@ def _shown(
 def _from(apex: Points, point: tuple[Plane, ...]) -> tuple[Plane, Plane, Plane]:
     x, y, z = (p - np.float32(a) for p, a in zip(point, apex, strict=True))
     return x, y, z
+
+
+def _boxes(points: tuple[Plane, Plane, Plane]) -> NDArray[np.float32]:
+    """Lowest and highest coordinates (6, C) of successive chunks of points, or of all."""
+    lane = LANES.find("boxes")
+    if lane is None:
+        ends = *(each.min() for each in points), *(each.max() for each in points)
+        return np.array(ends, dtype=np.float32)[:, None]
+    boxes: NDArray[np.float32] = lane(*points)
+    return boxes
+
+
+def _boxes_from(apex: Points, boxes: NDArray[np.float32] | None) -> NDArray[np.float32] | None:
+    """Return the boxes of the ways from an apex to points, given those of the points."""
+    if boxes is None:
+        return None
+    return boxes - np.tile(apex.astype(np.float32), 2)[:, None]
 
 
 def _moved(apex: Points, way: tuple[Plane, ...]) -> tuple[Plane, Plane, Plane]:

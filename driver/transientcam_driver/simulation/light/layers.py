@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.light.bundle import Region, inside, numbers
-from transientcam_driver.simulation.light.coverage import Plane, overlapped, single
+from transientcam_driver.simulation.light.coverage import Plane, overlapped
 from transientcam_driver.simulation.light.ends import LitEnds
 from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.light.paths import Lit, scatter_of, sparse_image
@@ -17,6 +17,7 @@ from transientcam_driver.simulation.responses import Moments, Scatter, SparseRes
 from transientcam_driver.simulation.scene.scene import Scene
 
 Values = NDArray[np.float64]
+
 
 @dataclass(frozen=True, slots=True)
 class Layers:

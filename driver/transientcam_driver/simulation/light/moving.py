@@ -119,9 +119,7 @@ class MovingLight:
         uncovered = uncovered_by(layers, (self.still.height, self.still.width))
         shows = shown_tiles(uncovered)
         shadows = [
-            shadow
-            for k in range(len(self._chains))
-            if (shadow := self._shadow(shapes, k, shows))
+            shadow for k in range(len(self._chains)) if (shadow := self._shadow(shapes, k, shows))
         ]
         region = union([*(each.region for each in visible), *(each.region for each in shadows)])
         return MovingResponses(self.still, scene, layers, uncovered, shadows, region)

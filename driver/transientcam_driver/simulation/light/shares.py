@@ -31,7 +31,7 @@ class Around:
 
     @cached_property
     def reach(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-        """Where the neighbours of successive points are, for lanes: see `compiled_edges.reach`."""
+        """Where the neighbours of successive points are, for lanes: see `compiled_chunks.reach`."""
         lane = LANES.find("reach")
         assert lane is not None  # noqa: S101  (lanes are made ready together)
         reach, rim = lane(self.beside)
