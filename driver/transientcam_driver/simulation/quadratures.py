@@ -26,7 +26,7 @@ class Quadratures:
     def of(cls, planes: LightPlanes) -> "Quadratures":
         """Take planes apart; a copy of it has contiguous ones."""
         terms = tuple((k, term.real, term.imag) for k, term in planes.terms.items())
-        dark = isinstance(planes.constant, np.float32) and not planes.constant
+        dark = not np.ndim(planes.constant) and not planes.constant
         return cls(planes.constant, planes.mean if dark else planes.mean + planes.constant, terms)
 
     def at(self, phasors: dict[int, complex], *, illumination: bool) -> Plane:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.handle import Response
 
-Moments = NDArray[np.complex64] | NDArray[np.float32]
+Moments = NDArray[np.complex64 | np.float32]
 """In single precision; at 0 Hz they are real numbers."""
 
 

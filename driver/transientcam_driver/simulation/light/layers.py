@@ -296,6 +296,6 @@ def _darken(moments: Moments, region: Region, dimmed: _Dimmed, each: Moments) ->
         lane(*planes, parts, top, left, region[0].start, region[1].start)
         return
     rows, columns = dimmed.places
-    part = inside(dimmed.region, region)
+    part = moments[inside(dimmed.region, region)]
     taken = (1 - dimmed.light[rows, columns]) * each[dimmed.region][rows, columns]
-    moments[part][rows, columns] -= taken
+    part[rows, columns] = part[rows, columns] - taken

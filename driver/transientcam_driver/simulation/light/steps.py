@@ -135,7 +135,7 @@ class Between:
             plane = total.view(np.float32)
             of = plane, plane.shape[1] // total.shape[1], numbers(region)
             mixed: NDArray[np.float32] = lane(*of, *chain.from_iterable(parts))
-            return mixed.view(total.dtype)
+            return mixed.view(np.complex64) if frequency_hz else mixed
         moments = np.float32(one) * first.moments_in(region, frequency_hz)
         moments += np.float32(other) * second.moments_in(region, frequency_hz)
         return moments
