@@ -58,7 +58,7 @@ class _Dimmed:
 
     @property
     def places(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Rows and columns in the region of the pixels that have not all; rounding may add to it."""
+        """Rows and columns in the region of pixels that have not all; rounding may add to it."""
         rows, columns = np.nonzero(self.light != 1)
         return rows, columns
 
