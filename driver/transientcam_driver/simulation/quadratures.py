@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from transientcam_driver.simulation.effects.effect import LightPlanes
 from transientcam_driver.simulation.light import View
 from transientcam_driver.simulation.light.bundle import Region, holds
+from transientcam_driver.simulation.light.lanes import LANES
 
 Plane = NDArray[np.float32]
 
@@ -25,12 +26,20 @@ class Quadratures:
     def of(cls, planes: LightPlanes) -> "Quadratures":
         """Take planes apart; a copy of it has contiguous ones."""
         terms = tuple((k, term.real, term.imag) for k, term in planes.terms.items())
-        return cls(planes.constant, planes.mean + planes.constant, terms)
+        dark = not np.ndim(planes.constant) and not planes.constant
+        return cls(planes.constant, planes.mean if dark else planes.mean + planes.constant, terms)
 
     def at(self, phasors: dict[int, complex], *, illumination: bool) -> Plane:
         """Electrons of an image, given exp(i k theta) of each harmonic."""
         if not illumination:
             return np.zeros_like(self.offset) + self.constant
+        lane = LANES.find("at_phase")
+        if lane is not None and len(self.terms) == 1:
+            ((k, *planes),) = self.terms
+            turned: Plane = lane(
+                self.offset, *planes, np.float32(phasors[k].real), np.float32(phasors[k].imag)
+            )
+            return turned
         electrons = self.offset.copy()
         for k, in_phase, quadrature in self.terms:
             electrons += in_phase * np.float32(phasors[k].real)

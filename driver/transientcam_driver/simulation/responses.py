@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 from transientcam_driver.handle import Response
 
+Moments = NDArray[np.complex64 | np.float32]
+"""In single precision; at 0 Hz they are real numbers."""
+
 
 class Responses(Protocol):
     """Impulse responses g(tau) of H x W pixels."""

@@ -23,11 +23,9 @@ from transientcam_driver.simulation.effects.effect import (
     ImageEffect,
     LightEffect,
     LightPlanes,
-    NormalDraw,
     PlaneEffect,
     Shot,
     ShotEffect,
-    Stage,
 )
 from transientcam_driver.simulation.effects.modulation_harmonics import ModulationHarmonics
 from transientcam_driver.simulation.effects.motion import MotionDuringSequence
@@ -36,6 +34,7 @@ from transientcam_driver.simulation.imperfections import IDEAL, PINHOLE, DeviceP
 from transientcam_driver.simulation.light import Scenery, View, Views, Wanted
 from transientcam_driver.simulation.light.bundle import Region
 from transientcam_driver.simulation.quadratures import Canvas, Quadratures
+from transientcam_driver.simulation.readout import ReadOut
 
 _AMBIENT_C = 25.0
 
@@ -56,7 +55,7 @@ class _Plan:
     waveform: ModulationHarmonics | None
     on_light: tuple[PlaneEffect, ...]
     on_shot: tuple[ShotEffect, ...]
-    stages: tuple[Stage, ...]
+    read_out: ReadOut
     view: View | None = None
     time_s: float = 0.0
     quadratures: dict[int, Quadratures] = field(default_factory=dict)
@@ -140,7 +139,7 @@ class World:
             next((each for each in made if isinstance(each, ModulationHarmonics)), None),
             tuple(each for each in made if isinstance(each, PlaneEffect)),
             tuple(each for each in made if isinstance(each, ShotEffect)),
-            _stages([each for each in made if isinstance(each, ImageEffect)]),
+            ReadOut([each for each in made if isinstance(each, ImageEffect)]),
         )
         if not self._scenery.moves:  # all at once, rather than during the first exposures
             for harmonic in self._plan.frequencies_hz:
@@ -150,10 +149,7 @@ class World:
         """Expose and read one image: 1/2 (b_0 + Re(b_j G_1 exp(-i theta))), then the effects."""
         random = np.random.Generator(np.random.SFC64(np.random.SeedSequence((self._seed, number))))
         mean_e = self.mean_image_e(label, number=number, device_time_s=device_time_s)
-        exposure = Exposure(mean_e, random)
-        for stage in self._configured().stages:
-            stage.apply(exposure)
-        return exposure.signal.astype(np.uint16)
+        return self._configured().read_out.codes(Exposure(mean_e, random))
 
     def mean_image_e(
         self, label: ImageLabel, *, number: int, device_time_s: float
@@ -280,14 +276,14 @@ class World:
             (slice(None), slice(None)) if region is None else region,
             np.float32(0),
             view.reflectance,
-            (scale_e * view.moments(0.0, region).real).astype(np.float32),
+            (scale_e * view.moments(0.0, region).real).astype(np.float32, copy=False),
         )
         if frequency_hz:
             contents = plan.waveform.harmonics(frequency_hz) if plan.waveform else {1: 1.0}
             for k, content in contents.items():
                 factor = scale_e * content * plan.conditions.sub_phase_gain(k)
                 moments = view.moments(k * frequency_hz, region)
-                planes.terms[k] = (factor * moments).astype(np.complex64)
+                planes.terms[k] = (factor * moments).astype(np.complex64, copy=False)
         for effect in plan.on_light:
             effect.on_light(planes)
         return planes
@@ -307,13 +303,3 @@ class World:
     def _configured(self) -> _Plan:
         assert self._plan is not None, "no sequence committed"  # noqa: S101  (the firmware configures first)
         return self._plan
-
-
-def _stages(effects: list[ImageEffect]) -> tuple[Stage, ...]:
-    """Insert one draw of noise behind the stages that add to its variance."""
-    stages: list[Stage] = []
-    for effect in effects:
-        if stages and stages[-1].adds_variance and not effect.adds_variance:
-            stages.append(NormalDraw())
-        stages.append(effect)
-    return tuple(stages)

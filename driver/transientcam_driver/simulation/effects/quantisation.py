@@ -19,9 +19,9 @@ class Quantisation(ImageEffect):
 
     def __init__(self, conditions: Conditions) -> None:
         super().__init__(conditions)
-        self._dn_per_e = np.float32(1 / conditions.sensor.gain_e_per_dn)
-        self._dark_dn = np.float32(conditions.sensor.dark_dn)
-        self._highest_dn = np.float32(conditions.sensor.highest_dn)
+        self.dn_per_e = np.float32(1 / conditions.sensor.gain_e_per_dn)
+        self.dark_dn = np.float32(conditions.sensor.dark_dn)
+        self.highest_dn = np.float32(conditions.sensor.highest_dn)
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
@@ -33,7 +33,7 @@ class Quantisation(ImageEffect):
     def apply(self, exposure: Exposure) -> None:
         """Turn electrons into codes."""
         image = exposure.signal
-        image *= self._dn_per_e
-        image += self._dark_dn
+        image *= self.dn_per_e
+        image += self.dark_dn
         np.rint(image, out=image)
-        np.clip(image, np.float32(0), self._highest_dn, out=image)
+        np.clip(image, np.float32(0), self.highest_dn, out=image)

@@ -19,7 +19,7 @@ class ReadNoise(ImageEffect):
 
     def __init__(self, conditions: Conditions) -> None:
         super().__init__(conditions)
-        self._variance_e2 = np.float32(conditions.sensor.read_noise_e**2)
+        self.variance_e2 = np.float32(conditions.sensor.read_noise_e**2)
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
@@ -35,4 +35,4 @@ class ReadNoise(ImageEffect):
 
     def apply(self, exposure: Exposure) -> None:
         """Add its variance."""
-        exposure.variance_e2 = exposure.variance_e2 + self._variance_e2
+        exposure.variance_e2 = exposure.variance_e2 + self.variance_e2

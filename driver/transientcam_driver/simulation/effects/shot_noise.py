@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from transientcam_driver.simulation.effects.conditions import Call, Conditions, always
 from transientcam_driver.simulation.effects.effect import Exposure, ImageEffect
@@ -37,11 +38,15 @@ class ShotNoise(ImageEffect):
 
     def apply(self, exposure: Exposure) -> None:
         """Draw few electrons one by one; give many their variance."""
-        signal = exposure.signal
-        few = np.flatnonzero(signal < FEW_E)
-        exposure.variance_e2 = exposure.variance_e2 + signal
+        few = np.flatnonzero(exposure.signal < FEW_E)
+        exposure.variance_e2 = exposure.variance_e2 + exposure.signal
         if few.size:
-            flat, variance_e2 = signal.reshape(-1), exposure.variance_e2.reshape(-1)
-            variance_e2[few] -= flat[few]
-            lit = few[flat[few] > 0]
-            flat[lit] = exposure.random.poisson(flat[lit])
+            exposure.variance_e2.reshape(-1)[few] -= exposure.signal.reshape(-1)[few]
+            draw_few(exposure, few)
+
+
+def draw_few(exposure: Exposure, few: NDArray[np.intp]) -> None:
+    """Draw the electrons of some pixels, by rising index, one by one."""
+    flat = exposure.signal.reshape(-1)
+    lit = few[flat[few] > 0]
+    flat[lit] = exposure.random.poisson(flat[lit])

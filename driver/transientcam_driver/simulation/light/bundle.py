@@ -27,7 +27,7 @@ class Bundle:
     Attributes
     ----------
     near
-        (H, W) t from which a line counts; it counts up to ``far``.
+        (H, W) t from which a line counts; it counts up to ``far``. (1, W) where all are the same.
     frame
         (3, 3) the middle line, and two unit vectors across it.
     low, high
@@ -67,8 +67,8 @@ class Bundle:
         return cls(
             apex,
             (x, y, z),
-            np.broadcast_to(np.asarray(near, dtype=np.float32), counts.shape).copy(),
-            np.broadcast_to(np.asarray(far, dtype=np.float32), counts.shape).copy(),
+            plane_of(near, counts.shape),
+            plane_of(far, counts.shape),
             frame,
             low,
             high,
@@ -111,7 +111,16 @@ class Bundle:
     def within(self, region: Region) -> tuple[tuple[Plane, Plane, Plane], Plane, Plane]:
         """Return the ways of a region's lines, and from where to where they count."""
         x, y, z = (each[region] for each in self.way)
-        return (x, y, z), self.near[region], self.far[region]
+        near, far = (np.broadcast_to(each, self.way[0].shape) for each in (self.near, self.far))
+        return (x, y, z), near[region], far[region]
+
+
+def plane_of(values: NDArray[np.floating] | np.floating | float, shape: tuple[int, ...]) -> Plane:
+    """Return a plane (H, W) in single precision; (1, W) if all values are the same."""
+    plane = np.broadcast_to(np.asarray(values, dtype=np.float32), shape)
+    if plane.size and (plane == plane[0, 0]).all():
+        return plane[:1].copy()
+    return plane.copy()
 
 
 def _span(tiles: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from transientcam_driver.simulation.light.compiling import (
     AROUND,
+    CHUNK,
     DOUBLES,
     FLAGS,
     LINE,
@@ -32,9 +33,8 @@ Plane = Any
 _ZERO, _ONE, _TWO = np.float32(0), np.float32(1), np.float32(2)
 _MEAN_BEND, _CUBE = np.float32(24), np.float32(1.5)
 _LEAST, _GENTLEST = np.float32(1e-9), np.float32(1e-2)
+_HALF, _SURELY, _ROUNDED = np.float32(0.5), np.float32(1.001), np.float32(1e-5)
 _NAN, _TINY = np.float32(np.nan), np.float32(1e-12)
-CHUNK = 64
-"""Points at a time, which are mostly beside each other in a row."""
 
 
 @inner
@@ -199,11 +199,23 @@ def _axes(plate: Any) -> Any:
 
 
 @inner
-def _inside_row(ball: Any, x: Any, y: Any, z: Any, inside: Any) -> Any:
-    """Cross a row of lines with an ellipsoid; return the span of those that meet it."""
+def _row(plane: Plane, row: int) -> Any:
+    """Return a row of a plane; of one that holds a single row, that one stands for all."""
+    return plane[min(row, len(plane) - 1)]
+
+
+@inner
+def _cross_row(ball: Any, x: Any, y: Any, z: Any, inside: Any, at: Any) -> Any:
+    """Cross a row of lines with an ellipsoid; return the span of those that meet it.
+
+    Put the t at which they enter it, but for pixels at its border.
+    """
     for i in range(len(x)):
-        along = _along(ball, x[i], y[i], z[i])
-        inside[i] = along * (along / _squared(ball, x[i], y[i], z[i])) + ball[6]
+        squared, along = _squared(ball, x[i], y[i], z[i]), _along(ball, x[i], y[i], z[i])
+        closest = along / squared
+        value = along * closest + ball[6]
+        inside[i] = value
+        at[i] = -closest - np.sqrt(max(value, _ZERO)) / np.sqrt(squared)
     first, after = 0, len(x)
     while first < after and not inside[first] > _ZERO:
         first += 1
@@ -213,24 +225,17 @@ def _inside_row(ball: Any, x: Any, y: Any, z: Any, inside: Any) -> Any:
 
 
 @inner
-def _entered_row(ball: Any, x: Any, y: Any, z: Any, inside: Any, at: Any) -> None:
-    """Put the t at which lines enter an ellipsoid in a row, but for pixels at its border."""
-    for i in range(len(x)):
-        squared = _squared(ball, x[i], y[i], z[i])
-        root = np.sqrt(max(inside[i], _ZERO))
-        at[i] = -(_along(ball, x[i], y[i], z[i]) / squared) - root / np.sqrt(squared)
-
-
-@inner
-def _cross(ball: Any, x: Plane, y: Plane, z: Plane, of: Any, inside: Plane, spans: Any) -> None:
+def _cross(
+    ball: Any, x: Plane, y: Plane, z: Plane, of: Any, inside: Plane, at: Plane, spans: Any
+) -> None:
     """Cross the lines of a region; row by row, put where pixels may be covered in ``spans``."""
     top, left, height, width = of
     right = left + width
     met = np.empty((height, 2), int64)
     for row in range(height):
         r = top + row
-        met[row, 0], met[row, 1] = _inside_row(
-            ball, x[r, left:right], y[r, left:right], z[r, left:right], inside[row]
+        met[row, 0], met[row, 1] = _cross_row(
+            ball, x[r, left:right], y[r, left:right], z[r, left:right], inside[row], at[row]
         )
     for row in range(height):
         first, after = met[row, 0] - 1, met[row, 1] + 1
@@ -252,24 +257,25 @@ def seen(
     axes: Any, apex: Any, x: Plane, y: Plane, z: Plane, near: Plane, far: Plane, fills: Plane,
     of: Any,
 ) -> Any:  # fmt: skip
-    """Return shares of pixels that show an ellipsoid, and where their lines enter it."""
+    """Return shares of pixels that show an ellipsoid, and where their lines enter it.
+
+    Of planes of one row, all rows are alike.
+    """
     top, left, height, width = of
-    ball, right = _ball(axes, apex), left + width
+    ball = _ball(axes, apex)
     inside, at = np.empty((height, width), float32), np.empty((height, width), float32)
     share, spans = np.zeros((height, width), float32), np.empty((height, 2), int64)
     border = np.zeros(width, np.bool_)
-    _cross(ball, x, y, z, of, inside, spans)
+    _cross(ball, x, y, z, of, inside, at, spans)
     for row in range(height):
         r, start, end = top + row, spans[row, 0], spans[row, 1]
-        _entered_row(
-            ball, x[r, left:right], y[r, left:right], z[r, left:right], inside[row], at[row]
-        )
         if start >= end:
             continue
         _mark(inside, row, start, end, border)
+        since, until, full = _row(near, r), _row(far, r), _row(fills, r)
+        a, b = left + start, left + end
         _show(
-            at[row, start:end], inside[row, start:end], near[r, left + start : left + end],
-            far[r, left + start : left + end], fills[r, left + start : left + end],
+            at[row, start:end], inside[row, start:end], since[a:b], until[a:b], full[a:b],
             share[row, start:end],
         )  # fmt: skip
         for column in range(start, end):
@@ -279,8 +285,8 @@ def seen(
                 squared = _squared(ball, x[r, c], y[r, c], z[r, c])
                 closest = -(_along(ball, x[r, c], y[r, c], z[r, c]) / squared)
                 at[row, column] = closest - root / np.sqrt(squared)
-                shows = at[row, column] > near[r, c] and at[row, column] < far[r, c]
-                share[row, column] = part * fills[r, c] if shows else _ZERO
+                shows = at[row, column] > since[c] and at[row, column] < until[c]
+                share[row, column] = part * full[c] if shows else _ZERO
     return share, at
 
 
@@ -393,17 +399,18 @@ def _shade(
     for run in runs:
         first, end = run[2], run[3]
         for row in range(run[0], run[1]):
-            r, a, b = top + row, start + first, start + end
+            since, until = _row(near, top + row), _row(far, top + row)
             _mark(inside, row, first, end, marks)
             found |= _block(
-                inside[row, first:end], closest[row, first:end], near[r, a:b], far[r, a:b],
+                inside[row, first:end], closest[row, first:end],
+                since[start + first : start + end], until[start + first : start + end],
                 touching, share[row, first:end],
             )  # fmt: skip
             for column in range(first, end):
                 if marks[column]:
                     at, c = closest[row, column], start + column
                     part = _share(inside, row, column)[0]
-                    between = at > near[r, c] + touching and at < far[r, c] * (_ONE - touching)
+                    between = at > since[c] + touching and at < until[c] * (_ONE - touching)
                     share[row, column] = part if between else _ZERO
                     found |= share[row, column] > _ZERO
                     border[count, 0], border[count, 1] = row, column
@@ -448,43 +455,52 @@ def shade(
 
 
 @inner
-def _in_shadow(left: Any, shown: Any) -> Any:
-    """Return how many pixels of a row are seen in shadow."""
-    count = 0
+def _shadowed(left: Any, shown: Any) -> Any:
+    """Whether any pixel is seen in shadow, and any such in part."""
+    dark, part = False, False
     for i in range(len(left)):
-        count += (left[i] < _ONE) & (shown[i] > _ZERO)
-    return count
+        dims = (left[i] < _ONE) & (shown[i] > _ZERO)
+        dark |= dims
+        part |= dims & (shown[i] < _ONE)
+    return dark, part
+
+
+@inner
+def _leave(left: Any, shown: Any, light: Any) -> None:
+    """Put the light that is left in pixels that are seen as a whole."""
+    for i in range(len(left)):
+        light[i] = left[i] if shown[i] > _ZERO else _ONE
 
 
 @lane(WHOLE, WHOLE, REGION)
 def dimmed(seen: Plane, left: Plane, of: Any) -> Any:
-    """Return rows and columns of pixels in a region that are seen in shadow, and the light left.
+    """Return the shares of light left in pixels of a region that are seen in shadow, of others 1.
 
-    ``seen`` and ``left`` are shares of all pixels.
+    And whether there are any in successive chunks of each row. ``seen`` and ``left`` are shares of
+    all pixels.
     """
     top, start, height, width = of
     part = left[top : top + height, start : start + width]
-    found, count = np.zeros((height, width // CHUNK + 1), int64), 0
+    light, chunks = np.empty((height, width), float32), (width + CHUNK - 1) // CHUNK
+    dark = np.zeros((height, chunks), np.bool_)
     for row in range(height):
-        line, shown = part[row], seen[top + row, start : start + width]
-        for a in range(0, width, CHUNK):
-            found[row, a // CHUNK] = _in_shadow(line[a : a + CHUNK], shown[a : a + CHUNK])
-            count += found[row, a // CHUNK]
-    places, light, k = np.empty((2, count), int64), np.empty(count, float32), 0
-    for row in range(height):
-        line, shown = part[row], seen[top + row, start : start + width]
-        for c in range(width // CHUNK + 1):
-            if not found[row, c]:
+        # of rows of ``part`` numba does not know that they are contiguous
+        line, shown = left[top + row, start : start + width], seen[top + row, start : start + width]
+        for c in range(chunks):
+            a, b = c * CHUNK, min((c + 1) * CHUNK, width)
+            dark[row, c], mixed = _shadowed(line[a:b], shown[a:b])
+            _leave(line[a:b], shown[a:b], light[row, a:b])
+            if not mixed:
                 continue
-            for column in range(c * CHUNK, min((c + 1) * CHUNK, width)):
-                if not (line[column] < _ONE and shown[column] > _ZERO):
+            for column in range(a, b):
+                share = shown[column]
+                if not (line[column] < _ONE and _ZERO < share < _ONE):
                     continue
-                places[0, k], places[1, k], light[k] = top + row, start + column, _ZERO
+                light[row, column] = _ZERO
                 if line[column] > _ZERO:
                     both = _overlap(seen, part, row, column, of, _ONE)
-                    light[k] = both / max(shown[column], _LEAST)
-                k += 1
-    return places, light
+                    light[row, column] = both / max(share, _LEAST)
+    return light, dark
 
 
 @lane(PLANE)
@@ -533,43 +549,47 @@ def _reaches_none_but(counts: Any, reach: Any, c: int) -> Any:
     return _reaches(counts, reach, c) == all_of
 
 
-@lane(AROUND)
-def reach(beside: Any) -> Any:
-    """Return chunks of the points beside those of each chunk, and which points lack neighbours.
+@inner
+def _may_meet(ball: Any, low: Any, high: Any, may: Any) -> None:
+    """Put whether any line from an apex up to a point in a box may meet an ellipsoid.
 
-    Of those above, below, left and right, the first chunk, and the one after the last.
+    Where the ellipsoid is a unit sphere, the box is within a sphere: lines to all its points are
+    no farther from the one to the middle than its radius.
     """
-    count = beside.shape[1]
-    chunks = (count + CHUNK - 1) // CHUNK
-    reached, rim = np.zeros((chunks, 8), int64), np.zeros(count, np.bool_)
-    for c in range(chunks):
-        start, stop = c * CHUNK, min((c + 1) * CHUNK, count)
-        alone = rim[start:stop]
-        for k in range(4):
-            places, first, last = beside[k, start:stop], count, -1
-            for i in range(len(places)):
-                none = places[i] == count
-                first, last = min(first, places[i]), max(last, -1 if none else places[i])
-                alone[i] |= none
-            if last >= 0:
-                reached[c, 2 * k], reached[c, 2 * k + 1] = first // CHUNK, last // CHUNK + 1
-    return reached, rim
+    x, y, z = low
+    u, v, w = high
+    away = ball[3] * ball[3] + ball[4] * ball[4] + ball[5] * ball[5]
+    for c in range(len(may)):
+        a, b, d = (
+            _HALF * ball[0] * (x[c] + u[c]),
+            _HALF * ball[1] * (y[c] + v[c]),
+            _HALF * ball[2] * (z[c] + w[c]),
+        )
+        e, f, g = (
+            _HALF * ball[0] * (u[c] - x[c]),
+            _HALF * ball[1] * (v[c] - y[c]),
+            _HALF * ball[2] * (w[c] - z[c]),
+        )
+        middle = a * a + b * b + d * d
+        along = -(a * ball[3] + b * ball[4] + d * ball[5])
+        t = min(max(along / (middle + _TINY), _ZERO), _ONE)
+        squared = away - _TWO * t * along + t * t * middle
+        limit = _ONE + np.sqrt(e * e + f * f + g * g)
+        may[c] = squared < _SURELY * limit * limit + _ROUNDED * (away + middle)
 
 
 @inner
 def _cross_points(
     ball: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any, own: Any, values: Any
-) -> bool:
-    """Put where lines to points of other surfaces meet an ellipsoid; whether any does."""
-    met = 0
+) -> Any:
+    """Put where lines to points of other surfaces meet an ellipsoid; return how many do."""
     for i in range(len(x)):
         squared, along = _squared(ball, x[i], y[i], z[i]), _along(ball, x[i], y[i], z[i])
         value, at = along * (along / squared) + ball[6], -(along / squared)
         counts = (at > near[i] + touching) & (at < _ONE - touching) & (index[i] != own)
-        met += counts & (value > _ZERO)
         away = (at - _ONE) * np.sqrt(squared)
         values[i] = value if counts & (not away * away < value) else _NAN
-    return met > 0
+    return _above(values)
 
 
 @inner
@@ -581,28 +601,95 @@ def _above(values: Any) -> Any:
     return count
 
 
-@lane(PLANES, DOUBLES, PLACES, LINE, LINE, LINE, LINE, float32, PLACES, AROUND, NUMBERS, LINE)
+@inner
+def _cross_chunk(ball: Any, c: int, lines: Any, own: Any, values: Any) -> Any:
+    """Do it for a chunk of them."""
+    x, y, z, near, touching, index = lines
+    a, b = c * CHUNK, min((c + 1) * CHUNK, len(x))
+    return _cross_points(
+        ball, x[a:b], y[a:b], z[a:b], near[a:b], touching, index[a:b], own, values[a:b]
+    )
+
+
+@inner
+def _cross_beside(
+    ball: Any, c: int, around: Any, lines: Any, own: Any, values: Any, known: Any
+) -> None:
+    """Do it for a chunk, and for those with neighbours of its points, where it is not done yet."""
+    if not known[c]:
+        _cross_chunk(ball, c, lines, own, values)
+        known[c] = True
+    for side in range(4):
+        for i in range(c * CHUNK, min((c + 1) * CHUNK, len(values) - 1)):
+            beside = around[side, i] // CHUNK
+            if not known[beside]:
+                _cross_chunk(ball, beside, lines, own, values)
+                known[beside] = True
+
+
+@inner
+def _any_other(index: Any, own: Any) -> bool:
+    """Whether any point is on another surface."""
+    if index[0] != own:
+        return True
+    found = False
+    for i in range(len(index)):
+        found |= index[i] != own
+    return found
+
+
+@inner
+def _any_beside(values: Any, around: Any, counts: Any, reach: Any, c: int) -> bool:
+    """Whether any point of a chunk, or any neighbour of such, is above 0."""
+    if counts[c + 1] > counts[c]:
+        return True
+    found = False
+    for side in range(4):
+        if counts[reach[c, 2 * side + 1]] == counts[reach[c, 2 * side]]:
+            continue
+        places = around[side, c * CHUNK : min((c + 1) * CHUNK, len(values) - 1)]
+        for i in range(len(places)):
+            found |= values[places[i]] > _ZERO
+    return found
+
+
+@lane(
+    PLANES, DOUBLES, PLACES, LINE, LINE, LINE, LINE, float32, PLACES, AROUND, NUMBERS, WHOLE, LINE
+)
 def dim_softly(
     axes: Any, apex: Any, owns: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any,
-    around: Any, reach: Any, clear: Any,
+    around: Any, reach: Any, boxes: Any, clear: Any,
 ) -> None:  # fmt: skip
     """Take from the light at points what ellipsoids cover of the pixels around them.
 
-    Only chunks of points in and beside which a line meets an ellipsoid have any share.
+    Only chunks of points in and beside which a line meets an ellipsoid have any share, and only
+    those with a box that lines may meet one before are looked at. Boxes are of the ways (x, y, z).
     """
     count, chunks = len(x), len(reach)
-    values, counts = np.empty(count + 1, float32), np.zeros(chunks + 1, int64)
-    values[count] = _NAN
+    values, counts = np.full(count + 1, _NAN, float32), np.zeros(chunks + 1, int64)
+    known, stale = np.ones(chunks + 1, np.bool_), np.zeros(chunks, np.bool_)
+    lines = x, y, z, near, touching, index
+    low, high = (boxes[0], boxes[1], boxes[2]), (boxes[3], boxes[4], boxes[5])
     for n in range(len(axes)):
         ball = _ball(axes[n], apex)
-        if not _cross_points(ball, x, y, z, near, touching, index, owns[n], values):
-            continue
+        _may_meet(ball, low, high, known[:chunks])
         for c in range(chunks):
-            counts[c + 1] = counts[c] + _above(values[c * CHUNK : min((c + 1) * CHUNK, count)])
+            a, b = c * CHUNK, min((c + 1) * CHUNK, count)
+            counts[c + 1] = counts[c]
+            known[c] = known[c] and _any_other(index[a:b], owns[n])
+            if known[c]:
+                counts[c + 1] += _cross_chunk(ball, c, lines, owns[n], values)
+            elif stale[c]:
+                values[a:b] = _NAN
         for c in range(chunks):
-            if _reaches(counts, reach, c):
-                for i in range(c * CHUNK, min((c + 1) * CHUNK, count)):
+            a, b = c * CHUNK, min((c + 1) * CHUNK, count)
+            if not _reaches(counts, reach, c):
+                continue
+            if _any_beside(values, around, counts, reach, c):
+                _cross_beside(ball, c, around, lines, owns[n], values, known)
+                for i in range(a, b):
                     clear[i] *= _ONE - _share_among(values, around, i)
+        stale[:] = known[:chunks]
 
 
 @lane(WHOLE, LINE, LINE, LINE, LINE, float32, PLACES, int64, LINE)
@@ -644,7 +731,12 @@ def _show_points(values: Any, around: Any, reach: Any, rim: Any, share: Any) -> 
         both[c + 1] = both[c] + (on == b - a and beside == b - a)
     for c in range(chunks):
         a, b = c * CHUNK, min((c + 1) * CHUNK, count)
-        if not (_reaches(along, reach, c) and _reaches(across, reach, c)):
+        if not (
+            _reaches(along, reach, c)
+            and _reaches(across, reach, c)
+            and _any_beside(first, around, along, reach, c)
+            and _any_beside(second, around, across, reach, c)
+        ):
             share[a:b] = _ZERO
             continue
         amid = _reaches_none_but(both, reach, c)

@@ -1,4 +1,4 @@
-"""Points that are seen, the light on them, and moments: compiled arithmetic without edges.
+"""The light on points, and moments: compiled arithmetic without edges.
 
 Bytes are those of the statements in NumPy, as in `compiled_edges`.
 """
@@ -8,19 +8,17 @@ from typing import Any
 import numpy as np
 
 from transientcam_driver.simulation.light.compiling import (
-    AROUND,
+    CHUNK,
     DOUBLES,
     LINE,
+    MARKS,
     NUMBERS,
     PLACES,
-    PLANES,
     REGION,
-    ROWS,
     WHOLE,
     float32,
     float64,
     inner,
-    int32,
     int64,
     lane,
 )
@@ -28,124 +26,6 @@ from transientcam_driver.simulation.light.compiling import (
 Plane = Any
 """A float32 array as numba compiles it."""
 _ZERO, _ONE = np.float32(0), np.float32(1)
-_CLEAR = 1e-9  # as in Ellipsoid.tangents
-
-
-@inner
-def _times(one: Any, other: Any) -> Any:
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
-
-
-@inner
-def _tangents(away: Any, radii: Any, middle: Any, across: Any) -> Any:
-    """Return what `Ellipsoid.tangents` does, of one that is so far away."""
-    along, aside = _times(away, middle), _times(away, across)
-    along_m, across_m = radii * middle, radii * across
-    a = along * along - _times(along_m, along_m)
-    if along <= 0 or a <= _CLEAR:
-        return -np.inf, np.inf
-    b = along * aside - _times(along_m, across_m)
-    c = aside * aside - _times(across_m, across_m)
-    root = np.sqrt(max(b * b - a * c, 0.0))
-    return (b - root) / a, (b + root) / a
-
-
-@inner
-def _met_row(tiles: Any, low: Any, high: Any, down: Any, up: Any, of: Any) -> Any:
-    """Mark the tiles of a row; return the first, and the one after the last."""
-    width = len(tiles)
-    for k in range(width):
-        across = (low[k] <= of[1]) & (high[k] >= of[0])
-        tiles[k] = across & (down[k] <= of[3]) & (up[k] >= of[2])
-    first, after = 0, width
-    while first < after and not tiles[first]:
-        first += 1
-    while after > first and not tiles[after - 1]:
-        after -= 1
-    return first, after
-
-
-@lane(PLANES, DOUBLES, ROWS, PLANES, PLANES, ROWS, ROWS)
-def met(axes: Any, apex: Any, frame: Any, low: Any, high: Any, lowest: Any, highest: Any) -> Any:
-    """Return tiles whose lines may meet ellipsoids, and their spans of rows and of columns."""
-    count, height, width = len(axes), low.shape[1], low.shape[2]
-    tiles = np.zeros((count, height, width), np.bool_)
-    spans = np.zeros((count, 4), int64)
-    for n in range(count):
-        away, radii = axes[n, 0] - apex, axes[n, 1]
-        first, last = _tangents(away, radii, frame[0], frame[1])
-        start, end = _tangents(away, radii, frame[0], frame[2])
-        top, bottom, left, right = height, 0, width, 0
-        for row in range(height):
-            if lowest[0, row] > last or highest[0, row] < first:
-                continue
-            if lowest[1, row] > end or highest[1, row] < start:
-                continue
-            found = _met_row(
-                tiles[n, row], low[0, row], high[0, row], low[1, row], high[1, row],
-                (first, last, start, end),
-            )  # fmt: skip
-            if found[0] < found[1]:
-                top, bottom = min(top, row), row + 1
-                left, right = min(left, found[0]), max(right, found[1])
-        if bottom:
-            spans[n, 0], spans[n, 1], spans[n, 2], spans[n, 3] = top, bottom, left, right
-    return tiles, spans
-
-
-@lane(WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, int64, int64, LINE, int64, NUMBERS, WHOLE)
-def points(
-    share: Plane, at: Plane, x: Plane, y: Plane, z: Plane, top: int, left: int, apex: Any,
-    start: int, places: Any, lines: Any,
-) -> None:  # fmt: skip
-    """Put rows, columns, shares, t, points and ways of the pixels that show a surface."""
-    a, b, c, k = apex[0], apex[1], apex[2], start
-    for row in range(share.shape[0]):
-        shown, r = share[row], row + top
-        for column in range(len(shown)):
-            if shown[column] == _ZERO:
-                continue
-            s, t = column + left, at[row, column]
-            u, v, w = x[r, s], y[r, s], z[r, s]
-            places[0, k], places[1, k] = r, s
-            lines[0, k], lines[1, k] = shown[column], t
-            lines[2, k], lines[3, k], lines[4, k] = u * t + a, v * t + b, w * t + c
-            lines[5, k], lines[6, k], lines[7, k] = u, v, w
-            k += 1
-
-
-@lane(PLACES, PLACES, int64, int64, int64, int64)
-def around(rows: Any, columns: Any, top: int, left: int, height: int, width: int) -> Any:
-    """Return what is around points in a region of an image."""
-    count = len(rows)
-    place = np.empty((height + 2, width + 2), int32)
-    for row in range(height + 2):
-        line = place[row]
-        for i in range(width + 2):
-            line[i] = count
-    for i in range(count):
-        place[rows[i] - top + 1, columns[i] - left + 1] = i
-    beside = np.empty((4, count), int32)
-    for i in range(count):
-        row, column = rows[i] - top + 1, columns[i] - left + 1
-        beside[0, i], beside[1, i] = place[row - 1, column], place[row + 1, column]
-        beside[2, i], beside[3, i] = place[row, column - 1], place[row, column + 1]
-    return beside
-
-
-@lane(PLACES, AROUND)
-def among(on: Any, beside: Any) -> Any:
-    """Return what is beside some of the points, by their own indices."""
-    place = np.empty(beside.shape[1] + 1, int32)
-    for k in range(len(place)):
-        place[k] = len(on)
-    for k in range(len(on)):
-        place[on[k]] = k
-    found = np.empty((4, len(on)), int32)
-    for side in range(4):
-        for k in range(len(on)):
-            found[side, k] = place[beside[side, on[k]]]
-    return found
 
 
 @inner
@@ -180,20 +60,49 @@ def received(
     return length_m, irradiance, cosine
 
 
-@lane(WHOLE, WHOLE, NUMBERS, LINE, int64, int64)
-def darkened(moments: Plane, each: Plane, places: Any, left: Any, top: int, start: int) -> None:
+@inner
+def _darken(moments: Any, each: Any, light: Any) -> None:
+    """Do it for a chunk of pixels with one number, or two, each."""
+    if len(moments) == len(light):
+        for i in range(len(light)):
+            moments[i] -= (_ONE - light[i]) * each[i]
+        return
+    for i in range(len(light)):
+        dark = _ONE - light[i]
+        moments[2 * i] -= dark * each[2 * i]
+        moments[2 * i + 1] -= dark * each[2 * i + 1]
+
+
+@lane(WHOLE, WHOLE, WHOLE, MARKS, int64, int64, int64, int64, int64)
+def darkened(
+    moments: Plane, each: Plane, light: Plane, dark: Any, parts: int, top: int, left: int,
+    first: int, start: int,
+) -> None:  # fmt: skip
     """Take from moments the part that a shadow leaves out of those by one chain of mirrors.
 
-    Planes of moments hold real and imaginary parts in turn; the moments begin at a row and a column
-    of all pixels.
+    A moment has so many parts: a real number, or a real and an imaginary one. Shares of light begin
+    at a row and a column of all pixels, and so do the moments.
     """
-    rows, columns = places[0], places[1]
-    for k in range(len(rows)):
-        dark = _ONE - left[k]
-        row, column = rows[k], 2 * columns[k]
-        at = column - 2 * start
-        moments[row - top, at] -= dark * each[row, column]
-        moments[row - top, at + 1] -= dark * each[row, column + 1]
+    width = light.shape[1]
+    for row in range(len(light)):
+        line, of_chain = moments[top + row - first], each[top + row]
+        for c in range(dark.shape[1]):
+            if dark[row, c]:
+                a, b = c * CHUNK, min((c + 1) * CHUNK, width)
+                _darken(
+                    line[parts * (left + a - start) : parts * (left + b - start)],
+                    of_chain[parts * (left + a) : parts * (left + b)],
+                    light[row, a:b],
+                )
+
+
+@lane(DOUBLES, float64)
+def phases(delay_s: Any, angular_hz: Any) -> Any:
+    """Return phases of light with some times of flight."""
+    phase_rad = np.empty(len(delay_s), float32)
+    for i in range(len(delay_s)):
+        phase_rad[i] = angular_hz * delay_s[i]
+    return phase_rad
 
 
 @lane(WHOLE, PLACES, DOUBLES, LINE, LINE)
@@ -262,18 +171,32 @@ def arrived(
     return delay_s, weight
 
 
+@inner
+def _leave(moments: Any, rest: Any) -> None:
+    """Leave a share of the moments in a row of pixels."""
+    if len(moments) == len(rest):
+        for c in range(len(rest)):
+            moments[c] *= rest[c]
+        return
+    for c in range(len(rest)):
+        moments[2 * c] *= rest[c]
+        moments[2 * c + 1] *= rest[c]
+
+
 @lane(WHOLE, WHOLE, NUMBERS, WHOLE, LINE, int64, int64)
 def layered(
     moments: Plane, uncovered: Plane, places: Any, of_rays: Any, share: Any, top: int, left: int
 ) -> None:
     """Leave of moments what is not covered, and add those of what covers it, by its share."""
-    width = moments.shape[1] // 2
+    parts = of_rays.shape[1]
+    width = moments.shape[1] // parts
     for row in range(moments.shape[0]):
-        line, rest = moments[row], uncovered[top + row, left : left + width]
-        for c in range(len(rest)):
-            line[2 * c] *= rest[c]
-            line[2 * c + 1] *= rest[c]
+        _leave(moments[row], uncovered[top + row, left : left + width])
     rows, columns = places[0], places[1]
+    if parts == 1:
+        for k in range(len(rows)):
+            moments[rows[k] - top, columns[k] - left] += of_rays[k, 0] * share[k]
+        return
     for k in range(len(rows)):
         row, column = rows[k] - top, 2 * (columns[k] - left)
         moments[row, column] += of_rays[k, 0] * share[k]
@@ -291,27 +214,30 @@ def uncover(uncovered: Plane, places: Any, share: Any) -> None:
         uncovered[rows[k], columns[k]] = max(left, _ZERO)
 
 
-@lane(WHOLE, REGION, float32, WHOLE, REGION, float32, WHOLE, REGION)
+@lane(WHOLE, int64, REGION, float32, WHOLE, REGION, float32, WHOLE, REGION)
 def blended(
-    total: Plane, of: Any, one: Any, first: Plane, of_first: Any, other: Any, second: Plane,
-    of_second: Any,
+    total: Plane, parts: int, of: Any, one: Any, first: Plane, of_first: Any, other: Any,
+    second: Plane, of_second: Any,
 ) -> Any:  # fmt: skip
-    """Return moments of a region between two times, from those of the regions that differ then."""
+    """Return moments of a region between two times, from those of the regions that differ then.
+
+    A moment has so many parts.
+    """
     top, left, height, width = of
-    mixed = np.empty((height, 2 * width), float32)
-    then, later = np.empty(2 * width, float32), np.empty(2 * width, float32)
+    mixed = np.empty((height, parts * width), float32)
+    then, later = np.empty(parts * width, float32), np.empty(parts * width, float32)
     for row in range(height):
         r = top + row
-        still = total[r, 2 * left : 2 * (left + width)]
+        still = total[r, parts * left : parts * (left + width)]
         then[:], later[:] = still, still
         place = r - of_first[0]
         if 0 <= place < of_first[2]:
-            shift = 2 * (of_first[1] - left)
-            then[shift : shift + 2 * of_first[3]] = first[place]
+            shift = parts * (of_first[1] - left)
+            then[shift : shift + parts * of_first[3]] = first[place]
         place = r - of_second[0]
         if 0 <= place < of_second[2]:
-            shift = 2 * (of_second[1] - left)
-            later[shift : shift + 2 * of_second[3]] = second[place]
+            shift = parts * (of_second[1] - left)
+            later[shift : shift + parts * of_second[3]] = second[place]
         line = mixed[row]
         for c in range(len(line)):
             line[c] = one * then[c] + other * later[c]

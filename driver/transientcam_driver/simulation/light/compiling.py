@@ -10,7 +10,10 @@ from numba import int32 as numba_int32
 from numba import int64 as numba_int64
 from numba import njit
 from numba import types as numba_types
+from numba import uint16 as numba_uint16
 
+CHUNK = 64
+"""Points at a time, which are mostly beside each other in a row."""
 LANES: dict[str, Callable[..., Any]] = {}
 """All lanes that are compiled, by their names."""
 
@@ -27,8 +30,10 @@ DOUBLES = float64[::1]
 ROWS = float64[:, ::1]
 PLANES = float64[:, :, ::1]
 TILES = _types.boolean[:, :, ::1]
+MARKS = _types.boolean[:, ::1]
 FLAGS = _types.boolean[::1]
 PLACES = int64[::1]
+CODES = _types.Array(numba_uint16, 1, "C")
 NUMBERS = int64[:, ::1]
 AROUND = int32[:, ::1]
 REGION = _types.UniTuple(int64, 4)
@@ -41,6 +46,14 @@ def inner(function: Callable[..., Any]) -> Any:
     The cache notices changes of that file only.
     """
     return njit(nogil=True, error_model="numpy")(function)
+
+
+def without_nan(function: Callable[..., Any]) -> Any:
+    """Do the same for a function of numbers of which none is NaN, nor their signs of zero count.
+
+    Only then are the least and the greatest of many numbers found by vectors.
+    """
+    return njit(nogil=True, error_model="numpy", fastmath={"nnan", "nsz"})(function)
 
 
 def lane(*signature: Any) -> Callable[[Callable[..., Any]], Any]:

@@ -4,6 +4,7 @@ The same as ``paths.light_on_ends``, for the many points that are lit anew for e
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,17 +31,18 @@ from transientcam_driver.simulation.scene.geometry import (
 from transientcam_driver.simulation.scene.scene import Scene, Surface
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Segment:
     """Lines ``apex + t way`` that light comes along to points at t = 1, from ``near`` on.
 
-    ``mirror`` is the one that the points lie on, if they do.
+    ``mirror`` is the one that the points lie on, if they do, and ``known`` the boxes if they are.
     """
 
     apex: Points
     way: tuple[Plane, Plane, Plane]
     near: Plane
     mirror: Surface | None
+    known: NDArray[np.float32] | None = None
 
     def of(self, kept: NDArray[np.intp]) -> "Segment":
         """Return the lines of some of the points."""
@@ -53,12 +55,16 @@ class Segment:
         way = np.stack(self.way, axis=-1).astype(np.float64)
         return self.apex + way, self.apex + self.near[:, None] * way
 
+    @cached_property
+    def boxes(self) -> NDArray[np.float32]:
+        """Lowest and highest coordinates (6, C) of ways of successive chunks of points, or all."""
+        return _boxes(self.way) if self.known is None else self.known
+
     @property
     def box(self) -> tuple[Points, Points]:
         """Lowest and highest coordinates, up to the apex."""
-        low = np.array([min(float(w.min()), 0.0) for w in self.way])
-        high = np.array([max(float(w.max()), 0.0) for w in self.way])
-        return self.apex + low, self.apex + high
+        low, high = self.boxes[:3].min(axis=1), self.boxes[3:].max(axis=1)
+        return self.apex + np.minimum(low, 0.0), self.apex + np.maximum(high, 0.0)
 
 
 _Lines = tuple[tuple[Plane, Plane, Plane], Plane, tuple[Plane, Plane, Plane]]
@@ -116,9 +122,11 @@ class Ends:
         normal = self._normals()
         facing, reflectance = self._returned(normal)
         glossy = any(surface.gloss for surface in self.surfaces)
+        every, whole = np.arange(len(self.index)), np.ones(len(self.index), dtype=np.float32)
+        boxes = _boxes(self.point)
         ways: list[tuple[int, Way]] = []
         for k, light in enumerate(lights):
-            on, shown, beside, segments = _ways(light, self.point, around)
+            on, shown, beside, segments = _ways(light, (every, whole, boxes), self.point, around)
             if not on.size:
                 continue
             sent = reflectance
@@ -194,7 +202,7 @@ class Ends:
             irradiance = np.maximum(facing, 0) / (length_m * length_m * length_m)
             cosine = -(way[0] * axis[0] + way[1] * axis[1] + way[2] * axis[2]) / length_m
         if self.still.light.beam_exponent:
-            irradiance *= beam(self.still.light, cosine).astype(np.float32)
+            irradiance *= beam(self.still.light, cosine).astype(np.float32, copy=False)
         return single(length_m), single(irradiance)
 
     def _clear(
@@ -244,12 +252,12 @@ class Ends:
         if lane is None or len(axes) != len(soft):
             return near
         if soft:
-            line = *segment.way, segment.near, TOUCHING, index
-            lane(axes, segment.apex, np.array(soft), *line, around.beside, around.reach[0], clear)
+            line = *segment.way, segment.near, TOUCHING, index, around.beside, around.reach[0]
+            lane(axes, segment.apex, np.array(soft), *line, segment.boxes, clear)
         return [k for k in near if k not in movers]
 
     def _normals(self) -> tuple[Plane, Plane, Plane]:
-        starts = np.flatnonzero(np.diff(self.index, prepend=-1))
+        starts = np.append(0, np.flatnonzero(self.index[1:] != self.index[:-1]) + 1)
         shapes = [self.surfaces[self.index[start]].shape for start in starts]
         lane = LANES.find("upright")
         balls = [(*each.centre, *each.radii**2) for each in shapes if isinstance(each, Ellipsoid)]
@@ -324,14 +332,18 @@ def _dimmed(shape: Shape, segment: Segment, of: tuple[NDArray[np.intp], int], cl
 
 
 def _ways(
-    light: ImageLight, point: tuple[Plane, Plane, Plane], around: Around | None
+    light: ImageLight,
+    every: tuple[NDArray[np.intp], Plane, NDArray[np.float32]],
+    point: tuple[Plane, Plane, Plane],
+    around: Around | None,
 ) -> tuple[NDArray[np.intp], Plane, Around | None, list[Segment]]:
     """Return the points that a chain of mirrors shows the light to, and its ways to them.
 
     Between the two, the share of the pixel around each point to which it does, and what is around.
+    ``every``: all points, all of the pixels around them, and boxes around chunks of them.
     """
-    on = np.arange(len(point[0]))
-    share = np.ones(len(on), dtype=np.float32)
+    on, share, boxes = every
+    known: NDArray[np.float32] | None = boxes
     segments: list[Segment] = []
     start, last = point, None
     for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
@@ -339,16 +351,19 @@ def _ways(
         if not kept.size:
             return kept, part, around, []
         if len(kept) < len(on):  # mostly few points, or all
+            known = None
             on, share = on[kept], share[kept]
             around = around if around is None else among(kept, around)
             segments = [each.of(kept) for each in segments]
         share = share * part
-        segments.append(Segment(image_m, way, at, last))
+        segments.append(Segment(image_m, way, at, last, _boxes_from(image_m, known)))
+        known = None
         start = met
         last = mirror
     lamp = light.positions_m[-1]
     none = np.zeros(len(on), dtype=np.float32)
-    return on, share, around, [*segments, Segment(lamp, _from(lamp, start), none, last)]
+    straight = Segment(lamp, _from(lamp, start), none, last, _boxes_from(lamp, known))
+    return on, share, around, [*segments, straight]
 
 
 def _shown(
@@ -380,6 +395,23 @@ def _shown(
 def _from(apex: Points, point: tuple[Plane, ...]) -> tuple[Plane, Plane, Plane]:
     x, y, z = (p - np.float32(a) for p, a in zip(point, apex, strict=True))
     return x, y, z
+
+
+def _boxes(points: tuple[Plane, Plane, Plane]) -> NDArray[np.float32]:
+    """Lowest and highest coordinates (6, C) of successive chunks of points, or of all."""
+    lane = LANES.find("boxes")
+    if lane is None:
+        ends = *(each.min() for each in points), *(each.max() for each in points)
+        return np.array(ends, dtype=np.float32)[:, None]
+    boxes: NDArray[np.float32] = lane(*points)
+    return boxes
+
+
+def _boxes_from(apex: Points, boxes: NDArray[np.float32] | None) -> NDArray[np.float32] | None:
+    """Return the boxes of the ways from an apex to points, given those of the points."""
+    if boxes is None:
+        return None
+    return boxes - np.tile(apex.astype(np.float32), 2)[:, None]
 
 
 def _moved(apex: Points, way: tuple[Plane, ...]) -> tuple[Plane, Plane, Plane]:

@@ -14,6 +14,14 @@ from typing import Any, Final
 
 THREAD: Final = "transientcam-compile-light"
 """Name of the thread that compiles."""
+COMPILED: Final = (
+    "compiled_images",
+    "light.compiled_chunks",
+    "light.compiled_edges",
+    "light.compiled_light",
+    "light.compiled_tiles",
+)
+"""Modules of lanes."""
 _log = logging.getLogger("transientcam_driver")
 
 
@@ -51,11 +59,11 @@ class Lanes:
         ImportError
             Where there is no compiler.
         """
-        for name in ("compiled_edges", "compiled_light"):
-            import_module(f"transientcam_driver.simulation.light.{name}")
-        from transientcam_driver.simulation.light.compiling import LANES as COMPILED
+        for name in COMPILED:
+            import_module(f"transientcam_driver.simulation.{name}")
+        from transientcam_driver.simulation.light.compiling import LANES as FOUND
 
-        self._ready = dict(COMPILED)
+        self._ready = dict(FOUND)
 
     def _make_ready(self) -> None:
         try:

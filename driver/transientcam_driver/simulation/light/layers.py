@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.light.bundle import Region, inside, numbers
-from transientcam_driver.simulation.light.coverage import Plane, overlapped, single
+from transientcam_driver.simulation.light.coverage import Plane, overlapped
 from transientcam_driver.simulation.light.ends import LitEnds
 from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.light.paths import Lit, scatter_of, sparse_image
 from transientcam_driver.simulation.light.still import StillLight
-from transientcam_driver.simulation.responses import Scatter, SparseResponses
+from transientcam_driver.simulation.responses import Moments, Scatter, SparseResponses
 from transientcam_driver.simulation.scene.scene import Scene
 
 Values = NDArray[np.float64]
@@ -46,15 +46,30 @@ class Shadow:
 
 @dataclass(frozen=True, slots=True)
 class _Dimmed:
-    """Pixels by row and column (2, P), and what of their light by a chain of mirrors is left."""
+    """Shares (h, w) of the light by a chain of mirrors that are left in pixels of a region.
+
+    ``dark``: whether any pixel of successive chunks of a row has less than all; lanes know it.
+    """
 
     chain: int
-    places: NDArray[np.intp]
-    left: Plane
+    region: Region
+    light: Plane
+    dark: NDArray[np.bool_] | None = None
+
+    @property
+    def places(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows and columns in the region of pixels that have not all; rounding may add to it."""
+        rows, columns = np.nonzero(self.light != 1)
+        return rows, columns
 
 
 class MovingResponses:
     """Impulse responses at one time.
+
+    Parameters
+    ----------
+    uncovered
+        Shares (H, W) of pixels that show what stands still.
 
     Attributes
     ----------
@@ -67,31 +82,30 @@ class MovingResponses:
         still: StillLight,
         scene: Scene,
         layers: Layers | None,
+        uncovered: Plane,
         shadows: list[Shadow],
         region: Region,
     ) -> None:
         self.region = region
         self.scene = scene
         self._still = still
-        self._found: dict[float, NDArray[np.complex64]] = {}
+        self._found: dict[float, Moments] = {}
         self._shape = still.height, still.width
         self._layers = layers
-        self._uncovered = np.ones(self._shape, dtype=np.float32)
-        if layers is not None:
-            _uncover(self._uncovered, layers)
+        self._uncovered = uncovered
         self._dimmed = tuple(self._dim(each) for each in shadows)
 
     def _dim(self, shadow: Shadow) -> _Dimmed:
         """Return what a shadow leaves of the light on what is not covered."""
         lane = LANES.find("dimmed")
         if lane is not None:
-            places, light = lane(self._uncovered, shadow.left, numbers(shadow.region))
-            return _Dimmed(shadow.chain, places, light)
+            light, dark = lane(self._uncovered, shadow.left, numbers(shadow.region))
+            return _Dimmed(shadow.chain, shadow.region, light, dark)
         seen, left = self._uncovered[shadow.region], shadow.left[shadow.region]
         on = np.nonzero((left < 1) & (seen > 0))
-        light = overlapped(seen, left)[on] / np.maximum(seen[on], np.float32(1e-9))
-        corner = [[of.start] for of in shadow.region]
-        return _Dimmed(shadow.chain, np.stack(on) + corner, single(light))
+        light = np.ones_like(left)
+        light[on] = overlapped(seen, left)[on] / np.maximum(seen[on], np.float32(1e-9))
+        return _Dimmed(shadow.chain, shadow.region, light)
 
     @property
     def kind(self) -> Literal["sparse", "dense"]:
@@ -103,7 +117,7 @@ class MovingResponses:
         whole = slice(0, self._shape[0]), slice(0, self._shape[1])
         return self.moments_in(whole, frequency_hz).astype(np.complex128)
 
-    def moments_in(self, region: Region, frequency_hz: float) -> NDArray[np.complex64]:
+    def moments_in(self, region: Region, frequency_hz: float) -> Moments:
         """Moments of a region that holds all that differs."""
         differ = self.differing(frequency_hz)
         if region == self.region:
@@ -112,17 +126,17 @@ class MovingResponses:
         moments[inside(self.region, region)] = differ
         return moments
 
-    def unchanged(self, frequency_hz: float) -> NDArray[np.complex64]:
+    def unchanged(self, frequency_hz: float) -> Moments:
         """Moments (H, W) of what stands still."""
         return self._still.phasors(frequency_hz)[1]
 
-    def differing(self, frequency_hz: float) -> NDArray[np.complex64]:
+    def differing(self, frequency_hz: float) -> Moments:
         """Moments of the region that differs."""
         if frequency_hz not in self._found:
             self._found[frequency_hz] = self._moments(frequency_hz)
         return self._found[frequency_hz]
 
-    def _moments(self, frequency_hz: float) -> NDArray[np.complex64]:
+    def _moments(self, frequency_hz: float) -> Moments:
         each, total = self._still.phasors(frequency_hz)
         region = self.region
         moments = total[region].copy()
@@ -134,9 +148,9 @@ class MovingResponses:
         top, left = (of.start for of in region)
         lane = LANES.find("layered")
         if lane is not None:
-            pairs = of_rays.view(np.float32).reshape(-1, 2)
+            numbers_of = of_rays.view(np.float32).reshape(len(of_rays), -1)
             share = self._layers.share
-            lane(moments.view(np.float32), self._uncovered, places, pairs, share, top, left)
+            lane(moments.view(np.float32), self._uncovered, places, numbers_of, share, top, left)
             return moments
         moments *= self._uncovered[region]
         of_rays *= self._layers.share
@@ -145,21 +159,24 @@ class MovingResponses:
             moments[rows - top, columns - left] += of_rays[part]
         return moments
 
-    def _of_layers(self, layers: Layers, frequency_hz: float) -> NDArray[np.complex64]:
+    def _of_layers(self, layers: Layers, frequency_hz: float) -> Moments:
         """Moments of the points of layers, in single precision."""
+        if not frequency_hz:
+            brightness = np.zeros(layers.places.shape[1], dtype=np.float32)
+            for _chain, way in layers.lit.ways:
+                on = slice(None) if len(way.on) == len(brightness) else way.on
+                brightness[on] += way.weight
+            return brightness
         of_rays = np.zeros(layers.places.shape[1], dtype=np.complex64)
         lane = LANES.find("turned")
         for _chain, way in layers.lit.ways:
-            on = slice(None) if len(way.on) == len(of_rays) else way.on
-            if not frequency_hz:
-                of_rays.real[on] += way.weight
-                continue
-            phase_rad = (2 * np.pi * frequency_hz * way.delay_s).astype(np.float32)
+            phase_rad = _phases(way.delay_s, 2 * np.pi * frequency_hz)
             cosine, sine = np.cos(phase_rad), np.sin(phase_rad)
             if lane is not None:
                 pairs = of_rays.view(np.float32).reshape(-1, 2)
                 lane(pairs, way.on, way.weight, cosine, sine)
                 continue
+            on = slice(None) if len(way.on) == len(of_rays) else way.on
             of_rays.real[on] += way.weight * cosine
             of_rays.imag[on] += way.weight * sine
         scatter = scatter_of(self.scene, layers.lit.ends.index)
@@ -218,8 +235,10 @@ class MovingResponses:
         weight = weight * self._uncovered.ravel()
         chains = len(self._still.lit.weight)
         for dimmed in self._dimmed:
-            pixel = np.ravel_multi_index(tuple(dimmed.places), self._shape)
-            weight[dimmed.chain :: chains, pixel] *= dimmed.left
+            rows, columns = dimmed.places
+            top, left = (of.start for of in dimmed.region)
+            pixel = np.ravel_multi_index((rows + top, columns + left), self._shape)
+            weight[dimmed.chain :: chains, pixel] *= dimmed.light[rows, columns]
         delays, weights, spreads = [delay_s], [weight], [scatter]
         if self._layers is not None:
             for part in self._layers.parts:
@@ -243,27 +262,40 @@ class MovingResponses:
         return delay_s, weight, scatter_of(self.scene, np.full(shape, lit.surface[0]))
 
 
-def _uncover(uncovered: Plane, layers: Layers) -> None:
-    """Take from shares (H, W) of pixels what layers cover."""
+def uncovered_by(layers: Layers | None, shape: tuple[int, int]) -> Plane:
+    """Return the shares (H, W) of pixels that layers leave."""
+    uncovered = np.ones(shape, dtype=np.float32)
+    if layers is None:
+        return uncovered
     lane = LANES.find("uncover")
     if lane is not None:
         lane(uncovered, layers.places, layers.share)
-        return
+        return uncovered
     for part in layers.parts:
         rows, columns = layers.places[:, part]
         uncovered[rows, columns] -= layers.share[part]
     np.maximum(uncovered, 0, out=uncovered)  # what rounding leaves
+    return uncovered
 
 
-def _darken(
-    moments: NDArray[np.complex64], region: Region, dimmed: _Dimmed, each: NDArray[np.complex64]
-) -> None:
+def _phases(delay_s: NDArray[np.float64], angular_hz: float) -> NDArray[np.float32]:
+    lane = LANES.find("phases")
+    if lane is None:
+        return (angular_hz * delay_s).astype(np.float32)
+    phase_rad: NDArray[np.float32] = lane(delay_s, angular_hz)
+    return phase_rad
+
+
+def _darken(moments: Moments, region: Region, dimmed: _Dimmed, each: Moments) -> None:
     """Take what a shadow leaves out of light by one chain (H, W) from the moments of a region."""
-    top, left = (of.start for of in region)
     lane = LANES.find("darkened")
-    if lane is not None:
-        planes = moments.view(np.float32), each.view(np.float32)
-        lane(*planes, dimmed.places, dimmed.left, top, left)
+    if lane is not None and dimmed.dark is not None:
+        planes = moments.view(np.float32), each.view(np.float32), dimmed.light, dimmed.dark
+        top, left, *_extent = numbers(dimmed.region)
+        parts = planes[1].shape[1] // each.shape[1]
+        lane(*planes, parts, top, left, region[0].start, region[1].start)
         return
     rows, columns = dimmed.places
-    moments[rows - top, columns - left] -= (1 - dimmed.left) * each[rows, columns]
+    part = moments[inside(dimmed.region, region)]
+    taken = (1 - dimmed.light[rows, columns]) * each[dimmed.region][rows, columns]
+    part[rows, columns] = part[rows, columns] - taken

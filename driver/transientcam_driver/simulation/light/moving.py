@@ -22,9 +22,21 @@ from transientcam_driver.simulation.light.bundle import (
 from transientcam_driver.simulation.light.coverage import Plane, overlapped
 from transientcam_driver.simulation.light.ends import Ends
 from transientcam_driver.simulation.light.lanes import LANES
-from transientcam_driver.simulation.light.layers import Layers, MovingResponses, Shadow
+from transientcam_driver.simulation.light.layers import (
+    Layers,
+    MovingResponses,
+    Shadow,
+    uncovered_by,
+)
 from transientcam_driver.simulation.light.paths import ImageLight, image_lights
-from transientcam_driver.simulation.light.shares import above, around, seen, shade
+from transientcam_driver.simulation.light.shares import (
+    above,
+    around,
+    grown_tiles,
+    seen,
+    shade,
+    shown_tiles,
+)
 from transientcam_driver.simulation.light.still import Sight, StillLight
 from transientcam_driver.simulation.scene.geometry import Points, Shape
 from transientcam_driver.simulation.scene.scene import Scene
@@ -46,7 +58,7 @@ class _Seen:
     @property
     def count(self) -> int:
         """How many pixels show it."""
-        return int(np.count_nonzero(self.share != 0))
+        return int(np.count_nonzero(self.share))
 
     def put_points(self, start: int, places: NDArray[np.intp], lines: NDArray[np.float32]) -> None:
         """Put what is known of its pixels into the columns from one on.
@@ -104,9 +116,13 @@ class MovingLight:
         found = [each for sight in self._sights for each in self._cover(shapes, sight)]
         visible = self._visible(found)
         layers = self._lit(scene, visible) if visible else None
-        shadows = [shadow for k in range(len(self._chains)) if (shadow := self._shadow(shapes, k))]
+        uncovered = uncovered_by(layers, (self.still.height, self.still.width))
+        shows = shown_tiles(uncovered)
+        shadows = [
+            shadow for k in range(len(self._chains)) if (shadow := self._shadow(shapes, k, shows))
+        ]
         region = union([*(each.region for each in visible), *(each.region for each in shadows)])
-        return MovingResponses(self.still, scene, layers, shadows, region)
+        return MovingResponses(self.still, scene, layers, uncovered, shadows, region)
 
     def _cover(self, shapes: list[Shape], sight: Sight) -> Iterator[_Seen]:
         """Shares of pixels that surfaces cover, where nothing that stands still is before them."""
@@ -163,15 +179,23 @@ class MovingLight:
         parts = tuple(slice(*pair) for pair in pairwise(ends))
         return Layers(places, share, lit, parts)
 
-    def _shadow(self, shapes: list[Shape], chain: int) -> Shadow | None:
-        """Share of the light by a chain of mirrors that is left on what stands still."""
-        left: Plane | None = None
+    def _shadow(
+        self, shapes: list[Shape], chain: int, shows: NDArray[np.bool_] | None
+    ) -> Shadow | None:
+        """Share of the light by a chain of mirrors that is left on what stands still.
+
+        Only near tiles that show any of it: each shape takes light at the edge of another one by
+        what is left of it in the pixels beside, so that shares depend on as many pixels around.
+        """
+        bundles = self._chains[chain]
+        if not bundles:
+            return None
+        left = np.ones((self.still.height, self.still.width), dtype=np.float32)
+        near = grown_tiles(shows, 1 + len(bundles) * len(shapes))
         regions: list[Region] = []
-        for bundle in self._chains[chain]:
-            if left is None:
-                left = np.ones((self.still.height, self.still.width), dtype=np.float32)
-            regions += shade(shapes, bundle, left, soft=self._soft)
-        if left is None or not regions:
+        for bundle in bundles:
+            regions += shade(shapes, bundle, left, near, soft=self._soft)
+        if not regions:
             return None
         return Shadow(chain, union(regions), left)
 

@@ -31,7 +31,7 @@ class Around:
 
     @cached_property
     def reach(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-        """Where the neighbours of successive points are, for lanes: see `compiled_edges.reach`."""
+        """Where the neighbours of successive points are, for lanes: see `compiled_chunks.reach`."""
         lane = LANES.find("reach")
         assert lane is not None  # noqa: S101  (lanes are made ready together)
         reach, rim = lane(self.beside)
@@ -43,7 +43,7 @@ def seen(
 ) -> tuple[Plane, Plane]:
     """Return shares (h, w) of what ``fills`` pixels that show a shape, and the t of its front.
 
-    ``fills`` (H, W) are shares of all pixels.
+    ``fills`` are shares of all pixels, (H, W), or (1, W) where all are the same.
     """
     lane = LANES.find("seen")
     if lane is not None and soft and isinstance(shape, Ellipsoid):
@@ -54,17 +54,45 @@ def seen(
     cross = crossing(shape, bundle.apex, way)
     share, root = _share(cross, soft=soft, rooted=True)
     at = cross.entered(root)
-    share *= fills[region]
+    share *= np.broadcast_to(fills, bundle.way[0].shape)[region]
     share[~((at > near) & (at < far))] = 0
     return share, at
 
 
-def shade(shapes: list[Shape], bundle: Bundle, left: Plane, *, soft: bool) -> list[Region]:
+def shown_tiles(shown: Plane) -> NDArray[np.bool_] | None:
+    """Return tiles (R, C) in which anything is shown, given shares of all pixels; None for all."""
+    lane = LANES.find("shown_tiles")
+    if lane is None:
+        return None
+    tiles: NDArray[np.bool_] = lane(shown, TILE)
+    return tiles
+
+
+def grown_tiles(tiles: NDArray[np.bool_] | None, pixels: int) -> NDArray[np.bool_] | None:
+    """Return tiles, and those up to so many pixels from one."""
+    lane = LANES.find("grown")
+    if tiles is None or lane is None:
+        return None
+    grown: NDArray[np.bool_] = lane(tiles, -(-pixels // TILE))
+    return grown
+
+
+def shade(
+    shapes: list[Shape],
+    bundle: Bundle,
+    left: Plane,
+    shows: NDArray[np.bool_] | None,
+    *,
+    soft: bool,
+) -> list[Region]:
     """Take from shares (H, W) of light what shapes block; return the regions of those that do.
 
-    Light is blocked on a bundle's lines between two of their points.
+    Light is blocked on a bundle's lines between two of their points. It matters in tiles (R, C)
+    that show it.
     """
     tiles, regions = bundle.meeting(shapes)
+    if shows is not None:
+        tiles &= shows
     lane = LANES.find("shade")
     axes = axes_of(shapes)
     if lane is not None and soft and len(axes) == len(shapes):

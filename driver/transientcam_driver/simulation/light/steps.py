@@ -13,6 +13,7 @@ from transientcam_driver.simulation.light.bundle import Region, numbers, union
 from transientcam_driver.simulation.light.coverage import single
 from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.light.layers import MovingResponses
+from transientcam_driver.simulation.responses import Moments
 from transientcam_driver.simulation.scene.motion import Motion
 from transientcam_driver.simulation.scene.scene import Scene
 
@@ -121,7 +122,7 @@ class Between:
         (one, first), (other, second) = self._parts
         return one * first.moments(frequency_hz) + other * second.moments(frequency_hz)
 
-    def moments_in(self, region: Region, frequency_hz: float) -> NDArray[np.complex64]:
+    def moments_in(self, region: Region, frequency_hz: float) -> Moments:
         """Moments of a region that holds all that differs."""
         (one, first), (other, second) = self._parts
         lane = LANES.find("blended")
@@ -130,9 +131,11 @@ class Between:
                 (np.float32(share), of.differing(frequency_hz).view(np.float32), numbers(of.region))
                 for share, of in self._parts
             )
-            total = first.unchanged(frequency_hz).view(np.float32)
-            mixed: NDArray[np.float32] = lane(total, numbers(region), *chain.from_iterable(parts))
-            return mixed.view(np.complex64)
+            total = first.unchanged(frequency_hz)
+            plane = total.view(np.float32)
+            of = plane, plane.shape[1] // total.shape[1], numbers(region)
+            mixed: NDArray[np.float32] = lane(*of, *chain.from_iterable(parts))
+            return mixed.view(np.complex64) if frequency_hz else mixed
         moments = np.float32(one) * first.moments_in(region, frequency_hz)
         moments += np.float32(other) * second.moments_in(region, frequency_hz)
         return moments

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.effects.glimpses import Noise
-from transientcam_driver.simulation.light.bundle import Bundle
+from transientcam_driver.simulation.light.bundle import Bundle, plane_of
 from transientcam_driver.simulation.light.coverage import Plane, covered, crossing
 from transientcam_driver.simulation.light.followed import FollowedRays
 from transientcam_driver.simulation.light.paths import (
@@ -18,7 +18,7 @@ from transientcam_driver.simulation.light.paths import (
     sparse_image,
 )
 from transientcam_driver.simulation.light.rays import rays_within
-from transientcam_driver.simulation.responses import Scatter, SparseResponses
+from transientcam_driver.simulation.responses import Moments, Scatter, SparseResponses
 from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene
 
@@ -32,7 +32,7 @@ class Sight:
     Attributes
     ----------
     fills
-        (H, W) share of each pixel that the last mirror fills.
+        (H, W) share of each pixel that the last mirror fills; (1, W) where all are the same.
     throughput
         Share of the light that the mirrors leave.
     """
@@ -75,7 +75,7 @@ class StillLight:
         """Pixels, by index, that are the mean over several rays."""
         if noise is not None:
             self.mixed = np.flatnonzero(self._differs(noise, highest_hz))
-        self._phasors: dict[float, tuple[NDArray[np.complex64], NDArray[np.complex64]]] = {}
+        self._phasors: dict[float, tuple[Moments, Moments]] = {}
 
     @property
     def pixel_rad(self) -> float:
@@ -116,7 +116,7 @@ class StillLight:
             point[self.mixed[more]] = self.fine.point[of_ray]
         return on, point
 
-    def phasors(self, frequency_hz: float) -> tuple[NDArray[np.complex64], NDArray[np.complex64]]:
+    def phasors(self, frequency_hz: float) -> tuple[Moments, Moments]:
         """Moments (K, H, W) by chain of mirrors, and (H, W) in all."""
         if frequency_hz not in self._phasors:
             each = self.lit.phasors(frequency_hz, self.lit.scatter(self.scene))
@@ -125,7 +125,11 @@ class StillLight:
                 each[:, self.mixed] = fine.reshape(len(each), -1, len(self.mixed)).mean(axis=1)
             each = each.reshape(-1, self.height, self.width)
             total = each.sum(axis=0)
-            self._phasors[frequency_hz] = each.astype(np.complex64), total.astype(np.complex64)
+            self._phasors[frequency_hz] = (
+                (each.astype(np.complex64), total.astype(np.complex64))
+                if frequency_hz
+                else (each.real.astype(np.float32), total.real.astype(np.float32))
+            )
         return self._phasors[frequency_hz]
 
     @cached_property
@@ -189,7 +193,7 @@ class StillLight:
                 near=near.reshape(shape),
                 far=far.reshape(shape),
             )
-            sights.append(Sight(bundle, fills, throughput))
+            sights.append(Sight(bundle, plane_of(fills, shape), throughput))
             if bounces == self.scene.mirror_bounces:
                 continue
             for k in np.unique(which[np.isfinite(nearest)]):

@@ -32,7 +32,7 @@ from transientcam_driver.simulation.light.variants import (
     without_mirrors,
     without_scattering,
 )
-from transientcam_driver.simulation.responses import Responses
+from transientcam_driver.simulation.responses import Moments, Responses
 from transientcam_driver.simulation.scene.scene import Scene
 
 Values = NDArray[np.float64]
@@ -68,7 +68,9 @@ class View:
     reflectance: Callable[[], NDArray[np.float32] | np.float32]
     region: Region | None = None
 
-    def moments(self, frequency_hz: float, region: Region | None) -> NDArray[np.complexfloating]:
+    def moments(
+        self, frequency_hz: float, region: Region | None
+    ) -> NDArray[np.complexfloating] | Moments:
         """Moments of all pixels, or of a region that holds all that differs."""
         if region is None:
             return self.responses.moments(frequency_hz)

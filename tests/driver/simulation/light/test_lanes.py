@@ -14,7 +14,7 @@ from transientcam_driver import Sequence
 from transientcam_driver.simulation.build import find_scene, world_of
 from transientcam_driver.simulation.light.coverage import covered, overlapped
 from transientcam_driver.simulation.light.ends import Ends
-from transientcam_driver.simulation.light.lanes import LANES, THREAD, Lanes
+from transientcam_driver.simulation.light.lanes import COMPILED, LANES, THREAD, Lanes
 from transientcam_driver.simulation.light.paths import image_lights
 from transientcam_driver.simulation.light.shares import Around, above
 from transientcam_driver.simulation.scene.geometry import Ellipsoid, Rectangle
@@ -205,8 +205,8 @@ def test_a_setting_leaves_everything_to_numpy(setting: str) -> None:
 
 
 def test_without_a_compiler_numpy_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("compiled_edges", "compiled_light", "compiling"):
-        monkeypatch.delitem(sys.modules, f"transientcam_driver.simulation.light.{name}")
+    for name in (*COMPILED, "light.compiling"):
+        monkeypatch.delitem(sys.modules, f"transientcam_driver.simulation.{name}")
     monkeypatch.setitem(sys.modules, "numba", None)
     lanes = Lanes({})
 

@@ -1,0 +1,52 @@
+"""Noise and quantisation in one compiled pass against the effects one by one: the same codes."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from transientcam_driver.sensor import Sensor
+from transientcam_driver.sequence import Sequence
+from transientcam_driver.simulation.light import GivenScenery
+from transientcam_driver.simulation.light.lanes import LANES
+from transientcam_driver.simulation.responses import SparseResponses
+from transientcam_driver.simulation.world import World
+
+SEQUENCE = Sequence(harmonics=1, zeroth="estimated", exposure_s=1e-3)
+
+
+@pytest.fixture(autouse=True)
+def no_lanes_afterwards() -> Iterator[None]:
+    yield
+    LANES._ready = {}
+
+
+def codes(effects: dict[str, str], seed: int) -> bytes:
+    """Codes of images of pixels from none to more light than the converter has codes for."""
+    weight = np.geomspace(1e-4, 1e2, 500 * 400).reshape(1, 500, 400)
+    weight[0, :3] = 0
+    scenery = GivenScenery(SparseResponses(np.full_like(weight, 5e-9), weight))
+    world = World(scenery, Sensor(), electrons_per_s=3e6, effects=effects, seed=seed)
+    world.configure(SEQUENCE, SEQUENCE.labels)
+    labels = enumerate(SEQUENCE.labels)
+    return np.array([world.image(each, number=n, device_time_s=0) for n, each in labels]).tobytes()
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {},
+        {"saturation": "on"},
+        {"read-noise": "off"},
+        {"shot-noise": "off"},
+        {"shot-noise": "off", "read-noise": "off"},
+        {"modulation-harmonics": "on"},
+    ],
+)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_codes_are_those_of_the_effects_one_by_one(effects: dict[str, str], seed: int) -> None:
+    expected = codes(effects, seed)
+
+    LANES.compile_now()
+
+    assert codes(effects, seed) == expected
