@@ -18,8 +18,8 @@ export interface Demand {
 
 export const EVERYTHING: Demand = { maxRate_hz: null, coded: false, part: false };
 
-/** What is decided, and what the link carried when it was. */
-export interface Decision {
+/** What is decided by the link, and what it carried then. */
+export interface LinkDecision {
   readonly demand: Demand;
   readonly carried_bytes_s: number;
 }
@@ -50,6 +50,8 @@ const MOST_PATIENCE = 16;
 
 /** Decides what to ask for by what arrives; times are of any one clock. */
 export class DemandControl {
+  /** Fewer frames are asked for than this asks for. */
+  limited = false;
   #demand = EVERYTHING;
   /** Frames that the camera takes a second, measured while all were asked for. */
   #camera_hz = 0;
@@ -101,7 +103,7 @@ export class DemandControl {
   }
 
   /** A product of a frame arrived; answers what to ask for where that changes. */
-  arrived(now_s: number, frame: number, bytes: number): Decision | null {
+  arrived(now_s: number, frame: number, bytes: number): LinkDecision | null {
     this.#waited_s += now_s - (this.#waits_s ?? now_s);
     this.#waits_s = null;
     this.#bytes += bytes;
@@ -132,7 +134,7 @@ export class DemandControl {
   #decide(span_s: number, carried_bytes_s: number): boolean {
     const lost = Math.max(0, ...this.#dropped.values());
     const all = this.#demand.maxRate_hz === null;
-    if (all) this.#camera_hz = (this.#frames + lost) / span_s;
+    if (all && !this.limited) this.#camera_hz = (this.#frames + lost) / span_s;
     if (lost === 0) return !all && this.#calm(carried_bytes_s);
     this.#quiet = 0;
     const taken = this.#frames / (this.#frames + lost);

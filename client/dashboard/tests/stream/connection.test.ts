@@ -149,6 +149,50 @@ describe("over a thin link", () => {
   });
 });
 
+describe("with a slow browser", () => {
+  const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.["subscriptions"];
+  const stutters = (): void => {
+    for (let window = 0; window < 2; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: 16 });
+  };
+
+  test("asks for fewer frames and says so, and for all when the user says", () => {
+    world.socket.opens();
+    stutters();
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: 8 }]);
+    expect(world.events.at(-1)).toEqual({ type: "demand", demand: { maxRate_hz: 8, coded: false, part: false }, carried_bytes_s: null, pictures_hz: 14.5 });
+    world.connection.adapt(false);
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+    expect(world.events.at(-1)).toMatchObject({ type: "demand", demand: { maxRate_hz: null }, pictures_hz: null });
+    stutters();
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+  });
+
+  test("asks for more again where there is room, and for all of another sequence", () => {
+    world.socket.opens();
+    stutters();
+    world.connection.moved({ pictures_hz: 50, frames_hz: 8 });
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: 12 }]);
+    world.socket.receives({ type: "notice", kind: "sequence-changed", sequence: {} });
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+  });
+
+  test("asks for what both the link and the browser take", async () => {
+    world.socket.opens();
+    for (let frame = 1; frame <= 4; frame++) {
+      world.socket.receives({ type: "notice", kind: "dropped", channel: 0, count: 3, total: 3 });
+      world.socket.receives({ type: "frame", product: "range", axes: ["y", "x"], meta: { frame: 4 * frame }, array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) } });
+      world.connection.acknowledge(4 * frame);
+      await world.passes(1);
+    }
+    const [{ max_rate_hz: linked_hz }] = asked() as { max_rate_hz: number }[];
+    expect(linked_hz).toBeLessThan(2);
+    for (let window = 0; window < 2; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: linked_hz });
+    const event = world.events.at(-1);
+    expect(event).toMatchObject({ type: "demand", pictures_hz: 14.5, demand: { maxRate_hz: linked_hz / 2 } });
+    expect(event).not.toMatchObject({ carried_bytes_s: null });
+  });
+});
+
 describe("a stream", () => {
   test("subscribes once it is open, and again when something else is wanted", () => {
     expect(world.socket.sent).toEqual([]);

@@ -51,7 +51,9 @@ export function Timeline() {
         max={1}
         step={STEP}
         aria-label="Time of flight"
-        onPointerDown={() => (player.playing.value = false)}
+        onPointerDown={() => ([player.playing.value, player.scrubbed.value] = [false, true])}
+        onPointerUp={() => (player.scrubbed.value = false)}
+        onPointerCancel={() => (player.scrubbed.value = false)}
         onInput={(event) => {
           player.seek(event.currentTarget.valueAsNumber);
         }}
