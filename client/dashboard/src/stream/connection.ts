@@ -63,6 +63,8 @@ export type ConnectionEvent =
 /** Frames the service may send ahead of what was drawn. */
 export const CREDITS = 2;
 
+/** So long after the last report light may still move; it comes every 2 s. */
+const MOVING_S = 4;
 const FIRST_RETRY_S = 0.5;
 const LONGEST_RETRY_S = 8;
 /** The service admits no client without a valid token. */
@@ -85,6 +87,8 @@ export class StreamConnection {
   readonly #link = new DemandControl();
   #carried_bytes_s = 0;
   #pace = new PaceControl();
+  /** When the page last said how fluently light moves. */
+  #moved_s = -Infinity;
   #adapts = true;
   /** The part of the picture in sight: column and row of its first pixel, width and height; null for all of it. */
   #sight: readonly number[] | null = null;
@@ -136,6 +140,7 @@ export class StreamConnection {
 
   /** How fluently light moved on the page over a while. */
   moved(report: FluencyReport): void {
+    this.#moved_s = this.#around.now_s();
     if (this.#adapts && this.#open && this.#pace.judge(report)) this.#askAnew();
   }
 
@@ -221,7 +226,9 @@ export class StreamConnection {
     if (message.type !== "frame") return;
     const { product, axes, array, meta } = message;
     this.#codes.set(product, codesFor(axes, array.dtype));
-    const decision = this.#link.arrived(this.#around.now_s(), meta.frame, bytes);
+    const now_s = this.#around.now_s();
+    this.#link.excused = this.#pace.acts && now_s - this.#moved_s < MOVING_S;
+    const decision = this.#link.arrived(now_s, meta.frame, bytes);
     if (decision === null) return;
     this.#carried_bytes_s = decision.carried_bytes_s;
     this.#askAnew();

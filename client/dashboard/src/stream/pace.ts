@@ -35,6 +35,7 @@ export class PaceControl {
   #best_hz = 0;
   /** Below so many pictures a second fewer frames may help: they did not where there were more. */
   #vain_hz = Infinity;
+  #acts = false;
   #slow = 0;
   #calm = 0;
   #patience = 1;
@@ -43,6 +44,11 @@ export class PaceControl {
   /** Most frames a second to ask for; null for all. */
   get maxRate_hz(): number | null {
     return this.#maxRate_hz;
+  }
+
+  /** The last window was slow, and something is still to be done about it. */
+  get acts(): boolean {
+    return this.#acts;
   }
 
   /** Pictures a second while all frames were asked for. */
@@ -57,6 +63,7 @@ export class PaceControl {
     if (this.#maxRate_hz === null) this.#camera_hz = frames_hz;
     if (pictures_hz >= FLUENT_HZ) return this.#fluent(pictures_hz);
     this.#calm = 0;
+    this.#acts = this.#maxRate_hz === null ? pictures_hz < this.#vain_hz : this.#maxRate_hz > this.#least_hz;
     this.#slow += 1;
     if (this.#slow < (this.#raised ? 1 : SLOW_WINDOWS)) return false;
     this.#slow = 0;
@@ -70,11 +77,14 @@ export class PaceControl {
       if (pictures_hz >= this.#vain_hz) return false;
       this.#before_hz = pictures_hz;
     }
-    const least_hz = Math.min(ENOUGH_HZ, this.#camera_hz / 2);
-    if (this.#maxRate_hz !== null && this.#maxRate_hz <= least_hz) return pictures_hz < HELPS * this.#before_hz && this.#giveUp();
+    if (this.#maxRate_hz !== null && this.#maxRate_hz <= this.#least_hz) return pictures_hz < HELPS * this.#before_hz && this.#giveUp();
     const step = Math.min(MOST_STEP, Math.max(LEAST_STEP, pictures_hz / FLUENT_HZ));
-    this.#maxRate_hz = Math.max(least_hz, step * Math.min(frames_hz, this.#maxRate_hz ?? Infinity));
+    this.#maxRate_hz = Math.max(this.#least_hz, step * Math.min(frames_hz, this.#maxRate_hz ?? Infinity));
     return true;
+  }
+
+  get #least_hz(): number {
+    return Math.min(ENOUGH_HZ, this.#camera_hz / 2);
   }
 
   #giveUp(): boolean {
@@ -86,6 +96,7 @@ export class PaceControl {
   /** A fluent window: more is asked for after enough of them with room. */
   #fluent(pictures_hz: number): boolean {
     this.#slow = 0;
+    this.#acts = false;
     const roomy = pictures_hz >= ROOMY_HZ || pictures_hz >= NEARLY * this.#best_hz;
     this.#calm = roomy ? this.#calm + 1 : 0;
     if (this.#maxRate_hz === null) {

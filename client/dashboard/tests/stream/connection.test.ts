@@ -117,7 +117,7 @@ describe("over a thin link", () => {
   const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.["subscriptions"];
   /** A frame every 2 s of a camera that takes ten a second, drawn at once. */
   const starves = async (): Promise<void> => {
-    for (let frame = 1; frame <= 4; frame++) {
+    for (let frame = 1; frame <= 5; frame++) {
       world.socket.receives({ type: "notice", kind: "dropped", channel: 0, count: 19, total: 19 });
       world.socket.receives(picture(20 * frame));
       world.connection.acknowledge(20 * frame);
@@ -176,9 +176,26 @@ describe("with a slow browser", () => {
     expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
   });
 
+  test("does not take frames that it is late for to be lost on the way, while it can ask for fewer and light moves", async () => {
+    world.socket.opens();
+    const late = async (frame: number, report: boolean): Promise<void> => {
+      world.socket.receives({ type: "notice", kind: "dropped", channel: 0, count: 9, total: 9 });
+      world.socket.receives({ type: "frame", product: "range", axes: ["y", "x"], meta: { frame }, array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) } });
+      world.connection.acknowledge(frame);
+      // slow, but from window to window not twice in a row
+      if (report) world.connection.moved({ pictures_hz: 40, frames_hz: 1 });
+      if (report) world.connection.moved({ pictures_hz: 12, frames_hz: 1 });
+      await world.passes(2);
+    };
+    for (let frame = 1; frame <= 6; frame++) await late(frame, true);
+    expect(world.events.filter(({ type }) => type === "demand")).toEqual([]);
+    for (let frame = 7; frame <= 12; frame++) await late(frame, false); // the light stands
+    expect(world.events.filter(({ type }) => type === "demand").at(-1)).toMatchObject({ pictures_hz: null, demand: { coded: true } });
+  });
+
   test("asks for what both the link and the browser take", async () => {
     world.socket.opens();
-    for (let frame = 1; frame <= 4; frame++) {
+    for (let frame = 1; frame <= 5; frame++) {
       world.socket.receives({ type: "notice", kind: "dropped", channel: 0, count: 3, total: 3 });
       world.socket.receives({ type: "frame", product: "range", axes: ["y", "x"], meta: { frame: 4 * frame }, array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) } });
       world.connection.acknowledge(4 * frame);

@@ -46,6 +46,7 @@ describe("of the frames", () => {
   test("one slow window costs none, two cost some", () => {
     const watched = new Watched().plays(1, SLOW);
     expect(watched.control.maxRate_hz).toBeNull();
+    expect(watched.control.acts).toBe(true);
     watched.plays(1, FAST).plays(1, SLOW);
     expect(watched.control.maxRate_hz).toBeNull();
     watched.plays(1, SLOW);
@@ -58,6 +59,7 @@ describe("of the frames", () => {
     expect(watched.plays(1, SLOW).pictures_hz).toBeGreaterThanOrEqual(29);
     const slower = new Watched().plays(20, { ...SLOW, picture_s: 0.03 });
     expect(slower.control.maxRate_hz).toBe(5);
+    expect(slower.control.acts).toBe(false); // it has done all that it can
   });
 
   test("a camera's that are few already, half are taken at least", () => {
